@@ -1,0 +1,14 @@
+"""Maps the five folders of the repository into the namespace package ``catenary``."""
+
+from setuptools import setup
+
+PARTS = ("meshgen", "solver", "mbs", "postproc", "cases")
+
+setup(
+    packages=[f"catenary.{part}" for part in PARTS],
+    package_dir={f"catenary.{part}": part for part in PARTS},
+    package_data={
+        "catenary.cases": ["*/case.toml", "*/README.md", "*/reference/*.csv"],
+        "catenary.postproc": ["templates/*"],
+    },
+)

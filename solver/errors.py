@@ -1,0 +1,25 @@
+"""Errors that a user sees: one sentence, one exit code. A leaf module: it imports nothing of ours."""
+
+
+class CatenaryError(Exception):
+    """An error with a sentence for the user and an exit code for the shell."""
+
+    exit_code = 1
+
+
+class InputError(CatenaryError):
+    """The scene, the mesh or the command line asks for something impossible (exit code 2).
+
+    The message is one sentence that names the key, its value, what is allowed and where.
+    """
+
+    exit_code = 2
+
+
+class RunBroken(CatenaryError):
+    """The run could not be continued: NaN, no convergence, disk full (exit code 1).
+
+    The message names time, place and remedy; the result file stays readable up to the last step.
+    """
+
+    exit_code = 1

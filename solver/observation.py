@@ -1,0 +1,80 @@
+"""What the time loop shows to those who watch it. Observers never change a run and never solve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What is fixed before the first step. All ranks hold the global arrays.
+
+    Attributes
+    ----------
+    n_pantographs : number of pantographs
+    dt, start_time : time step and time of the initial state [s]
+    n_steps : steps planned
+    arm_x, dropper_x : positions of steady arms and droppers [m]
+    owned_arms, owned_droppers : indices of those whose values this rank provides; every index has
+        exactly one owner
+    node_points : (n_nodes, 3) static equilibrium shape of the line [m], z up
+    owned_nodes : node numbers of the rows of ``Snapshot.uplift``, one owner each
+    """
+
+    n_pantographs: int
+    dt: float
+    start_time: float
+    n_steps: int
+    arm_x: np.ndarray
+    dropper_x: np.ndarray
+    owned_arms: np.ndarray
+    owned_droppers: np.ndarray
+    node_points: np.ndarray
+    owned_nodes: np.ndarray
+
+
+@dataclass
+class StepView:
+    """The state after a step; arrays are views that the next step overwrites.
+
+    Attributes
+    ----------
+    step, time : number of the step (0 is the initial state) and its time [s]
+    contact_position : (n_pantographs,) along the track [m], all ranks
+    contact_force, head_height, wire_height : (n_pantographs,) [N], [m], [m], rank 0 only
+    dropper_force : (n owned droppers,) tension, negative in compression [N]
+    arm_uplift : (n owned arms,) vertical displacement of the contact wire from equilibrium [m]
+    node_uplift : () -> (n owned nodes,) vertical displacement [m]; not collective
+    energies : () -> (kinetic, elastic) of the line relative to equilibrium [J]; collective
+    checkpoint : () -> dict of arrays on rank 0 with which to continue, None elsewhere; collective
+    """
+
+    step: int
+    time: float
+    contact_position: np.ndarray
+    contact_force: np.ndarray
+    head_height: np.ndarray
+    wire_height: np.ndarray
+    dropper_force: np.ndarray
+    arm_uplift: np.ndarray
+    node_uplift: Callable[[], np.ndarray]
+    energies: Callable[[], tuple[float, float]]
+    checkpoint: Callable[[], dict[str, Any] | None]
+
+
+class Observer(Protocol):
+    """Watches a run. All methods are called on all ranks at the same steps."""
+
+    def start(self, stage: Stage) -> None:
+        """Before the initial state is shown."""
+
+    def observe(self, view: StepView) -> None:
+        """After the initial state and after every step. May be collective at steps that depend
+        only on ``view.step``."""
+
+    def finish(self, outcome: str) -> None:
+        """After the last step. ``outcome`` is "done", "interrupted" or the sentence of what broke."""

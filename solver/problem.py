@@ -1,0 +1,94 @@
+"""Everything that a run is made of, in SI units: what the scene says once its units are converted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from catenary.mbs.lumped import LumpedData
+from catenary.meshgen.line import Line
+
+
+@dataclass(frozen=True)
+class Damping:
+    """Proportional damping C = alpha K + beta M (paper, section 2).
+
+    ``alpha`` [s] acts on stiffness, ``beta`` [1/s] on mass. ``per_component`` replaces both for
+    the components that it names (``contact_wire``, ``messenger_wire``, ``droppers``,
+    ``steady_arms``, ``supports``) with a pair (alpha, beta).
+    """
+
+    alpha: float
+    beta: float
+    per_component: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ContactLaw:
+    """Penalty contact: stiffness [N/m] and damping [N s/m] of the gap between head and wire."""
+
+    stiffness: float
+    damping: float
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A pantograph on the train.
+
+    ``behind`` [m] is its distance behind the train's reference point (0 for the leading one),
+    ``static_force`` [N] the force on the wire at rest at ``nominal_height`` [m] of the head;
+    None stands for the mean height of the wire under the static force.
+    """
+
+    data: LumpedData
+    static_force: float
+    behind: float
+    nominal_height: float | None = None
+
+
+@dataclass(frozen=True)
+class Train:
+    """``speed`` [m/s]; ``start`` and ``end`` [m] of the leading pantograph; ``raise_time`` [s] in
+    which the static force grows from zero to its value."""
+
+    speed: float
+    start: float
+    end: float
+    raise_time: float
+    placements: tuple[Placement, ...]
+
+
+@dataclass(frozen=True)
+class Numerics:
+    """Time step [s], scheme, Newmark parameters, tolerances of the fixed-point correction.
+
+    ``scheme`` is ``one_solve`` or ``fixed_point`` (paper eqs. 2.4-2.7); ``eps_d`` [m] and
+    ``eps_v`` [m/s] end the latter's iteration, at most ``max_iterations`` times a step.
+    """
+
+    dt: float
+    scheme: str
+    beta: float
+    gamma: float
+    eps_d: float
+    eps_v: float
+    max_iterations: int
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One run. ``effects`` holds the names of the effects that are simulated, and no others.
+
+    ``evaluation`` (from, to) [m] is the stretch whose statistics are judged;
+    ``residual_stiffness_ratio`` is the share of its stiffness that a compressed dropper keeps.
+    """
+
+    line: Line
+    damping: Damping
+    contact: ContactLaw
+    train: Train
+    numerics: Numerics
+    evaluation: tuple[float, float]
+    residual_stiffness_ratio: float
+    effects: frozenset[str]
+    gravity: float = 9.81
