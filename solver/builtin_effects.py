@@ -1,0 +1,215 @@
+"""The effects that Catenary ships, in building order. Importing this module registers them."""
+
+from __future__ import annotations
+
+from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.solver.effects import Effect, register
+from catenary.solver.model import ModelBuilder
+
+
+def _vertical(builder: ModelBuilder) -> None:
+    mesh, line, model = builder.mesh, builder.problem.line, builder.model
+    builder.add_wire(MESSENGER_WIRE)
+    builder.add_wire(CONTACT_WIRE)
+    builder.add_links("droppers", mesh.droppers, "w", model.dropper_stiffness)
+    builder.add_springs("supports", mesh.supports, "w", line.support_stiffness)
+    builder.hold(mesh.anchors, "w")
+
+
+def _dropper_mass(builder: ModelBuilder) -> None:
+    half = 0.5 * builder.problem.line.dropper.mass_per_length * builder.model.dropper_lengths
+    for side in (0, 1):
+        builder.add_masses("droppers", builder.mesh.droppers[:, side], half)
+
+
+def _clamp_mass(builder: ModelBuilder) -> None:
+    kind, mesh = builder.problem.line.dropper, builder.mesh
+    builder.add_masses(MESSENGER_WIRE, mesh.droppers[:, 0], kind.messenger_clamp_mass)
+    builder.add_masses(CONTACT_WIRE, mesh.droppers[:, 1], kind.contact_clamp_mass)
+
+
+def _arm_inertia(builder: ModelBuilder) -> None:
+    arm, nodes = builder.problem.line.steady_arm, builder.mesh.steady_arms
+    rod = arm.mass_per_length * arm.length
+    # A rod hinged at its far end: a third of its mass moves with the wire, half of it hangs there.
+    builder.add_masses(
+        "steady_arms", nodes, rod / 3 + arm.clamp_mass, hanging_mass=rod / 2 + arm.clamp_mass
+    )
+
+
+def _arm_stiffness(builder: ModelBuilder) -> None:
+    nodes = builder.mesh.steady_arms
+    builder.add_springs("steady_arms", nodes, "w", builder.problem.line.steady_arm.stiffness)
+
+
+register(
+    Effect(
+        "vertical",
+        "vertical motion of the tensioned wires",
+        "wire bending and tension, droppers, messenger supports, anchors",
+        "paper eq. (2.1)",
+        default=True,
+        unknowns=("w", "theta_y"),
+        always=True,
+        build=_vertical,
+    )
+)
+register(
+    Effect(
+        "gravity",
+        "gravity and form finding",
+        "weights, static equilibrium, dropper pre-tension and lengths",
+        "paper section 2; static equilibrium of a tensioned beam",
+        default=True,
+        build=lambda builder: builder.set_gravity(builder.problem.gravity),
+    )
+)
+register(
+    Effect(
+        "pre_sag",
+        "pre-sag of the contact wire",
+        "target heights of the form finding",
+        "paper section 1 (pre-sag of 1/1000)",
+        default=True,
+        requires=("gravity",),
+        applies=lambda p: any(any(sag) for sag in p.line.pre_sag),
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "transition_spans",
+        "transition spans in which the contact wire rises to the tensioner",
+        "target heights of the form finding at both ends",
+        "paper section 5, figure 4",
+        default=True,
+        applies=lambda p: any(p.line.n_transition) and p.line.transition_rise > 0,
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "dropper_mass",
+        "mass of the droppers",
+        "half of each dropper's mass at either end",
+        "paper Table 1",
+        default=True,
+        applies=lambda p: p.line.dropper.mass_per_length > 0,
+        build=_dropper_mass,
+    )
+)
+register(
+    Effect(
+        "clamp_mass",
+        "mass of the dropper clamps",
+        "lumped masses on both wires",
+        "paper section 2 and Table 1",
+        default=True,
+        applies=lambda p: p.line.dropper.messenger_clamp_mass + p.line.dropper.contact_clamp_mass
+        > 0,
+        build=_clamp_mass,
+    )
+)
+register(
+    Effect(
+        "arm_inertia",
+        "inertia and weight of the steady arms",
+        "a third of the hinged arm's mass and its clamp on the contact wire",
+        "paper Table 1; hinged rod",
+        default=True,
+        applies=lambda p: p.line.steady_arm.clamp_mass
+        + p.line.steady_arm.mass_per_length * p.line.steady_arm.length
+        > 0,
+        build=_arm_inertia,
+    )
+)
+register(
+    Effect(
+        "arm_stiffness",
+        "vertical stiffness of the steady arms",
+        "springs from the contact wire to the ground at the arms",
+        "EN 50318:2002 reference model",
+        default=True,
+        applies=lambda p: p.line.steady_arm.stiffness > 0,
+        build=_arm_stiffness,
+    )
+)
+register(
+    Effect(
+        "structural_damping",
+        "structural damping of the line",
+        "C = alpha K + beta M, globally or per component",
+        "paper eq. (2.2)",
+        default=True,
+        applies=lambda p: p.damping.alpha > 0
+        or p.damping.beta > 0
+        or any(any(pair) for pair in p.damping.per_component.values()),
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "dropper_slackening",
+        "droppers that slacken",
+        "compensation of the droppers that would be pushed",
+        "paper eq. (2.7)",
+        default=True,
+        requires=("gravity",),
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "residual_dropper_stiffness",
+        "residual stiffness of slack droppers",
+        "a share of the stiffness is kept in compression",
+        "paper section 2 (about 1/100)",
+        default=False,
+        requires=("dropper_slackening",),
+        applies=lambda p: p.residual_stiffness_ratio > 0,
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "contact_loss",
+        "loss and regain of contact",
+        "the contact force cannot pull",
+        "paper section 4",
+        default=True,
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "contact_damping",
+        "damping of the contact",
+        "a force on the gap rate, its convective part V dw/dx included",
+        "penalty contact with a viscous term",
+        default=False,
+        applies=lambda p: p.contact.damping > 0,
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "several_pantographs",
+        "several pantographs on one train",
+        "one contact and one pantograph each",
+        "paper section 5",
+        default=True,
+        applies=lambda p: len(p.train.placements) > 1,
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "supercritical_speed",
+        "train speed at or above the wave speed of the contact wire",
+        "nothing: it lifts the check on the speed",
+        "paper eq. (1.1)",
+        default=False,
+        applies=lambda p: p.train.speed >= p.line.contact_wire.wave_speed,
+        build=lambda builder: builder.count_term(),
+    )
+)

@@ -1,0 +1,95 @@
+"""Tensioned Euler-Bernoulli element with Hermite interpolation, for many lengths at once.
+
+Unknowns of an element: (w1, theta1, w2, theta2) with theta = dw/dx. Source: paper, eq. (2.1).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def stiffness(length: np.ndarray, bending_stiffness: float, tension: float) -> np.ndarray:
+    """Element matrices K = EI K_L + F K_G of eq. (2.1).
+
+    Parameters
+    ----------
+    length : ndarray, shape (n,) [m]
+    bending_stiffness : EI [N m2]
+    tension : F [N], positive in tension
+
+    Returns
+    -------
+    ndarray, shape (n, 4, 4)
+        Forces [N] and moments [N m] for unit displacements [m] and rotations [rad].
+    """
+    one = np.ones_like(length)
+    bending = _matrix(
+        [12 * one, 6 * length, -12 * one, 6 * length],
+        [4 * length**2, -6 * length, 2 * length**2],
+        [12 * one, -6 * length],
+        [4 * length**2],
+    )
+    geometric = _matrix(
+        [36 * one, 3 * length, -36 * one, 3 * length],
+        [4 * length**2, -3 * length, -(length**2)],
+        [36 * one, -3 * length],
+        [4 * length**2],
+    )
+    return (bending_stiffness / length**3)[:, None, None] * bending + (tension / (30 * length))[
+        :, None, None
+    ] * geometric
+
+
+def mass(length: np.ndarray, mass_per_length: float) -> np.ndarray:
+    """Consistent mass matrices, shape (n, 4, 4), for lengths [m] and mass per length [kg/m]."""
+    one = np.ones_like(length)
+    shape = _matrix(
+        [156 * one, 22 * length, 54 * one, -13 * length],
+        [4 * length**2, 13 * length, -3 * length**2],
+        [156 * one, -22 * length],
+        [4 * length**2],
+    )
+    return (mass_per_length * length / 420)[:, None, None] * shape
+
+
+def uniform_load(length: np.ndarray) -> np.ndarray:
+    """Nodal forces and moments of a unit load per length along w, shape (n, 4) [m], [m2]."""
+    half = length / 2
+    moment = length**2 / 12
+    return np.stack([half, moment, half, -moment], axis=1)
+
+
+def shape_functions(xi: float, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Hermite functions and their derivatives along x at ``xi`` in [0, 1], each shape (4,).
+
+    w(x) = N @ unknowns [m], dw/dx = N' @ unknowns [-].
+    """
+    square, cube = xi * xi, xi * xi * xi
+    value = np.array(
+        [
+            1 - 3 * square + 2 * cube,
+            length * (xi - 2 * square + cube),
+            3 * square - 2 * cube,
+            length * (cube - square),
+        ]
+    )
+    slope = np.array(
+        [
+            6 * (square - xi) / length,
+            1 - 4 * xi + 3 * square,
+            6 * (xi - square) / length,
+            3 * square - 2 * xi,
+        ]
+    )
+    return value, slope
+
+
+def _matrix(*upper_rows: list[np.ndarray]) -> np.ndarray:
+    """Symmetric matrices, shape (n, 4, 4), from the rows of their upper triangle."""
+    n = upper_rows[0][0].shape[0]
+    result = np.empty((n, 4, 4))
+    for i, row in enumerate(upper_rows):
+        for j, entry in enumerate(row, start=i):
+            result[:, i, j] = entry
+            result[:, j, i] = entry
+    return result
