@@ -1,0 +1,186 @@
+#!/usr/bin/env bash
+# Sets up .venv with everything that Catenary needs; called by `make setup`, safe to repeat.
+#
+# Debian and Ubuntu: PETSc, MPI, HDF5 and gmsh's shared libraries come from apt, the rest from the
+# package index. Elsewhere (clusters, conda) the python3 on the PATH must bring petsc4py, mpi4py
+# and h5py. Versions stand in pyproject.toml only.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+# gmsh's wheel links to these libraries of OpenGL and X (ldd libgmsh.so), though no window is opened.
+DEBIAN_PACKAGES=(
+    python3-petsc4py-real python3-mpi4py python3-h5py-mpi python3-scipy python3-numpy
+    openmpi-bin python3-venv make
+    libglu1-mesa libgl1 libxrender1 libxcursor1 libxfixes3 libxext6 libxft2 libfontconfig1
+    libxinerama1 libx11-6 libgomp1
+)
+STAMP=.venv/catenary-setup
+
+say() { printf '%s\n' "$*" >&2; }
+
+fail() {
+    say "setup: $*"
+    exit 1
+}
+
+# --- is there anything to do? ------------------------------------------------------------------
+
+# What the environment was made from; the folder is in it because scripts of a venv hold its path.
+fingerprint() {
+    printf '%s\n' "$PWD"
+    cat pyproject.toml setup.py .setup/* | cksum
+}
+
+is_current() {
+    [ -f "$STAMP" ] && [ "$(cat "$STAMP")" = "$(fingerprint)" ] &&
+        .venv/bin/python -c 'import petsc4py, mpi4py, catenary.solver.errors' 2>/dev/null
+}
+
+# --- Debian and Ubuntu -------------------------------------------------------------------------
+
+is_installed() {
+    dpkg-query -W -f='${db:Status-Status}\n' "$1" 2>/dev/null | grep -qx installed
+}
+
+# Some libraries carry another name since the change to 64-bit time (Ubuntu 24.04, Debian 13).
+is_provided() {
+    is_installed "$1" || is_installed "${1}t64"
+}
+
+name_in_archive() {
+    local name
+    for name in "$1" "${1}t64"; do
+        if apt-cache policy "$name" 2>/dev/null | grep -q 'Candidate: [^(]'; then
+            printf '%s\n' "$name"
+            return
+        fi
+    done
+    fail "the package archive of this system has no $1; add its main component (on Ubuntu: universe)"
+}
+
+missing_packages() {
+    local name
+    for name in "${DEBIAN_PACKAGES[@]}"; do
+        is_provided "$name" || printf '%s\n' "$name"
+    done
+}
+
+as_root() {
+    if [ "$(id -u)" = 0 ]; then
+        env DEBIAN_FRONTEND=noninteractive "$@"
+    else
+        sudo env DEBIAN_FRONTEND=noninteractive "$@"
+    fi
+}
+
+may_install() {
+    [ "$(id -u)" = 0 ] || { command -v sudo >/dev/null && { [ -t 0 ] || sudo -n true 2>/dev/null; }; }
+}
+
+install_packages() {
+    local name
+    local -a names=()
+    say "setup: installing $# system packages"
+    as_root apt-get update -qq >&2 || fail "apt-get update failed"
+    for name in "$@"; do
+        names+=("$(name_in_archive "$name")")
+    done
+    as_root apt-get install -qq -y --no-install-recommends -o DPkg::Lock::Timeout=120 \
+        "${names[@]}" >&2 || fail "apt-get could not install: ${names[*]}"
+}
+
+# Folder that holds the petsc4py of the newest installed PETSc: Debian keeps it out of sys.path.
+petsc_folder() {
+    dpkg-query -W -f='${db:Status-Status} ${Package}\n' 'python3-petsc4py-real*' |
+        sed -n 's/^installed //p' | xargs dpkg -L | grep '/petsc4py/__init__\.py$' |
+        sort -V | tail -n 1 | sed 's|/petsc4py/__init__\.py$||'
+}
+
+# --- other systems -----------------------------------------------------------------------------
+
+has_everything() {
+    command -v "$1" >/dev/null && "$1" -c 'import petsc4py, mpi4py, h5py, numpy, venv' 2>/dev/null
+}
+
+explain() {
+    cat >&2 <<'TEXT'
+setup: python3 on the PATH does not bring petsc4py, mpi4py and h5py, which Catenary needs.
+  Debian, Ubuntu:  run `make setup` as root or as a user who may use sudo.
+  conda-forge:     conda create -n catenary -c conda-forge python petsc petsc4py mpi4py h5py scipy gmsh make
+                   conda activate catenary, then make setup
+  Cluster:         load the modules of PETSc with petsc4py, mpi4py and h5py for one Python, typically
+                   module load petsc4py mpi4py h5py      (or: petsc, python, h5py-mpi)
+                   and check: python3 -c "import petsc4py, mpi4py, h5py"; then make setup
+TEXT
+    exit 1
+}
+
+# --- steps -------------------------------------------------------------------------------------
+
+# Sets `python` (the interpreter to build on) and `extra_path` (PETSc's folder, empty if not needed).
+choose_python() {
+    local -a missing=()
+    python=python3
+    extra_path=
+    if command -v apt-get >/dev/null && command -v dpkg-query >/dev/null; then
+        mapfile -t missing < <(missing_packages)
+        if [ "${#missing[@]}" -gt 0 ] && may_install; then
+            install_packages "${missing[@]}"
+            missing=()
+        fi
+        if [ "${#missing[@]}" = 0 ]; then
+            python=/usr/bin/python3
+            extra_path=$(petsc_folder)
+            [ -n "$extra_path" ] || fail "dpkg lists no petsc4py in python3-petsc4py-real"
+            return
+        fi
+    fi
+    has_everything "$python" || explain
+}
+
+make_environment() {
+    # A half-made or moved environment is not worth repairing.
+    if [ ! -f "$STAMP" ] || [ "$(head -n 1 "$STAMP")" != "$PWD" ] ||
+        ! .venv/bin/python -m pip --version >/dev/null 2>&1; then
+        rm -rf .venv
+        "$python" -m venv --system-site-packages .venv
+    fi
+    rm -f "$STAMP"
+    local site
+    site=$(.venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
+    if [ -n "$extra_path" ]; then
+        printf '%s\n' "$extra_path" >"$site/petsc.pth"
+    fi
+}
+
+install_python_packages() {
+    local work
+    work=$(mktemp -d)
+    # shellcheck disable=SC2064  # the folder of now, not of later
+    trap "rm -rf '$work'" EXIT
+    .venv/bin/python .setup/requirements.py pyproject.toml >"$work/requirements.txt"
+    # petsc4py and h5py are compiled against the system's numpy: nothing may bring another one.
+    "$python" - >"$work/constraints.txt" <<'CODE'
+import importlib
+
+for name in ("numpy", "scipy"):
+    try:
+        print(f"{name}=={importlib.import_module(name).__version__}")
+    except ModuleNotFoundError:
+        pass
+CODE
+    say "setup: installing Python packages into .venv"
+    .venv/bin/python -m pip install --quiet --no-input --disable-pip-version-check \
+        --constraint "$work/constraints.txt" --requirement "$work/requirements.txt" >&2
+    .venv/bin/python -m pip install --quiet --no-input --disable-pip-version-check \
+        --no-deps --no-build-isolation --editable . >&2
+}
+
+if is_current; then
+    exit 0
+fi
+choose_python
+make_environment
+install_python_packages
+.venv/bin/python .setup/check.py >&2
+fingerprint >"$STAMP"

@@ -1,0 +1,65 @@
+# One thread a rank: the linear algebra is small, and MPI is what runs in parallel.
+export OMP_NUM_THREADS = 1
+export OPENBLAS_NUM_THREADS = 1
+
+PYTHON := .venv/bin/python
+PYTEST := $(PYTHON) -m pytest
+PARTS := meshgen solver mbs postproc cases
+RESULT := results/ambrosio2012
+
+# Open MPI starts neither as root nor with more ranks than cores unless told to; other MPI
+# libraries know neither option.
+MPI_FLAGS = $(shell mpirun --version 2>/dev/null | grep -q 'Open MPI' && echo --oversubscribe --bind-to none)
+ifeq ($(shell id -u),0)
+export OMPI_ALLOW_RUN_AS_ROOT = 1
+export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM = 1
+endif
+
+.DEFAULT_GOAL := help
+# The targets share .venv and two cores: one after the other, also under make -j.
+.NOTPARALLEL:
+.PHONY: help setup run test test-unit test-verification test-mpi test-regression lint format clean
+
+help: ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 20
+
+setup: ## install what is needed, system packages included; quick when all is there
+	@bash .setup/setup.sh
+
+run: setup ## simulate the paper's case and write its report
+	.venv/bin/catenary run ambrosio2012 -o $(RESULT) --force
+	@echo "report: $(CURDIR)/$(RESULT)/report.html"
+
+test: setup lint ## lint and all tests, as CI runs them
+	$(PYTEST) tests/unit
+	$(PYTEST) tests/verification
+	$(PYTEST) tests/regression
+	@$(MAKE) --no-print-directory test-mpi
+
+test-unit: setup ## tests of single parts
+	$(PYTEST) tests/unit
+
+test-verification: setup ## tests against closed-form and published solutions
+	$(PYTEST) tests/verification
+
+test-regression: setup ## every case, shortened, against published ranges
+	$(PYTEST) tests/regression
+
+test-mpi: setup ## the same answers on 2 and 3 ranks
+	timeout 600 mpirun -n 2 $(MPI_FLAGS) $(PYTHON) -m mpi4py -m pytest tests/mpi
+	timeout 600 mpirun -n 3 $(MPI_FLAGS) $(PYTHON) -m mpi4py -m pytest tests/mpi
+
+lint: setup ## ruff (lint and format) and mypy
+	$(PYTHON) -m ruff check .
+	$(PYTHON) -m ruff format --check .
+	@mkdir -p build/typing/catenary
+	@for part in $(PARTS); do ln -sfn ../../../$$part build/typing/catenary/$$part; done
+	MYPYPATH=build/typing $(PYTHON) -m mypy $(PARTS:%=-p catenary.%)
+
+format: setup ## bring all files into ruff's format
+	$(PYTHON) -m ruff check --fix .
+	$(PYTHON) -m ruff format .
+
+clean: ## remove what can be made again, results and .venv excepted
+	rm -rf build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
