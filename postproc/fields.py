@@ -1,0 +1,238 @@
+"""Snapshots of the moving line for ParaView: HDF5 for the numbers, XDMF for their meaning.
+
+Readers accept one dataset per snapshot and ``Polyline`` cells of two nodes; hyperslabs of one big
+dataset lose their arrays silently in the Xdmf3 reader, hence the layout. Warp by the vector
+``displacement`` to see the motion; the geometry is the line at rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.postproc.gathering import ColumnGather
+from catenary.postproc.storage import MARGIN, broken_write, reserve, write_whole
+from catenary.solver.errors import RunBroken
+from catenary.solver.observation import Stage, StepView
+from catenary.solver.parallel import on_root
+
+COMPONENTS = {CONTACT_WIRE: 0, MESSENGER_WIRE: 1, "droppers": 2}
+_MAX_BUFFER = 32 * 1024 * 1024
+
+
+class FieldRecorder:
+    """Observer that writes ``fields.xdmf`` and the ``.h5`` beside it.
+
+    Collective, like all its methods except ``observe`` between flushes. Both files are closed and
+    valid after every flush.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+    path_xdmf : the XDMF file; the numbers go into the file of the same name ending in ``.h5``
+    wires : name -> (n,) int, nodes of each wire in order of x
+    droppers : (n_droppers, 2) int, upper and lower node of each
+    every : steps between two snapshots
+    snapshots_per_flush : snapshots kept in memory between two flushes
+    resume : continue the files: snapshots from the stage's start time on are replaced
+    """
+
+    def __init__(
+        self,
+        comm: Any,
+        path_xdmf: Path | str,
+        wires: Mapping[str, np.ndarray],
+        droppers: np.ndarray,
+        *,
+        every: int,
+        snapshots_per_flush: int = 50,
+        resume: bool = False,
+    ) -> None:
+        self._comm = comm
+        self._xdmf = Path(path_xdmf)
+        self._h5 = self._xdmf.with_suffix(".h5")
+        self._cells, self._component = line_cells(wires, droppers)
+        self._every = every
+        self._capacity = snapshots_per_flush
+        self._resume = resume
+        self._buffered: list[float] = []
+        self._written: list[float] = []
+        self._broken = False
+
+    def start(self, stage: Stage) -> None:
+        """Write mesh and an XDMF without snapshots. Collective.
+
+        Raises
+        ------
+        RunBroken
+            On all ranks, if the files cannot be written.
+        """
+        self._n_nodes = int(stage.node_points.shape[0])
+        self._capacity = max(1, min(self._capacity, _MAX_BUFFER // (8 * self._n_nodes)))
+        self._gather = ColumnGather(
+            self._comm, stage.owned_nodes, self._n_nodes, self._capacity
+        )
+        self._uplift = np.zeros((self._capacity, self._gather.n_owned))
+        self._guarded(lambda: self._open(stage), stage.start_time)
+
+    def observe(self, view: StepView) -> None:
+        """Keep a snapshot if one is due; collective when the buffer is full."""
+        if view.step % self._every:
+            return
+        self._uplift[len(self._buffered)] = view.node_uplift()
+        self._buffered.append(view.time)
+        if len(self._buffered) == self._capacity:
+            self._flush()
+
+    def finish(self, outcome: str) -> None:
+        """Write what is left. Collective."""
+        if not self._broken:
+            self._flush()
+
+    def _flush(self) -> None:
+        times = list(self._buffered)
+        uplift = self._gather(self._uplift[: len(times)])
+        self._buffered.clear()
+        if times:
+            self._guarded(lambda: self._append(times, uplift), times[-1])
+
+    def _guarded(self, work: Callable[[], None], time: float) -> None:
+        """Run ``work`` on rank 0; if it fails, all ranks raise RunBroken. Collective."""
+
+        def attempt() -> None:
+            try:
+                work()
+            except (OSError, RuntimeError) as error:
+                raise broken_write(self._h5, time, error) from error
+
+        try:
+            on_root(self._comm, attempt)
+        except RunBroken:
+            self._broken = True
+            raise
+
+    # ---- rank 0 ------------------------------------------------------------------------------
+
+    def _open(self, stage: Stage) -> None:
+        if self._resume:
+            self._cut(stage.start_time - 0.5 * stage.dt)
+        else:
+            with h5py.File(self._h5, "w") as file:
+                file["mesh/points"] = stage.node_points
+                file["mesh/cells"] = self._cells
+                file["mesh/component"] = self._component
+                file.create_dataset("times", shape=(0,), maxshape=(None,), chunks=(256,), dtype="f8")
+                file.create_group("uplift")
+                file.create_group("displacement")
+        self._describe()
+
+    def _cut(self, time: float) -> None:
+        with h5py.File(self._h5, "r+") as file:
+            times = file["times"][...]
+            keep = int(np.searchsorted(times, time))
+            for number in range(keep, times.size):
+                del file["uplift"][_name(number)], file["displacement"][_name(number)]
+            file["times"].resize(keep, axis=0)
+            self._written = times[:keep].tolist()
+
+    def _append(self, times: list[float], uplift: np.ndarray) -> None:
+        # Room for uncompressed snapshots, so that a full disk cannot spoil what is there.
+        need = len(times) * (4 * 4 * self._n_nodes + 2048)
+        reserve(self._h5, self._h5.stat().st_size, need + MARGIN)
+        vector = np.zeros((self._n_nodes, 3), dtype=np.float32)
+        packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+        with h5py.File(self._h5, "r+") as file:
+            for row, time in enumerate(times):
+                name = _name(len(self._written))
+                vector[:, 2] = uplift[row]
+                file.create_dataset(f"uplift/{name}", data=vector[:, 2], **packed)
+                file.create_dataset(f"displacement/{name}", data=vector, **packed)
+                self._written.append(time)
+            file["times"].resize(len(self._written), axis=0)
+            file["times"][-len(times) :] = times
+        self._describe()
+
+    def _describe(self) -> None:
+        write_whole(
+            self._xdmf,
+            xdmf(self._h5.name, self._n_nodes, self._cells.shape[0], self._written),
+        )
+
+
+def line_cells(
+    wires: Mapping[str, np.ndarray], droppers: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Line cells (n_cells, 2) int32 of wires and droppers, and component of each, (n_cells,) int32.
+
+    Components are numbered by ``COMPONENTS``; wires that it does not name follow. Not collective.
+    """
+    cells, component = [], []
+    for name, nodes in wires.items():
+        cells.append(np.column_stack([nodes[:-1], nodes[1:]]))
+        number = COMPONENTS.get(name, len(COMPONENTS) + len(component))
+        component.append(np.full(len(nodes) - 1, number))
+    cells.append(np.asarray(droppers).reshape(-1, 2))
+    component.append(np.full(len(cells[-1]), COMPONENTS["droppers"]))
+    return (
+        np.concatenate(cells).astype(np.int32),
+        np.concatenate(component).astype(np.int32),
+    )
+
+
+def xdmf(h5_name: str, n_nodes: int, n_cells: int, times: list[float]) -> str:
+    """Text of an XDMF 3 file with a grid for each snapshot. Not collective.
+
+    Parameters
+    ----------
+    h5_name : file of the numbers, relative to the XDMF file
+    times : times of the snapshots [s]; with none of them the file shows the line at rest
+    """
+    mesh = f"""\
+        <Topology TopologyType="Polyline" NodesPerElement="2" NumberOfElements="{n_cells}">
+          <DataItem Dimensions="{n_cells} 2" NumberType="Int" Precision="4" Format="HDF">\
+{h5_name}:/mesh/cells</DataItem>
+        </Topology>
+        <Geometry GeometryType="XYZ">
+          <DataItem Dimensions="{n_nodes} 3" NumberType="Float" Precision="8" Format="HDF">\
+{h5_name}:/mesh/points</DataItem>
+        </Geometry>
+        <Attribute Name="component" AttributeType="Scalar" Center="Cell">
+          <DataItem Dimensions="{n_cells}" NumberType="Int" Precision="4" Format="HDF">\
+{h5_name}:/mesh/component</DataItem>
+        </Attribute>
+"""
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>\n',
+        '<Xdmf Version="3.0">\n  <Domain>\n',
+        '    <Grid Name="line" GridType="Collection" CollectionType="Temporal">\n',
+    ]
+    for number, time in enumerate(times):
+        lines += [
+            f'      <Grid Name="line" GridType="Uniform">\n        <Time Value="{time!r}"/>\n',
+            mesh,
+            _node_attribute("uplift", "Scalar", f"{n_nodes}", h5_name, number),
+            _node_attribute("displacement", "Vector", f"{n_nodes} 3", h5_name, number),
+            "      </Grid>\n",
+        ]
+    if not times:
+        lines.append(f'      <Grid Name="line" GridType="Uniform">\n{mesh}      </Grid>\n')
+    lines.append("    </Grid>\n  </Domain>\n</Xdmf>\n")
+    return "".join(lines)
+
+
+def _node_attribute(name: str, kind: str, dimensions: str, h5_name: str, number: int) -> str:
+    return f"""\
+        <Attribute Name="{name}" AttributeType="{kind}" Center="Node">
+          <DataItem Dimensions="{dimensions}" NumberType="Float" Precision="4" Format="HDF">\
+{h5_name}:/{name}/{_name(number)}</DataItem>
+        </Attribute>
+"""
+
+
+def _name(number: int) -> str:
+    return f"{number:06d}"

@@ -1,0 +1,70 @@
+"""Filters for contact forces: 20 Hz low-pass and the bands 0-5 and 5-20 Hz, without phase shift.
+
+Source: EN 50317 (20 Hz, Butterworth, 6th order) and EN 50318 (bands). Each filter runs forward
+and backward over the record, which cancels its phase and squares its gain: at the cut-off the
+gain is 1/2 (-6 dB), at frequency f of a low-pass 1 / (1 + (tan(pi f dt)/tan(pi fc dt))^12).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import signal
+
+from catenary.solver.errors import InputError
+
+CUT_OFF = 20.0
+BAND_LIMIT = 5.0
+ORDER = 6
+# The slowest pole of the 6th-order low-pass decays with sin(pi/12) 2 pi fc, thus to 1e-4 in
+# 5.7 / fc; the record is continued by that much at both ends before it is filtered.
+_PADDING_PERIODS = 6.0
+
+
+def check_sampling(dt: float, cut_off: float = CUT_OFF) -> None:
+    """Raise InputError if a record with time step ``dt`` [s] cannot be filtered at ``cut_off`` [Hz]."""
+    if 1.0 / dt <= 2.0 * cut_off:
+        raise InputError(
+            f"numerics.dt_s = {dt:g} s records at {1.0 / dt:.4g} Hz, too slowly for the "
+            f"{cut_off:g} Hz filter of the contact force: it must be below {0.5 / cut_off:g} s"
+        )
+
+
+def low_pass(values: np.ndarray, dt: float, cut_off: float = CUT_OFF) -> np.ndarray:
+    """``values`` without what is faster than ``cut_off``, shape as ``values``. Not collective.
+
+    Parameters
+    ----------
+    values : (n,) or (n, columns), equidistant in time, the whole record
+    dt : time between two records [s]
+    cut_off : where the gain is 1/2 [Hz]
+
+    Raises
+    ------
+    InputError
+        If the record is sampled at no more than twice the cut-off.
+    """
+    check_sampling(dt, cut_off)
+    sos = signal.butter(ORDER, cut_off, btype="low", fs=1.0 / dt, output="sos")
+    return _both_ways(sos, values, dt, cut_off)
+
+
+def band_0_5(values: np.ndarray, dt: float) -> np.ndarray:
+    """Part of ``values`` up to 5 Hz, the mean included: a 5 Hz low-pass."""
+    return low_pass(values, dt, BAND_LIMIT)
+
+
+def band_5_20(values: np.ndarray, dt: float) -> np.ndarray:
+    """Part of ``values`` between 5 and 20 Hz, free of the mean: a band-pass of 6th-order edges."""
+    check_sampling(dt, CUT_OFF)
+    edges = (BAND_LIMIT, CUT_OFF)
+    sos = signal.butter(ORDER, edges, btype="bandpass", fs=1.0 / dt, output="sos")
+    return _both_ways(sos, values, dt, BAND_LIMIT)
+
+
+def _both_ways(sos: np.ndarray, values: np.ndarray, dt: float, slowest: float) -> np.ndarray:
+    values = np.asarray(values, dtype=float)
+    n = values.shape[0]
+    if n == 0:
+        return values.copy()
+    padding = min(n - 1, int(np.ceil(_PADDING_PERIODS / (slowest * dt))))
+    return np.asarray(signal.sosfiltfilt(sos, values, axis=0, padlen=padding))

@@ -1,0 +1,236 @@
+"""A march without a solver: analytic signals shown to the observers through real stages and views."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from catenary.meshgen.line import DropperKind, Line, SteadyArm, Wire
+from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
+from catenary.postproc.header import Header, line_datasets, static_datasets
+from catenary.postproc.recorder import Recorder
+from catenary.solver.equilibrium import Elasticity, Equilibrium
+from catenary.solver.observation import Observer, Stage, StepView
+
+N_SPANS, SPAN = 16, 50.0
+DROPPERS = tuple(5.0 + 5.0 * k for k in range(9))
+SPEED = 300.0 / 3.6
+EVALUATION = (250.0, 550.0)
+
+
+def make_line() -> Line:
+    sag = tuple(0.05 * (1.0 - ((x - SPAN / 2) / 20.0) ** 2) for x in DROPPERS)
+    return Line(
+        span_lengths=(SPAN,) * N_SPANS,
+        dropper_positions=(DROPPERS,) * N_SPANS,
+        pre_sag=(sag,) * N_SPANS,
+        stagger=tuple(0.2 * (-1) ** i for i in range(N_SPANS + 1)),
+        contact_height=5.3,
+        encumbrance=1.2,
+        contact_wire=Wire(20e3, 1.33, 180.0),
+        messenger_wire=Wire(16e3, 1.07, 130.0),
+        dropper=DropperKind(1e5, None, 0.117, 0.195, 0.165),
+        support_stiffness=5e5,
+        steady_arm=SteadyArm(1.2, 0.7, 0.2, 300.0),
+        n_transition=(1, 1),
+        transition_rise=0.5,
+    )
+
+
+def make_mesh(line: Line) -> LineMesh:
+    """Two wires with a node at every mast and dropper and two between any of them."""
+    masts = line.support_positions
+    stations = np.unique(
+        np.concatenate([masts, *(m + np.array(DROPPERS) for m in masts[:-1])]).round(6)
+    )
+    x = np.unique(
+        np.concatenate([a + (b - a) * np.arange(3) / 3 for a, b in zip(stations, stations[1:])])
+    )
+    x = np.append(x, stations[-1])
+    n = x.size
+    within = np.mod(x, SPAN)
+    contact_z = line.target_height(x) - 0.05 * np.clip(
+        1.0 - ((within - SPAN / 2) / 20.0) ** 2, 0.0, None
+    )
+    messenger_z = 6.5 - 0.4 * within * (SPAN - within) / (SPAN / 2) ** 2
+    points = np.zeros((2 * n, 3))
+    points[:, 0] = np.tile(x, 2)
+    points[:, 2] = np.concatenate([contact_z, messenger_z])
+
+    def node(position: np.ndarray) -> np.ndarray:
+        return np.abs(x[None, :] - position[:, None]).argmin(axis=1)
+
+    at = np.setdiff1d(stations, masts)
+    return LineMesh(
+        points=points,
+        wires={CONTACT_WIRE: np.arange(n), MESSENGER_WIRE: n + np.arange(n)},
+        droppers=np.column_stack([n + node(at), node(at)]),
+        steady_arms=node(masts[1:-1]),
+        supports=n + node(masts[1:-1]),
+        anchors=np.array([0, n - 1, n, 2 * n - 1]),
+    )
+
+
+def make_header(line: Line, mesh: LineMesh, **attributes: Any) -> Header:
+    height = mesh.points[:, 2]
+    length = height[mesh.droppers[:, 0]] - height[mesh.droppers[:, 1]]
+    force = np.full(length.size, 65.0) + 8.0 * np.cos(mesh.x(mesh.droppers[:, 1]))
+    equilibrium = Equilibrium(height, np.zeros(height.size), force, length)
+    x = 7 * SPAN + np.linspace(0.0, SPAN, 41)
+    elasticity = Elasticity(x, 1e-3 * (0.33 + 0.12 * np.sin(np.pi * (x - x[0]) / SPAN) ** 2))
+    known: dict[str, Any] = {
+        "case": "made_up",
+        "title": "A made-up line <with> & awkward title",
+        "n_dofs": 2 * mesh.n_nodes,
+        "speed_m_per_s": SPEED,
+        "wave_speed_m_per_s": line.contact_wire.wave_speed,
+        "system": "ac",
+        "edition": "2006",
+        "versions": {"catenary": "0.1.0", "petsc": "3.18.5", "python": "3.11"},
+        "config": {"line": {"n_spans": N_SPANS}, "numerics": {"dt_s": 1e-3, "scheme": "one_solve"}},
+        "effects_on": [("vertical", "vertical motion of the tensioned wires", "always")],
+        "effects_off": [("lateral", "stagger and lateral motion", "not asked for")],
+    }
+    datasets = {**line_datasets(line, mesh, EVALUATION), **static_datasets(mesh, equilibrium, elasticity)}
+    return Header({**known, **attributes}, datasets)
+
+
+@dataclass
+class March:
+    """Drives observers with signals whose statistics are known."""
+
+    n_steps: int = 8000
+    dt: float = 1e-3
+    start: float = 60.0
+    separations: tuple[float, ...] = (0.0, 100.0)
+    comm: Any = field(default_factory=lambda: MPI.COMM_SELF)
+
+    def __post_init__(self) -> None:
+        self.line = make_line()
+        self.mesh = make_mesh(self.line)
+        self.arm_x = self.mesh.x(self.mesh.steady_arms)
+        self.dropper_x = self.mesh.x(self.mesh.droppers[:, 1])
+
+    def header(self, **attributes: Any) -> Header:
+        return make_header(self.line, self.mesh, **attributes)
+
+    def own(self, count: int) -> np.ndarray:
+        """This rank's share of ``count`` things: contiguous, as on a line cut into runs of spans."""
+        return np.array_split(np.arange(count), self.comm.size)[self.comm.rank]
+
+    def stage(self, first_step: int = 0) -> Stage:
+        return Stage(
+            n_pantographs=len(self.separations),
+            dt=self.dt,
+            start_time=first_step * self.dt,
+            n_steps=self.n_steps,
+            arm_x=self.arm_x,
+            dropper_x=self.dropper_x,
+            owned_arms=self.own(self.arm_x.size),
+            owned_droppers=self.own(self.dropper_x.size),
+            node_points=self.mesh.points,
+            owned_nodes=self.own(self.mesh.n_nodes),
+        )
+
+    def position(self, t: float) -> np.ndarray:
+        return self.start + SPEED * t - np.asarray(self.separations)
+
+    def force(self, t: float) -> np.ndarray:
+        """Mean 150 N, 30 N amplitude at the span frequency, growing parts at 9 and 60 Hz."""
+        p = np.arange(len(self.separations))
+        phase = 2 * np.pi * t
+        return (
+            150.0
+            + (30.0 + 6.0 * p) * np.sin(phase * SPEED / SPAN + p)
+            + (15.0 + 5.0 * p) * np.sin(phase * 9.0 + 2 * p)
+            + 10.0 * np.sin(phase * 60.0)
+        )
+
+    def wave(self, t: float, x: np.ndarray) -> np.ndarray:
+        """Uplift of the line at positions x: a hump around each pantograph with a wake [m]."""
+        total = np.zeros(x.size)
+        for position in self.position(t):
+            ahead = x - position
+            hump = 0.06 * np.exp(-((ahead / 9.0) ** 2))
+            wake = 0.02 * np.exp(np.minimum(ahead, 0.0) / 60.0) * np.sin(0.35 * ahead)
+            total += hump + np.where(ahead < 0, wake, 0.0)
+        return total
+
+    def view(self, step: int) -> StepView:
+        t = step * self.dt
+        position = self.position(t)
+        arms = self.arm_x[self.own(self.arm_x.size)]
+        droppers = self.dropper_x[self.own(self.dropper_x.size)]
+        nodes = self.mesh.points[self.own(self.mesh.n_nodes), 0]
+        wire = 5.3 - 0.02 + 0.015 * np.sin(2 * np.pi * position / SPAN)
+        slack = 90.0 / 0.06 * np.maximum(self.wave(t, droppers), 0.0)
+        return StepView(
+            step=step,
+            time=t,
+            contact_position=position,
+            contact_force=self.force(t),
+            head_height=wire - 0.002,
+            wire_height=wire,
+            dropper_force=np.maximum(65.0 + 8.0 * np.cos(droppers) - slack, -0.5),
+            arm_uplift=self.wave(t, arms),
+            node_uplift=lambda: self.wave(t, nodes),
+            energies=lambda: (2.0 + np.sin(t), 3.0 + np.cos(t)),
+            checkpoint=lambda: {"step": step, "state": np.full(50, float(step)), "kind": "made up"},
+        )
+
+    def drive(
+        self, *observers: Observer, outcome: str = "done", first_step: int = 0, last: int | None = None
+    ) -> None:
+        stage = self.stage(first_step)
+        for observer in observers:
+            observer.start(stage)
+        for step in range(first_step, (self.n_steps if last is None else last) + 1):
+            view = self.view(step)
+            for observer in observers:
+                observer.observe(view)
+        for observer in observers:
+            observer.finish(outcome)
+
+
+PERFORMANCE = {
+    "phase_wall_s": {"mesh": 0.1, "equilibrium": 0.2, "march": 4.0, "report": 0.5},
+    "march_wall_s": 4.0,
+    "inner_iterations": {"steps": 8000, "iterations": 8400},
+}
+
+
+def record(path: Path, march: March, **options: Any) -> Path:
+    """A finished result file."""
+    attributes = options.pop("attributes", {})
+    recorder = Recorder(march.comm, path, march.header(**attributes), **options)
+    march.drive(recorder)
+    recorder.close(PERFORMANCE)
+    return path
+
+
+@pytest.fixture(scope="session")
+def march() -> March:
+    return March()
+
+
+@pytest.fixture(scope="session")
+def run_folder(tmp_path_factory: pytest.TempPathFactory, march: March) -> Path:
+    """A folder with the result file of a finished run of two pantographs. Read only."""
+    folder = tmp_path_factory.mktemp("run")
+    record(folder / "run.h5", march, energy_every=100)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def make_march() -> type[March]:
+    return March
+
+
+@pytest.fixture(scope="session")
+def record_run() -> Any:
+    return record
