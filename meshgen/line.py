@@ -20,7 +20,7 @@ class Wire:
 
     @property
     def wave_speed(self) -> float:
-        """Speed of transverse waves on the wire taken as a string, sqrt(F/rho) [m/s] (paper eq. 1.1)."""
+        """Speed of transverse waves on the wire as a string, sqrt(F/rho) [m/s] (paper eq. 1.1)."""
         return float(np.sqrt(self.tension / self.mass_per_length))
 
 
@@ -44,12 +44,15 @@ class SteadyArm:
     """A steady arm hinged at its registration end and clamped to the contact wire.
 
     length [m], mass per length [kg/m], clamp mass [kg], vertical stiffness at the wire [N/m].
+    ``holds_height``: whether the arm holds the contact wire at its height at rest and so carries
+    weight there; otherwise the wire hangs freely between the droppers next to the arm.
     """
 
     length: float
     mass_per_length: float
     clamp_mass: float
     stiffness: float
+    holds_height: bool = False
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,8 @@ class Line:
     contact_height : height of the contact wire at the supports of the running spans [m]
     encumbrance : height of the messenger wire above ``contact_height`` at the supports [m]
     support_stiffness : vertical stiffness of a messenger-wire support [N/m]
-    n_transition : spans at the start and at the end in which the contact wire rises to the tensioner
+    n_transition : spans at the start and at the end in which the contact wire rises to the
+        tensioner
     transition_rise : height gained by the contact wire over all transition spans of one end [m]
     """
 
@@ -94,7 +98,8 @@ class Line:
 
     @property
     def running_range(self) -> tuple[float, float]:
-        """Where a pantograph may run: from the end of the first transition to the start of the last [m]."""
+        """Where a pantograph may run: from the end of the first transition to the start of the
+        last one [m]."""
         masts = self.support_positions
         return float(masts[self.n_transition[0]]), float(masts[self.n_spans - self.n_transition[1]])
 

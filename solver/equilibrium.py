@@ -81,7 +81,8 @@ def _form(model: Model) -> Equilibrium:
     slope = np.zeros(mesh.n_nodes)
 
     lower = mesh.droppers[:, 1]
-    held = np.concatenate([lower, mesh.anchors[np.isin(mesh.anchors, contact)]])
+    arms = mesh.steady_arms if line.steady_arm.holds_height else mesh.steady_arms[:0]
+    held = np.concatenate([lower, arms, mesh.anchors[np.isin(mesh.anchors, contact)]])
     target = line.target_height(mesh.x(held))
     if "transition_spans" not in model.terms_of:
         target = np.full_like(target, line.contact_height)

@@ -1,0 +1,127 @@
+"""Short columns of A^-1: the line's answer within one step to unit forces on wire and droppers.
+
+A column vanishes beyond the reach of the operator, so only a window of it is stored. Forces far
+enough apart do not see each other, so many columns come from one solve.
+"""
+
+from __future__ import annotations
+
+import heapq
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from catenary.solver.distribution import Ownership
+from catenary.solver.errors import RunBroken
+from catenary.solver.linear import StepSolver
+
+# What may stand outside the windows, relative to the peak: round-off of one solve.
+_LEAK = 1e-13
+
+
+class Windows:
+    """Where along the line the unknowns stand, and which of them a force at x can move.
+
+    Parameters
+    ----------
+    positions : (n_nodes,) ascending positions of the rows of nodes [m]
+    block_size : unknowns per node
+    reach : half width of a window [m]
+    """
+
+    def __init__(self, positions: np.ndarray, block_size: int, reach: float) -> None:
+        self._positions = positions
+        self._block_size = block_size
+        self.reach = reach
+
+    def around(self, x_low: float, x_high: float) -> tuple[int, int]:
+        """Range of unknowns within reach of [x_low, x_high]."""
+        low, high = np.searchsorted(
+            self._positions, [x_low - self.reach - 1e-9, x_high + self.reach + 1e-9]
+        )
+        return int(low) * self._block_size, int(high) * self._block_size
+
+
+class ShortColumns:
+    """Owned parts of the columns A^-1 b_j for sparse right-hand sides b_j.
+
+    Attributes
+    ----------
+    start : (n,) local number of the first unknown of each column's owned window
+    values : list of n arrays, the owned window of each column, possibly empty
+    """
+
+    def __init__(self, start: np.ndarray, values: list[np.ndarray]) -> None:
+        self.start = start
+        self.values = values
+
+    def add(self, column: int, factor: float, target: np.ndarray) -> None:
+        """Add ``factor`` times a column to a local array, shape (n_local,)."""
+        values = self.values[column]
+        if values.size:
+            begin = self.start[column]
+            target[begin : begin + values.size] += factor * values
+
+
+def compute(
+    comm: Any,
+    solver: StepSolver,
+    ownership: Ownership,
+    windows: Windows,
+    dofs: np.ndarray,
+    coefficients: np.ndarray,
+    x: np.ndarray,
+) -> ShortColumns:
+    """Columns for the right-hand sides with ``coefficients`` on ``dofs``, both (n, m). Collective.
+
+    ``x`` (n,) [m] is where each of them stands.
+    """
+    n = x.size
+    right = PETSc.Vec().createMPI((ownership.n_local, None), comm=comm)
+    solution = right.duplicate()
+    start = np.zeros(n, dtype=np.int64)
+    values: list[np.ndarray] = [np.zeros(0)] * n
+    worst = 0.0
+    for group in _groups_apart(x, 2.0 * windows.reach):
+        right.zeroEntries()
+        own = ownership.owned(dofs[group])
+        with right as array:
+            np.add.at(
+                array, dofs[group][own] - ownership.first, coefficients[group][own]
+            )
+        solver.solve(right, solution)
+        with solution as array:
+            peak = np.abs(array).max(initial=0.0)
+            for column in group:
+                low, high = windows.around(x[column], x[column])
+                low = min(max(low, ownership.first), ownership.last) - ownership.first
+                high = min(max(high, ownership.first), ownership.last) - ownership.first
+                start[column] = low
+                values[column] = array[low:high].copy()
+                array[low:high] = 0.0
+            leak = np.abs(array).max(initial=0.0)
+        worst = max(worst, leak / peak if peak > 0 else 0.0)
+    right.destroy()
+    solution.destroy()
+    if comm.allreduce(worst > _LEAK):
+        raise RunBroken(
+            "the response to a point load does not decay within "
+            f"{windows.reach:.0f} m; give the scene a smaller numerics.dt_s"
+        )
+    return ShortColumns(start, values)
+
+
+def _groups_apart(x: np.ndarray, distance: float) -> list[np.ndarray]:
+    """Split positions into few groups in each of which all are further apart than ``distance``."""
+    groups: list[list[int]] = []
+    ends: list[tuple[float, int]] = []
+    for i in np.argsort(x, kind="stable"):
+        if ends and x[i] - ends[0][0] > distance + 1e-6:
+            _, group = heapq.heappop(ends)
+        else:
+            group = len(groups)
+            groups.append([])
+        groups[group].append(int(i))
+        heapq.heappush(ends, (float(x[i]), group))
+    return [np.array(group) for group in groups]

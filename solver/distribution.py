@@ -1,0 +1,65 @@
+"""Which rank owns which part of the line: contiguous runs of stations, cut between droppers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catenary.solver.model import Model
+
+# Nodes closer than this along the track belong to one station [m].
+_SAME_STATION = 1e-6
+
+
+@dataclass(frozen=True)
+class Ownership:
+    """Contiguous ranges of unknowns, the same on every rank.
+
+    Attributes
+    ----------
+    bounds : (n_ranks + 1,) rank r owns the unknowns [bounds[r], bounds[r + 1])
+    rank : this rank
+    """
+
+    bounds: np.ndarray
+    rank: int
+
+    @property
+    def first(self) -> int:
+        return int(self.bounds[self.rank])
+
+    @property
+    def last(self) -> int:
+        return int(self.bounds[self.rank + 1])
+
+    @property
+    def n_local(self) -> int:
+        return self.last - self.first
+
+    def owned(self, dofs: np.ndarray) -> np.ndarray:
+        """Mask of the unknowns that this rank owns, shape as ``dofs``."""
+        return (dofs >= self.first) & (dofs < self.last)
+
+
+def distribute(model: Model, n_ranks: int, rank: int) -> Ownership:
+    """Cut a line into ``n_ranks`` runs of nearly equal size. Not collective.
+
+    A cut never separates nodes of one station nor the two ends of a dropper, so that dropper
+    forces need no communication. Ranks beyond the number of stations own nothing.
+    """
+    n_nodes = model.mesh.n_nodes
+    x = np.empty(n_nodes)
+    x[model.row_of_node] = model.mesh.points[:, 0]
+    can_cut = np.ones(n_nodes + 1, dtype=bool)
+    can_cut[1:-1] = np.diff(x) > _SAME_STATION
+    ends = np.sort(model.row_of_node[model.mesh.droppers], axis=1)
+    # +1 where a dropper's range of rows begins to forbid cuts, -1 where it ends.
+    steps = np.zeros(n_nodes + 2)
+    np.add.at(steps, ends[:, 0] + 1, 1)
+    np.add.at(steps, ends[:, 1] + 1, -1)
+    can_cut &= np.cumsum(steps)[: n_nodes + 1] == 0
+    cuts = np.flatnonzero(can_cut)
+    wanted = np.linspace(0, n_nodes, n_ranks + 1)
+    nearest = cuts[np.clip(np.searchsorted(cuts, wanted), 0, cuts.size - 1)]
+    return Ownership(nearest * model.block_size, rank)

@@ -1,0 +1,117 @@
+"""Solves with the constant step operator: LU on one rank, one neighbour exchange on many.
+
+On several ranks the solver is restricted additive Schwarz whose overlap is the reach of A^-1:
+each rank solves its own run of the line and as much of its neighbours' as can influence it,
+which makes the preconditioner a direct solver. That is verified; where it does not hold, the
+same preconditioner is iterated.
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from catenary.solver.distribution import Ownership
+from catenary.solver.errors import RunBroken
+
+logger = logging.getLogger(__name__)
+
+PREFIX = "march_"
+# A direct solve of a matrix as well conditioned as A (below 1e6) leaves about 1e-15.
+_DIRECT = 1e-12
+
+
+class StepSolver:
+    """Factored step operator. Collective to make and to use; the maker calls ``destroy``.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+    matrix : the operator A, kept by reference
+    ownership : Ownership
+    overlap : range of unknowns [low, high) that influences this rank's own
+    """
+
+    def __init__(
+        self, comm: Any, matrix: PETSc.Mat, ownership: Ownership, overlap: tuple[int, int]
+    ) -> None:
+        self._ksp = PETSc.KSP().create(comm)
+        self._ksp.setOptionsPrefix(PREFIX)
+        self._ksp.setOperators(matrix)
+        self._ksp.setType(PETSc.KSP.Type.PREONLY)
+        pc = self._ksp.getPC()
+        if comm.size == 1:
+            pc.setType(PETSc.PC.Type.LU)
+            pc.setFactorOrdering(PETSc.Mat.OrderingType.ND)
+        else:
+            self._set_up_schwarz(pc, ownership, overlap)
+        self._ksp.setFromOptions()
+        self._ksp.setUp()
+        self.iterations = 0
+        self._verify(matrix)
+
+    def solve(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
+        """Solve A ``solution`` = ``right``. Collective."""
+        self._ksp.solve(right, solution)
+
+    def check(self) -> None:
+        """Raise RunBroken if the last solve did not converge. Collective only in its effect."""
+        reason = self._ksp.getConvergedReason()
+        if reason < 0:
+            raise RunBroken(
+                f"the linear solver did not converge (PETSc reason {reason}); drop the options "
+                f"under -{PREFIX} or give the scene a smaller numerics.dt_s"
+            )
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether one application of the preconditioner solves exactly."""
+        return bool(self._ksp.getType() == PETSc.KSP.Type.PREONLY)
+
+    def destroy(self) -> None:
+        """Free the factors. Collective."""
+        self._ksp.destroy()
+
+    @staticmethod
+    def _set_up_schwarz(pc: PETSc.PC, ownership: Ownership, overlap: tuple[int, int]) -> None:
+        pc.setType(PETSc.PC.Type.ASM)
+        pc.setASMType(PETSc.PC.ASMType.RESTRICT)
+        own = PETSc.IS().createStride(ownership.n_local, ownership.first, 1, comm=PETSc.COMM_SELF)
+        low, high = overlap if ownership.n_local else (ownership.first, ownership.first)
+        wide = PETSc.IS().createStride(high - low, low, 1, comm=PETSc.COMM_SELF)
+        pc.setASMLocalSubdomains(1, [wide], [own])
+        options = PETSc.Options(PREFIX)
+        for name, value in (
+            ("sub_ksp_type", "preonly"),
+            ("sub_pc_type", "lu"),
+            ("sub_pc_factor_mat_ordering_type", "nd"),
+        ):
+            if not options.hasName(name):
+                options.setValue(name, value)
+
+    def _verify(self, matrix: PETSc.Mat) -> None:
+        """Measure the residual for a load on every unknown; iterate if it is not round-off."""
+        solution, right = matrix.createVecs()
+        residual = right.duplicate()
+        first, last = right.getOwnershipRange()
+        right.setArray(np.cos(1.0 + 3.7 * np.arange(first, last)))
+        right.assemble()
+        self._ksp.solve(right, solution)
+        self.check()
+        matrix.mult(solution, residual)
+        residual.axpy(-1.0, right)
+        relative = residual.norm() / right.norm()
+        if not np.isfinite(relative):
+            raise RunBroken("the step operator cannot be factored: it is singular or not finite")
+        if relative > _DIRECT and self.is_direct:
+            logger.warning(
+                "the solver leaves a residual of %.1e in one application; iterating with GMRES",
+                relative,
+            )
+            self._ksp.setType(PETSc.KSP.Type.GMRES)
+            self._ksp.setTolerances(rtol=1e-14, max_it=200)
+        for vector in (solution, right, residual):
+            vector.destroy()

@@ -1,0 +1,325 @@
+"""The march: PETSc's TS drives our stepper, and observers are shown every state.
+
+The Newmark family runs as a TS of type ``python``: PETSc owns the time loop, its options (prefix
+``march_``), its monitors and its events; the stepper advances line and pantographs by one step.
+"""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from catenary.meshgen.mesh import LineMesh
+from catenary.solver.distribution import distribute
+from catenary.solver.equilibrium import Equilibrium
+from catenary.solver.errors import InputError, RunBroken
+from catenary.solver.inner import InnerProblem
+from catenary.solver.interaction import Interaction
+from catenary.solver.linear import PREFIX
+from catenary.solver.model import Model
+from catenary.solver.newmark import NewmarkLine
+from catenary.solver.observation import Observer, Stage, StepView
+from catenary.solver.pantographs import Pantographs, nominal_height_rule
+from catenary.solver.problem import Problem
+from catenary.solver.schemes import FixedPoint, LoadSource, OneSolve, Scheme
+
+
+@dataclass
+class Outcome:
+    """How a march ended.
+
+    ``outcome`` is "done", "interrupted" or the sentence of what broke; ``wall`` [s] the time of
+    the time loop alone; ``simulated`` [s]; ``n_steps`` taken; ``counters`` of the scheme.
+    """
+
+    outcome: str
+    wall: float
+    simulated: float
+    n_steps: int
+    counters: dict[str, int] = field(default_factory=dict)
+
+
+class March:
+    """A line with its train, ready to run. Collective to make; ``destroy`` is collective too.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+    problem, model, form : what ``equilibrium.find_form`` was given and returned, on all ranks
+    """
+
+    def __init__(self, comm: Any, problem: Problem, model: Model, form: Equilibrium) -> None:
+        self._comm = comm
+        self._problem = problem
+        self._model = model
+        train, numerics = problem.train, problem.numerics
+        self.ownership = distribute(model, comm.size, comm.rank)
+        self._line = NewmarkLine(comm, model, self.ownership, numerics)
+        on = model.terms_of
+        trailing = max(placement.behind for placement in train.placements)
+        uses_rate = "contact_damping" in on
+        self._interaction = Interaction(
+            comm,
+            model,
+            form,
+            self._line,
+            (train.start - trailing, train.end),
+            len(train.placements),
+            train.speed,
+            uses_rate,
+            "dropper_slackening" in on,
+        )
+        self._pantographs = Pantographs(
+            problem, self._interaction.wire, nominal_height_rule(model, form), comm.rank == 0
+        )
+        self._scheme = self._make_scheme(on)
+        self._stage = self._make_stage(form)
+        self._own_rows(model)
+        self._first_step = 0
+        self._start_time = 0.0
+
+    @property
+    def n_steps(self) -> int:
+        """Steps from the start of the run to its end."""
+        train = self._problem.train
+        duration = (train.end - train.start) / train.speed
+        return max(1, math.floor(duration / self._problem.numerics.dt + 1e-9))
+
+    def restore(self, checkpoint: dict[str, Any]) -> None:
+        """Continue from what ``StepView.checkpoint`` gave, on any number of ranks.
+
+        Collective; every rank passes the same checkpoint.
+        """
+        rows = slice(self.ownership.first, self.ownership.last)
+        self._line.displacement[:] = checkpoint["displacement"][rows]
+        self._line.velocity[:] = checkpoint["velocity"][rows]
+        self._line.acceleration[:] = checkpoint["acceleration"][rows]
+        self._first_step = int(checkpoint["step"])
+        self._start_time = self._first_step * self._problem.numerics.dt
+        self._pantographs.move_to(self._start_time)
+        self._pantographs.contact_force[:] = checkpoint["contact_force"]
+        self._pantographs.head_height[:] = checkpoint["head_height"]
+        self._pantographs.wire_height[:] = checkpoint["wire_height"]
+        for i, pantograph in enumerate(self._pantographs.models):
+            pantograph.restore(checkpoint[f"pantograph_{i}"])
+
+    def run(
+        self,
+        observers: Sequence[Observer],
+        stop_requested: Callable[[], bool] = lambda: False,
+    ) -> Outcome:
+        """March to the end, or until any rank's ``stop_requested`` says so. Collective.
+
+        A step that breaks ends the march with its sentence as the outcome; observers have then
+        seen everything up to the last good step.
+        """
+        ts = self._make_ts(observers, stop_requested)
+        for observer in observers:
+            observer.start(self._stage)
+        begin = clock.perf_counter()
+        outcome = "done"
+        try:
+            ts.solve(self._line.solution)
+            if self._stepper.broken:
+                outcome = self._stepper.broken
+            elif self._stepper.stopped:
+                outcome = "interrupted"
+        finally:
+            wall = clock.perf_counter() - begin
+            ts.destroy()
+        for observer in observers:
+            observer.finish(outcome)
+        n_steps = self._stepper.step_number - self._first_step
+        return Outcome(
+            outcome,
+            wall,
+            n_steps * self._problem.numerics.dt,
+            n_steps,
+            self._scheme.counters.as_dict(),
+        )
+
+    def destroy(self) -> None:
+        """Free all PETSc objects. Collective."""
+        self._line.destroy()
+
+    def _make_scheme(self, on: dict[str, int]) -> Scheme:
+        problem = self._problem
+        may_lose = "contact_loss" in on
+        kept = problem.residual_stiffness_ratio if "residual_dropper_stiffness" in on else 0.0
+        law = problem.contact
+        if "contact_damping" not in on:
+            law = type(law)(law.stiffness, 0.0)
+        if problem.numerics.scheme == "one_solve":
+            inner = InnerProblem(law, may_lose, kept)
+            return OneSolve(self._comm, self._interaction, self._pantographs, inner, self._loads())
+        return FixedPoint(
+            self._comm,
+            self._interaction,
+            self._pantographs,
+            problem.numerics,
+            law.stiffness,
+            law.damping,
+            may_lose,
+            kept,
+            "dropper_slackening" in on,
+            self._loads(),
+        )
+
+    def _loads(self) -> LoadSource:
+        """This rank's part of the loads that change with time; without any, no calls are made."""
+        free = ~np.isin(np.arange(self._model.n_dofs), self._model.constrained)
+        parts = []
+        for load in self._model.step_loads:
+            mine = self.ownership.owned(load.dofs) & free[load.dofs]
+            if mine.any():
+                parts.append((load, mine, load.dofs[mine] - self.ownership.first))
+        if not parts:
+            return lambda time: []
+        return lambda time: [(dofs, load.values(time)[mine]) for load, mine, dofs in parts]
+
+    def _make_stage(self, form: Equilibrium) -> Stage:
+        mesh = self._model.mesh
+        points = mesh.points.copy()
+        points[:, 2] = form.height
+        arms = self._model.dofs(mesh.steady_arms)
+        mine = self.ownership.owned(arms)
+        self._arm_rows = arms[mine] - self.ownership.first
+        nodes = np.arange(mesh.n_nodes)
+        owned_nodes = nodes[self.ownership.owned(self._model.dofs(nodes))]
+        self._node_rows = self._model.dofs(owned_nodes) - self.ownership.first
+        return Stage(
+            n_pantographs=self._pantographs.n,
+            dt=self._problem.numerics.dt,
+            start_time=0.0,
+            n_steps=self.n_steps,
+            arm_x=mesh.x(mesh.steady_arms),
+            dropper_x=mesh.x(mesh.droppers[:, 1]),
+            owned_arms=np.flatnonzero(mine),
+            owned_droppers=self._interaction.droppers.numbers,
+            node_points=points,
+            owned_nodes=owned_nodes,
+        )
+
+    def _own_rows(self, model: Model) -> None:
+        droppers = self._interaction.droppers
+        kept = (
+            self._problem.residual_stiffness_ratio
+            if "residual_dropper_stiffness" in model.terms_of
+            else 0.0
+        )
+        slackens = "dropper_slackening" in model.terms_of
+
+        def tension() -> np.ndarray:
+            linear = droppers.tension()
+            return np.maximum(linear, kept * linear) if slackens else linear
+
+        self._tension = tension
+
+    def _make_ts(
+        self, observers: Sequence[Observer], stop_requested: Callable[[], bool]
+    ) -> PETSc.TS:
+        dt = self._problem.numerics.dt
+        self._stepper = _Stepper(self._scheme, self._first_step, dt, stop_requested)
+        ts = PETSc.TS().create(self._comm)
+        ts.setOptionsPrefix(PREFIX)
+        ts.setProblemType(PETSc.TS.ProblemType.NONLINEAR)
+        ts.createPython(self._stepper, comm=self._comm)
+        ts.setOptionsPrefix(PREFIX)
+        ts.setTime(self._start_time)
+        ts.setTimeStep(dt)
+        ts.setStepNumber(self._first_step)
+        ts.setMaxSteps(self.n_steps)
+        ts.setMaxTime(2.0 * self.n_steps * dt)
+        ts.setExactFinalTime(PETSc.TS.ExactFinalTime.STEPOVER)
+        if observers:
+            ts.setMonitor(lambda _ts, step, time, _u: self._show(observers, step, time))
+        ts.setFromOptions()
+        if abs(ts.getTimeStep() - dt) > 1e-12 * dt:
+            raise InputError(
+                f"the PETSc option -{PREFIX}ts_dt is {ts.getTimeStep():g}; the time step is part "
+                f"of the scene: give numerics.dt_s instead, which is {dt:g} s"
+            )
+        return ts
+
+    def _show(self, observers: Sequence[Observer], step: int, time: float) -> None:
+        if self._stepper.broken:
+            return
+        pantographs, line = self._pantographs, self._line
+        view = StepView(
+            step=step,
+            time=time,
+            contact_position=pantographs.position,
+            contact_force=pantographs.contact_force,
+            head_height=pantographs.head_height,
+            wire_height=pantographs.wire_height,
+            dropper_force=self._tension(),
+            arm_uplift=line.displacement[self._arm_rows],
+            node_uplift=lambda: line.displacement[self._node_rows],
+            energies=line.energies,
+            checkpoint=lambda: self._checkpoint(step),
+        )
+        for observer in observers:
+            observer.observe(view)
+
+    def _checkpoint(self, step: int) -> dict[str, Any] | None:
+        """Everything needed to continue after ``step``, on rank 0. Collective."""
+        line = self._line
+        whole = {
+            name: self._comm.gather(values.copy(), root=0)
+            for name, values in (
+                ("displacement", line.displacement),
+                ("velocity", line.velocity),
+                ("acceleration", line.acceleration),
+            )
+        }
+        if self._comm.rank != 0:
+            return None
+        result: dict[str, Any] = {k: np.concatenate(parts) for k, parts in whole.items() if parts}
+        result["step"] = step
+        pantographs = self._pantographs
+        result["contact_force"] = pantographs.contact_force.copy()
+        result["head_height"] = pantographs.head_height.copy()
+        result["wire_height"] = pantographs.wire_height.copy()
+        for i, pantograph in enumerate(pantographs.models):
+            result[f"pantograph_{i}"] = pantograph.state()
+        return result
+
+
+class _Stepper:
+    """Context of the TS of type python: one step of the scheme at a time."""
+
+    def __init__(
+        self, scheme: Scheme, first_step: int, dt: float, stop_requested: Callable[[], bool]
+    ) -> None:
+        self._scheme = scheme
+        self._dt = dt
+        self._stop_requested = stop_requested
+        self.step_number = first_step
+        self.stopped = False
+        self.broken = ""
+
+    def step(self, ts: PETSc.TS) -> None:
+        """Called by PETSc; errors may not pass through it, so they are kept for the march."""
+        # Times are multiples of dt, not sums, so that a long run does not drift.
+        time = (self.step_number + 1) * self._dt
+        try:
+            goes_on = self._scheme.step(time, self._stop_requested())
+        except RunBroken as error:
+            self.broken = str(error)
+            ts.setConvergedReason(PETSc.TS.ConvergedReason.DIVERGED_STEP_REJECTED)
+            return
+        self.step_number += 1
+        ts.setTime(time)
+        if not goes_on:
+            self.stopped = True
+            ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
+
+    def view(self, ts: PETSc.TS, viewer: PETSc.Viewer) -> None:
+        """Name the scheme in -march_ts_view."""
+        viewer.printfASCII(f"  Newmark step by scheme {type(self._scheme).__name__}\n")
