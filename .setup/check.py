@@ -1,4 +1,4 @@
-"""Import what Catenary stands on and say in one line what was found, or in one sentence what fails."""
+"""Import what Catenary stands on; say in one line what was found, or in a sentence what fails."""
 
 import re
 import subprocess

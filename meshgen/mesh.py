@@ -6,8 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+# Names of the physical groups of a mesh file: lines, then points.
 CONTACT_WIRE = "contact_wire"
 MESSENGER_WIRE = "messenger_wire"
+DROPPERS = "droppers"
+STEADY_ARMS = "steady_arms"
+SUPPORTS = "supports"
+ANCHORS = "anchors"
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,123 @@
+"""A Gmsh mesh file, ours or a user's own, as a line mesh. The only file that imports meshio."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import warnings
+from pathlib import Path
+
+import meshio
+import numpy as np
+
+from catenary.meshgen import mesh as names
+from catenary.meshgen.chains import Groups, assemble
+from catenary.meshgen.mesh import LineMesh
+from catenary.solver.errors import InputError
+
+_LINE_GROUPS = (names.CONTACT_WIRE, names.MESSENGER_WIRE, names.DROPPERS)
+_POINT_GROUPS = (names.STEADY_ARMS, names.SUPPORTS, names.ANCHORS)
+_MAY_BE_EMPTY = (names.DROPPERS, names.STEADY_ARMS, names.SUPPORTS)
+_KINDS = {0: "points", 1: "lines", 2: "surfaces", 3: "volumes"}
+
+
+def read_mesh(path: Path) -> LineMesh:
+    """The line mesh of a ``.msh`` file of any version, checked. Not collective: one rank reads.
+
+    Numbering and orientation of nodes and elements in the file do not matter; a dropper may
+    consist of several elements, of which only the ends are kept. Nodes that nothing uses are left
+    out, the others are numbered along the track, the messenger wire's first at equal x.
+
+    Parameters
+    ----------
+    path : file with the physical groups of lines ``contact_wire``, ``messenger_wire``,
+        ``droppers`` and of points ``steady_arms``, ``supports``, ``anchors``. ``droppers``,
+        ``steady_arms`` and ``supports`` may have no members, but must be named.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a group is missing, or the groups do not make a line:
+        one sentence with the file's name and the place.
+    """
+    content = _load(path)
+    members: dict[str, np.ndarray] = {}
+    for dimension, wanted in ((1, _LINE_GROUPS), (0, _POINT_GROUPS)):
+        for name in wanted:
+            members[name] = _members(content, name, dimension, path)
+    points = np.ascontiguousarray(content.points, dtype=float)
+    if points.shape[1] != 3 or not np.isfinite(points).all():
+        raise InputError(f"{path}: the nodes must have three finite coordinates each")
+    return assemble(Groups(points=points, **members), str(path))
+
+
+def _load(path: Path) -> meshio.Mesh:
+    if not path.is_file():
+        raise InputError(f"the mesh file {path} does not exist")
+    try:
+        # meshio prints what it does not understand; what matters to us is checked below.
+        with warnings.catch_warnings(), contextlib.redirect_stderr(io.StringIO()):
+            warnings.simplefilter("ignore")
+            return meshio.gmsh.read(path)
+    except Exception as error:  # a damaged file ends in whatever meshio stumbles over
+        if "Incompatible cell data" in str(error):
+            raise InputError(
+                f"{path}: some elements are in no physical group: save the mesh in Gmsh without "
+                "the option to save all elements (Mesh.SaveAll = 0), or as MSH 2.2"
+            ) from error
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(f"{path} cannot be read as a Gmsh mesh file: {reason}") from error
+
+
+def _members(content: meshio.Mesh, name: str, dimension: int, path: Path) -> np.ndarray:
+    """Elements of a physical group, shape (n, 2) for lines; node numbers, (n,), for points."""
+    if name not in content.field_data:
+        present = ", ".join(sorted(content.field_data)) or "none"
+        raise InputError(
+            f"{path}: the physical group {name} of {_KINDS[dimension]} is missing (present: "
+            f"{present})"
+        )
+    number, found_dimension = (int(value) for value in content.field_data[name])
+    if found_dimension != dimension:
+        raise InputError(
+            f"{path}: the physical group {name} holds {_KINDS[found_dimension]}, but must hold "
+            f"{_KINDS[dimension]}"
+        )
+    blocks = [
+        np.asarray(block.data[chosen], dtype=np.int64)
+        for block, chosen in _blocks_of_group(content, name, number, dimension)
+    ]
+    width = dimension + 1
+    if any(block.shape[1] != width for block in blocks):
+        raise InputError(
+            f"{path}: the physical group {name} has elements of higher order, but only lines of "
+            "two nodes are understood (Mesh.ElementOrder = 1)"
+        )
+    found = np.concatenate([np.empty((0, width), dtype=np.int64), *blocks])
+    if found.size == 0 and name not in _MAY_BE_EMPTY:
+        raise InputError(f"{path}: the physical group {name} has no members")
+    if found.size and found.min() < 0:
+        raise InputError(f"{path}: the physical group {name} uses a node that the file lacks")
+    return found if dimension else np.unique(found)
+
+
+def _blocks_of_group(
+    content: meshio.Mesh, name: str, number: int, dimension: int
+) -> list[tuple[meshio.CellBlock, np.ndarray]]:
+    """Blocks of elements of that dimension with the rows that belong to the group."""
+    physical = content.cell_data.get("gmsh:physical")
+    # MSH 4.1 tells the groups of each curve, several perhaps; before, each element names one.
+    sets = content.cell_sets.get(name)
+    chosen = []
+    for k, block in enumerate(content.cells):
+        if block.dim != dimension:
+            continue
+        if sets is not None:
+            rows = np.asarray(sets[k], dtype=np.int64)
+        elif physical is not None:
+            rows = np.flatnonzero(physical[k] == number)
+        else:
+            continue
+        if rows.size:
+            chosen.append((block, rows))
+    return chosen
