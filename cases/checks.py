@@ -1,0 +1,312 @@
+"""What types and bounds cannot see: whether line, train, evaluation and effects fit together.
+
+Every check raises ``InputError`` with one sentence that names the key, its value, what is allowed
+and where the key was written.
+"""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+import numpy as np
+
+from catenary.cases.convert import static_force
+from catenary.cases.keys import is_known, known_keys
+from catenary.cases.messages import shown, unknown_key
+from catenary.cases.units import unit_of
+from catenary.meshgen.line import Line
+from catenary.solver import effects
+from catenary.solver.errors import InputError
+from catenary.solver.problem import Problem
+
+if TYPE_CHECKING:
+    from catenary.cases.scene import Scene
+
+# Two heads cannot stand closer on a roof; their contacts would also share one finite element.
+MIN_SEPARATION = 1.0
+# Slack for sums of decimal lengths [m].
+_TINY = 1e-6
+# Effects that are off by default and need a value in the scene: the key that holds it.
+_DATA_OF = {
+    "contact_damping": "contact.damping_N_s_per_m",
+    "residual_dropper_stiffness": "line.dropper.residual_stiffness_ratio",
+}
+
+
+def check(scene: Scene) -> None:
+    """Raise ``InputError`` with the first thing in which a scene contradicts itself."""
+    _test_keys(scene)
+    _effect_names(scene)
+    _effect_requirements(scene)
+    _effect_data(scene)
+    _pantograph_names(scene)
+    _separations(scene)
+    _static_forces(scene)
+    line = scene.to_line()
+    _droppers_inside_spans(scene, line)
+    _dropper_lengths(scene, line)
+    _speed(scene, line)
+    _running(scene, line)
+    _evaluation(scene)
+    _raising(scene)
+    _standard(scene)
+    _mesh_file(scene)
+
+
+def _refuse(scene: Scene, key: str, value: object, why: str) -> NoReturn:
+    unit = unit_of(key)
+    number = f"{value:g}" if isinstance(value, float) else shown(value)
+    in_unit = f" {unit}" if unit else ""
+    raise InputError(f"{key} is {number}{in_unit} {scene.origin.of(key)}; {why}")
+
+
+def _test_keys(scene: Scene) -> None:
+    known = known_keys(type(scene))
+    for key in scene.test:
+        if not is_known(key, known) or key.startswith("test."):
+            where = f"in the [test] table {scene.origin.of('test')}"
+            raise InputError(unknown_key(key, where, known))
+
+
+def _effect_names(scene: Scene) -> None:
+    known = effects.registry()
+    for name, on in scene.effects.items():
+        key = f"effects.{name}"
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            hint = f"did you mean effects.{near[0]}?" if near else f"known are {', '.join(known)}"
+            raise InputError(f"{shown(key)[1:-1]} {scene.origin.of(key)} is unknown; {hint}")
+        if known[name].always and not on:
+            _refuse(scene, key, on, "it is part of every scene and cannot be left out")
+
+
+def _effect_requirements(scene: Scene) -> None:
+    switches = scene.switches()
+    for name, effect in effects.registry().items():
+        for required in effect.requires if switches[name] else ():
+            if not switches[required]:
+                how = "on" if name in scene.effects else "on by default"
+                key = f"effects.{name}" if name in scene.effects else f"effects.{required}"
+                raise InputError(
+                    f"effects.{name} is {how} and requires effects.{required}, which is off "
+                    f"{scene.origin.of(key)}; switch both on or both off"
+                )
+
+
+def _effect_data(scene: Scene) -> None:
+    values = {
+        "contact_damping": scene.contact.damping_N_s_per_m,
+        "residual_dropper_stiffness": scene.line.dropper.residual_stiffness_ratio,
+    }
+    switches = scene.switches()
+    for name, value in values.items():
+        key = _DATA_OF[name]
+        if switches.get(name) and value == 0:
+            _refuse(scene, key, value, f"effects.{name} is on and needs a value greater than 0")
+        if value > 0 and name not in scene.effects and switches.get(name) is False:
+            _refuse(
+                scene,
+                key,
+                value,
+                f"it acts only with effects.{name} = true; write that, or false to leave it out",
+            )
+    n = len(scene.train.pantographs)
+    if n > 1 and not switches.get("several_pantographs", True):
+        key = "effects.several_pantographs"
+        _refuse(scene, key, False, f"train.pantographs has {n} entries; leave one or switch it on")
+
+
+def _pantograph_names(scene: Scene) -> None:
+    for i, place in enumerate(scene.train.pantographs):
+        if place.name not in scene.pantographs:
+            near = difflib.get_close_matches(place.name, scene.pantographs, n=1)
+            hint = (
+                f"did you mean {near[0]}?"
+                if near
+                else f"it must be one of {', '.join(scene.pantographs)}"
+            )
+            _refuse(scene, f"train.pantographs.{i}.name", place.name, hint)
+
+
+def _separations(scene: Scene) -> None:
+    behind = [place.behind_m for place in scene.train.pantographs]
+    if behind[0] != 0:
+        key = "train.pantographs.0.behind_m"
+        _refuse(scene, key, behind[0], "the first pantograph leads, so it must be 0")
+    for i in range(1, len(behind)):
+        if behind[i] < behind[i - 1] + MIN_SEPARATION:
+            _refuse(
+                scene,
+                f"train.pantographs.{i}.behind_m",
+                behind[i],
+                f"it must be at least {MIN_SEPARATION:g} m more than the {behind[i - 1]:g} m of "
+                "the pantograph before it",
+            )
+
+
+def _static_forces(scene: Scene) -> None:
+    speed = scene.train.speed_km_h
+    for place in scene.train.pantographs:
+        kind = scene.pantographs[place.name]
+        if static_force(kind, speed) is None:
+            assert kind.static_force_by_speed is not None
+            first, last = kind.static_force_by_speed[0][0], kind.static_force_by_speed[-1][0]
+            _refuse(
+                scene,
+                "train.speed_km_h",
+                speed,
+                f"pantographs.{place.name}.static_force_by_speed only holds forces for "
+                f"{first:g} to {last:g} km/h",
+            )
+
+
+def _droppers_inside_spans(scene: Scene, line: Line) -> None:
+    kind = scene.line.dropper
+    if kind.positions_m is not None and len(set(line.span_lengths)) > 1:
+        key = "line.dropper.positions_m"
+        raise InputError(
+            f"{key} {scene.origin.of(key)} holds for one span length, but the spans are "
+            f"{', '.join(f'{span:g}' for span in sorted(set(line.span_lengths)))} m long; give "
+            "line.dropper.patterns or count and spacing_m"
+        )
+    for span, positions in zip(line.span_lengths, line.dropper_positions, strict=True):
+        outside = [x for x in positions if not _TINY < x < span - _TINY]
+        if not outside:
+            continue
+        if kind.count is not None:
+            _refuse(
+                scene,
+                "line.dropper.count",
+                kind.count,
+                f"at a spacing of {kind.spacing_m:g} m these do not fit into a span of {span:g} m",
+            )
+        which = "positions_m" if kind.positions_m is not None else "patterns"
+        key = f"line.dropper.{which}"
+        raise InputError(
+            f"{key} {scene.origin.of(key)} puts a dropper at {outside[0]:g} m; it must lie inside "
+            f"the span, between 0 and {span:g} m"
+        )
+
+
+def estimated_dropper_lengths(line: Line, gravity: float) -> list[np.ndarray]:
+    """Dropper lengths of each span [m], the messenger wire taken as a parabola.
+
+    Its load is its own weight and that of the contact wire less what the pre-sag's curvature lets
+    the contact wire's tension carry; bending and the supports' give are left out. Good to a few
+    centimetres: it serves to refuse the impossible, the form finding gives the lengths.
+    """
+    lengths = []
+    masts = line.support_positions
+    for i, span in enumerate(line.span_lengths):
+        x = np.asarray(line.dropper_positions[i])
+        pre_sag = np.asarray(line.pre_sag[i])
+        height = line.target_height(masts[i] + x) - pre_sag
+        mid_sag = float(pre_sag.max(initial=0.0))
+        carried = 8 * mid_sag * line.contact_wire.tension / span**2
+        weight = gravity * (line.contact_wire.mass_per_length + line.messenger_wire.mass_per_length)
+        load = max(weight - carried, gravity * line.messenger_wire.mass_per_length)
+        sag = load * x * (span - x) / (2 * line.messenger_wire.tension)
+        lengths.append(line.contact_height + line.encumbrance - sag - height)
+    return lengths
+
+
+def _dropper_lengths(scene: Scene, line: Line) -> None:
+    gravity = Problem.gravity if scene.switches().get("gravity", True) else 0.0
+    shortest = [float(v.min()) for v in estimated_dropper_lengths(line, gravity)]
+    span = int(np.argmin(shortest))
+    if shortest[span] <= 0:
+        _refuse(
+            scene,
+            "line.encumbrance_m",
+            line.encumbrance,
+            f"the messenger wire would hang {-shortest[span]:.2f} m below the contact wire in span "
+            f"{span + 1}: raise it, raise line.messenger_wire.tension_N or shorten the span",
+        )
+
+
+def _speed(scene: Scene, line: Line) -> None:
+    wave = 3.6 * line.contact_wire.wave_speed
+    speed = scene.train.speed_km_h
+    if speed >= wave and not scene.switches().get("supercritical_speed", False):
+        _refuse(
+            scene,
+            "train.speed_km_h",
+            speed,
+            f"it must be below the wave speed of the contact wire ({wave:.1f} km/h) unless "
+            "effects.supercritical_speed = true",
+        )
+
+
+def _running(scene: Scene, line: Line) -> None:
+    first, last = line.running_range
+    start, end = scene.train.start_m, scene.end_m
+    rear = scene.train.pantographs[-1].behind_m
+    inside = f"the running range is {first:g} to {last:g} m"
+    if not first - _TINY <= start <= last + _TINY:
+        _refuse(scene, "train.start_m", start, f"it must lie inside the line: {inside}")
+    if start - rear < first - _TINY:
+        _refuse(
+            scene,
+            "train.start_m",
+            start,
+            f"the pantograph {rear:g} m behind would start at {start - rear:g} m, outside the "
+            f"line: {inside}",
+        )
+    given = scene.train.end_m
+    if given is not None and given > last + _TINY:
+        _refuse(scene, "train.end_m", given, f"it must lie inside the line: {inside}")
+    if end <= start:
+        if given is None:
+            _refuse(scene, "train.start_m", start, f"it must lie before the end at {end:g} m")
+        _refuse(scene, "train.end_m", given, f"it must be greater than train.start_m ({start:g} m)")
+    if end - start < scene.train.speed_km_h / 3.6 * scene.numerics.dt_s:
+        _refuse(scene, "numerics.dt_s", scene.numerics.dt_s, "the run would have no step at all")
+
+
+def _evaluation(scene: Scene) -> None:
+    start, end = scene.train.start_m, scene.end_m
+    stretch = scene.evaluation
+    for i, place in enumerate(scene.train.pantographs):
+        who = "the pantograph" if len(scene.train.pantographs) == 1 else f"pantograph {i + 1}"
+        covers = f"{who} only runs from {start - place.behind_m:g} to {end - place.behind_m:g} m"
+        if stretch.from_m < start - place.behind_m - _TINY:
+            _refuse(scene, "evaluation.from_m", stretch.from_m, covers)
+        if stretch.to_m > end - place.behind_m + _TINY:
+            _refuse(scene, "evaluation.to_m", stretch.to_m, covers)
+
+
+def _raising(scene: Scene) -> None:
+    run = (scene.evaluation.from_m - scene.train.start_m) / (scene.train.speed_km_h / 3.6)
+    if scene.train.raise_time_s > run + _TINY:
+        _refuse(
+            scene,
+            "train.raise_time_s",
+            scene.train.raise_time_s,
+            f"the leading pantograph reaches evaluation.from_m after {run:.3g} s and must be "
+            "raised by then",
+        )
+
+
+def _standard(scene: Scene) -> None:
+    from catenary.postproc.standards import EDITIONS, SYSTEMS
+
+    for key, value, known in (
+        ("evaluation.edition", scene.evaluation.edition, EDITIONS),
+        ("evaluation.system", scene.evaluation.system, SYSTEMS),
+    ):
+        if value not in known:
+            _refuse(scene, key, value, f"it must be one of {', '.join(known)}")
+
+
+def _mesh_file(scene: Scene) -> None:
+    path = scene.mesh_file()
+    if path is None:
+        return
+    try:
+        found = Path(path).is_file()
+    except (OSError, ValueError):
+        found = False
+    if not found:
+        _refuse(scene, "mesh.file", str(path), "there is no such file")

@@ -1,0 +1,106 @@
+"""Reading a case file and the ``--set`` assignments into one nested table, without judging it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from catenary.cases.messages import shown
+from catenary.solver.errors import InputError
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+_MAX_BYTES = 10_000_000  # a scene is written by hand; more is some other file
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Contents of a TOML file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is not TOML.
+    """
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise InputError(f"{path} is too large for a case file ({_MAX_BYTES} bytes allowed)")
+        text = path.read_bytes().decode("utf-8")
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path} is not a text file in UTF-8 (byte {error.start} is not)"
+        ) from error
+    try:
+        return tomllib.loads(text)
+    except RecursionError as error:
+        raise InputError(f"{path} is nested too deeply") from error
+    except ValueError as error:  # TOMLDecodeError, and integers of thousands of digits
+        raise InputError(f"{path} is not valid TOML: {error}") from error
+
+
+def parse_assignment(text: str) -> tuple[str, Any]:
+    """Key and value of ``key=value``; the value is read as TOML, as plain text if it is none."""
+    key, equals, value = text.partition("=")
+    key = key.strip()
+    if not equals or not key or any(not part for part in key.split(".")):
+        raise InputError(
+            f"--set {shown(text)} must have the form key=value, e.g. train.speed_km_h=300"
+        )
+    try:
+        parsed = tomllib.loads(f"value = {value}")
+    except (ValueError, RecursionError):
+        return key, value.strip()
+    if set(parsed) != {"value"}:
+        return key, value.strip()
+    return key, parsed["value"]
+
+
+def assign(raw: dict[str, Any], key: str, value: Any) -> None:
+    """Set a dotted key in a nested table, making the tables on the way.
+
+    A number in the key is an index into a list; the number after the last one appends.
+
+    Raises
+    ------
+    InputError
+        If the key leads through something that is neither a table nor a list.
+    """
+    parts = key.split(".")
+    if parts[0] in ("petsc", "test") and len(parts) > 2:
+        parts = [parts[0], ".".join(parts[1:])]  # their keys may hold dots
+    here: Any = raw
+    for depth, part in enumerate(parts):
+        last = depth == len(parts) - 1
+        if isinstance(here, dict):
+            if last:
+                here[part] = value
+            else:
+                here = here.setdefault(part, {})
+        elif isinstance(here, list):
+            here = _assign_in_list(here, parts, depth, value)
+        else:
+            above = ".".join(parts[:depth])
+            raise InputError(
+                f"{shown(key)[1:-1]} cannot be set on the command line (--set): {above} is "
+                f"{shown(here)} and no table"
+            )
+
+
+def _assign_in_list(here: list[Any], parts: list[str], depth: int, value: Any) -> Any:
+    above, part = ".".join(parts[:depth]), parts[depth]
+    index = int(part) if part.isascii() and part.isdigit() and len(part) < 6 else -1
+    if not 0 <= index <= len(here):
+        raise InputError(
+            f"{shown('.'.join(parts))[1:-1]} cannot be set on the command line (--set): {above} "
+            f"is a list of {len(here)}, so that a number from 0 to {len(here)} must follow it"
+        )
+    if index == len(here):
+        here.append({})
+    if depth == len(parts) - 1:
+        here[index] = value
+    return here[index]

@@ -1,0 +1,170 @@
+"""The scene: everything a run is made of, as it is written in ``case.toml``.
+
+``load_scene`` is the one way in. A loaded scene is sound: types, bounds, geometry and effects
+have been checked, so that what follows meets no surprise.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import Field, PrivateAttr, ValidationError
+
+from catenary.cases.catalogue import find_case
+from catenary.cases.keys import is_known, known_keys
+from catenary.cases.loading import assign, parse_assignment, read_toml
+from catenary.cases.messages import Origin, input_error, unknown_key
+from catenary.cases.schema_line import LineTable, MeshTable
+from catenary.cases.schema_run import (
+    CaseTable,
+    ContactTable,
+    EvaluationTable,
+    NumericsTable,
+    OutputTable,
+    PantographTable,
+    PetscTable,
+    TrainTable,
+)
+from catenary.cases.table import Table
+from catenary.solver import effects as effect_registry
+
+if TYPE_CHECKING:
+    from catenary.meshgen.line import Line
+    from catenary.solver.problem import Problem
+
+
+class Scene(Table):
+    """All tables of a case."""
+
+    case: CaseTable = Field(default_factory=CaseTable, description="what the case is")
+    line: LineTable = Field(description="the line from anchor to anchor")
+    mesh: MeshTable = Field(default_factory=MeshTable, description="the finite-element mesh")
+    pantographs: dict[str, PantographTable] = Field(
+        min_length=1, description="the kinds of pantograph, by name"
+    )
+    train: TrainTable = Field(description="the train and its pantographs")
+    contact: ContactTable = Field(default_factory=ContactTable, description="penalty contact")
+    numerics: NumericsTable = Field(default_factory=NumericsTable, description="time stepping")
+    evaluation: EvaluationTable = Field(description="the stretch whose statistics are judged")
+    output: OutputTable = Field(default_factory=OutputTable, description="what is written")
+    effects: dict[str, bool] = Field(
+        default_factory=dict, description="what is simulated; see `catenary plan`"
+    )
+    petsc: PetscTable = Field(default_factory=dict, description="PETSc options; those after -- win")
+    test: dict[str, Any] = Field(
+        default_factory=dict, description="keys and values that shorten the case for tests"
+    )
+
+    _origin: Origin = PrivateAttr(default=Origin("the scene"))
+
+    @property
+    def origin(self) -> Origin:
+        """Where the keys were written, for sentences about them."""
+        return self._origin
+
+    def switches(self) -> dict[str, bool]:
+        """Every effect of the registry and whether it is on, in the registry's order."""
+        return {
+            name: effect.always or self.effects.get(name, effect.default)
+            for name, effect in effect_registry.registry().items()
+        }
+
+    @property
+    def end_m(self) -> float:
+        """Where the leading pantograph stops [m]: ``train.end_m`` or what stands for it."""
+        if self.train.end_m is not None:
+            return self.train.end_m
+        line = self.to_line()
+        running_end = line.running_range[1]
+        behind = max(placement.behind_m for placement in self.train.pantographs)
+        run_out = sum(line.span_lengths) / line.n_spans
+        return float(min(running_end, self.evaluation.to_m + behind + run_out))
+
+    def to_line(self) -> Line:
+        """The line in SI units. Not collective."""
+        from catenary.cases.convert import line_of
+
+        return line_of(self)
+
+    def to_problem(self) -> Problem:
+        """Everything a run needs, in SI units. Not collective."""
+        from catenary.cases.convert import problem_of
+
+        return problem_of(self)
+
+    def mesh_file(self) -> Path | None:
+        """The user's own mesh, None if the mesh is made from the line."""
+        return None if self.mesh.file is None else Path(self.mesh.file)
+
+    def resolved(self) -> dict[str, Any]:
+        """All keys with the values that hold, plain enough for JSON; loads to the same scene."""
+        plain: dict[str, Any] = self.model_dump(mode="json", exclude_none=True)
+        plain["train"]["end_m"] = self.end_m
+        plain["effects"] = self.switches()
+        if self.mesh.file is not None:
+            plain["mesh"] = {"file": self.mesh.file}
+        return plain
+
+
+def load_scene(case: str | Path, overrides: Sequence[str] = (), shortened: bool = False) -> Scene:
+    """The checked scene of a shipped case's name or a case file. Not collective.
+
+    Parameters
+    ----------
+    case : name, file or folder
+    overrides : ``key=value`` each, value in TOML; they win over the file
+    shortened : apply the case's ``[test]`` table before the overrides
+
+    Raises
+    ------
+    InputError
+        In one sentence, if anything is wrong.
+    """
+    path = find_case(str(case)).absolute()
+    raw = read_toml(path)
+    known = known_keys(Scene)
+    if shortened and isinstance(raw.get("test"), dict):
+        for key, value in raw["test"].items():
+            assign(raw, key, value)
+    given = []
+    for text in overrides:
+        key, value = parse_assignment(text)
+        if not is_known(key, known):
+            from catenary.solver.errors import InputError
+
+            raise InputError(unknown_key(key, "on the command line (--set)", known))
+        assign(raw, key, value)
+        given.append(key)
+    return scene_from(raw, Origin(str(path), tuple(given)), folder=path.parent)
+
+
+def scene_from(raw: dict[str, Any], origin: Origin, folder: Path | None = None) -> Scene:
+    """The checked scene of a nested table, such as ``Scene.resolved()`` gives.
+
+    ``folder`` is where a relative ``mesh.file`` is looked for and whose name an unnamed case takes.
+    """
+    from catenary.cases.checks import check
+
+    raw = copy.deepcopy(raw)
+    _fill_in(raw, folder)
+    try:
+        scene = Scene.model_validate(raw)
+    except ValidationError as failed:
+        raise input_error(failed, raw, Scene, origin) from None
+    scene._origin = origin
+    check(scene)
+    return scene
+
+
+def _fill_in(raw: dict[str, Any], folder: Path | None) -> None:
+    if folder is None:
+        return
+    case = raw.setdefault("case", {})
+    if isinstance(case, dict):
+        case.setdefault("name", folder.name)
+    mesh = raw.get("mesh")
+    if isinstance(mesh, dict) and isinstance(mesh.get("file"), str) and mesh["file"]:
+        mesh["file"] = str(folder / Path(mesh["file"]))

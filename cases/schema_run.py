@@ -1,0 +1,201 @@
+"""Scene tables of what runs on the line: train, pantographs, contact, numerics, evaluation."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, field_validator, model_validator
+
+from catenary.cases.table import Table, ascending, exactly_one
+
+# Statistics are taken below 20 Hz (EN 50317); its Nyquist limit is the longest step that can do so.
+MAX_DT = 1.0 / 40.0
+
+
+class CaseTable(Table):
+    """What the case is."""
+
+    name: str = Field("", max_length=200, description="name; the folder's if absent")
+    title: str = Field("", max_length=500, description="one line for lists and reports")
+    description: str = Field("", max_length=20000, description="problem and set-up")
+    source: str = Field("", max_length=2000, description="where the data come from")
+
+
+class PlacementTable(Table):
+    """A pantograph on the train."""
+
+    name: str = Field(min_length=1, description="which table of [pantographs] it is")
+    behind_m: float = Field(
+        0.0, ge=0, le=1000, description="distance behind the leading pantograph"
+    )
+
+
+class TrainTable(Table):
+    """The train: one speed, one or more pantographs."""
+
+    speed_km_h: float = Field(ge=1, le=1000, description="train speed")
+    start_m: float = Field(
+        ge=0, le=1e6, description="position of the leading pantograph at the start"
+    )
+    end_m: float | None = Field(
+        None,
+        ge=0,
+        le=1e6,
+        description="position of the leading pantograph at the end; one span after the trailing "
+        "one has left the evaluated stretch if absent",
+    )
+    raise_time_s: float = Field(
+        0.5, ge=0, le=60, description="time in which the static force grows from zero"
+    )
+    pantographs: list[PlacementTable] = Field(
+        min_length=1, max_length=16, description="pantographs in running order, leading one first"
+    )
+
+
+Mass = Annotated[float, Field(gt=0, le=1000)]
+Stiffness = Annotated[float, Field(ge=0, le=1e8)]
+DampingValue = Annotated[float, Field(ge=0, le=1e6)]
+Force = Annotated[float, Field(ge=-1000, le=1000)]
+
+
+class PantographTable(Table):
+    """A pantograph as a chain of lumped masses, head first; the last spring stands on the base."""
+
+    type: Literal["lumped"] = Field("lumped", description="model of the pantograph")
+    masses_kg: list[Mass] = Field(min_length=1, max_length=20, description="masses, head first")
+    stiffnesses_N_per_m: list[Stiffness] = Field(
+        description="springs below each mass, the last one to the base; only that may be 0"
+    )
+    dampings_N_s_per_m: list[DampingValue] = Field(description="dampers below each mass")
+    static_force_N: float | None = Field(
+        None, gt=0, le=1000, description="force on the wire at rest"
+    )
+    static_force_by_speed: (
+        list[Annotated[list[float], Field(min_length=2, max_length=2)]] | None
+    ) = Field(
+        None,
+        min_length=1,
+        max_length=1000,
+        description="pairs of speed [km/h] and force [N], linear in between",
+    )
+    nominal_height_m: float | None = Field(
+        None, gt=0, le=20, description="head height at which the static force holds"
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> PantographTable:
+        n = len(self.masses_kg)
+        for name in ("stiffnesses_N_per_m", "dampings_N_s_per_m"):
+            if len(getattr(self, name)) != n:
+                raise ValueError(
+                    f"must give one value per mass, but {name} has {len(getattr(self, name))} "
+                    f"and masses_kg has {n}"
+                )
+        if any(k == 0 for k in self.stiffnesses_N_per_m[:-1]):
+            raise ValueError("must have springs between its masses: only the last of "
+                             "stiffnesses_N_per_m may be 0")  # fmt: skip
+        exactly_one(self, "static_force_N", "static_force_by_speed")
+        if self.static_force_by_speed is not None:
+            ascending([pair[0] for pair in self.static_force_by_speed],
+                      "the speeds of static_force_by_speed")  # fmt: skip
+            for _, force in self.static_force_by_speed:
+                if not 0 < force <= 1000:
+                    raise ValueError(
+                        "must have forces between 0 and 1000 N in static_force_by_speed, "
+                        f"but one is {force:g}"
+                    )
+        return self
+
+
+class ContactTable(Table):
+    """Penalty contact between head and wire."""
+
+    stiffness_N_per_m: float = Field(5e4, gt=0, le=1e9, description="penalty stiffness")
+    damping_N_s_per_m: float = Field(
+        0.0, ge=0, le=1e6, description="damping, acts with effects.contact_damping"
+    )
+
+
+class NumericsTable(Table):
+    """Time stepping."""
+
+    dt_s: float = Field(1e-3, ge=1e-6, description="time step")
+    scheme: Literal["one_solve", "fixed_point"] = Field(
+        "one_solve", description="one solve a step, or the paper's fixed-point correction"
+    )
+    newmark_beta: float = Field(0.25, gt=0, le=1, description="Newmark's beta")
+    newmark_gamma: float = Field(0.5, ge=0.5, le=2, description="Newmark's gamma")
+    eps_d_m: float = Field(
+        1e-6, gt=0, le=1e-2, description="fixed_point: change of displacement that ends a step"
+    )
+    eps_v_m_per_s: float = Field(
+        1e-3, gt=0, le=1, description="fixed_point: change of velocity that ends a step"
+    )
+    max_iterations: int = Field(
+        50, ge=1, le=10000, description="fixed_point: most corrections a step"
+    )
+
+    @field_validator("dt_s")
+    @classmethod
+    def _resolves_20_hz(cls, dt: float) -> float:
+        if dt > MAX_DT:
+            raise ValueError(f"must be at most {MAX_DT} s, so that 20 Hz are resolved")
+        return dt
+
+    @model_validator(mode="after")
+    def _stable(self) -> NumericsTable:
+        if 2 * self.newmark_beta < self.newmark_gamma:
+            raise ValueError(
+                "must have 2 newmark_beta >= newmark_gamma to be stable for every step, but "
+                f"newmark_beta is {self.newmark_beta:g} and newmark_gamma is {self.newmark_gamma:g}"
+            )
+        return self
+
+
+class EvaluationTable(Table):
+    """The stretch whose statistics are judged, and by what."""
+
+    from_m: float = Field(ge=0, le=1e6, description="start of the evaluated stretch")
+    to_m: float = Field(gt=0, le=1e6, description="end of the evaluated stretch")
+    edition: str = Field("2006", description="edition of EN 50367 whose limits are applied")
+    system: str = Field("ac", description="power supply, which decides the mean force allowed")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> EvaluationTable:
+        if self.to_m <= self.from_m:
+            raise ValueError(
+                f"must end after it starts, but from_m is {self.from_m:g} and to_m {self.to_m:g}"
+            )
+        return self
+
+
+class OutputTable(Table):
+    """What is written besides the channels."""
+
+    field_every_s: float = Field(
+        0.0, ge=0, le=1e4, description="cadence of field snapshots; 0 writes none"
+    )
+    energy_every_s: float = Field(
+        0.0, ge=0, le=1e4, description="cadence of the line's energy; 0 writes none"
+    )
+    flush_every_steps: int = Field(
+        500, ge=1, le=10**7, description="steps after which the result file is brought up to date"
+    )
+
+
+def _petsc_value(value: Any) -> Any:
+    if not isinstance(value, str | int | float | bool):
+        raise ValueError("must be text, a number, true or false")
+    return value
+
+
+def _petsc_name(name: str) -> str:
+    if not re.fullmatch(r"[A-Za-z][\w.:-]*", name):
+        raise ValueError("must be named like a PETSc option without its dash, e.g. ksp_type")
+    return name
+
+
+PetscTable = dict[
+    Annotated[str, AfterValidator(_petsc_name)], Annotated[Any, AfterValidator(_petsc_value)]
+]

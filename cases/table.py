@@ -1,0 +1,44 @@
+"""What all tables of a scene share: strict types, no unknown keys, bounds, finite numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict
+
+
+class Table(BaseModel):
+    """A table of ``case.toml``.
+
+    Strict: "20 kN" is not a number and 1 is not true. Validators raise ``ValueError`` with a
+    predicate ("must be ...") that ``messages.sentence`` completes with key, value and place.
+    """
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def _as_list(value: Any) -> Any:
+    return [value] if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+def exactly_one(table: Table, *names: str) -> None:
+    """Raise ``ValueError`` unless exactly one of the keys ``names`` is given."""
+    given = [name for name in names if getattr(table, name) is not None]
+    if len(given) != 1:
+        but = "none is given" if not given else f"{' and '.join(given)} are given"
+        raise ValueError(f"needs exactly one of {', '.join(names)}, but {but}")
+
+
+def ascending(values: Sequence[float], what: str) -> None:
+    """Raise ``ValueError`` unless each value is greater than the one before."""
+    for before, after in zip(values, values[1:], strict=False):
+        if after <= before:
+            raise ValueError(
+                f"must list {what} in ascending order, but {after:g} follows {before:g}"
+            )
+
+
+# A list for which a person may write one number.
+OneOrMore = BeforeValidator(_as_list)
+LengthList = Annotated[list[float], OneOrMore]

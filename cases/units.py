@@ -1,0 +1,35 @@
+"""Units of scene keys: which suffix stands for which unit, and the two conversions to SI."""
+
+from __future__ import annotations
+
+# One table gives each key its unit. Longest suffix first, so that "_kg_per_m" is not read as "_m".
+SUFFIXES: dict[str, str] = {
+    "_N_s_per_m": "N s/m",
+    "_m_per_s": "m/s",
+    "_kg_per_m": "kg/m",
+    "_N_per_m": "N/m",
+    "_N_m2": "N m2",
+    "_km_h": "km/h",
+    "_per_s": "1/s",
+    "_mm": "mm",
+    "_kg": "kg",
+    "_m": "m",
+    "_N": "N",
+    "_s": "s",
+}
+
+
+def unit_of(key: str) -> str:
+    """Unit that the last part of a dotted key names, "" where it names none."""
+    name = next((part for part in reversed(key.split(".")) if not part.isdigit()), "")
+    return next((unit for suffix, unit in SUFFIXES.items() if name.endswith(suffix)), "")
+
+
+def speed_from_km_h(speed: float) -> float:
+    """Speed [m/s] from ``speed`` [km/h]."""
+    return speed / 3.6
+
+
+def length_from_mm(length: float) -> float:
+    """Length [m] from ``length`` [mm]."""
+    return length / 1000.0
