@@ -22,7 +22,7 @@ _KINDS = {0: "points", 1: "lines", 2: "surfaces", 3: "volumes"}
 
 
 def read_mesh(path: Path) -> LineMesh:
-    """The line mesh of a ``.msh`` file of any version, checked. Not collective: one rank reads.
+    """The line mesh of a ``.msh`` file (MSH 2.2 or 4.1), checked. Not collective: one rank reads.
 
     Numbering and orientation of nodes and elements in the file do not matter; a dropper may
     consist of several elements, of which only the ends are kept. Nodes that nothing uses are left

@@ -1,0 +1,244 @@
+"""The mesh of a line: counts, places, heights, and a file that Gmsh itself understands."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import gmsh
+import numpy as np
+import pytest
+
+from catenary.meshgen.build import make_mesh
+from catenary.meshgen.gmsh_lines import write_mesh
+from catenary.meshgen.line import Line
+from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.meshgen.reader import read_mesh
+from catenary.solver.errors import InputError
+
+# Gmsh finds the parameter of each node to 1e-12 of the line's length, and writes 16 digits.
+PLACE = 1e-8
+
+
+def cuts_of(line: Line) -> np.ndarray:
+    """Masts and droppers in order [m]."""
+    masts = line.support_positions
+    places = [
+        start + np.array(at) for start, at in zip(masts, line.dropper_positions, strict=False)
+    ]
+    return np.sort(np.concatenate([masts, *places]))
+
+
+@pytest.mark.parametrize("elements_per_gap", [1, 2, 5])
+def test_every_gap_holds_the_elements_asked_for(
+    make_line: Callable[..., Line], elements_per_gap: int
+) -> None:
+    line = make_line()
+    mesh = make_mesh(line, elements_per_gap)
+    cuts = cuts_of(line)
+    for wire in (CONTACT_WIRE, MESSENGER_WIRE):
+        x = mesh.x(mesh.wires[wire])
+        assert x.size == elements_per_gap * (cuts.size - 1) + 1
+        np.testing.assert_allclose(x[::elements_per_gap], cuts, atol=PLACE)
+        length = np.diff(x).reshape(-1, elements_per_gap)
+        np.testing.assert_allclose(
+            length,
+            np.repeat(np.diff(cuts)[:, None] / elements_per_gap, elements_per_gap, axis=1),
+            atol=PLACE,
+        )
+    assert mesh.n_nodes == 2 * (elements_per_gap * (cuts.size - 1) + 1)
+    assert mesh.droppers.shape == (12, 2)
+    assert mesh.steady_arms.shape == mesh.supports.shape == (3,)
+    assert mesh.anchors.shape == (4,)
+
+
+def test_refinement_multiplies_the_gaps_next_to_masts_only(make_line: Callable[..., Line]) -> None:
+    line = make_line()
+    mesh = make_mesh(line, 2, support_refinement=3)
+    masts, cuts = line.support_positions, cuts_of(line)
+    for wire in (CONTACT_WIRE, MESSENGER_WIRE):
+        x = mesh.x(mesh.wires[wire])
+        for left, right in zip(cuts[:-1], cuts[1:], strict=True):
+            inside = np.count_nonzero((x > left + PLACE) & (x < right - PLACE))
+            next_to_mast = np.isclose(masts, left).any() or np.isclose(masts, right).any()
+            assert inside + 1 == (6 if next_to_mast else 2)
+
+
+def test_droppers_hang_where_the_line_says_in_order(make_line: Callable[..., Line]) -> None:
+    line = make_line()
+    mesh = make_mesh(line, 3)
+    wanted = np.setdiff1d(cuts_of(line), line.support_positions)
+    for side, wire in ((0, MESSENGER_WIRE), (1, CONTACT_WIRE)):
+        np.testing.assert_allclose(mesh.x(mesh.droppers[:, side]), wanted, atol=PLACE)
+        assert np.isin(mesh.droppers[:, side], mesh.wires[wire]).all()
+
+
+def test_arms_supports_and_anchors_sit_on_their_wires(make_line: Callable[..., Line]) -> None:
+    line = make_line()
+    mesh = make_mesh(line, 3)
+    masts = line.support_positions
+    np.testing.assert_allclose(mesh.x(mesh.steady_arms), masts[1:-1], atol=PLACE)
+    np.testing.assert_allclose(mesh.x(mesh.supports), masts[1:-1], atol=PLACE)
+    assert np.isin(mesh.steady_arms, mesh.wires[CONTACT_WIRE]).all()
+    assert np.isin(mesh.supports, mesh.wires[MESSENGER_WIRE]).all()
+    ends = np.concatenate([wire[[0, -1]] for wire in mesh.wires.values()])
+    assert sorted(mesh.anchors) == sorted(ends)
+
+
+def test_contact_wire_follows_pre_sag_stagger_and_the_rise_to_the_tensioners(
+    make_line: Callable[..., Line],
+) -> None:
+    line = make_line()
+    mesh = make_mesh(line, 4)
+    x, y, z = mesh.points[mesh.wires[CONTACT_WIRE]].T
+    masts = line.support_positions
+    np.testing.assert_allclose(y, np.interp(x, masts, line.stagger), atol=1e-9)
+    # transition spans: a parabola, 0.4 m at the anchors; a quarter of it at midspan
+    assert z[[0, -1]] == pytest.approx([5.7, 5.7], abs=1e-12)
+    assert np.interp(25.0, x, z) == pytest.approx(5.3 + 0.25 * 0.4 - 0.02, abs=1e-9)
+    assert np.interp(192.5, x, z) == pytest.approx(5.3 + 0.25 * 0.4 - 0.01, abs=1e-9)
+    # second span: droppers at 55, 68, 92, 105 with 0, 30, 30, 0 mm, straight in between
+    for place, sag in ((50.0, 0.0), (61.5, 0.015), (68.0, 0.03), (80.0, 0.03), (110.0, 0.0)):
+        assert np.interp(place, x, z) == pytest.approx(5.3 - sag, abs=1e-9)
+
+
+def test_messenger_wire_sags_by_the_weight_of_both_wires(make_line: Callable[..., Line]) -> None:
+    line = make_line()
+    mesh = make_mesh(line, 1)
+    x, y, z = mesh.points[mesh.wires[MESSENGER_WIRE]].T
+    assert not y.any()
+    np.testing.assert_allclose(np.interp(line.support_positions, x, z), 5.3 + 1.4, atol=1e-12)
+    # q L^2 / 8F at the dropper in the middle of the first span
+    assert np.interp(25.0, x, z) == pytest.approx(6.7 - (1.35 + 1.07) * 9.81 * 50.0**2 / (8 * 16e3))
+
+
+def test_nodes_are_numbered_along_the_track(make_line: Callable[..., Line]) -> None:
+    mesh = make_mesh(make_line(), 3)
+    assert (np.diff(mesh.points[:, 0]) > -PLACE).all()
+    # both wires' nodes of one station are neighbours, the messenger wire's first
+    np.testing.assert_array_equal(mesh.wires[CONTACT_WIRE] - mesh.wires[MESSENGER_WIRE], 1)
+
+
+def test_gmsh_opens_the_file_with_its_physical_groups(
+    make_line: Callable[..., Line], tmp_path: Path
+) -> None:
+    path = tmp_path / "line.msh"
+    mesh = make_mesh(make_line(), 2, path)
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.open(str(path))
+        groups = {
+            gmsh.model.getPhysicalName(*group): (
+                group[0],
+                len(gmsh.model.mesh.getNodesForPhysicalGroup(*group)[0]),
+            )
+            for group in gmsh.model.getPhysicalGroups()
+        }
+    finally:
+        gmsh.finalize()
+    wire = mesh.wires[CONTACT_WIRE].size
+    assert groups == {
+        "contact_wire": (1, wire),
+        "messenger_wire": (1, wire),
+        "droppers": (1, 24),
+        "steady_arms": (0, 3),
+        "supports": (0, 3),
+        "anchors": (0, 4),
+    }
+
+
+def test_a_single_span_has_no_supports_and_is_read_back(make_line: Callable[..., Line]) -> None:
+    line = make_line(
+        span_lengths=(50.0,),
+        dropper_positions=((),),
+        pre_sag=((),),
+        stagger=(0.0, 0.0),
+        n_transition=(0, 0),
+    )
+    mesh = make_mesh(line, 4)
+    assert mesh.n_nodes == 10
+    assert mesh.droppers.shape == (0, 2)
+    assert mesh.supports.size == mesh.steady_arms.size == 0
+    np.testing.assert_array_equal(mesh.anchors, [0, 1, 8, 9])
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"dropper_positions": ((0.0,), (5.0,))}, "the dropper at 0 m of span 1 lies on a mast"),
+        ({"dropper_positions": ((5.0,), (50.0,))}, "the dropper at 50 m of span 2 lies on a mast"),
+        ({"dropper_positions": ((5.0,), (61.0,))}, "the dropper at 61 m of span 2 lies outside"),
+        ({"dropper_positions": ((-4.0,), (5.0,))}, "the dropper at -4 m of span 1 lies outside"),
+        ({"dropper_positions": ((float("nan"),), (5.0,))}, "the dropper at nan m of span 1"),
+        (
+            {"dropper_positions": ((9.0, 5.0), (5.0,)), "pre_sag": ((0.0, 0.0), (0.0,))},
+            "the droppers at 9 and 5 m of span 1 are not in ascending order",
+        ),
+        ({"pre_sag": ((0.0,), ())}, "span 2 has 1 droppers, but pre_sag names 0 values"),
+        ({"stagger": (0.0, 0.2)}, "stagger has 2 entries, but 2 spans need 3"),
+        ({"span_lengths": (50.0, 0.0)}, "the length of span 2 is 0 m"),
+        ({"encumbrance": 0.1, "n_transition": (0, 0)}, "at the dropper at 5 m of span 1"),
+    ],
+)
+def test_an_impossible_line_is_refused(
+    make_line: Callable[..., Line], tmp_path: Path, changes: dict[str, object], sentence: str
+) -> None:
+    two_spans: dict[str, object] = {
+        "span_lengths": (50.0, 50.0),
+        "dropper_positions": ((5.0,), (5.0,)),
+        "pre_sag": ((0.0,), (0.0,)),
+        "stagger": (0.0, 0.2, 0.0),
+    }
+    path = tmp_path / "line.msh"
+    with pytest.raises(InputError, match=sentence):
+        write_mesh(make_line(**{**two_spans, **changes}), 3, path)
+    assert not path.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name", "sentence"),
+    [
+        ((0, 1), "line.msh", "elements_per_gap is 0"),
+        ((3, 0), "line.msh", "support_refinement is 0"),
+        ((3, 1), "line.vtk", "must have a name that ends in .msh"),
+        ((3, 1), "missing/line.msh", "cannot be written"),
+    ],
+)
+def test_an_impossible_request_is_refused(
+    make_line: Callable[..., Line],
+    tmp_path: Path,
+    arguments: tuple[int, int],
+    name: str,
+    sentence: str,
+) -> None:
+    count, refinement = arguments
+    with pytest.raises(InputError, match=sentence):
+        write_mesh(make_line(), count, tmp_path / name, support_refinement=refinement)
+    assert not gmsh.isInitialized()
+
+
+def test_gmsh_prints_nothing_and_leaves_the_interrupt_alone(
+    make_line: Callable[..., Line], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    before = signal.getsignal(signal.SIGINT)
+    write_mesh(make_line(), 3, tmp_path / "line.msh")
+    read_mesh(tmp_path / "line.msh")
+    assert signal.getsignal(signal.SIGINT) is before
+    assert not gmsh.isInitialized()
+    assert capfd.readouterr() == ("", "")
+
+
+def test_an_open_session_of_the_caller_stays_open(
+    make_line: Callable[..., Line], tmp_path: Path
+) -> None:
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.add("of the caller")
+        write_mesh(make_line(), 3, tmp_path / "line.msh")
+        assert gmsh.isInitialized()
+        assert gmsh.model.list() == ["", "of the caller"]
+    finally:
+        gmsh.finalize()
