@@ -1,0 +1,141 @@
+"""The arrows between the layers, read from the imports of the code itself."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PARTS = ("meshgen", "mbs", "solver", "postproc", "cases")
+
+# meshgen, mbs <- solver <- postproc <- cases
+MAY_IMPORT = {
+    "meshgen": {"meshgen"},
+    "mbs": {"mbs"},
+    "solver": {"meshgen", "mbs", "solver"},
+    "postproc": {"meshgen", "mbs", "solver", "postproc"},
+    "cases": set(PARTS),
+}
+LEAVES = {"catenary.solver.errors", "catenary.solver.parallel"}
+FILES = sorted(path for part in PARTS for path in (ROOT / part).rglob("*.py"))
+
+
+def imports_in(tree: ast.AST) -> Iterator[str]:
+    """Every module that is imported anywhere in a file, ``from a import b`` as ``a.b``."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (name.name for name in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            # relative imports would hide an arrow; none is allowed
+            assert node.level == 0, f"relative import in line {node.lineno}"
+            yield from (f"{node.module}.{name.name}" for name in node.names)
+
+
+def is_within(module: str, package: str) -> bool:
+    return module == package or module.startswith(package + ".")
+
+
+def broken_arrows(part: str, modules: list[str]) -> list[str]:
+    """Imports that a file of ``part`` must not make."""
+    wrong = []
+    for module in modules:
+        top, *rest = module.split(".")
+        if top in PARTS or (top == "catenary" and not rest):
+            wrong.append(f"{module} (import catenary.<part>.<module>)")
+        elif top == "catenary" and rest[0] not in MAY_IMPORT[part]:
+            if not any(is_within(module, leaf) for leaf in LEAVES):
+                wrong.append(module)
+    return wrong
+
+
+def tree_of(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"), str(path))
+
+
+def test_the_checks_find_what_they_are_for() -> None:
+    tree = ast.parse(
+        "import catenary.solver.march\n"
+        "def late():\n    from catenary.solver.errors import InputError\n    import solver\n"
+    )
+    found = list(imports_in(tree))
+    assert broken_arrows("meshgen", found) == [
+        "catenary.solver.march",
+        "solver (import catenary.<part>.<module>)",
+    ]
+    assert broken_arrows("solver", ["catenary.postproc.recorder", "catenary.mbs.lumped"]) == [
+        "catenary.postproc.recorder"
+    ]
+    loose = ast.parse("from mpi4py import MPI\ndef f(comm=MPI.COMM_WORLD):\n    pass\n")
+    inside = ast.parse("from mpi4py import MPI\ndef f():\n    return MPI.COMM_WORLD\n")
+    assert list(world_at_import(loose)) == [2]
+    assert list(world_at_import(inside)) == []
+    assert len(FILES) > len(PARTS)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_file_imports_only_layers_before_its_own(path: Path) -> None:
+    part = path.relative_to(ROOT).parts[0]
+    assert broken_arrows(part, list(imports_in(tree_of(path)))) == []
+
+
+@pytest.mark.parametrize("leaf", sorted(LEAVES))
+def test_a_leaf_imports_nothing_but_errors(leaf: str) -> None:
+    path = ROOT.joinpath(*leaf.split(".")[1:]).with_suffix(".py")
+    ours = [name for name in imports_in(tree_of(path)) if is_within(name, "catenary")]
+    assert all(is_within(name, "catenary.solver.errors") for name in ours)
+
+
+@pytest.mark.parametrize(
+    ("module", "only"), [("gmsh", "meshgen/gmsh_lines.py"), ("meshio", "meshgen/reader.py")]
+)
+def test_a_mesh_library_is_imported_in_one_file(module: str, only: str) -> None:
+    users = {
+        str(path.relative_to(ROOT))
+        for path in FILES
+        if any(is_within(name, module) for name in imports_in(tree_of(path)))
+    }
+    assert users == {only}
+
+
+FILE_WRITERS = ("h5py", "meshio", "gmsh", "catenary.postproc", "matplotlib", "jinja2")
+
+
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "solver").rglob("*.py")), ids=lambda path: str(path.relative_to(ROOT))
+)
+def test_the_solver_never_writes_results(path: Path) -> None:
+    found = [
+        name
+        for name in imports_in(tree_of(path))
+        if any(is_within(name, writer) for writer in FILE_WRITERS)
+    ]
+    assert found == []
+
+
+def world_at_import(tree: ast.Module) -> Iterator[int]:
+    """Lines that use COMM_WORLD when the module is imported, default arguments included."""
+    pending: list[ast.AST] = list(tree.body)
+    while pending:
+        node = pending.pop()
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            # the body runs later, defaults and decorators run now
+            pending += [d for d in (*node.args.defaults, *node.args.kw_defaults) if d is not None]
+            pending += getattr(node, "decorator_list", [])
+            continue
+        if isinstance(node, ast.Attribute) and node.attr == "COMM_WORLD":
+            yield node.lineno
+        if isinstance(node, ast.ImportFrom) and any(n.name == "COMM_WORLD" for n in node.names):
+            yield node.lineno
+        pending += ast.iter_child_nodes(node)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [path for path in FILES if path.relative_to(ROOT).parts[0] != "cases"],
+    ids=lambda path: str(path.relative_to(ROOT)),
+)
+def test_no_module_holds_the_world_communicator(path: Path) -> None:
+    assert list(world_at_import(tree_of(path))) == []

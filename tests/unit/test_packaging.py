@@ -1,0 +1,152 @@
+"""What is installed: the five folders as catenary.*, their data, and nothing under a bare name."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PARTS = ("meshgen", "solver", "mbs", "postproc", "cases")
+BUILT_FROM = (*PARTS, "pyproject.toml", "setup.py", "LICENSE", "README.md")
+
+# What a program finds from outside the checkout, printed as JSON.
+SHOW = """
+import importlib, json, sys
+from pathlib import Path
+modules = sys.argv[1:]
+print(json.dumps({name: str(Path(importlib.import_module(name).__file__)) for name in modules}))
+"""
+
+
+def run(*command: str | Path, cwd: Path, **variables: str) -> subprocess.CompletedProcess[str]:
+    environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
+    return subprocess.run(
+        [str(part) for part in command],
+        cwd=cwd,
+        env={**environment, **variables},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=200,
+    )
+
+
+def must(done: subprocess.CompletedProcess[str]) -> str:
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def library_files() -> set[str]:
+    """Python files of the checkout, by the names under which they are to be installed."""
+    return {f"catenary/{part}/{path.name}" for part in PARTS for path in (ROOT / part).glob("*.py")}
+
+
+def data_files() -> set[str]:
+    """Data of the checkout that a run or a report reads, likewise."""
+    patterns = (
+        "cases/*/case.toml",
+        "cases/*/README.md",
+        "cases/*/reference/*.csv",
+        "postproc/templates/*",
+    )
+    return {
+        f"catenary/{path.relative_to(ROOT)}"
+        for pattern in patterns
+        for path in ROOT.glob(pattern)
+        if path.is_file()
+    }
+
+
+@pytest.fixture(scope="module")
+def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of what a package is built from: building leaves its traces there."""
+    copy = tmp_path_factory.mktemp("sources")
+    for name in BUILT_FROM:
+        if (ROOT / name).is_dir():
+            shutil.copytree(
+                ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__", "results")
+            )
+        elif (ROOT / name).exists():
+            shutil.copy2(ROOT / name, copy / name)
+    return copy
+
+
+@pytest.fixture(scope="module")
+def installed(sources: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder that holds the wheel's content as pip installs it."""
+    folder = tmp_path_factory.mktemp("wheel")
+    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--no-input")
+    must(
+        run(
+            *pip, "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--no-index",
+            "--wheel-dir", folder, sources, cwd=folder,
+        )
+    )  # fmt: skip
+    (wheel,) = folder.glob("catenary-*.whl")
+    target = folder / "target"
+    must(run(*pip, "install", "--quiet", "--no-deps", "--target", target, wheel, cwd=folder))
+    return target
+
+
+def test_the_wheel_is_imported_from_where_it_is_installed(installed: Path, tmp_path: Path) -> None:
+    modules = (
+        "catenary.meshgen",
+        "catenary.meshgen.line",
+        "catenary.solver.errors",
+        "catenary.solver.problem",
+        "catenary.mbs.lumped",
+        "catenary.postproc",
+        "catenary.cases",
+    )
+    found = json.loads(
+        must(run(sys.executable, "-c", SHOW, *modules, cwd=tmp_path, PYTHONPATH=str(installed)))
+    )
+    assert sorted(found) == sorted(modules)
+    for name, file in found.items():
+        assert Path(file).is_relative_to(installed), f"{name} came from {file}"
+
+
+def test_the_wheel_holds_all_modules_and_data_and_no_tests(installed: Path) -> None:
+    there = {str(path.relative_to(installed)) for path in installed.rglob("*") if path.is_file()}
+    ours = {name for name in there if name.startswith("catenary/") and "__pycache__" not in name}
+    assert ours == library_files() | data_files()
+    # beside it only the metadata and the program
+    tops = {Path(name).parts[0] for name in there}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"catenary", "bin"}
+    assert (installed / "bin" / "catenary").is_file()
+
+
+def test_the_source_archive_can_build_the_wheel(sources: Path, tmp_path: Path) -> None:
+    build = f"from setuptools.build_meta import build_sdist; print(build_sdist({str(tmp_path)!r}))"
+    must(run(sys.executable, "-c", build, cwd=sources))
+    (archive,) = tmp_path.glob("catenary-*.tar.gz")
+    with tarfile.open(archive) as content:
+        names = {name.partition("/")[2] for name in content.getnames()}
+    wanted = {name.removeprefix("catenary/") for name in library_files() | data_files()}
+    assert wanted | {"pyproject.toml", "setup.py", "LICENSE"} <= names
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_a_bare_name_is_refused_with_a_hint(part: str) -> None:
+    done = run(sys.executable, "-c", f"import {part}", cwd=ROOT)
+    assert done.returncode == 1
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.startswith(f"ImportError: import catenary.{part}, not {part}: ")
+
+
+def test_the_editable_install_is_found_from_elsewhere(tmp_path: Path) -> None:
+    modules = [f"catenary.{part}" for part in PARTS]
+    found = json.loads(must(run(sys.executable, "-c", SHOW, *modules, cwd=tmp_path)))
+    assert found == {f"catenary.{part}": str(ROOT / part / "__init__.py") for part in PARTS}
+
+
+def test_the_program_is_installed_beside_the_interpreter() -> None:
+    program = Path(sys.executable).with_name("catenary")
+    assert os.access(program, os.X_OK), "run make setup"
