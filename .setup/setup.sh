@@ -39,7 +39,7 @@ is_current() {
 # --- Debian and Ubuntu -------------------------------------------------------------------------
 
 is_installed() {
-    dpkg-query -W -f='${db:Status-Status}\n' "$1" 2>/dev/null | grep -qx installed
+    [[ $(dpkg-query -W -f='<${db:Status-Status}>' "$1" 2>/dev/null) == *"<installed>"* ]]
 }
 
 # Some libraries carry another name since the change to 64-bit time (Ubuntu 24.04, Debian 13).
@@ -50,7 +50,8 @@ is_provided() {
 name_in_archive() {
     local name
     for name in "$1" "${1}t64"; do
-        if apt-cache policy "$name" 2>/dev/null | grep -q 'Candidate: [^(]'; then
+        # No pipe into grep -q: it would end apt-cache early, which pipefail takes for a failure.
+        if [[ $(apt-cache policy "$name" 2>/dev/null) =~ Candidate:\ [^\(] ]]; then
             printf '%s\n' "$name"
             return
         fi
@@ -74,19 +75,32 @@ as_root() {
 }
 
 may_install() {
-    [ "$(id -u)" = 0 ] || { command -v sudo >/dev/null && { [ -t 0 ] || sudo -n true 2>/dev/null; }; }
+    [ "$(id -u)" = 0 ] && return
+    command -v sudo >/dev/null || return
+    # A password can only be asked for at a terminal.
+    [ -t 0 ] || sudo -n true 2>/dev/null
+}
+
+# Run a command without its chatter, which is shown when it fails.
+quietly() {
+    local output
+    output=$("$@" 2>&1 </dev/null) || {
+        say "$output"
+        return 1
+    }
 }
 
 install_packages() {
     local name
     local -a names=()
     say "setup: installing $# system packages"
-    as_root apt-get update -qq >&2 || fail "apt-get update failed"
+    quietly as_root apt-get update || fail "apt-get update failed"
     for name in "$@"; do
-        names+=("$(name_in_archive "$name")")
+        name=$(name_in_archive "$name")
+        names+=("$name")
     done
-    as_root apt-get install -qq -y --no-install-recommends -o DPkg::Lock::Timeout=120 \
-        "${names[@]}" >&2 || fail "apt-get could not install: ${names[*]}"
+    quietly as_root apt-get install -y --no-install-recommends -o DPkg::Lock::Timeout=120 \
+        "${names[@]}" || fail "apt-get could not install: ${names[*]}"
 }
 
 # Folder that holds the petsc4py of the newest installed PETSc: Debian keeps it out of sys.path.
@@ -102,9 +116,13 @@ has_everything() {
     command -v "$1" >/dev/null && "$1" -c 'import petsc4py, mpi4py, h5py, numpy, venv' 2>/dev/null
 }
 
+# What to do, given the names of missing packages where there is apt.
 explain() {
+    say "setup: python3 on the PATH does not bring petsc4py, mpi4py and h5py, which Catenary needs."
+    if [ $# -gt 0 ]; then
+        say "  Here:            apt-get install --no-install-recommends $*"
+    fi
     cat >&2 <<'TEXT'
-setup: python3 on the PATH does not bring petsc4py, mpi4py and h5py, which Catenary needs.
   Debian, Ubuntu:  run `make setup` as root or as a user who may use sudo.
   conda-forge:     conda create -n catenary -c conda-forge python petsc petsc4py mpi4py h5py scipy gmsh make
                    conda activate catenary, then make setup
@@ -135,7 +153,7 @@ choose_python() {
             return
         fi
     fi
-    has_everything "$python" || explain
+    has_everything "$python" || explain "${missing[@]}"
 }
 
 make_environment() {
