@@ -62,7 +62,7 @@ def is_known(key: str, known: list[str]) -> bool:
 
 
 def _matches(parts: list[str], pattern: list[str]) -> bool:
-    if pattern[-1] == ANY and len(pattern) == 2 and pattern[0] in ("petsc", "test"):
+    if pattern in (["petsc", ANY], ["test", ANY]):
         return len(parts) >= 2 and parts[0] == pattern[0]  # free tables: names may hold dots
     return len(parts) == len(pattern) and all(
         want in (ANY, part) for part, want in zip(parts, pattern, strict=True)
@@ -72,26 +72,30 @@ def _matches(parts: list[str], pattern: list[str]) -> bool:
 def nearest(key: str, known: list[str]) -> str | None:
     """The known key that ``key`` most likely stands for, None if nothing comes near.
 
-    First a neighbour in the same table, then the same or a similar last part anywhere, then the
-    whole key.
+    In this order: the same last part in another table, a similar one in the same table, a similar
+    one anywhere, a similar key as a whole. What the scene itself names is shown as ``<name>``.
     """
     parts = key.split(".")
-    siblings = []
-    for candidate in known:
-        pattern = candidate.split(".")
-        if pattern[-1] != ANY and _matches(parts[:-1], pattern[:-1] or []):
-            siblings.append(pattern[-1])
+    named = [candidate for candidate in known if not candidate.endswith(ANY)]
+    lasts = [candidate.rsplit(".", 1)[-1] for candidate in named]
+    if parts[-1] in lasts:
+        return _most_alike(key, named, parts[-1])
+    siblings = [
+        last
+        for candidate, last in zip(named, lasts, strict=True)
+        if _matches(parts[:-1], candidate.split(".")[:-1])
+    ]
     close = difflib.get_close_matches(parts[-1], siblings, n=1, cutoff=0.6)
     if close:
         return ".".join([*parts[:-1], close[0]])
-    if len(parts) == 1:
-        stems = {name.split("_")[0]: name for name in siblings}
-        if parts[0] in stems:
-            return stems[parts[0]]
-    plain = [candidate for candidate in known if ANY not in candidate]
-    last = {candidate.rsplit(".", 1)[-1]: candidate for candidate in reversed(plain)}
-    close = difflib.get_close_matches(parts[-1], list(last), n=1, cutoff=0.75)
+    close = difflib.get_close_matches(parts[-1], lasts, n=1, cutoff=0.75)
     if close:
-        return last[close[0]]
-    close = difflib.get_close_matches(key, plain, n=1, cutoff=0.6)
-    return close[0] if close else None
+        return _most_alike(key, named, close[0])
+    close = difflib.get_close_matches(key, named, n=1, cutoff=0.6)
+    return close[0].replace(ANY, "<name>") if close else None
+
+
+def _most_alike(key: str, known: list[str], last: str) -> str:
+    candidates = [c for c in known if c.rsplit(".", 1)[-1] == last]
+    best = difflib.get_close_matches(key, candidates, n=1, cutoff=0.0)[0]
+    return best.replace(ANY, "<name>")

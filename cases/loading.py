@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from catenary.cases.messages import shown
+from catenary.cases.messages import COMMAND_LINE, shown
 from catenary.solver.errors import InputError
 
 if sys.version_info >= (3, 11):
@@ -43,14 +43,23 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"{path} is not valid TOML: {error}") from error
 
 
+# What ``key=`` stands for: the key is taken away, so that its default holds.
+REMOVED = object()
+
+
 def parse_assignment(text: str) -> tuple[str, Any]:
-    """Key and value of ``key=value``; the value is read as TOML, as plain text if it is none."""
+    """Key and value of ``key=value``; the value is read as TOML, as plain text if it is none.
+
+    An empty value is ``REMOVED``.
+    """
     key, equals, value = text.partition("=")
     key = key.strip()
     if not equals or not key or any(not part for part in key.split(".")):
         raise InputError(
             f"--set {shown(text)} must have the form key=value, e.g. train.speed_km_h=300"
         )
+    if not value.strip():
+        return key, REMOVED
     try:
         parsed = tomllib.loads(f"value = {value}")
     except (ValueError, RecursionError):
@@ -60,10 +69,11 @@ def parse_assignment(text: str) -> tuple[str, Any]:
     return key, parsed["value"]
 
 
-def assign(raw: dict[str, Any], key: str, value: Any) -> None:
-    """Set a dotted key in a nested table, making the tables on the way.
+def assign(raw: dict[str, Any], key: str, value: Any, where: str = COMMAND_LINE) -> None:
+    """Set a dotted key in a nested table, making the tables on the way; ``REMOVED`` takes it away.
 
-    A number in the key is an index into a list; the number after the last one appends.
+    A number in the key is an index into a list; the number after the last one appends. ``where``
+    says in an error where the assignment was written.
 
     Raises
     ------
@@ -76,31 +86,34 @@ def assign(raw: dict[str, Any], key: str, value: Any) -> None:
     here: Any = raw
     for depth, part in enumerate(parts):
         last = depth == len(parts) - 1
-        if isinstance(here, dict):
-            if last:
-                here[part] = value
-            else:
-                here = here.setdefault(part, {})
-        elif isinstance(here, list):
-            here = _assign_in_list(here, parts, depth, value)
+        if isinstance(here, list):
+            place: Any = _index(here, parts, depth, where)
+            if place == len(here):
+                here.append({})
+        elif isinstance(here, dict):
+            place = part
+            if not last:
+                here.setdefault(part, {})
         else:
             above = ".".join(parts[:depth])
             raise InputError(
-                f"{shown(key)[1:-1]} cannot be set on the command line (--set): {above} is "
-                f"{shown(here)} and no table"
+                f"{shown(key)[1:-1]} cannot be set {where}: {above} is {shown(here)} and no table"
             )
+        if not last:
+            here = here[place]
+        elif value is not REMOVED:
+            here[place] = value
+        elif isinstance(here, list) or place in here:
+            del here[place]
 
 
-def _assign_in_list(here: list[Any], parts: list[str], depth: int, value: Any) -> Any:
+def _index(here: list[Any], parts: list[str], depth: int, where: str) -> int:
+    """The index that a key names in a list, at most one past its last entry."""
     above, part = ".".join(parts[:depth]), parts[depth]
     index = int(part) if part.isascii() and part.isdigit() and len(part) < 6 else -1
     if not 0 <= index <= len(here):
         raise InputError(
-            f"{shown('.'.join(parts))[1:-1]} cannot be set on the command line (--set): {above} "
-            f"is a list of {len(here)}, so that a number from 0 to {len(here)} must follow it"
+            f"{shown('.'.join(parts))[1:-1]} cannot be set {where}: {above} is a list of "
+            f"{len(here)}, so that a number from 0 to {len(here)} must follow it"
         )
-    if index == len(here):
-        here.append({})
-    if depth == len(parts) - 1:
-        here[index] = value
-    return here[index]
+    return index

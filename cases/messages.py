@@ -13,6 +13,7 @@ from catenary.cases.units import unit_of
 from catenary.solver.errors import InputError
 
 _SHOWN = 60
+COMMAND_LINE = "on the command line (--set)"
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class Origin:
         """Place of a key, with its preposition, for use in a sentence."""
         for given in self.overridden:
             if key == given or key.startswith(given + ".") or given.startswith(key + "."):
-                return "on the command line (--set)"
+                return COMMAND_LINE
         return f"in {self.file}"
 
 
@@ -45,7 +46,7 @@ def shown(value: Any) -> str:
 def unknown_key(key: str, where: str, known: list[str]) -> str:
     """The sentence for a key that the scene does not know."""
     near = nearest(key, known)
-    hint = f"; did you mean {near}?" if near else "; see `catenary check --keys` for all keys"
+    hint = f"; did you mean {near}?" if near else "; see `catenary list --keys` for all keys"
     return f"{shown(key)[1:-1]} {where} is unknown{hint}"
 
 

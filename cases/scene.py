@@ -16,7 +16,7 @@ from pydantic import Field, PrivateAttr, ValidationError
 from catenary.cases.catalogue import find_case
 from catenary.cases.keys import is_known, known_keys
 from catenary.cases.loading import assign, parse_assignment, read_toml
-from catenary.cases.messages import Origin, input_error, unknown_key
+from catenary.cases.messages import COMMAND_LINE, Origin, input_error, unknown_key
 from catenary.cases.schema_line import LineTable, MeshTable
 from catenary.cases.schema_run import (
     CaseTable,
@@ -30,6 +30,7 @@ from catenary.cases.schema_run import (
 )
 from catenary.cases.table import Table
 from catenary.solver import effects as effect_registry
+from catenary.solver.errors import InputError
 
 if TYPE_CHECKING:
     from catenary.meshgen.line import Line
@@ -115,7 +116,7 @@ def load_scene(case: str | Path, overrides: Sequence[str] = (), shortened: bool 
     Parameters
     ----------
     case : name, file or folder
-    overrides : ``key=value`` each, value in TOML; they win over the file
+    overrides : ``key=value`` each, value in TOML; they win over the file; ``key=`` removes a key
     shortened : apply the case's ``[test]`` table before the overrides
 
     Raises
@@ -128,14 +129,12 @@ def load_scene(case: str | Path, overrides: Sequence[str] = (), shortened: bool 
     known = known_keys(Scene)
     if shortened and isinstance(raw.get("test"), dict):
         for key, value in raw["test"].items():
-            assign(raw, key, value)
+            assign(raw, key, value, f"in the [test] table of {path}")
     given = []
     for text in overrides:
         key, value = parse_assignment(text)
         if not is_known(key, known):
-            from catenary.solver.errors import InputError
-
-            raise InputError(unknown_key(key, "on the command line (--set)", known))
+            raise InputError(unknown_key(key, COMMAND_LINE, known))
         assign(raw, key, value)
         given.append(key)
     return scene_from(raw, Origin(str(path), tuple(given)), folder=path.parent)
@@ -144,12 +143,13 @@ def load_scene(case: str | Path, overrides: Sequence[str] = (), shortened: bool 
 def scene_from(raw: dict[str, Any], origin: Origin, folder: Path | None = None) -> Scene:
     """The checked scene of a nested table, such as ``Scene.resolved()`` gives.
 
-    ``folder`` is where a relative ``mesh.file`` is looked for and whose name an unnamed case takes.
+    ``folder`` is where a relative ``mesh.file`` of the case file is looked for (one of the command
+    line is relative to the working directory) and whose name an unnamed case takes.
     """
     from catenary.cases.checks import check
 
     raw = copy.deepcopy(raw)
-    _fill_in(raw, folder)
+    _fill_in(raw, folder, "mesh.file" in origin.overridden)
     try:
         scene = Scene.model_validate(raw)
     except ValidationError as failed:
@@ -159,7 +159,7 @@ def scene_from(raw: dict[str, Any], origin: Origin, folder: Path | None = None) 
     return scene
 
 
-def _fill_in(raw: dict[str, Any], folder: Path | None) -> None:
+def _fill_in(raw: dict[str, Any], folder: Path | None, own_path: bool) -> None:
     if folder is None:
         return
     case = raw.setdefault("case", {})
@@ -167,4 +167,5 @@ def _fill_in(raw: dict[str, Any], folder: Path | None) -> None:
         case.setdefault("name", folder.name)
     mesh = raw.get("mesh")
     if isinstance(mesh, dict) and isinstance(mesh.get("file"), str) and mesh["file"]:
-        mesh["file"] = str(folder / Path(mesh["file"]))
+        base = Path.cwd() if own_path else folder
+        mesh["file"] = str(base / mesh["file"])

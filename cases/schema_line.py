@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from catenary.cases.table import LengthList, Table, ascending, exactly_one
+from catenary.cases.table import TAKE_AWAY, LengthList, Table, ascending, exactly_one
 
 Span = Annotated[float, Field(ge=5, le=500)]
 PreSag = Annotated[float, Field(ge=-1000, le=1000)]
@@ -81,7 +81,7 @@ class DropperTable(Table):
         if (self.count is None) != (self.spacing_m is None):
             raise ValueError("needs count and spacing_m together, but only one is given")
         if self.pre_sag_mm is not None and self.pre_sag_mid_mm is not None:
-            raise ValueError("takes pre_sag_mm or pre_sag_mid_mm, but both are given")
+            raise ValueError(f"takes pre_sag_mm or pre_sag_mid_mm, but both are given{TAKE_AWAY}")
         if self.patterns is not None:
             ascending([p.span_m for p in self.patterns], "patterns by span_m")
             if self.pre_sag_mm is not None:
@@ -230,5 +230,5 @@ class MeshTable(Table):
     def _consistent(self) -> MeshTable:
         ignored = self.model_fields_set & {"elements_per_gap", "support_refinement"}
         if self.file is not None and ignored:
-            raise ValueError(f"takes file or {sorted(ignored)[0]}, but both are given")
+            raise ValueError(f"takes file or {sorted(ignored)[0]}, but both are given{TAKE_AWAY}")
         return self

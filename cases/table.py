@@ -18,6 +18,10 @@ class Table(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
 
+# How to get rid of a key that a case file gives, for sentences about keys that exclude others.
+TAKE_AWAY = " (--set KEY= takes one away)"
+
+
 def _as_list(value: Any) -> Any:
     return [value] if isinstance(value, int | float) and not isinstance(value, bool) else value
 
@@ -26,7 +30,7 @@ def exactly_one(table: Table, *names: str) -> None:
     """Raise ``ValueError`` unless exactly one of the keys ``names`` is given."""
     given = [name for name in names if getattr(table, name) is not None]
     if len(given) != 1:
-        but = "none is given" if not given else f"{' and '.join(given)} are given"
+        but = "none is given" if not given else f"{' and '.join(given)} are given{TAKE_AWAY}"
         raise ValueError(f"needs exactly one of {', '.join(names)}, but {but}")
 
 

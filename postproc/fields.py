@@ -11,12 +11,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.postproc.gathering import ColumnGather
-from catenary.postproc.storage import MARGIN, broken_write, reserve, write_whole
+from catenary.postproc.storage import MARGIN, broken_write, opened, reserve, write_whole
 from catenary.solver.errors import RunBroken
 from catenary.solver.observation import Stage, StepView
 from catenary.solver.parallel import on_root
@@ -74,9 +73,7 @@ class FieldRecorder:
         """
         self._n_nodes = int(stage.node_points.shape[0])
         self._capacity = max(1, min(self._capacity, _MAX_BUFFER // (8 * self._n_nodes)))
-        self._gather = ColumnGather(
-            self._comm, stage.owned_nodes, self._n_nodes, self._capacity
-        )
+        self._gather = ColumnGather(self._comm, stage.owned_nodes, self._n_nodes, self._capacity)
         self._uplift = np.zeros((self._capacity, self._gather.n_owned))
         self._guarded(lambda: self._open(stage), stage.start_time)
 
@@ -122,17 +119,19 @@ class FieldRecorder:
         if self._resume:
             self._cut(stage.start_time - 0.5 * stage.dt)
         else:
-            with h5py.File(self._h5, "w") as file:
+            with opened(self._h5, "w") as file:
                 file["mesh/points"] = stage.node_points
                 file["mesh/cells"] = self._cells
                 file["mesh/component"] = self._component
-                file.create_dataset("times", shape=(0,), maxshape=(None,), chunks=(256,), dtype="f8")
+                file.create_dataset(
+                    "times", shape=(0,), maxshape=(None,), chunks=(256,), dtype="f8"
+                )
                 file.create_group("uplift")
                 file.create_group("displacement")
         self._describe()
 
     def _cut(self, time: float) -> None:
-        with h5py.File(self._h5, "r+") as file:
+        with opened(self._h5, "r+") as file:
             times = file["times"][...]
             keep = int(np.searchsorted(times, time))
             for number in range(keep, times.size):
@@ -146,7 +145,7 @@ class FieldRecorder:
         reserve(self._h5, self._h5.stat().st_size, need + MARGIN)
         vector = np.zeros((self._n_nodes, 3), dtype=np.float32)
         packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
-        with h5py.File(self._h5, "r+") as file:
+        with opened(self._h5, "r+") as file:
             for row, time in enumerate(times):
                 name = _name(len(self._written))
                 vector[:, 2] = uplift[row]
@@ -171,15 +170,14 @@ def line_cells(
 
     Components are numbered by ``COMPONENTS``; wires that it does not name follow. Not collective.
     """
-    cells, component = [], []
-    for name, nodes in wires.items():
-        cells.append(np.column_stack([nodes[:-1], nodes[1:]]))
-        number = COMPONENTS.get(name, len(COMPONENTS) + len(component))
-        component.append(np.full(len(nodes) - 1, number))
-    cells.append(np.asarray(droppers).reshape(-1, 2))
-    component.append(np.full(len(cells[-1]), COMPONENTS["droppers"]))
+    numbers = dict(COMPONENTS)
+    parts = [(name, np.column_stack([nodes[:-1], nodes[1:]])) for name, nodes in wires.items()]
+    parts.append(("droppers", np.asarray(droppers).reshape(-1, 2)))
+    component = [
+        np.full(len(cells), numbers.setdefault(name, len(numbers))) for name, cells in parts
+    ]
     return (
-        np.concatenate(cells).astype(np.int32),
+        np.concatenate([cells for _, cells in parts]).astype(np.int32),
         np.concatenate(component).astype(np.int32),
     )
 

@@ -21,7 +21,7 @@ _PADDING_PERIODS = 6.0
 
 
 def check_sampling(dt: float, cut_off: float = CUT_OFF) -> None:
-    """Raise InputError if a record with time step ``dt`` [s] cannot be filtered at ``cut_off`` [Hz]."""
+    """Raise InputError if a time step ``dt`` [s] is too long for a filter at ``cut_off`` [Hz]."""
     if 1.0 / dt <= 2.0 * cut_off:
         raise InputError(
             f"numerics.dt_s = {dt:g} s records at {1.0 / dt:.4g} Hz, too slowly for the "

@@ -31,7 +31,7 @@ REQUIRED_ATTRIBUTES = (
 
 @dataclass(frozen=True)
 class Header:
-    """Root attributes and constant datasets of a result file; rank 0 needs it, others may pass None.
+    """Root attributes and constant datasets of a result file; only rank 0 needs it.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ def line_datasets(
 def static_datasets(
     mesh: LineMesh, equilibrium: Equilibrium, elasticity: Elasticity
 ) -> dict[str, np.ndarray]:
-    """Datasets of ``/static``: droppers, contact-wire profile and elasticity at rest. Not collective."""
+    """Datasets of ``/static``: droppers, profile and elasticity at rest. Not collective."""
     contact = mesh.wires[CONTACT_WIRE]
     return {
         "static/dropper_length": equilibrium.dropper_length,

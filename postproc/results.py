@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from catenary.postproc import channels
-from catenary.postproc.recorder import DONE, FORMAT, RUNNING
+from catenary.postproc.result_file import DONE, FORMAT, RUNNING
 from catenary.solver.errors import InputError
 
 RESULT_FILE = "run.h5"
@@ -90,7 +90,7 @@ class Results:
 
     @property
     def outcome(self) -> str:
-        """"done", "interrupted", "running" (also if the program was killed), or what broke."""
+        """ "done", "interrupted", "running" (also if the program was killed), or what broke."""
         return str(self.attributes.get("outcome", RUNNING))
 
     @property

@@ -166,9 +166,7 @@ def mean_force_limit(speed: float, system: str, edition: str) -> float:
 def max_force_limit(speed: float, system: str, edition: str) -> float:
     """Force [N] below which the contact force must stay at ``speed`` [m/s]."""
     v = speed * KMH
-    return next(
-        s.limit for s in _edition(edition).max_force[_system(system)] if _up_to(v, s.up_to)
-    )
+    return next(s.limit for s in _edition(edition).max_force[_system(system)] if _up_to(v, s.up_to))
 
 
 def judge(
@@ -282,7 +280,7 @@ def _criterion(
 ) -> Criterion:
     passed: bool | None = None
     if not (math.isnan(value) or math.isnan(limit)):
-        passed = {"<=": value <= limit, "<": value < limit, ">": value > limit}[relation]
+        passed = bool({"<=": value <= limit, "<": value < limit, ">": value > limit}[relation])
     return Criterion(what, value, limit, unit, relation, passed, clause)
 
 
@@ -301,7 +299,5 @@ def _edition(name: str) -> Edition:
 
 def _system(name: str) -> str:
     if name not in SYSTEMS:
-        raise InputError(
-            f'there is no supply system "{name}": choose one of {", ".join(SYSTEMS)}'
-        )
+        raise InputError(f'there is no supply system "{name}": choose one of {", ".join(SYSTEMS)}')
     return name

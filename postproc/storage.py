@@ -1,15 +1,18 @@
-"""What all writers of result files share: attributes, space on the disk, files that appear whole."""
+"""What the writers of result files share: attributes, room on the disk, files that appear whole."""
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import json
 import math
 import os
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 
 from catenary.solver.errors import RunBroken
@@ -44,33 +47,76 @@ def as_attribute(value: Any) -> Any:
     return json.dumps(plain(value), ensure_ascii=False)
 
 
+class NoRoom(OSError):
+    """The disk, a quota or a limit of the process leaves no room; nothing was written yet."""
+
+
 def reserve(path: Path, start: int, n_bytes: int) -> None:
-    """Claim ``n_bytes`` [bytes] on the disk from byte ``start`` of a file on. Not collective.
+    """Claim ``n_bytes`` [bytes] on the disk behind a file's end at ``start``. Not collective.
 
     HDF5 updates its tables in place and appends the data: if the disk fills up in between, the
     tables point to data that are not there and the file is lost. Claimed space excludes that.
 
     Raises
     ------
-    OSError
-        If the disk, a quota or a limit of the process leaves no room.
+    NoRoom
     """
-    if not hasattr(os, "posix_fallocate"):  # not on macOS, where a full disk may cost the file
-        return
     handle = os.open(path, os.O_RDWR)
     try:
-        os.posix_fallocate(handle, start, n_bytes)
+        _claim(handle, start, n_bytes)
     except OSError as error:
-        if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):  # a file system that cannot claim
-            raise
+        raise NoRoom(error.errno, error.strerror) from error
     finally:
         os.close(handle)
+
+
+def _claim(handle: int, start: int, n_bytes: int) -> None:
+    if hasattr(os, "posix_fallocate"):
+        try:
+            os.posix_fallocate(handle, start, n_bytes)
+            return
+        except OSError as error:
+            if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):
+                raise
+    # Neither the system nor the file system can claim: occupy the place.
+    while n_bytes > 0:
+        written = os.pwrite(handle, bytes(min(n_bytes, 1 << 20)), start)
+        start, n_bytes = start + written, n_bytes - written
+
+
+def abandon(file: h5py.File) -> None:
+    """Close a file to which a write has failed, without touching the disk again.
+
+    HDF5 would repeat the failed writes until the program ends, spoil more of the file and crash
+    the interpreter at its exit; so it gets memory to write to.
+    """
+    if hasattr(os, "memfd_create"):
+        sink = os.memfd_create("abandoned")
+        os.dup2(sink, file.id.get_vfd_handle())
+        os.close(sink)
+    with contextlib.suppress(OSError, RuntimeError):
+        file.close()
+
+
+@contextlib.contextmanager
+def opened(path: Path, mode: str) -> Iterator[h5py.File]:
+    """An HDF5 file for writing, abandoned if a write fails. A context manager."""
+    file = h5py.File(path, mode)
+    try:
+        yield file
+        file.flush()
+    except (OSError, RuntimeError):
+        abandon(file)
+        raise
+    file.close()
 
 
 def broken_write(path: Path, time: float, error: Exception) -> RunBroken:
     """The error for the user when writing ``path`` failed at ``time`` [s] of the simulation."""
     code = getattr(error, "errno", None)
-    reason = os.strerror(code) if code else str(error)
+    # HDF5 hides the system's word among the figures of several lines.
+    hidden = re.search(r"error message = '([^']*)'", str(error))
+    reason = os.strerror(code) if code else hidden.group(1) if hidden else str(error)
     return RunBroken(
         f"writing {path} failed at t = {time:.3f} s ({reason}): free some space or choose another "
         "output folder; what was written before stays readable"

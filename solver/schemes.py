@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
+from mpi4py import MPI
 
 from catenary.mbs.interface import HeadState
 from catenary.solver.contact import Touch
@@ -221,7 +222,7 @@ class FixedPoint:
         height, rate = self.interaction.heights(touches)
         both = np.concatenate([height, rate])
         if self.comm.size > 1:
-            both = self.comm.allreduce(both)
+            self.comm.Allreduce(MPI.IN_PLACE, both)
         height, rate = both[: force.size], both[force.size :]
         new = np.empty_like(force)
         for i, head in enumerate(heads):
@@ -249,8 +250,6 @@ class FixedPoint:
         )
         largest = float(np.nan_to_num(change, nan=np.inf).max())
         if self.comm.size > 1:
-            from mpi4py import MPI
-
             largest = self.comm.allreduce(largest, op=MPI.MAX)
         if not np.isfinite(largest):
             raise RunBroken(

@@ -1,4 +1,4 @@
-"""A march without a solver: analytic signals shown to the observers through real stages and views."""
+"""A march without a solver: analytic signals shown to observers through real stages and views."""
 
 from __future__ import annotations
 
@@ -49,7 +49,12 @@ def make_mesh(line: Line) -> LineMesh:
         np.concatenate([masts, *(m + np.array(DROPPERS) for m in masts[:-1])]).round(6)
     )
     x = np.unique(
-        np.concatenate([a + (b - a) * np.arange(3) / 3 for a, b in zip(stations, stations[1:])])
+        np.concatenate(
+            [
+                a + (b - a) * np.arange(3) / 3
+                for a, b in zip(stations[:-1], stations[1:], strict=True)
+            ]
+        )
     )
     x = np.append(x, stations[-1])
     n = x.size
@@ -96,7 +101,10 @@ def make_header(line: Line, mesh: LineMesh, **attributes: Any) -> Header:
         "effects_on": [("vertical", "vertical motion of the tensioned wires", "always")],
         "effects_off": [("lateral", "stagger and lateral motion", "not asked for")],
     }
-    datasets = {**line_datasets(line, mesh, EVALUATION), **static_datasets(mesh, equilibrium, elasticity)}
+    datasets = {
+        **line_datasets(line, mesh, EVALUATION),
+        **static_datasets(mesh, equilibrium, elasticity),
+    }
     return Header({**known, **attributes}, datasets)
 
 
@@ -120,7 +128,7 @@ class March:
         return make_header(self.line, self.mesh, **attributes)
 
     def own(self, count: int) -> np.ndarray:
-        """This rank's share of ``count`` things: contiguous, as on a line cut into runs of spans."""
+        """This rank's share of ``count`` things: contiguous, as on a line cut into spans."""
         return np.array_split(np.arange(count), self.comm.size)[self.comm.rank]
 
     def stage(self, first_step: int = 0) -> Stage:
@@ -184,7 +192,11 @@ class March:
         )
 
     def drive(
-        self, *observers: Observer, outcome: str = "done", first_step: int = 0, last: int | None = None
+        self,
+        *observers: Observer,
+        outcome: str = "done",
+        first_step: int = 0,
+        last: int | None = None,
     ) -> None:
         stage = self.stage(first_step)
         for observer in observers:
