@@ -1,0 +1,217 @@
+"""The report of a run: ``report.html`` with its pictures, ``summary.json``, ``droppers.csv``.
+
+It reads the result file and nothing else, and works for unfinished runs as well.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from matplotlib.figure import Figure
+
+from catenary.postproc import export, plots, standards
+from catenary.postproc import statistics as stats
+from catenary.postproc.results import Results
+from catenary.postproc.standards import KMH, Criterion
+from catenary.postproc.statistics import RunStatistics
+from catenary.postproc.storage import write_whole
+from catenary.postproc.summary import as_json, real_time_factor, summarise
+
+_TEMPLATES = Path(__file__).parent / "templates"
+_STATISTICS_ROWS = (
+    ("mean", "mean", "N", 1.0, 1),
+    ("standard deviation", "std", "N", 1.0, 1),
+    ("standard deviation, 0-5 Hz", "std_0_5", "N", 1.0, 1),
+    ("standard deviation, 5-20 Hz", "std_5_20", "N", 1.0, 1),
+    ("maximum", "maximum", "N", 1.0, 1),
+    ("minimum", "minimum", "N", 1.0, 1),
+    ("mean + 3 sigma", "stat_max", "N", 1.0, 1),
+    ("mean - 3 sigma", "stat_min", "N", 1.0, 1),
+    ("loss of contact (unfiltered)", "loss_percent", "%", 1.0, 3),
+    ("losses of 5 ms and longer", "arcing_percent", "%", 1.0, 3),
+    ("contact height range", "contact_height_range", "mm", 1e3, 1),
+)
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was written and found: the files, the criteria, and ``verdict`` (None: not judged)."""
+
+    files: list[Path]
+    criteria: list[Criterion]
+    verdict: bool | None
+
+
+@dataclass(frozen=True)
+class _Picture:
+    name: str
+    caption: str
+    data: bytes
+
+    @property
+    def uri(self) -> str:
+        return "data:image/png;base64," + base64.b64encode(self.data).decode("ascii")
+
+
+def write_report(result_path: Path | str, out_dir: Path | str) -> Report:
+    """Write summary, report, pictures and dropper table of a run into a folder. Not collective.
+
+    Each file appears whole or not at all.
+
+    Parameters
+    ----------
+    result_path : result file or its folder
+    out_dir : folder that exists
+
+    Raises
+    ------
+    InputError
+        If ``result_path`` is no result file.
+    """
+    out = Path(out_dir)
+    with Results(result_path) as results:
+        statistics = stats.evaluate(results)
+        criteria = judge(results, statistics)
+        pictures = _pictures(results, statistics)
+        content: dict[str, bytes | str] = {f"{p.name}.png": p.data for p in pictures}
+        content["droppers.csv"] = export.droppers_csv(results)
+        content["report.html"] = _html(results, statistics, criteria, pictures)
+        content["summary.json"] = as_json(summarise(results, statistics, criteria))
+        verdict = standards.verdict(criteria) if results.complete else None
+    for name, data in content.items():
+        write_whole(out / name, data)
+    return Report([out / name for name in content], criteria, verdict)
+
+
+def judge(results: Results, statistics: RunStatistics) -> list[Criterion]:
+    """The criteria of the edition and system that the result file names. Not collective."""
+    about = results.attributes
+    return standards.judge(
+        statistics,
+        about["speed_m_per_s"],
+        about["wave_speed_m_per_s"],
+        about["system"],
+        about["edition"],
+    )
+
+
+def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
+    drawn: list[tuple[str, str, Figure | None]] = []
+    if results.time.size > 1:
+        drawn.append(
+            ("contact_force", "Contact force along the track.", plots.contact_force(results))
+        )
+        if len(statistics.complaints) < len(statistics.pantographs):
+            drawn += [
+                (
+                    "statistics",
+                    "Contact force in the evaluation stretch.",
+                    plots.force_statistics(results, statistics),
+                ),
+                (
+                    "histogram",
+                    "Distribution of the contact force in the evaluation stretch.",
+                    plots.force_histogram(results, statistics),
+                ),
+            ]
+        if statistics.supports.x.size:
+            limit = standards.EDITIONS[results.attributes["edition"]].arm_uplift
+            drawn.append(
+                (
+                    "uplift",
+                    "Uplift of the contact wire at the steady arms.",
+                    plots.arm_uplift(results, statistics, limit),
+                )
+            )
+        if statistics.droppers.x.size:
+            drawn.append(("droppers", "Dropper forces.", plots.dropper_force(results, statistics)))
+    drawn.append(("static", "Profile and elasticity of the line.", plots.static_line(results)))
+    drawn.append(("energy", "Energies of the line.", plots.energies(results)))
+    return [_Picture(name, text, plots.png(f)) for name, text, f in drawn if f is not None]
+
+
+def _html(
+    results: Results,
+    statistics: RunStatistics,
+    criteria: list[Criterion],
+    pictures: list[_Picture],
+) -> str:
+    environment = Environment(
+        loader=FileSystemLoader(_TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["number"] = _number
+    about = results.attributes
+    return environment.get_template("report.html.j2").render(
+        about=about,
+        results=results,
+        statistics=statistics,
+        statistics_rows=_statistics_rows(statistics),
+        criteria=criteria,
+        failed=[c for c in criteria if c.passed is False],
+        verdict=standards.verdict(criteria),
+        edition=standards.EDITIONS[about["edition"]].title,
+        system=standards.SYSTEMS[about["system"]],
+        speed_km_h=KMH * about["speed_m_per_s"],
+        wave_speed_km_h=KMH * about["wave_speed_m_per_s"],
+        droppers=export.dropper_table(results),
+        reference_span=results.reference_span + 1,
+        elasticity=1e3 * results.static("elasticity"),
+        facts=_facts(results),
+        phases=about.get("phase_wall_s", {}),
+        config=json.dumps(about["config"], indent=2, ensure_ascii=False),
+        pictures={p.name: p for p in pictures},
+    )
+
+
+def _statistics_rows(statistics: RunStatistics) -> list[tuple[str, str, list[str]]]:
+    """Label, unit and the figures of all pantographs, row by row."""
+    return [
+        (label, unit, [_number(factor * getattr(p, name), digits) for p in statistics.pantographs])
+        for label, name, unit, factor, digits in _STATISTICS_ROWS
+    ]
+
+
+def _facts(results: Results) -> list[tuple[str, str]]:
+    about = results.attributes
+    n_cells = sum(len(nodes) - 1 for nodes in results.wires().values())
+    facts = [
+        (
+            "line",
+            f"{results.line('support_x').size - 1} spans, "
+            f"{results.line('support_x')[-1] - results.line('support_x')[0]:.0f} m, "
+            f"{results.line('dropper_x').size} droppers, {results.line('arm_x').size} steady arms",
+        ),
+        ("mesh", f"{results.line('node_points').shape[0]} nodes, {n_cells} wire elements"),
+        ("unknowns", f"{about['n_dofs']}"),
+        ("ranks", f"{about['n_ranks']}"),
+        ("time step", f"{1e3 * results.dt:g} ms"),
+        ("steps", f"{results.n_steps} of {about['n_steps_planned']}"),
+        ("simulated time", f"{results.simulated:.3f} s"),
+    ]
+    if "march_wall_s" in about:
+        facts.append(("wall time of the march", f"{about['march_wall_s']:.2f} s"))
+    factor = real_time_factor(results)
+    if factor is not None:
+        facts.append(("real-time factor (simulated / wall)", f"{factor:.2f}"))
+    facts += [
+        (name.replace("_", " "), f"{value}")
+        for name, value in about.get("inner_iterations", {}).items()
+    ]
+    facts.append(("started", str(about["created"])))
+    return facts
+
+
+def _number(value: Any, digits: int = 1) -> str:
+    """``value`` with ``digits`` decimals, a dash for NaN and None."""
+    if value is None or value != value:
+        return "–"
+    return f"{value:.{digits}f}"

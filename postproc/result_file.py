@@ -1,0 +1,204 @@
+"""The result file as its only writer, rank 0, handles it. Nothing here is collective.
+
+Everything that grows does so in ``append`` alone, which leaves a file that is readable as it
+stands; room on the disk is claimed one append ahead, so that a full disk costs no record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from catenary.postproc import channels
+from catenary.postproc.channels import Channel
+from catenary.postproc.header import Header
+from catenary.postproc.storage import MARGIN, abandon, as_attribute, reserve
+from catenary.solver.observation import Stage
+
+FORMAT = "catenary-run-1"
+RUNNING, DONE, INTERRUPTED = "running", "done", "interrupted"
+# The state to continue from is kept twice and written in turn: a run that is killed while it
+# writes one still has the other.
+_SLOTS = ("0", "1")
+
+
+class ResultFile:
+    """A result file open for writing.
+
+    Parameters
+    ----------
+    path : the file, overwritten unless ``resume``
+    stage : of the run
+    header : what the runner knows before the first step
+    n_ranks : size of the run's communicator
+    rows_per_append : largest number of rows of an append
+    with_energies : whether energies will be appended
+    resume : continue a file; what it holds from the stage's start time on is dropped
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        stage: Stage,
+        header: Header,
+        n_ranks: int,
+        *,
+        rows_per_append: int,
+        with_energies: bool,
+        resume: bool,
+    ) -> None:
+        self._path = path
+        self._file = h5py.File(path, "r+" if resume else "w")
+        table = _table(stage, with_energies)
+        if resume:
+            _cut(self._file, stage.start_time - 0.5 * stage.dt)
+        else:
+            _write_head(self._file, stage, header, n_ranks)
+            for name, (channel, columns) in table.items():
+                _create_growing(self._file, name, channel, columns, rows_per_append)
+        # Kept open: closing a dataset writes what is left of it, and h5py ignores errors there.
+        self._growing = {name: self._file[name] for name in table}
+        width = sum(columns or 1 for _, columns in table.values())
+        # An append touches the chunk begun last and one more.
+        self._room = 2 * 8 * rows_per_append * width + MARGIN
+        self._n_states = 0
+        self._file.attrs["outcome"] = RUNNING
+        self._file.flush()
+        self._reserve()
+
+    def append(self, blocks: Mapping[str, np.ndarray], state: Mapping[str, Any] | None) -> None:
+        """Append rows to growing datasets and store a state to continue from.
+
+        Parameters
+        ----------
+        blocks : path in the file -> (rows, ...) array
+        state : what ``checkpoint`` is to hold, None to leave it
+
+        Raises
+        ------
+        NoRoom
+            If there is no room for another append; this one is complete.
+        OSError, RuntimeError
+            If HDF5 could not write.
+        """
+        for name, block in blocks.items():
+            dataset = self._growing[name]
+            start = dataset.shape[0]
+            dataset.resize(start + block.shape[0], axis=0)
+            dataset[start:] = block
+        self._file.flush()
+        if state is not None:
+            self._store(state)
+        self._reserve()
+
+    def conclude(self, outcome: str) -> None:
+        """Store how the run ended."""
+        time = self._growing["time"]
+        attributes = self._file.attrs
+        attributes["outcome"] = outcome
+        attributes["n_steps"] = max(time.shape[0] - 1, 0)
+        attributes["simulated_s"] = float(time[-1] - time[0]) if time.shape[0] else 0.0
+        self._file.flush()
+
+    def close(self, performance: Mapping[str, Any]) -> None:
+        """Store ``performance`` as root attributes and close the file."""
+        for name, value in performance.items():
+            self._file.attrs[name] = as_attribute(value)
+        self._file.close()
+
+    def abandon(self) -> None:
+        """Close the file without writing to it, after a write has failed."""
+        abandon(self._file)
+
+    def _store(self, state: Mapping[str, Any]) -> None:
+        """Write a state, the first one into both slots, any other into the older one."""
+        group = self._file.require_group("checkpoint")
+        slots = (_SLOTS[self._n_states % 2],) if self._n_states else _SLOTS
+        for slot in slots:
+            place = group.require_group(slot)
+            for name, value in state.items():
+                _replace(place, name, value)
+            self._file.flush()
+            group.attrs["latest"] = slot
+        self._file.flush()
+        self._n_states += 1
+
+    def _reserve(self) -> None:
+        reserve(self._path, self._file.id.get_filesize(), self._room)
+
+
+def _table(stage: Stage, with_energies: bool) -> dict[str, tuple[Channel, int]]:
+    """Growing datasets: path -> channel and columns, 0 columns for one value a row."""
+    columns = {
+        channels.PANTOGRAPH: stage.n_pantographs,
+        channels.ARM: int(stage.arm_x.size),
+        channels.DROPPER: int(stage.dropper_x.size),
+    }
+    table = {"time": (channels.TIME, 0)}
+    for channel in channels.CHANNELS.values():
+        table[f"channels/{channel.name}"] = (channel, columns[channel.per])
+    if with_energies:
+        table.update({f"energy/{c.name}": (c, 0) for c in channels.ENERGIES.values()})
+    return table
+
+
+def _write_head(file: h5py.File, stage: Stage, header: Header, n_ranks: int) -> None:
+    fixed = {
+        "format": FORMAT,
+        "n_ranks": n_ranks,
+        "dt_s": stage.dt,
+        "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        "n_steps_planned": stage.n_steps,
+    }
+    for name, value in {**header.attributes, **fixed}.items():
+        file.attrs[name] = as_attribute(value)
+    known = {
+        "line/arm_x": stage.arm_x,
+        "line/dropper_x": stage.dropper_x,
+        "line/node_points": stage.node_points,
+    }
+    for name, array in {**header.datasets, **known}.items():
+        file.create_dataset(name, data=array)
+
+
+def _create_growing(
+    file: h5py.File, path: str, channel: Channel, columns: int, chunk_rows: int
+) -> None:
+    one_value_a_row = channel.per == channels.RUN
+    # A fixed dimension of zero is narrower than any chunk: leave it open.
+    shape, limit, chunks = (
+        ((0,), (None,), (chunk_rows,))
+        if one_value_a_row
+        else ((0, columns), (None, columns or None), (chunk_rows, max(columns, 1)))
+    )
+    dataset = file.create_dataset(path, shape=shape, maxshape=limit, chunks=chunks, dtype="f8")
+    dataset.attrs["unit"] = channel.unit
+    dataset.attrs["meaning"] = channel.meaning
+
+
+def _cut(file: h5py.File, time: float) -> None:
+    """Drop the records from ``time`` [s] on."""
+    parts = [(file["time"], [file["time"], *file["channels"].values()])]
+    if "energy" in file:
+        parts.append((file["energy/time"], list(file["energy"].values())))
+    for clock, datasets in parts:
+        keep = int(np.searchsorted(clock[...], time))
+        for dataset in datasets:
+            dataset.resize(keep, axis=0)
+
+
+def _replace(group: h5py.Group, name: str, value: Any) -> None:
+    """Overwrite in place if shape and type are the same, so that the file does not grow."""
+    array = np.asarray(value)
+    old = group.get(name)
+    if old is not None and old.shape == array.shape and old.dtype == array.dtype:
+        old[...] = array
+        return
+    if old is not None:
+        del group[name]
+    group.create_dataset(name, data=value)
