@@ -1,0 +1,292 @@
+"""The command line ``catenary``. Backends are imported inside the commands: --help stays quick."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from catenary.cases import console
+from catenary.solver.errors import InputError
+
+if TYPE_CHECKING:
+    from catenary.cases.scene import Scene
+
+app = typer.Typer(
+    name="catenary",
+    help="Finite elements for railway overhead lines coupled with pantographs.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Case = Annotated[
+    str, typer.Argument(help="Name of a shipped case, or a case.toml, or a folder with one.")
+]
+Assignments = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Replace a key of the scene, KEY= takes it away; repeatable.",
+    ),
+]
+MoreAssignments = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="KEY=VALUE", help="Further assignments after --set."),
+]
+Shortened = Annotated[
+    bool, typer.Option("--short", help="Apply the case's [test] table, which shortens it.")
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace what is there.")]
+
+
+def _load(
+    case: str, assignments: list[str] | None, extras: list[str] | None, shortened: bool = False
+) -> Scene:
+    from catenary.cases.petsc_options import split_extras
+    from catenary.cases.scene import load_scene
+
+    more, options = split_extras(extras or [])
+    if options:
+        raise InputError(f"{options[0]} after -- is a PETSc option; only run takes those")
+    return load_scene(case, [*(assignments or []), *more], shortened)
+
+
+@app.command(
+    "run",
+    help="Simulate a case and write its results into a folder.",
+    epilog="Example: catenary run en50318_2002 -o results/en300 --set train.speed_km_h=300 "
+    "-- -log_view",
+)
+@console.guarded
+def run(
+    case: Case,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")],
+    extras: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="-- PETSC_OPTION", help="Options for PETSc, after --."),
+    ] = None,
+    assignments: Assignments = None,
+    shortened: Shortened = False,
+    force: Force = False,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Exit with 3 if an acceptance criterion fails.")
+    ] = False,
+    verbose: Annotated[bool, typer.Option("-v", "--verbose", help="Say more.")] = False,
+) -> int:
+    """Collective."""
+    from catenary.cases import printing
+    from catenary.cases.petsc_options import as_arguments, split_extras, start_petsc
+    from catenary.cases.scene import load_scene
+    from catenary.solver.parallel import abort_on_unforeseen_error, on_root, set_up_logging
+
+    comm = console.world()
+    abort_on_unforeseen_error(comm)
+    set_up_logging(comm, verbose)
+
+    def read() -> tuple[Scene, list[str]]:
+        more, options = split_extras(extras or [])
+        if out.exists() and not out.is_dir():
+            raise InputError(f"-o {out} is a file; name a folder for the results")
+        return load_scene(case, [*(assignments or []), *more], shortened), options
+
+    scene, options = on_root(comm, read)
+    arguments = as_arguments(scene.petsc, options)
+    start_petsc(arguments)
+    from catenary.cases.runner import run_case
+
+    result = run_case(scene, out, comm, force=force, petsc_options=arguments)
+    if result.outcome != "done":
+        console.complain(
+            f"the run was {result.outcome}" if result.outcome == "interrupted" else result.outcome
+        )
+        return console.BROKEN
+    console.say(printing.summary_text(result.summary, out))
+    return console.NOT_ACCEPTED if strict and result.accepted is False else console.DONE
+
+
+@app.command(
+    "list",
+    help="List the shipped cases, or all keys of a scene.",
+    epilog="Example: catenary list --keys",
+)
+@console.guarded
+@console.serial
+def list_cases(
+    keys: Annotated[
+        bool, typer.Option("--keys", help="Every key of a scene, its unit, default and meaning.")
+    ] = False,
+) -> None:
+    """Serial."""
+    from catenary.cases import printing
+    from catenary.cases.catalogue import entries
+
+    console.say(printing.key_table() if keys else printing.case_table(entries()))
+
+
+@app.command(
+    "plan",
+    help="Print what a case simulates and what not, and what it will cost.",
+    epilog="Example: catenary plan ac_simple --set train.speed_km_h=320",
+)
+@console.guarded
+@console.serial
+def plan(
+    case: Case,
+    extras: MoreAssignments = None,
+    assignments: Assignments = None,
+    shortened: Shortened = False,
+) -> None:
+    """Serial."""
+    from catenary.cases.plan import make_plan, plan_text
+
+    console.say(plan_text(make_plan(_load(case, assignments, extras, shortened))))
+
+
+@app.command(
+    "check",
+    help="Check a case: keys, bounds, geometry, effects, mesh, and that no dropper is slack at "
+    "rest. Writes nothing.",
+    epilog="Example: catenary check my_line/case.toml --set line.dropper.pre_sag_mid_mm=60",
+)
+@console.guarded
+@console.serial
+def check(
+    case: Case,
+    extras: MoreAssignments = None,
+    assignments: Assignments = None,
+    shortened: Shortened = False,
+) -> None:
+    """Serial."""
+    from catenary.cases.meshing import mesh_of
+    from catenary.solver.equilibrium import find_form
+
+    scene = _load(case, assignments, extras, shortened)
+    problem = scene.to_problem()
+    mesh = mesh_of(scene)
+    find_form(problem, mesh)
+    console.say(
+        f"{scene.case.name} is sound: {problem.line.n_spans} spans, "
+        f"{problem.line.support_positions[-1]:g} m, {mesh.droppers.shape[0]} droppers, "
+        f"{mesh.n_nodes} nodes"
+    )
+
+
+@app.command(
+    "mesh",
+    help="Write the mesh of a case as a Gmsh file.",
+    epilog="Example: catenary mesh ac_simple -o ac_simple.msh --set mesh.elements_per_gap=6",
+)
+@console.guarded
+@console.serial
+def mesh(
+    case: Case,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Mesh file to write, *.msh.")],
+    extras: MoreAssignments = None,
+    assignments: Assignments = None,
+    force: Force = False,
+) -> None:
+    """Serial."""
+    from catenary.cases.meshing import write_mesh_of
+
+    made = write_mesh_of(_load(case, assignments, extras), out, force)
+    console.say(f"{out}: {made.n_nodes} nodes, {made.droppers.shape[0]} droppers")
+
+
+@app.command(
+    "static",
+    help="Print the dropper table, the sag and the elasticity of a case at rest.",
+    epilog="Example: catenary static ac_simple -o droppers.csv",
+)
+@console.guarded
+@console.serial
+def static(
+    case: Case,
+    extras: MoreAssignments = None,
+    assignments: Assignments = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--out",
+            help="Also write a file: *.csv holds the dropper table, *.json everything.",
+        ),
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Serial."""
+    from catenary.cases import printing
+    from catenary.cases.output_files import new_file, write_static
+
+    if out is not None:
+        new_file(out, (".csv", ".json"), force)
+    scene = _load(case, assignments, extras)
+    from catenary.cases.runner import static_table
+
+    table = static_table(scene)
+    if out is not None:
+        write_static(out, table)
+    console.say(printing.static_text(table, scene.to_line()))
+
+
+@app.command(
+    "report",
+    help="Write the report of a run again, from its result file alone.",
+    epilog="Example: catenary report results/en300",
+)
+@console.guarded
+@console.serial
+def report(
+    folder: Annotated[Path, typer.Argument(help="Folder of a run, with its run.h5.")],
+) -> None:
+    """Serial."""
+    from catenary.postproc.report import write_report
+
+    if not folder.is_dir():
+        raise InputError(f"{folder} is no folder; name the folder of a run")
+    written = write_report(folder, folder)
+    console.say("\n".join(str(path) for path in written.files))
+
+
+@app.command(
+    "compare",
+    help="Print two runs' figures side by side.",
+    epilog="Example: catenary compare results/coarse results/fine",
+)
+@console.guarded
+@console.serial
+def compare(
+    first: Annotated[Path, typer.Argument(help="Folder of a run.")],
+    second: Annotated[Path, typer.Argument(help="Folder of another run.")],
+) -> None:
+    """Serial."""
+    from catenary.postproc.compare import compare as compare_runs
+
+    console.say(compare_runs(first, second).rstrip())
+
+
+def main() -> None:
+    """Entry point. Exit codes: 0 done, 1 the run broke, 2 bad input, 3 not accepted (--strict)."""
+    from catenary.solver.parallel import launched_by_mpirun
+
+    if launched_by_mpirun():
+        # From here on the end of each rank waits for the others', so that a sentence of rank 0
+        # is out before the launcher sees the exit code of another.
+        console.world()
+    command: Any = typer.main.get_command(app)
+    try:
+        code = command(prog_name="catenary", standalone_mode=False)
+    except typer.Abort:
+        code = console.BROKEN
+    except Exception as error:
+        if not hasattr(error, "show") or not hasattr(error, "exit_code"):
+            raise
+        if console.speaks():  # a mistake in the options, told with the command's usage
+            error.show()
+        code = console.BAD_INPUT
+    sys.exit(code if isinstance(code, int) else console.DONE)

@@ -1,0 +1,81 @@
+"""How the command line speaks: one sentence for an error, one voice under mpirun, exit codes."""
+
+from __future__ import annotations
+
+import functools
+import os
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import typer
+
+from catenary.solver.errors import CatenaryError
+from catenary.solver.parallel import launched_by_mpirun, on_root
+
+DONE, BROKEN, BAD_INPUT, NOT_ACCEPTED = 0, 1, 2, 3
+_RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK")
+
+
+def speaks() -> bool:
+    """Whether this process is the one that prints: rank 0, or the only one. Not collective."""
+    return all(os.environ.get(name, "0") == "0" for name in _RANK_VARIABLES)
+
+
+def say(text: str) -> None:
+    """Print to standard output on rank 0. Not collective."""
+    if speaks():
+        typer.echo(text)
+
+
+def complain(sentence: str) -> None:
+    """Print one sentence to standard error on rank 0. Not collective."""
+    if speaks():
+        typer.echo(f"catenary: {' '.join(sentence.split())}", err=True)
+
+
+def world() -> Any:
+    """The communicator of all processes; starts MPI. Not collective."""
+    from mpi4py import MPI
+
+    return MPI.COMM_WORLD
+
+
+def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
+    """A command whose foreseen errors end in a sentence and an exit code, not in a traceback.
+
+    The command returns its exit code, None for 0. Collective if the command is.
+    """
+
+    @functools.wraps(command)
+    def wrapped(*args: Any, **kwargs: Any) -> None:
+        try:
+            code = command(*args, **kwargs)
+        except CatenaryError as error:
+            complain(str(error))
+            code = error.exit_code
+        except KeyboardInterrupt:
+            complain("interrupted")
+            code = BROKEN
+        except BrokenPipeError:  # the reader of a pipe has gone, as with `| head`
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            code = BROKEN
+        if code:
+            raise typer.Exit(code)
+
+    return wrapped
+
+
+def serial(command: Callable[..., int | None]) -> Callable[..., int | None]:
+    """A command that runs on rank 0 only; under mpirun the others learn its result.
+
+    Collective under mpirun. Its error is raised on all ranks.
+    """
+
+    @functools.wraps(command)
+    def wrapped(*args: Any, **kwargs: Any) -> int | None:
+        if not launched_by_mpirun():
+            return command(*args, **kwargs)
+        return on_root(world(), lambda: command(*args, **kwargs))
+
+    return wrapped

@@ -1,0 +1,215 @@
+"""What a scene will simulate and what not, its size, and an estimate of memory and time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from catenary.cases.scene import Scene
+from catenary.solver import effects
+from catenary.solver.problem import Problem
+
+# Cost model of the march on one rank, least squares over runs of 6e3 to 1e5 unknowns of the case
+# ac_simple on a two-core machine of 2026 (Debian 12, PETSc 3.18): per step and per unknown. Other
+# machines differ by a factor of two either way; the plan calls it an estimate.
+STEP_OVERHEAD = 1.1e-4  # [s]
+STEP_PER_UNKNOWN = 1.6e-8  # [s]
+# Each correction of the fixed-point scheme repeats the solve; two a step were measured.
+FIXED_POINT_FACTOR = 1.6
+
+# Resident memory of the same runs: interpreter with its libraries, then per unknown.
+MEMORY_BASE = 160e6  # [B]
+MEMORY_PER_UNKNOWN = 2200.0  # [B]
+_BYTES = 8
+_PER_PANTOGRAPH = 4  # channels of a pantograph in the result file
+
+
+class EffectRow(NamedTuple):
+    """An effect and why it is, or is not, part of a run."""
+
+    name: str
+    title: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A run before it is made.
+
+    Attributes
+    ----------
+    case, title : of the scene
+    on, off : effects that are simulated, and those that are not
+    unknowns : names of the unknowns at each node
+    n_nodes, n_dofs, n_steps : sizes
+    n_droppers, n_arms, n_pantographs : counts
+    element_lengths : shortest and longest element of the contact wire [m]
+    speed, wave_speed : of the train and of the contact wire [m/s]
+    static_forces : of the pantographs [N]
+    start, end, evaluation : stretch that the leading pantograph runs, and that is judged [m]
+    dt, simulated : time step and simulated time [s]
+    memory : estimate of the resident memory on one rank [B]
+    march : estimate of the wall time of the time loop on one rank [s]
+    file_size : size of the channels in the result file [B]
+    """
+
+    case: str
+    title: str
+    on: list[EffectRow]
+    off: list[EffectRow]
+    unknowns: tuple[str, ...]
+    n_nodes: int
+    n_dofs: int
+    n_steps: int
+    n_droppers: int
+    n_arms: int
+    n_pantographs: int
+    element_lengths: tuple[float, float]
+    speed: float
+    wave_speed: float
+    static_forces: tuple[float, ...]
+    start: float
+    end: float
+    evaluation: tuple[float, float]
+    dt: float
+    scheme: str
+    simulated: float
+    memory: float
+    march: float
+    file_size: float
+
+
+def effect_rows(scene: Scene, problem: Problem) -> tuple[list[EffectRow], list[EffectRow]]:
+    """Effects that a run simulates and those that it does not, with the reason. Not collective."""
+    active = {effect.name for effect in effects.active(problem)}
+    on, off = [], []
+    for name, effect in effects.registry().items():
+        if name in active:
+            if effect.always:
+                reason = "part of every scene"
+            else:
+                reason = "asked for by the scene" if name in scene.effects else "default"
+            on.append(EffectRow(name, effect.title, reason))
+        elif name in problem.effects:
+            off.append(EffectRow(name, effect.title, "nothing in the scene calls for it"))
+        else:
+            said = name in scene.effects
+            reason = "left out by the scene" if said else "off unless the scene asks for it"
+            off.append(EffectRow(name, effect.title, reason))
+    return on, off
+
+
+def make_plan(scene: Scene) -> Plan:
+    """The plan of a scene; makes the mesh to count its nodes. Not collective."""
+    import numpy as np
+
+    from catenary.cases.meshing import mesh_of
+    from catenary.meshgen.mesh import CONTACT_WIRE
+
+    problem = scene.to_problem()
+    mesh = mesh_of(scene)
+    on, off = effect_rows(scene, problem)
+    unknowns = effects.unknowns_per_node(effects.active(problem))
+    n_dofs = mesh.n_nodes * len(unknowns)
+    train, dt = problem.train, problem.numerics.dt
+    simulated = (train.end - train.start) / train.speed
+    n_steps = max(1, math.floor(simulated / dt + 1e-9))
+    length = np.diff(mesh.x(mesh.wires[CONTACT_WIRE]))
+    n_droppers, n_arms = mesh.droppers.shape[0], mesh.steady_arms.size
+    columns = 1 + _PER_PANTOGRAPH * len(train.placements) + n_droppers + n_arms
+    return Plan(
+        case=scene.case.name,
+        title=scene.case.title,
+        on=on,
+        off=off,
+        unknowns=unknowns,
+        n_nodes=mesh.n_nodes,
+        n_dofs=n_dofs,
+        n_steps=n_steps,
+        n_droppers=n_droppers,
+        n_arms=int(n_arms),
+        n_pantographs=len(train.placements),
+        element_lengths=(float(length.min()), float(length.max())),
+        speed=train.speed,
+        wave_speed=problem.line.contact_wire.wave_speed,
+        static_forces=tuple(place.static_force for place in train.placements),
+        start=train.start,
+        end=train.end,
+        evaluation=problem.evaluation,
+        dt=dt,
+        scheme=problem.numerics.scheme,
+        simulated=simulated,
+        memory=estimate_memory(n_dofs),
+        march=estimate_march(n_dofs, n_steps, problem.numerics.scheme),
+        file_size=float(_BYTES * columns * (n_steps + 1)),
+    )
+
+
+def estimate_memory(n_dofs: int) -> float:
+    """Resident memory of a run on one rank [B]."""
+    return MEMORY_BASE + MEMORY_PER_UNKNOWN * n_dofs
+
+
+def estimate_march(n_dofs: int, n_steps: int, scheme: str) -> float:
+    """Wall time of the time loop on one rank [s]."""
+    step = STEP_OVERHEAD + STEP_PER_UNKNOWN * n_dofs
+    return n_steps * step * (FIXED_POINT_FACTOR if scheme == "fixed_point" else 1.0)
+
+
+def plan_text(plan: Plan) -> str:
+    """The plan as text for a terminal."""
+    ratio = plan.speed / plan.wave_speed
+    forces = ", ".join(f"{force:.1f}" for force in plan.static_forces)
+    pantographs = "1 pantograph" if plan.n_pantographs == 1 else f"{plan.n_pantographs} pantographs"
+    rows = [
+        ("train", f"{3.6 * plan.speed:g} km/h, {pantographs}, static force {forces} N"),
+        (
+            "speed",
+            f"{ratio:.2f} of the contact wire's wave speed ({3.6 * plan.wave_speed:.1f} km/h)",
+        ),
+        ("runs", f"from {plan.start:g} to {plan.end:g} m (leading pantograph)"),
+        ("evaluated", f"from {plan.evaluation[0]:g} to {plan.evaluation[1]:g} m"),
+        (
+            "mesh",
+            f"{plan.n_nodes} nodes, {plan.n_droppers} droppers, {plan.n_arms} steady arms, "
+            f"elements of {plan.element_lengths[0]:.2f} to {plan.element_lengths[1]:.2f} m",
+        ),
+        (
+            "unknowns",
+            f"{plan.n_dofs} = {plan.n_nodes} nodes x {len(plan.unknowns)} "
+            f"({', '.join(plan.unknowns)})",
+        ),
+        (
+            "time",
+            f"{plan.simulated:.2f} s in {plan.n_steps} steps of {1e3 * plan.dt:g} ms, scheme "
+            f"{plan.scheme}",
+        ),
+        ("memory", f"about {plan.memory / 1e6:.0f} MB on one rank (estimate)"),
+        (
+            "march",
+            f"about {_duration(plan.march)} on one rank, real-time factor "
+            f"{plan.simulated / plan.march:.1f} (estimate)",
+        ),
+        ("results", f"about {plan.file_size / 1e6:.1f} MB of channels"),
+    ]
+    lines = [f"{plan.case}: {plan.title}", ""]
+    lines += [f"  {label:10} {text}" for label, text in rows]
+    lines += ["", "Simulated:", *_effect_lines(plan.on)]
+    lines += ["", "Not simulated:", *_effect_lines(plan.off)]
+    return "\n".join(lines)
+
+
+def _effect_lines(rows: list[EffectRow]) -> list[str]:
+    if not rows:
+        return ["  (nothing)"]
+    width = max(len(row.name) for row in rows)
+    return [f"  {row.name:{width}}  {row.title} ({row.reason})" for row in rows]
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 90:
+        return f"{seconds:.2g} s"
+    if seconds < 5400:
+        return f"{seconds / 60:.1f} min"
+    return f"{seconds / 3600:.1f} h"

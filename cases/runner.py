@@ -1,0 +1,299 @@
+"""From a scene to a judged contact force: mesh, equilibrium, march, recorder, report.
+
+Data flows one way; every phase is timed and is a PETSc log stage of the same name.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib import metadata
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from petsc4py import PETSc
+
+from catenary.cases.interrupts import StopRequest
+from catenary.cases.meshing import mesh_of
+from catenary.cases.plan import effect_rows
+from catenary.cases.scene import Scene
+from catenary.meshgen.mesh import LineMesh
+from catenary.postproc.fields import FieldRecorder
+from catenary.postproc.header import Header, line_datasets, static_datasets
+from catenary.postproc.progress import Progress
+from catenary.postproc.recorder import Recorder
+from catenary.postproc.report import write_report
+from catenary.postproc.results import Results
+from catenary.postproc.summary import summarise
+from catenary.solver.equilibrium import (
+    Elasticity,
+    Equilibrium,
+    elasticity,
+    find_form,
+    middle_span,
+)
+from catenary.solver.errors import InputError
+from catenary.solver.march import March, Outcome
+from catenary.solver.model import Model, build
+from catenary.solver.observation import Observer
+from catenary.solver.parallel import on_root
+from catenary.solver.problem import Problem
+
+logger = logging.getLogger("catenary.runner")
+
+RESULT = "run.h5"
+
+
+@dataclass
+class RunOutcome:
+    """How a run ended.
+
+    ``outcome`` is "done", "interrupted" or the sentence of what broke; ``accepted`` the verdict
+    of the standard, None if not judged; ``summary`` the content of ``summary.json``.
+    """
+
+    outcome: str
+    accepted: bool | None
+    summary: dict[str, Any] = field(default_factory=dict)
+
+
+class AtRest(NamedTuple):
+    """A line in equilibrium, on all ranks."""
+
+    mesh: LineMesh
+    model: Model
+    form: Equilibrium
+    lift: Elasticity
+
+
+class Phases:
+    """Wall time of the phases of a run [s], each also a PETSc log stage. Collective by use."""
+
+    def __init__(self) -> None:
+        self.wall: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, name: str) -> Iterator[None]:
+        """Time what happens inside."""
+        begin = time.perf_counter()
+        stage = PETSc.Log.Stage(name)
+        stage.push()
+        try:
+            yield
+        finally:
+            stage.pop()
+            self.wall[name] = time.perf_counter() - begin
+
+
+def run_case(
+    scene: Scene,
+    out_dir: Path,
+    comm: Any,
+    *,
+    force: bool = False,
+    petsc_options: Sequence[str] = (),
+) -> RunOutcome:
+    """Simulate a scene and write results, fields and report into ``out_dir``. Collective.
+
+    Parameters
+    ----------
+    scene : Scene, the same on all ranks
+    force : whether results that are there may be replaced
+    petsc_options : the options that PETSc was started with, for the record
+
+    Raises
+    ------
+    InputError
+        If the line is impossible or results are there already; nothing is written then.
+    """
+    on_root(comm, lambda: _refuse_to_overwrite(out_dir, force))
+    phases = Phases()
+    problem = scene.to_problem()
+    at_rest = _at_rest(scene, problem, comm, phases)
+    return _march(scene, problem, at_rest, out_dir, comm, phases, petsc_options, resume=False)
+
+
+def restart_case(
+    scene: Scene, out_dir: Path, comm: Any, *, petsc_options: Sequence[str] = ()
+) -> RunOutcome:
+    """Continue an interrupted or broken run from its last checkpoint. Collective.
+
+    ``scene`` must be the one that the run was started with; any number of ranks may continue.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to continue.
+    """
+    on_root(comm, lambda: _refuse_to_continue(out_dir))
+    phases = Phases()
+    problem = scene.to_problem()
+    at_rest = _at_rest(scene, problem, comm, phases)
+    return _march(scene, problem, at_rest, out_dir, comm, phases, petsc_options, resume=True)
+
+
+def static_table(scene: Scene) -> dict[str, np.ndarray]:
+    """The line at rest, arrays named as in the result file's groups. Not collective."""
+    problem = scene.to_problem()
+    mesh = mesh_of(scene)
+    model, form = find_form(problem, mesh)
+    lift = elasticity(model, *middle_span(problem.line))
+    data = {
+        **line_datasets(problem.line, mesh, problem.evaluation),
+        **static_datasets(mesh, form, lift),
+        "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
+    }
+    return {name.rsplit("/", 1)[-1]: values for name, values in data.items()}
+
+
+def _at_rest(scene: Scene, problem: Problem, comm: Any, phases: Phases) -> AtRest:
+    """Mesh and equilibrium, found on rank 0 and given to all. Collective."""
+    with phases("mesh"):
+        mesh: LineMesh = on_root(comm, lambda: mesh_of(scene))
+    with phases("equilibrium"):
+
+        def rest() -> tuple[Equilibrium, np.ndarray, Elasticity]:
+            model, form = find_form(problem, mesh)
+            lift = elasticity(model, *middle_span(problem.line))
+            return form, model.dropper_lengths, lift
+
+        form, lengths, lift = on_root(comm, rest)
+        model = build(problem, mesh, lengths)
+    return AtRest(mesh, model, form, lift)
+
+
+def _march(
+    scene: Scene,
+    problem: Problem,
+    at_rest: AtRest,
+    out_dir: Path,
+    comm: Any,
+    phases: Phases,
+    petsc_options: Sequence[str],
+    resume: bool,
+) -> RunOutcome:
+    with phases("distribute"):
+        march = March(comm, problem, at_rest.model, at_rest.form, at_rest.lift)
+        if resume:
+            march.restore(on_root(comm, lambda: _checkpoint(out_dir)))
+    on_root(comm, lambda: out_dir.mkdir(parents=True, exist_ok=True))
+    header = _header(scene, problem, at_rest, petsc_options) if comm.rank == 0 else None
+    dt, output = problem.numerics.dt, scene.output
+    recorder = Recorder(
+        comm,
+        out_dir / RESULT,
+        header,
+        flush_every=output.flush_every_steps,
+        energy_every=_cadence(output.energy_every_s, dt),
+        resume=resume,
+    )
+    observers: list[Observer] = [recorder, Progress(comm)]
+    field_every = _cadence(output.field_every_s, dt)
+    if field_every:
+        observers.append(
+            FieldRecorder(
+                comm,
+                out_dir / "fields.xdmf",
+                at_rest.mesh.wires,
+                at_rest.mesh.droppers,
+                every=field_every,
+                resume=resume,
+            )
+        )
+    with phases("march"), StopRequest() as stop:
+        outcome = march.run(observers, stop)
+    march.destroy()
+    recorder.close(_performance(outcome, phases))
+    with phases("report"):
+        result = on_root(comm, lambda: _report(out_dir, outcome))
+    logger.debug("phases [s]: %s", {name: round(wall, 3) for name, wall in phases.wall.items()})
+    return result
+
+
+def _report(out_dir: Path, outcome: Outcome) -> RunOutcome:
+    report = write_report(out_dir / RESULT, out_dir)
+    with Results(out_dir / RESULT) as results:
+        from catenary.postproc.statistics import evaluate
+
+        summary = summarise(results, evaluate(results), report.criteria)
+    return RunOutcome(outcome.outcome, report.verdict, summary)
+
+
+def _header(
+    scene: Scene, problem: Problem, at_rest: AtRest, petsc_options: Sequence[str]
+) -> Header:
+    on, off = effect_rows(scene, problem)
+    line = problem.line
+    return Header(
+        attributes={
+            "case": scene.case.name,
+            "title": scene.case.title,
+            "n_dofs": at_rest.model.n_dofs,
+            "speed_m_per_s": problem.train.speed,
+            "wave_speed_m_per_s": line.contact_wire.wave_speed,
+            "system": scene.evaluation.system,
+            "edition": scene.evaluation.edition,
+            "versions": _versions(),
+            "config": scene.resolved(),
+            "petsc_options": list(petsc_options),
+            "effects_on": [tuple(row) for row in on],
+            "effects_off": [tuple(row) for row in off],
+        },
+        datasets={
+            **line_datasets(line, at_rest.mesh, problem.evaluation),
+            **static_datasets(at_rest.mesh, at_rest.form, at_rest.lift),
+        },
+    )
+
+
+def _versions() -> dict[str, str]:
+    import h5py
+    import mpi4py
+
+    return {
+        "catenary": metadata.version("catenary"),
+        "PETSc": ".".join(str(part) for part in PETSc.Sys.getVersion()),
+        "mpi4py": mpi4py.__version__,
+        "numpy": np.__version__,
+        "h5py": h5py.__version__,
+    }
+
+
+def _performance(outcome: Outcome, phases: Phases) -> dict[str, Any]:
+    return {
+        "march_wall_s": outcome.wall,
+        "phase_wall_s": phases.wall,
+        "inner_iterations": outcome.counters,
+    }
+
+
+def _cadence(every: float, dt: float) -> int | None:
+    """Steps between two records that are to be ``every`` [s] apart; None for none."""
+    return max(1, round(every / dt)) if every > 0 else None
+
+
+def _checkpoint(out_dir: Path) -> dict[str, Any]:
+    with Results(out_dir / RESULT) as results:
+        return results.checkpoint
+
+
+def _refuse_to_overwrite(out_dir: Path, force: bool) -> None:
+    result = out_dir / RESULT
+    if result.exists() and not force:
+        raise InputError(
+            f"{result} holds the results of an earlier run; name another folder with -o, or give "
+            "--force to replace them"
+        )
+
+
+def _refuse_to_continue(out_dir: Path) -> None:
+    result = out_dir / RESULT
+    if not result.exists():
+        raise InputError(f"there is no {result} to continue; start the case with `catenary run`")
+    with Results(result) as results:
+        if results.complete:
+            raise InputError(f"the run in {result} is done; there is nothing to continue")

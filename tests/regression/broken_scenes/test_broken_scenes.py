@@ -1,0 +1,285 @@
+"""Broken scenes: each ends in one sentence, exit code 2, no traceback, and nothing written."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from catenary.cases.catalogue import shipped
+from catenary.cases.cli import app
+from typer.testing import CliRunner
+
+# Assignments on a shipped case, and what the sentence must hold besides the first one's key.
+ASSIGNMENTS = {
+    "negative tension": (
+        ["line.contact_wire.tension_N=-5"],
+        "is -5 on the command line (--set); it must be greater than 0 [N]",
+    ),
+    "unit in the value": (["line.contact_wire.tension_N=20 kN"], '"20 kN"'),
+    "kilonewtons as a number": (["line.contact_wire.tension_N=2e7"], "at most 1e+06 [N]"),
+    "not a number": (["line.contact_wire.mass_kg_per_m=nan"], "a finite number [kg/m]"),
+    "infinite": (["line.messenger_wire.tension_N=inf"], "a finite number [N]"),
+    "negative infinity": (["line.damping.alpha_s=-inf"], "a finite number [s]"),
+    "true for a number": (["line.encumbrance_m=true"], "must be a number [m]"),
+    "number for a switch": (["effects.contact_loss=1"], "must be true or false"),
+    "fraction of a span": (["line.n_spans=10.5"], "must be a whole number"),
+    "no spans": (["line.n_spans=0"], "at least 1"),
+    "a date": (["train.speed_km_h=2012-03-23"], "must be a number [km/h]"),
+    "huge integer": (["line.n_spans=" + "9" * 50], "at most 2000"),
+    "integer beyond printing": (["line.n_spans=" + "9" * 5000], "must be"),
+    "value in place of a table": (["line=3"], "must be a table"),
+    "table in place of a value": (["train.speed_km_h={a=1}"], "must be a number"),
+    "misspelt key": (["train.speed=300"], "did you mean train.speed_km_h?"),
+    "misspelt table": (["numeric.dt_s=1e-3"], "did you mean numerics.dt_s?"),
+    "key in the wrong table": (["line.tension_N=1"], "did you mean line.contact_wire.tension_N?"),
+    "misspelt effect": (["effects.gravty=true"], "did you mean effects.gravity?"),
+    "no equals sign": (["line.n_spans"], "key=value"),
+    "empty part of a key": (["line..n_spans=3"], "key=value"),
+    "through a value": (["train.speed_km_h.x=3"], "train.speed_km_h"),
+    "entry beyond a list": (["train.pantographs.5.behind_m=3"], "from 0 to 1"),
+    "name of an entry": (["train.pantographs.first.behind_m=3"], "from 0 to 1"),
+    "required key taken away": (["line.n_spans="], "is missing"),
+    "required effect off": (["effects.gravity=false", "effects.pre_sag=false"], "requires"),
+    "what cannot be left out": (["effects.vertical=false"], "cannot be left out"),
+    "damping without its effect": (["contact.damping_N_s_per_m=10"], "effects.contact_damping"),
+    "effect without its damping": (["effects.contact_damping=true"], "needs a value"),
+    "effect without its ratio": (["effects.residual_dropper_stiffness=true"], "needs a value"),
+    "ratio without its effect": (["line.dropper.residual_stiffness_ratio=0.01"], "acts only with"),
+    "ratio of one": (["line.dropper.residual_stiffness_ratio=1"], "must be less than 1"),
+    "dropper outside its span": (["line.dropper.positions_m=[10, 61]"], "between 0 and 60 m"),
+    "dropper at the support": (["line.dropper.positions_m=[0, 10]"], "greater than 0"),
+    "two droppers at one place": (["line.dropper.positions_m=[10, 10]"], "ascending"),
+    "no dropper": (["line.dropper.positions_m=[]"], "at least 1"),
+    "two ways to place droppers": (["line.dropper.count=8"], "exactly one of positions_m"),
+    "count without spacing": (
+        ["line.dropper.count=8", "line.dropper.positions_m="],
+        "count and spacing_m together",
+    ),
+    "too many droppers": (
+        ["line.dropper.count=12", "line.dropper.spacing_m=6", "line.dropper.positions_m="],
+        "do not fit into a span of 60 m",
+    ),
+    "two stiffnesses": (["line.dropper.axial_stiffness_N=1e6"], "exactly one of"),
+    "pre-sag of other length": (["line.dropper.pre_sag_mm=[1, 2]"], "2 values for 9 droppers"),
+    "pre-sag twice": (
+        ["line.dropper.pre_sag_mid_mm=5", "line.dropper.pre_sag_mm=[0,0,0,0,0,0,0,0,0]"],
+        "both are given",
+    ),
+    "several span lengths": (["line.span_m=[60, 55]"], "holds for one span length"),
+    "more lengths than spans": (["line.span_m=[60,60,60]", "line.n_spans=2"], "more lengths"),
+    "a span of a kilometre": (["line.span_m=1000"], "5 to 500 m"),
+    "stagger for some supports": (["line.stagger_m=[0.2, -0.2]"], "one per support (23)"),
+    "stagger beyond the head": (["line.stagger_m=20"], "within 2 m"),
+    "only transition spans": (["line.transition.n_spans_start=22"], "more spans"),
+    "encumbrance too small": (["line.encumbrance_m=0.3"], "below the contact wire"),
+    "slack messenger wire": (["line.messenger_wire.tension_N=2000"], "below the contact wire"),
+    "no damping component": (["line.damping.per_component.dropper.alpha_s=1"], "droppers"),
+    "half a damping": (["line.damping.per_component.droppers.alpha_s=1"], "beta_per_s"),
+    "no elements": (["mesh.elements_per_gap=0"], "at least 1"),
+    "too many elements": (["mesh.elements_per_gap=65"], "at most 64"),
+    "mesh made and given": (["mesh.file=own.msh"], "both are given"),
+    "missing mesh file": (["mesh.file=own.msh", "mesh.elements_per_gap="], "no such file"),
+    "standing still": (["train.speed_km_h=0"], "at least 1 [km/h]"),
+    "faster than the wave": (["train.speed_km_h=450"], "wave speed of the contact wire (438.2"),
+    "start before the line": (["train.start_m=-1"], "at least 0 [m]"),
+    "start behind the line": (["train.start_m=1400"], "0 to 1320 m"),
+    "end before the start": (["train.end_m=50"], "greater than train.start_m"),
+    "end behind the line": (["train.end_m=1321"], "0 to 1320 m"),
+    "no pantograph": (["train.pantographs=[]"], "at least 1"),
+    "unknown pantograph": (["train.pantographs.0.name=referense"], "did you mean reference?"),
+    "first one trails": (["train.pantographs.0.behind_m=5"], "must be 0"),
+    "two in one place": (
+        ["train.pantographs.1.name=reference", "train.pantographs.1.behind_m=0"],
+        "at least 1 m more",
+    ),
+    "trailing one outside": (
+        ["train.pantographs.1.name=reference", "train.pantographs.1.behind_m=200"],
+        "would start at -110 m",
+    ),
+    "trailing one misses the evaluation": (
+        [
+            "train.pantographs.1.name=reference",
+            "train.pantographs.1.behind_m=200",
+            "train.start_m=300",
+            "train.end_m=900",
+        ],
+        "pantograph 2 only runs from 100 to 700 m",
+    ),
+    "several pantographs switched off": (
+        [
+            "train.pantographs.1.name=reference",
+            "train.pantographs.1.behind_m=100",
+            "effects.several_pantographs=false",
+        ],
+        "2 entries",
+    ),
+    "masses without springs": (["pantographs.reference.masses_kg=[7, 9, 6]"], "one value per mass"),
+    "weightless head": (["pantographs.reference.masses_kg=[0, 15]"], "greater than 0 [kg]"),
+    "loose head": (["pantographs.reference.stiffnesses_N_per_m=[0, 50]"], "only the last"),
+    "negative damper": (["pantographs.reference.dampings_N_s_per_m=[-1, 90]"], "at least 0"),
+    "two static forces": (
+        ["pantographs.reference.static_force_by_speed=[[200, 100]]"],
+        "exactly one of",
+    ),
+    "speed outside the forces": (
+        [
+            "pantographs.reference.static_force_by_speed=[[275, 143], [320, 169]]",
+            "pantographs.reference.static_force_N=",
+        ],
+        "only holds forces for 275 to 320 km/h",
+    ),
+    "another model": (["pantographs.reference.type=multibdy"], "must be"),
+    "no contact stiffness": (["contact.stiffness_N_per_m=0"], "greater than 0 [N/m]"),
+    "step above 20 Hz": (["numerics.dt_s=0.03"], "20 Hz"),
+    "step of nothing": (["numerics.dt_s=0"], "at least 1e-06 [s]"),
+    "unknown scheme": (["numerics.scheme=newton"], "one_solve or fixed_point"),
+    "unstable Newmark": (["numerics.newmark_gamma=0.7"], "2 newmark_beta >= newmark_gamma"),
+    "negative Newmark damping": (["numerics.newmark_gamma=0.4"], "at least 0.5"),
+    "no iterations": (["numerics.max_iterations=0"], "at least 1"),
+    "evaluation backwards": (["evaluation.to_m=400"], "must end after it starts"),
+    "evaluation beyond the line": (["evaluation.to_m=1500"], "only runs from 90 to 1320 m"),
+    "evaluation before the start": (["evaluation.from_m=50"], "only runs from 90"),
+    "raised too late": (["train.raise_time_s=10"], "must be raised by then"),
+    "unknown edition": (["evaluation.edition=1999"], "must be text"),
+    "unknown edition as text": (['evaluation.edition="1999"'], "must be one of"),
+    "unknown system": (["evaluation.system=steam"], "must be one of"),
+    "list for a PETSc option": (["petsc.ksp_type=[1]"], "must be text"),
+    "PETSc option with its dash": (["petsc.-ksp_type=cg"], "without its dash"),
+    "unknown key in the test table": (["test.train.sped_km_h=3"], "did you mean train.speed_km_h?"),
+}
+
+# Changes to the text of a case file: (old, new, what the sentence must hold).
+EDITS = {
+    "no TOML": ("[line]", "[line", "is not valid TOML"),
+    "key twice": ("n_spans = 22", "n_spans = 22\nn_spans = 23", "is not valid TOML"),
+    "unit without quotes": ("= 20000.0", "= 20 kN", "is not valid TOML"),
+    "misspelt table": ("[train]", "[trian]", "did you mean train?"),
+    "unknown table": ("[contact]", "[zzzzzz]", "zzzzzz in"),
+    "missing table": ("[evaluation]", "[output]", "did you mean"),
+    "missing key": ("n_spans = 22", "", "line.n_spans (number of spans"),
+    "negative": ("mass_kg_per_m = 1.35", "mass_kg_per_m = -1.35", "case.toml; it must be greater"),
+    "not UTF-8": ("Reference model", "R\udce9f\udce9rence", "UTF-8"),
+    "integer too long to read": ("n_spans = 22", "n_spans = " + "9" * 5000, "is not valid TOML"),
+    "nested too deeply": ("n_spans = 22", "n_spans = " + "[" * 5000, "case.toml"),
+}
+
+
+def _one_sentence(output: str, out: Path, expected: str) -> None:
+    sentence = output.strip()
+    assert sentence.startswith("catenary: ")
+    assert "\n" not in sentence
+    assert expected in sentence, sentence
+    assert "Traceback" not in output
+    assert not out.exists()
+
+
+@pytest.fixture(autouse=True)
+def _own_hook_and_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(sys, "excepthook", sys.excepthook)  # run replaces it
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize("name", ASSIGNMENTS)
+def test_a_broken_assignment_ends_in_one_sentence_and_code_2(name: str, tmp_path: Path) -> None:
+    assignments, expected = ASSIGNMENTS[name]
+    out = tmp_path / "out"
+    words = [word for text in assignments for word in ("--set", text)]
+    result = CliRunner().invoke(app, ["run", "en50318_2002", "-o", str(out), *words])
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    _one_sentence(result.stderr, out, expected)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_a_broken_file_ends_in_one_sentence_that_names_it(name: str, tmp_path: Path) -> None:
+    old, new, expected = EDITS[name]
+    text = shipped()["en50318_2002"].read_text(encoding="utf-8")
+    assert old in text
+    file = tmp_path / "case.toml"
+    file.write_bytes(text.replace(old, new, 1).encode("utf-8", "surrogateescape"))
+    out = tmp_path / "out"
+    result = CliRunner().invoke(app, ["run", str(file), "-o", str(out)])
+    assert result.exit_code == 2, result.output
+    _one_sentence(result.stderr, out, expected)
+    assert str(file) in result.stderr
+    assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.parametrize(
+    ("case", "expected"),
+    [
+        ("en50318", "did you mean en50318_2002?"),
+        ("nothing/of/the/kind.toml", "there is no case or file"),
+        (".", "is no case file and no folder"),
+        ("a" * 5000, "there is no case or file"),
+        ("nul\0byte", "there is no case or file"),
+    ],
+)
+def test_a_case_that_is_not_there_is_named(case: str, expected: str, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    result = CliRunner().invoke(app, ["run", case, "-o", str(out)])
+    assert result.exit_code == 2, result.output
+    _one_sentence(result.stderr, out, expected)
+
+
+def test_an_empty_file_lacks_its_first_table(tmp_path: Path) -> None:
+    (tmp_path / "case.toml").write_text("")
+    result = CliRunner().invoke(app, ["check", str(tmp_path)])
+    assert result.exit_code == 2
+    assert "is missing" in result.stderr
+    assert "more problems" in result.stderr
+
+
+def test_a_line_whose_droppers_would_be_slack_at_rest_is_refused() -> None:
+    words = ["check", "en50318_2002", "--set", "line.dropper.pre_sag_mid_mm=500"]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 2, result.output
+    assert "would be slack at rest" in result.stderr
+
+
+def test_a_mesh_without_a_group_is_refused(tmp_path: Path) -> None:
+    made = tmp_path / "line.msh"
+    assert CliRunner().invoke(app, ["mesh", "en50318_2002", "-o", str(made)]).exit_code == 0
+    made.write_text(made.read_text().replace('"steady_arms"', '"study_arms"'))
+    words = [
+        "check",
+        "en50318_2002",
+        "--set",
+        f"mesh.file={made}",
+        "--set",
+        "mesh.elements_per_gap=",
+    ]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 2, result.output
+    assert "steady_arms" in result.stderr
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["run", "en50318_2002", "-o", "out", "--set", "train.speed_km_h=-1"],
+        ["run", "no_such_case", "-o", "out"],
+        ["run", "en50318_2002"],
+        ["run", "en50318_2002", "-o", "out", "--no-such-option"],
+        ["plan", "en50318_2002", "--set", "line.contact_wire.tension_N=20 kN"],
+        ["nonsense"],
+    ],
+)
+def test_the_program_itself_exits_with_2(words: list[str], tmp_path: Path) -> None:
+    entry = "from catenary.cases.cli import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", entry, *words],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 2, done.stderr
+    assert done.stdout == ""
+    assert "Traceback" not in done.stderr
+    assert done.stderr.strip()
+    assert list(tmp_path.iterdir()) == []
