@@ -25,6 +25,8 @@ def main() -> None:
     import scipy
     from petsc4py import PETSc
 
+    if not hasattr(h5py, "File"):
+        raise SystemExit("h5py is installed in part only: a folder, but no module (python3-h5py).")
     version = PETSc.Sys.getVersion()
     if version[:2] < OLDEST_PETSC:
         raise SystemExit(

@@ -7,10 +7,12 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
+# a|b: either will do, a is installed if none is there. The module h5py that chooses between the
+# serial and the MPI build lies in python3-h5py since Debian 13, in python3-h5py-serial before.
 # gmsh's wheel links to these libraries of OpenGL and X (ldd libgmsh.so), though no window is opened.
 DEBIAN_PACKAGES=(
-    python3-petsc4py-real python3-mpi4py python3-h5py-mpi python3-scipy python3-numpy
-    openmpi-bin python3-venv make
+    python3-petsc4py-real python3-mpi4py python3-h5py-mpi "python3-h5py|python3-h5py-serial"
+    python3-scipy python3-numpy openmpi-bin python3-venv make
     libglu1-mesa libgl1 libxrender1 libxcursor1 libxfixes3 libxext6 libxft2 libfontconfig1
     libxinerama1 libx11-6 libgomp1
 )
@@ -42,14 +44,26 @@ is_installed() {
     [[ $(dpkg-query -W -f='<${db:Status-Status}>' "$1" 2>/dev/null) == *"<installed>"* ]]
 }
 
-# Some libraries carry another name since the change to 64-bit time (Ubuntu 24.04, Debian 13).
+# Names under which a wanted package may be found, one a line. Some libraries carry another name
+# since the change to 64-bit time (Ubuntu 24.04, Debian 13).
+names_of() {
+    local name
+    for name in ${1//|/ }; do
+        printf '%s\n' "$name" "${name}t64"
+    done
+}
+
 is_provided() {
-    is_installed "$1" || is_installed "${1}t64"
+    local name
+    for name in $(names_of "$1"); do
+        is_installed "$name" && return
+    done
+    return 1
 }
 
 name_in_archive() {
     local name
-    for name in "$1" "${1}t64"; do
+    for name in $(names_of "$1"); do
         # No pipe into grep -q: it would end apt-cache early, which pipefail takes for a failure.
         if [[ $(apt-cache policy "$name" 2>/dev/null) =~ Candidate:\ [^\(] ]]; then
             printf '%s\n' "$name"
@@ -120,7 +134,7 @@ has_everything() {
 explain() {
     say "setup: python3 on the PATH does not bring petsc4py, mpi4py and h5py, which Catenary needs."
     if [ $# -gt 0 ]; then
-        say "  Here:            apt-get install --no-install-recommends $*"
+        say "  Here:            apt-get install --no-install-recommends ${*%%|*}"
     fi
     cat >&2 <<'TEXT'
   Debian, Ubuntu:  run `make setup` as root or as a user who may use sudo.
