@@ -61,10 +61,11 @@ class FieldRecorder:
         self._resume = resume
         self._buffered: list[float] = []
         self._written: list[float] = []
+        self._flushed_once = False
         self._broken = False
 
     def start(self, stage: Stage) -> None:
-        """Write mesh and an XDMF without snapshots. Collective.
+        """Write the mesh. Collective.
 
         Raises
         ------
@@ -83,7 +84,8 @@ class FieldRecorder:
             return
         self._uplift[len(self._buffered)] = view.node_uplift()
         self._buffered.append(view.time)
-        if len(self._buffered) == self._capacity:
+        # The first snapshot is written at once: from then on there is something to look at.
+        if len(self._buffered) == self._capacity or not self._flushed_once:
             self._flush()
 
     def finish(self, outcome: str) -> None:
@@ -95,6 +97,7 @@ class FieldRecorder:
         times = list(self._buffered)
         uplift = self._gather(self._uplift[: len(times)])
         self._buffered.clear()
+        self._flushed_once = True
         if times:
             self._guarded(lambda: self._append(times, uplift), times[-1])
 
@@ -118,7 +121,9 @@ class FieldRecorder:
     def _open(self, stage: Stage) -> None:
         if self._resume:
             self._cut(stage.start_time - 0.5 * stage.dt)
+            self._describe()
         else:
+            self._xdmf.unlink(missing_ok=True)  # one of an earlier run would name other numbers
             with opened(self._h5, "w") as file:
                 file["mesh/points"] = stage.node_points
                 file["mesh/cells"] = self._cells
@@ -128,7 +133,6 @@ class FieldRecorder:
                 )
                 file.create_group("uplift")
                 file.create_group("displacement")
-        self._describe()
 
     def _cut(self, time: float) -> None:
         with opened(self._h5, "r+") as file:
@@ -188,7 +192,7 @@ def xdmf(h5_name: str, n_nodes: int, n_cells: int, times: list[float]) -> str:
     Parameters
     ----------
     h5_name : file of the numbers, relative to the XDMF file
-    times : times of the snapshots [s]; with none of them the file shows the line at rest
+    times : times of the snapshots [s]
     """
     mesh = f"""\
         <Topology TopologyType="Polyline" NodesPerElement="2" NumberOfElements="{n_cells}">
@@ -217,8 +221,6 @@ def xdmf(h5_name: str, n_nodes: int, n_cells: int, times: list[float]) -> str:
             _node_attribute("displacement", "Vector", f"{n_nodes} 3", h5_name, number),
             "      </Grid>\n",
         ]
-    if not times:
-        lines.append(f'      <Grid Name="line" GridType="Uniform">\n{mesh}      </Grid>\n')
     lines.append("    </Grid>\n  </Domain>\n</Xdmf>\n")
     return "".join(lines)
 

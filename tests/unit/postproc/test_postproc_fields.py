@@ -1,0 +1,110 @@
+"""Field snapshots, read back by VTK's XDMF reader."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import pyvista
+
+from catenary.postproc import fields
+from catenary.postproc.fields import FieldRecorder
+from catenary.postproc.storage import NoRoom
+from catenary.solver.errors import RunBroken
+
+
+def watch(march: Any, path: Path, **options: Any) -> FieldRecorder:
+    known = {"every": 50, "snapshots_per_flush": 4, **options}
+    return FieldRecorder(march.comm, path, march.mesh.wires, march.mesh.droppers, **known)
+
+
+def test_vtk_reads_points_times_and_values(tmp_path: Path, make_march: Any) -> None:
+    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
+    march.drive(watch(march, path))
+    reader = pyvista.get_reader(path)
+    np.testing.assert_allclose(reader.time_values, 0.05 * np.arange(21), rtol=1e-12)
+    for time in reader.time_values[::5]:
+        reader.set_active_time_value(time)
+        grid = reader.read()
+        expected = march.wave(time, march.mesh.points[:, 0])
+        np.testing.assert_array_equal(grid.points, march.mesh.points)
+        np.testing.assert_allclose(grid.point_data["uplift"], expected, atol=1e-8)
+        np.testing.assert_array_equal(grid.point_data["displacement"][:, :2], 0.0)
+        np.testing.assert_array_equal(
+            grid.point_data["displacement"][:, 2], grid.point_data["uplift"]
+        )
+        warped = grid.warp_by_vector("displacement", factor=2.0)
+        np.testing.assert_allclose(
+            warped.points[:, 2], march.mesh.points[:, 2] + 2 * expected, atol=1e-6
+        )
+
+
+def test_wires_and_droppers_are_told_apart(tmp_path: Path, make_march: Any) -> None:
+    march, path = make_march(n_steps=100), tmp_path / "fields.xdmf"
+    march.drive(watch(march, path))
+    grid = pyvista.get_reader(path).read()
+    component = grid.cell_data["component"]
+    n = [len(march.mesh.wires[name]) - 1 for name in ("contact_wire", "messenger_wire")]
+    assert np.bincount(component).tolist() == [*n, len(march.mesh.droppers)]
+    cells = grid.cell_connectivity.reshape(-1, 2)
+    np.testing.assert_array_equal(cells[component == 2], march.mesh.droppers)
+    assert (march.mesh.points[cells[component == 1], 2] > 6.0).all()
+
+
+def test_other_wires_get_numbers_of_their_own() -> None:
+    wires = {"stitch_wire": np.arange(3), "contact_wire": np.arange(3), "feeder": np.arange(2)}
+    _, component = fields.line_cells(wires, np.zeros((0, 2), dtype=int))
+    assert component.tolist() == [3, 3, 0, 0, 4]
+
+
+def test_files_are_valid_after_every_flush(tmp_path: Path, make_march: Any) -> None:
+    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
+    watcher = watch(march, path)
+    watcher.start(march.stage())
+    watcher.observe(march.view(0))
+    assert pyvista.get_reader(path).read().n_points == march.mesh.n_nodes
+    for step in range(1, 230):  # the steps 50, 100, 150 and 200 fill the buffer
+        watcher.observe(march.view(step))
+    assert pyvista.get_reader(path).time_values == pytest.approx([0.0, 0.05, 0.1, 0.15, 0.2])
+
+
+def test_xdmf_names_the_numbers_beside_it(tmp_path: Path, make_march: Any) -> None:
+    march, path = make_march(n_steps=100), tmp_path / "run_7.xdmf"
+    march.drive(watch(march, path))
+    items = [item.text for item in ElementTree.parse(path).iter("DataItem")]
+    assert items and all(text and text.startswith("run_7.h5:/") for text in items)
+    with h5py.File(tmp_path / "run_7.h5") as file:
+        assert all(text.split(":")[1] in file for text in items if text)
+        assert len(file["uplift"]) == len(file["times"]) == 3
+
+
+def test_resumed_fields_replace_what_follows(tmp_path: Path, make_march: Any) -> None:
+    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
+    march.drive(watch(march, path), outcome="interrupted", last=620)
+    march.drive(watch(march, path, resume=True), first_step=500)
+    reader = pyvista.get_reader(path)
+    np.testing.assert_allclose(reader.time_values, 0.05 * np.arange(21), rtol=1e-12)
+
+
+def test_a_full_disk_breaks_the_run_and_keeps_the_snapshots(
+    tmp_path: Path, make_march: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
+    watcher = watch(march, path)
+    watcher.start(march.stage())
+    for step in range(201):
+        watcher.observe(march.view(step))
+
+    def full(*_: object) -> None:
+        raise NoRoom(28, "No space left on device")
+
+    monkeypatch.setattr(fields, "reserve", full)
+    with pytest.raises(RunBroken, match=r"fields.h5 failed at t = 0.400 s \(No space left"):
+        for step in range(201, 500):
+            watcher.observe(march.view(step))
+    watcher.finish("the disk is full")
+    assert pyvista.get_reader(path).time_values == pytest.approx([0.0, 0.05, 0.1, 0.15, 0.2])
