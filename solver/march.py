@@ -17,7 +17,7 @@ from petsc4py import PETSc
 
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.distribution import distribute
-from catenary.solver.equilibrium import Equilibrium
+from catenary.solver.equilibrium import Elasticity, Equilibrium
 from catenary.solver.errors import InputError, RunBroken
 from catenary.solver.inner import InnerProblem
 from catenary.solver.interaction import Interaction
@@ -52,9 +52,17 @@ class March:
     ----------
     comm : mpi4py communicator
     problem, model, form : what ``equilibrium.find_form`` was given and returned, on all ranks
+    elasticity : that of a running span, for the height at which static forces are defined
     """
 
-    def __init__(self, comm: Any, problem: Problem, model: Model, form: Equilibrium) -> None:
+    def __init__(
+        self,
+        comm: Any,
+        problem: Problem,
+        model: Model,
+        form: Equilibrium,
+        elasticity: Elasticity,
+    ) -> None:
         self._comm = comm
         self._problem = problem
         self._model = model
@@ -75,12 +83,13 @@ class March:
             uses_rate,
             "dropper_slackening" in on,
         )
+        nominal_height = nominal_height_rule(model, form, elasticity)
         self._pantographs = Pantographs(
-            problem, self._interaction.wire, nominal_height_rule(model, form), comm.rank == 0
+            problem, self._interaction.wire, nominal_height, comm.rank == 0
         )
         self._scheme = self._make_scheme(on)
-        self._stage = self._make_stage(form)
-        self._own_rows(model)
+        self._form = form
+        self._tension = self._dropper_law()
         self._first_step = 0
         self._start_time = 0.0
 
@@ -120,8 +129,9 @@ class March:
         seen everything up to the last good step.
         """
         ts = self._make_ts(observers, stop_requested)
+        stage = self._make_stage(self._form)
         for observer in observers:
-            observer.start(self._stage)
+            observer.start(stage)
         begin = clock.perf_counter()
         outcome = "done"
         try:
@@ -151,7 +161,7 @@ class March:
     def _make_scheme(self, on: dict[str, int]) -> Scheme:
         problem = self._problem
         may_lose = "contact_loss" in on
-        kept = problem.residual_stiffness_ratio if "residual_dropper_stiffness" in on else 0.0
+        kept = self._kept_ratio
         law = problem.contact
         if "contact_damping" not in on:
             law = type(law)(law.stiffness, 0.0)
@@ -196,7 +206,7 @@ class March:
         return Stage(
             n_pantographs=self._pantographs.n,
             dt=self._problem.numerics.dt,
-            start_time=0.0,
+            start_time=self._start_time,
             n_steps=self.n_steps,
             arm_x=mesh.x(mesh.steady_arms),
             dropper_x=mesh.x(mesh.droppers[:, 1]),
@@ -206,20 +216,25 @@ class March:
             owned_nodes=owned_nodes,
         )
 
-    def _own_rows(self, model: Model) -> None:
-        droppers = self._interaction.droppers
-        kept = (
-            self._problem.residual_stiffness_ratio
-            if "residual_dropper_stiffness" in model.terms_of
-            else 0.0
-        )
-        slackens = "dropper_slackening" in model.terms_of
-
+    def _dropper_law(self) -> Callable[[], np.ndarray]:
+        """Tension of the owned droppers as they are, slack ones included [N]."""
+        on, droppers = self._model.terms_of, self._interaction.droppers
+        if "dropper_slackening" not in on:
+            return droppers.tension
+        kept = self._kept_ratio
+        
         def tension() -> np.ndarray:
             linear = droppers.tension()
-            return np.maximum(linear, kept * linear) if slackens else linear
+            return np.maximum(linear, kept * linear)
 
-        self._tension = tension
+        return tension
+
+    @property
+    def _kept_ratio(self) -> float:
+        """Share of its stiffness that a slack dropper keeps."""
+        if "residual_dropper_stiffness" not in self._model.terms_of:
+            return 0.0
+        return self._problem.residual_stiffness_ratio
 
     def _make_ts(
         self, observers: Sequence[Observer], stop_requested: Callable[[], bool]
@@ -238,7 +253,7 @@ class March:
         ts.setMaxTime(2.0 * self.n_steps * dt)
         ts.setExactFinalTime(PETSc.TS.ExactFinalTime.STEPOVER)
         if observers:
-            ts.setMonitor(lambda _ts, step, time, _u: self._show(observers, step, time))
+            ts.setMonitor(lambda ts, step, time, _u: self._show(ts, observers, step, time))
         ts.setFromOptions()
         if abs(ts.getTimeStep() - dt) > 1e-12 * dt:
             raise InputError(
@@ -247,7 +262,9 @@ class March:
             )
         return ts
 
-    def _show(self, observers: Sequence[Observer], step: int, time: float) -> None:
+    def _show(
+        self, ts: PETSc.TS, observers: Sequence[Observer], step: int, time: float
+    ) -> None:
         if self._stepper.broken:
             return
         pantographs, line = self._pantographs, self._line
@@ -264,8 +281,12 @@ class March:
             energies=line.energies,
             checkpoint=lambda: self._checkpoint(step),
         )
-        for observer in observers:
-            observer.observe(view)
+        try:
+            for observer in observers:
+                observer.observe(view)
+        except RunBroken as error:
+            # An exception must not pass through PETSc; observers raise it on all ranks.
+            self._stepper.give_up(ts, str(error))
 
     def _checkpoint(self, step: int) -> dict[str, Any] | None:
         """Everything needed to continue after ``step``, on rank 0. Collective."""
@@ -311,14 +332,18 @@ class _Stepper:
         try:
             goes_on = self._scheme.step(time, self._stop_requested())
         except RunBroken as error:
-            self.broken = str(error)
-            ts.setConvergedReason(PETSc.TS.ConvergedReason.DIVERGED_STEP_REJECTED)
+            self.give_up(ts, str(error))
             return
         self.step_number += 1
         ts.setTime(time)
         if not goes_on:
             self.stopped = True
             ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
+
+    def give_up(self, ts: PETSc.TS, why: str) -> None:
+        """End the time loop because of an error that the march reports."""
+        self.broken = why
+        ts.setConvergedReason(PETSc.TS.ConvergedReason.DIVERGED_STEP_REJECTED)
 
     def view(self, ts: PETSc.TS, viewer: PETSc.Viewer) -> None:
         """Name the scheme in -march_ts_view."""

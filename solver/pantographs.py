@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy import integrate
 
 from catenary.mbs.interface import HeadState, Pantograph
 from catenary.mbs.lumped import LumpedPantograph
+from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.contact import ContactWire, Touch
-from catenary.solver.equilibrium import Equilibrium, elasticity, middle_span
+from catenary.solver.equilibrium import Elasticity, Equilibrium
 from catenary.solver.model import Model
 from catenary.solver.problem import Placement, Problem
 
@@ -80,22 +82,23 @@ class Pantographs:
             self.head_height[i] = head.height - head.height_compliance * contact_force[i]
 
 
-def nominal_height_rule(model: Model, form: Equilibrium) -> Callable[[Placement], float]:
+def nominal_height_rule(
+    model: Model, form: Equilibrium, elasticity: Elasticity
+) -> Callable[[Placement], float]:
     """Head height at which the static force is defined.
 
-    That of the placement, or else the mean height of the contact wire in the middle span when
-    the static force lifts it, so that the base spring neither adds to the mean force nor takes
-    from it.
+    That of the placement, or else the mean height of the contact wire in the stretch of
+    ``elasticity`` when the static force lifts it, so that the base spring neither adds to the
+    mean force nor takes from it.
     """
+    nodes = model.mesh.wires[CONTACT_WIRE]
+    x = elasticity.x
+    at_rest = np.interp(x, model.mesh.x(nodes), form.height[nodes])
 
     def height(placement: Placement) -> float:
         if placement.nominal_height is not None:
             return placement.nominal_height
-        low, high = middle_span(model.problem.line)
-        lift = elasticity(model, low, high)
-        nodes = model.mesh.wires["contact_wire"]
-        at_rest = np.interp(lift.x, model.mesh.x(nodes), form.height[nodes])
-        lifted = at_rest + placement.static_force * lift.lift
-        return float(np.trapz(lifted, lift.x) / (lift.x[-1] - lift.x[0]))
+        lifted = at_rest + placement.static_force * elasticity.lift
+        return float(integrate.trapezoid(lifted, x) / (x[-1] - x[0]))
 
     return height
