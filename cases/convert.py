@@ -60,6 +60,7 @@ def line_of(scene: Scene) -> Line:
             mass_per_length=table.steady_arm.mass_kg_per_m,
             clamp_mass=table.steady_arm.clamp_kg,
             stiffness=table.steady_arm.stiffness_N_per_m,
+            holds_height=table.steady_arm.holds_height,
         ),
         n_transition=(table.transition.n_spans_start, table.transition.n_spans_end),
         transition_rise=table.transition.rise_m,

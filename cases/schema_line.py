@@ -120,6 +120,11 @@ class SteadyArmTable(Table):
     stiffness_N_per_m: float = Field(
         0.0, ge=0, le=1e8, description="vertical stiffness at the contact wire"
     )
+    holds_height: bool = Field(
+        False,
+        description="whether the arm holds the contact wire at its height at rest; otherwise the "
+        "wire hangs freely between the droppers next to it",
+    )
 
 
 class ProportionalDamping(Table):

@@ -174,7 +174,7 @@ class OutputTable(Table):
     """What is written besides the channels."""
 
     field_every_s: float = Field(
-        0.0, ge=0, le=1e4, description="cadence of field snapshots; 0 writes none"
+        0.05, ge=0, le=1e4, description="cadence of field snapshots; 0 writes none"
     )
     energy_every_s: float = Field(
         0.0, ge=0, le=1e4, description="cadence of the line's energy; 0 writes none"
