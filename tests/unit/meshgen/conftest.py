@@ -37,7 +37,7 @@ def _line(**changes: object) -> Line:
     return Line(**{**settings, **changes})  # type: ignore[arg-type]
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_line() -> Callable[..., Line]:
     """Four uneven spans with pre-sag and rising ends; keywords replace fields."""
     return _line

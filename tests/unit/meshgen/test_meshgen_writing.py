@@ -9,6 +9,8 @@ from pathlib import Path
 import gmsh
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from catenary.meshgen.build import make_mesh
 from catenary.meshgen.gmsh_lines import write_mesh
@@ -118,6 +120,38 @@ def test_nodes_are_numbered_along_the_track(make_line: Callable[..., Line]) -> N
     assert (np.diff(mesh.points[:, 0]) > -PLACE).all()
     # both wires' nodes of one station are neighbours, the messenger wire's first
     np.testing.assert_array_equal(mesh.wires[CONTACT_WIRE] - mesh.wires[MESSENGER_WIRE], 1)
+
+
+@st.composite
+def spans(draw: st.DrawFn) -> tuple[float, tuple[float, ...]]:
+    """Length of a span and the droppers in it, some of them close together or to a mast [m]."""
+    gaps = draw(st.lists(st.integers(1, 2000), min_size=1, max_size=6))
+    cuts = np.cumsum(gaps) / 100.0
+    return float(cuts[-1]), tuple(cuts[:-1].tolist())
+
+
+@settings(max_examples=40, deadline=None)
+@given(given_spans=st.lists(spans(), min_size=1, max_size=5), elements_per_gap=st.integers(1, 6))
+def test_any_spans_and_droppers_are_meshed_as_described(
+    make_line: Callable[..., Line],
+    given_spans: list[tuple[float, tuple[float, ...]]],
+    elements_per_gap: int,
+) -> None:
+    n = len(given_spans)
+    line = make_line(
+        span_lengths=tuple(length for length, _ in given_spans),
+        dropper_positions=tuple(places for _, places in given_spans),
+        pre_sag=tuple((0.0,) * len(places) for _, places in given_spans),
+        stagger=(0.2,) * (n + 1),
+        n_transition=(0, 0),
+        encumbrance=10.0,
+    )
+    mesh = make_mesh(line, elements_per_gap)
+    cuts = cuts_of(line)
+    for wire in (CONTACT_WIRE, MESSENGER_WIRE):
+        np.testing.assert_allclose(mesh.x(mesh.wires[wire])[::elements_per_gap], cuts, atol=PLACE)
+    assert mesh.droppers.shape == (cuts.size - n - 1, 2)
+    assert mesh.steady_arms.size == mesh.supports.size == n - 1
 
 
 def test_gmsh_opens_the_file_with_its_physical_groups(
