@@ -1,0 +1,259 @@
+"""Scenes: loading, overriding, conversion to SI, and the resolved configuration."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from catenary.cases.catalogue import find_case, shipped
+from catenary.cases.messages import Origin
+from catenary.cases.scene import Scene, load_scene, scene_from
+from catenary.cases.units import unit_of
+from catenary.solver.errors import InputError
+
+# Keys that other programs rely on.
+CONTRACT = [
+    "train.speed_km_h",
+    "train.start_m",
+    "numerics.dt_s",
+    "numerics.scheme",
+    "mesh.elements_per_gap",
+    "line.n_spans",
+    "line.damping.alpha_s",
+    "line.damping.beta_per_s",
+    "contact.stiffness_N_per_m",
+    "evaluation.from_m",
+    "evaluation.to_m",
+    "effects.gravity",
+]
+
+
+@pytest.mark.parametrize("case", ["ambrosio2012", "en50318_2002", "ac_simple"])
+def test_the_promised_cases_are_shipped(case: str) -> None:
+    assert case in shipped()
+
+
+@pytest.mark.parametrize("case", list(shipped()))
+@pytest.mark.parametrize("shortened", [False, True])
+def test_every_shipped_case_loads(case: str, shortened: bool) -> None:
+    scene = load_scene(case, shortened=shortened)
+    problem = scene.to_problem()
+    assert scene.case.name == case
+    assert scene.case.title and scene.case.source
+    assert problem.train.end > problem.evaluation[1]
+    if shortened:
+        assert problem.line.n_spans < load_scene(case).line.n_spans
+
+
+@pytest.mark.parametrize("case", list(shipped()))
+def test_the_resolved_configuration_loads_to_the_same_problem(case: str) -> None:
+    scene = load_scene(case, ["train.speed_km_h=290"])
+    carried = json.loads(json.dumps(scene.resolved(), allow_nan=False))
+    again = scene_from(carried, Origin("the result file"))
+    assert again.to_problem() == scene.to_problem()
+    assert again.resolved() == scene.resolved()
+
+
+@pytest.mark.parametrize("key", CONTRACT)
+def test_contract_keys_can_be_set_and_are_resolved(key: str) -> None:
+    resolved = load_scene("en50318_2002").resolved()
+    table, name = resolved, key
+    while "." in name:
+        first, name = name.split(".", 1)
+        table = table[first]
+    value = table[name]
+    again = load_scene("en50318_2002", [f"{key}={json.dumps(value)}"])
+    assert again.resolved() == resolved
+
+
+def test_the_later_assignment_wins_over_the_earlier_and_both_over_the_file() -> None:
+    scene = load_scene("en50318_2002", ["train.speed_km_h=260", "train.speed_km_h = 300"])
+    assert scene.to_problem().train.speed == pytest.approx(300 / 3.6, rel=1e-15)
+
+
+def test_assignments_win_over_the_test_table() -> None:
+    short = load_scene("en50318_2002", shortened=True)
+    mine = load_scene("en50318_2002", ["line.n_spans=18"], shortened=True)
+    assert short.line.n_spans < 18 == mine.line.n_spans
+    assert mine.evaluation == short.evaluation
+
+
+def test_an_empty_value_takes_a_key_away() -> None:
+    kind = "pantographs.three_masses"
+    scene = load_scene(
+        "ac_simple", [f"{kind}.static_force_N=140", f"{kind}.static_force_by_speed="]
+    )
+    assert scene.to_problem().train.placements[0].static_force == 140.0
+    assert load_scene("ac_simple", ["numerics.dt_s="]).numerics.dt_s == 1e-3
+
+
+def test_a_second_pantograph_is_appended_by_its_number() -> None:
+    scene = load_scene(
+        "en50318_2002",
+        [
+            "train.start_m=300",
+            "train.pantographs.1.name=reference",
+            "train.pantographs.1.behind_m=200",
+        ],
+    )
+    train = scene.to_problem().train
+    assert [place.behind for place in train.placements] == [0.0, 200.0]
+    # The trailing one is to cross the evaluated stretch as well, and one span more.
+    assert train.end == scene.evaluation.to_m + 200.0 + 60.0
+
+
+def test_the_end_stops_at_the_end_of_the_running_range() -> None:
+    scene = load_scene("en50318_2002", ["line.n_spans=13", "evaluation.to_m=750"])
+    assert scene.end_m == 780.0
+
+
+def test_quantities_reach_the_problem_in_si_units() -> None:
+    problem = load_scene("ac_simple", ["train.speed_km_h=288"]).to_problem()
+    assert problem.train.speed == pytest.approx(80.0, rel=1e-15)
+    assert problem.line.pre_sag[0] == pytest.approx(
+        (0, 0.024, 0.041, 0.052, 0.055, 0.052, 0.041, 0.024, 0)
+    )
+    assert problem.line.stagger[:3] == (0.2, -0.2, 0.2)
+    assert len(problem.line.stagger) == problem.line.n_spans + 1
+    assert problem.line.contact_wire.tension == 22000.0
+    assert problem.damping.alpha == 1e-4
+    assert problem.damping.beta == 0.0125
+
+
+def test_the_static_force_is_interpolated_over_the_speed() -> None:
+    def force(speed: float) -> float:
+        scene = load_scene("ac_simple", [f"train.speed_km_h={speed}"])
+        return scene.to_problem().train.placements[0].static_force
+
+    low, high = force(275), force(320)
+    assert force(297.5) == pytest.approx(0.5 * (low + high), rel=1e-12)
+
+
+def test_span_lengths_are_repeated_over_the_running_spans() -> None:
+    scene = load_scene(
+        "ambrosio2012", ["line.span_m=[54, 52]", "line.n_spans=9", *_short_evaluation()]
+    )
+    assert scene.to_line().span_lengths == (50, 50, 54, 52, 54, 52, 50, 50, 50)
+    without = load_scene(
+        "ambrosio2012",
+        ["line.span_m=[54, 52]", "line.n_spans=9", "line.transition.span_m=", *_short_evaluation()],
+    )
+    assert without.to_line().span_lengths == (54, 52, 54, 52, 54, 52, 54, 52, 54)
+
+
+def _short_evaluation() -> list[str]:
+    return ["evaluation.from_m=200", "evaluation.to_m=300"]
+
+
+def test_counted_droppers_are_centred_and_their_pre_sag_is_a_parabola() -> None:
+    line = load_scene("ambrosio2012").to_line()
+    x, sag = np.array(line.dropper_positions[10]), np.array(line.pre_sag[10])
+    assert x[0] == pytest.approx(54 - x[-1])
+    assert np.diff(x) == pytest.approx(np.full(7, 6.75))
+    # A parabola has one second difference: 2 * 4 s / (7 * 6.75)^2 * 6.75^2 with s = 54 mm.
+    assert np.diff(sag, 2) == pytest.approx(np.full(6, -8 * 0.054 / 49))
+    assert sag[0] == sag[-1] == 0
+    mid = np.polyval(np.polyfit(x, sag, 2), 27.0)
+    assert mid == pytest.approx(0.054)
+    assert line.pre_sag[0] == (0.0,) * 8  # a transition span
+
+
+def test_patterns_give_each_span_length_its_droppers() -> None:
+    patterns = (
+        "line.dropper.patterns=[{span_m=50, positions_m=[10, 40]},"
+        " {span_m=54, positions_m=[10, 27, 44], pre_sag_mm=[0, 20, 0]}]"
+    )
+    removed = [f"line.dropper.{key}=" for key in ("count", "spacing_m", "pre_sag_mid_mm")]
+    line = load_scene("ambrosio2012", [patterns, *removed]).to_line()
+    assert line.dropper_positions[0] == (10, 40)
+    assert line.dropper_positions[5] == (10, 27, 44)
+    assert line.pre_sag[5] == (0, 0.02, 0)
+    with pytest.raises(InputError, match="no entry for spans of 53 m"):
+        load_scene("ambrosio2012", [patterns, *removed, "line.span_m=53"])
+
+
+def test_damping_of_single_components_replaces_the_lines() -> None:
+    scene = load_scene(
+        "en50318_2002", ["line.damping.per_component.droppers={alpha_s=0.01, beta_per_s=0.0}"]
+    )
+    assert scene.to_problem().damping.per_component == {"droppers": (0.01, 0.0)}
+
+
+def test_a_mesh_file_is_relative_to_its_case_or_to_the_working_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here, there = tmp_path / "here", tmp_path / "there"
+    for folder in (here, there):
+        folder.mkdir()
+        (folder / "own.msh").touch()
+    text = find_case("en50318_2002").read_text()
+    case = there / "case.toml"
+    case.write_text(text.replace("elements_per_gap = 5", 'file = "own.msh"'))
+    monkeypatch.chdir(here)
+    assert load_scene(case).mesh_file() == there / "own.msh"
+    assert load_scene(case, ["mesh.file=own.msh"]).mesh_file() == here / "own.msh"
+    assert load_scene(case).resolved()["mesh"] == {"file": str(there / "own.msh")}
+
+
+def test_a_case_is_found_by_name_file_and_folder_and_takes_its_folders_name(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / "my_line"
+    folder.mkdir()
+    text = find_case("en50318_2002").read_text().replace('name = "en50318_2002"\n', "")
+    (folder / "case.toml").write_text(text)
+    assert load_scene(folder).case.name == "my_line"
+    assert load_scene(folder / "case.toml").to_problem() == load_scene("en50318_2002").to_problem()
+
+
+def test_a_sentence_says_whether_the_file_or_the_command_line_is_wrong(tmp_path: Path) -> None:
+    file = tmp_path / "case.toml"
+    text = find_case("en50318_2002").read_text()
+    file.write_text(text.replace("tension_N = 20000.0", "tension_N = -5"))
+    with pytest.raises(InputError) as caught:
+        load_scene(file)
+    assert str(caught.value) == (
+        f"line.contact_wire.tension_N is -5 in {file}; it must be greater than 0 [N]"
+    )
+    with pytest.raises(InputError, match=r"is -6 on the command line \(--set\)"):
+        load_scene(file, ["line.contact_wire.tension_N=-6"])
+
+
+def test_the_number_of_further_problems_is_told() -> None:
+    with pytest.raises(InputError, match=r"\(and 2 more problems\)$"):
+        load_scene("en50318_2002", ["line.n_spans=0", "numerics.dt_s=0", "contact=3"])
+
+
+def test_every_key_has_a_help_text() -> None:
+    from catenary.cases.keys import table_in
+
+    tables = [Scene]
+    for table in tables:
+        for name, field in table.model_fields.items():
+            assert field.description, f"{table.__name__}.{name}"
+            inner, _ = table_in(field.annotation)
+            if inner is not None and inner not in tables:
+                tables.append(inner)
+    assert len(tables) > 15
+
+
+@pytest.mark.parametrize(
+    ("key", "unit"),
+    [
+        ("train.speed_km_h", "km/h"),
+        ("line.contact_wire.tension_N", "N"),
+        ("line.contact_wire.mass_kg_per_m", "kg/m"),
+        ("line.contact_wire.bending_stiffness_N_m2", "N m2"),
+        ("pantographs.x.dampings_N_s_per_m.0", "N s/m"),
+        ("line.damping.beta_per_s", "1/s"),
+        ("line.dropper.pre_sag_mm", "mm"),
+        ("numerics.eps_v_m_per_s", "m/s"),
+        ("line.n_spans", ""),
+        ("numerics.max_iterations", ""),
+        ("output.flush_every_steps", ""),
+    ],
+)
+def test_units_follow_from_names(key: str, unit: str) -> None:
+    assert unit_of(key) == unit
