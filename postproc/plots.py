@@ -144,7 +144,8 @@ def force_statistics(results: Results, statistics: RunStatistics) -> Figure:
         at = np.arange(len(groups)) + (place - 0.5 * (len(shown) - 1)) * width
         values = np.array([getattr(pantograph, name) for name in groups])
         bars = axes.bar(at, values, 0.92 * width, color=colour(index), label=pantograph.name)
-        axes.bar_label(bars, fmt="%.0f", padding=2, fontsize=8 if len(shown) < 4 else 6)
+        labels_of_bars = [f"{round(value)}" for value in values]
+        axes.bar_label(bars, labels_of_bars, padding=2, fontsize=8 if len(shown) < 4 else 6)
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     axes.set_xticks(np.arange(len(groups)), labels)
     axes.margins(y=0.12)

@@ -156,6 +156,7 @@ def _html(
         statistics=statistics,
         statistics_rows=_statistics_rows(statistics),
         criteria=criteria,
+        digits=lambda criterion: 3 if criterion.unit == "%" else 1,
         failed=[c for c in criteria if c.passed is False],
         verdict=standards.verdict(criteria),
         edition=standards.EDITIONS[about["edition"]].title,
