@@ -12,6 +12,9 @@ from catenary.cases import console
 from catenary.solver.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from catenary.cases.runner import RunOutcome
     from catenary.cases.scene import Scene
 
 app = typer.Typer(
@@ -57,6 +60,16 @@ def _load(
     return load_scene(case, [*(assignments or []), *more], shortened)
 
 
+PetscOptions = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="-- PETSC_OPTION", help="Options for PETSc, after --."),
+]
+Strict = Annotated[
+    bool, typer.Option("--strict", help="Exit with 3 if an acceptance criterion fails.")
+]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more.")]
+
+
 @app.command(
     "run",
     help="Simulate a case and write its results into a folder.",
@@ -67,27 +80,16 @@ def _load(
 def run(
     case: Case,
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")],
-    extras: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="-- PETSC_OPTION", help="Options for PETSc, after --."),
-    ] = None,
+    extras: PetscOptions = None,
     assignments: Assignments = None,
     shortened: Shortened = False,
     force: Force = False,
-    strict: Annotated[
-        bool, typer.Option("--strict", help="Exit with 3 if an acceptance criterion fails.")
-    ] = False,
-    verbose: Annotated[bool, typer.Option("-v", "--verbose", help="Say more.")] = False,
+    strict: Strict = False,
+    verbose: Verbose = False,
 ) -> int:
     """Collective."""
-    from catenary.cases import printing
-    from catenary.cases.petsc_options import as_arguments, split_extras, start_petsc
+    from catenary.cases.petsc_options import split_extras
     from catenary.cases.scene import load_scene
-    from catenary.solver.parallel import abort_on_unforeseen_error, on_root, set_up_logging
-
-    comm = console.world()
-    abort_on_unforeseen_error(comm)
-    set_up_logging(comm, verbose)
 
     def read() -> tuple[Scene, list[str]]:
         more, options = split_extras(extras or [])
@@ -95,18 +97,75 @@ def run(
             raise InputError(f"-o {out} is a file; name a folder for the results")
         return load_scene(case, [*(assignments or []), *more], shortened), options
 
-    scene, options = on_root(comm, read)
-    arguments = as_arguments(scene.petsc, options)
-    start_petsc(arguments)
+    comm, scene, arguments = _begin(read, verbose)
     from catenary.cases.runner import run_case
 
     result = run_case(scene, out, comm, force=force, petsc_options=arguments)
+    return _end(result, out, strict)
+
+
+@app.command(
+    "restart",
+    help="Continue an interrupted or broken run from the last state in its result file.",
+    epilog="Example: catenary restart results/en300",
+)
+@console.guarded
+def restart(
+    folder: Annotated[Path, typer.Argument(help="Folder of the run, with its run.h5.")],
+    extras: PetscOptions = None,
+    strict: Strict = False,
+    verbose: Verbose = False,
+) -> int:
+    """Collective."""
+    from catenary.cases.messages import Origin
+    from catenary.cases.petsc_options import split_extras
+    from catenary.cases.scene import scene_from
+
+    def read() -> tuple[Scene, list[str]]:
+        from catenary.postproc.results import Results
+
+        more, options = split_extras(extras or [])
+        if more:
+            raise InputError(f"{more[0]} cannot be changed when a run is continued")
+        if not folder.is_dir():
+            raise InputError(f"{folder} is no folder; name the folder of a run")
+        with Results(folder) as results:
+            config = results.attributes["config"]
+        return scene_from(config, Origin(str(results.path))), options
+
+    comm, scene, arguments = _begin(read, verbose)
+    from catenary.cases.runner import restart_case
+
+    result = restart_case(scene, folder, comm, petsc_options=arguments)
+    return _end(result, folder, strict)
+
+
+def _begin(
+    read: Callable[[], tuple[Scene, list[str]]], verbose: bool
+) -> tuple[Any, Scene, list[str]]:
+    """Communicator, scene and the options with which PETSc now runs. Collective."""
+    from catenary.cases.petsc_options import as_arguments, start_petsc
+    from catenary.solver.parallel import abort_on_unforeseen_error, on_root, set_up_logging
+
+    comm = console.world()
+    abort_on_unforeseen_error(comm)
+    set_up_logging(comm, verbose)
+    scene, options = on_root(comm, read)
+    arguments = as_arguments(scene.petsc, options)
+    start_petsc(arguments)
+    return comm, scene, arguments
+
+
+def _end(result: RunOutcome, folder: Path, strict: bool) -> int:
+    """Tell how a run ended and return its exit code. Not collective."""
+    from catenary.cases import printing
+
     if result.outcome != "done":
-        console.complain(
-            f"the run was {result.outcome}" if result.outcome == "interrupted" else result.outcome
-        )
+        interrupted = result.outcome == "interrupted"
+        hint = f"the run was interrupted; `catenary restart {folder}` continues it"
+        console.complain(hint if interrupted else result.outcome)
         return console.BROKEN
-    console.say(printing.summary_text(result.summary, out))
+    console.say(printing.summary_text(result.summary, folder))
     return console.NOT_ACCEPTED if strict and result.accepted is False else console.DONE
 
 

@@ -67,34 +67,36 @@ class LumpedPantograph:
     ) -> None:
         self._lift_full = static_force
         self._raise_time = raise_time
-        self._dt = dt
-        mass = np.diag(np.asarray(data.masses, dtype=float))
-        self._mass = mass
+        n = data.n_masses
+        self._mass = np.diag(np.asarray(data.masses, dtype=float))
         self._stiffness = data.chain(data.stiffnesses)
-        self._damping = data.chain(data.dampings)
+        damping = data.chain(data.dampings)
         # The base spring carries nothing when the head is at its nominal height under the static
         # force, which compresses every spring between head and last mass.
         compression = sum(static_force / k for k in data.stiffnesses[:-1])
-        self._base_stiffness = data.stiffnesses[-1]
         self._base_height = nominal_height + compression
-        self._inverse = linalg.inv(
-            mass + gamma * dt * self._damping + beta * dt**2 * self._stiffness
+        base_force = data.stiffnesses[-1] * self._base_height
+        # A step is linear: new state = step @ state + lift * by_lift + by_base - force * by_force,
+        # with the state (positions, velocities, accelerations).
+        one, none = np.eye(n), np.zeros((n, n))
+        predict_position = np.hstack([one, dt * one, dt**2 * (0.5 - beta) * one])
+        predict_velocity = np.hstack([none, one, dt * (1.0 - gamma) * one])
+        inverse = linalg.inv(self._mass + gamma * dt * damping + beta * dt**2 * self._stiffness)
+        free = -inverse @ (self._stiffness @ predict_position + damping @ predict_velocity)
+        self._step = np.vstack(
+            [
+                predict_position + beta * dt**2 * free,
+                predict_velocity + gamma * dt * free,
+                free,
+            ]
         )
-        self._c_position = beta * dt**2
-        self._c_velocity = gamma * dt
-        self._c_predict = 0.5 * dt**2 * (1.0 - 2.0 * beta)
-        self._c_predict_velocity = dt * (1.0 - gamma)
-        # A unit contact force pushes the head down.
-        self._response = np.ascontiguousarray(self._inverse[:, 0])
-        self._compliance_height = float(self._c_position * self._response[0])
-        self._compliance_velocity = float(self._c_velocity * self._response[0])
-        n = data.n_masses
-        self.position = np.zeros(n)
-        self.velocity = np.zeros(n)
-        self.acceleration = np.zeros(n)
-        self._free_acceleration = np.zeros(n)
-        self._free_position = np.zeros(n)
-        self._free_velocity = np.zeros(n)
+        unit = np.vstack([beta * dt**2 * inverse, gamma * dt * inverse, inverse])
+        self._by_force = unit[:, 0].copy()
+        self._by_lift = unit[:, -1].copy()
+        self._by_base = base_force * self._by_lift
+        self._n = n
+        self._state = np.zeros(3 * n)
+        self._free = np.zeros(3 * n)
 
     def lift(self, time: float) -> float:
         """Net lift on the last mass at ``time`` [N]: a half cosine up to the static force."""
@@ -102,42 +104,40 @@ class LumpedPantograph:
             return self._lift_full
         return self._lift_full * 0.5 * (1.0 - float(np.cos(np.pi * time / self._raise_time)))
 
+    @property
+    def position(self) -> np.ndarray:
+        """Heights of the masses, head first, shape (n,) [m]."""
+        return self._state[: self._n]
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Velocities of the masses, upward, shape (n,) [m/s]."""
+        return self._state[self._n : 2 * self._n]
+
     def place(self, head_height: float) -> None:
         """Put all masses at rest at ``head_height`` [m], springs relaxed, no contact."""
-        self.position[:] = head_height
-        self.velocity[:] = 0.0
-        self.acceleration[:] = 0.0
+        self._state[: self._n] = head_height
+        self._state[self._n :] = 0.0
 
     def predict(self, time: float) -> HeadState:
         """Head at ``time`` [s] as an affine function of the contact force in the coming step."""
-        a = self.acceleration
-        self._free_position = self.position + self._dt * self.velocity + self._c_predict * a
-        self._free_velocity = self.velocity + self._c_predict_velocity * a
-        force = -(self._stiffness @ self._free_position) - self._damping @ self._free_velocity
-        force[-1] += self.lift(time) + self._base_stiffness * self._base_height
-        free = self._inverse @ force
-        self._free_acceleration = free
-        return HeadState(
-            float(self._free_position[0] + self._c_position * free[0]),
-            float(self._free_velocity[0] + self._c_velocity * free[0]),
-            self._compliance_height,
-            self._compliance_velocity,
-        )
+        free = self._step @ self._state
+        free += self.lift(time) * self._by_lift + self._by_base
+        self._free = free
+        n, by_force = self._n, self._by_force
+        return HeadState(float(free[0]), float(free[n]), float(by_force[0]), float(by_force[n]))
 
     def advance(self, contact_force: float) -> None:
         """Take the step predicted last with this contact force [N]."""
-        a = self._free_acceleration - contact_force * self._response
-        self.acceleration = a
-        self.position = self._free_position + self._c_position * a
-        self.velocity = self._free_velocity + self._c_velocity * a
+        self._state = self._free - contact_force * self._by_force
 
     def state(self) -> np.ndarray:
         """Positions, velocities and accelerations, shape (3 n,)."""
-        return np.concatenate([self.position, self.velocity, self.acceleration])
+        return self._state.copy()
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
-        self.position, self.velocity, self.acceleration = np.split(np.array(state), 3)
+        self._state = np.array(state, dtype=float)
 
     def energy(self) -> float:
         """Kinetic energy, and elastic energy of all springs, the base spring included [J]."""

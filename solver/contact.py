@@ -8,7 +8,7 @@ import numpy as np
 
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.distribution import Ownership
-from catenary.solver.elements import shape_functions
+from catenary.solver.elements import shape_slopes, shape_values
 from catenary.solver.equilibrium import Equilibrium
 from catenary.solver.model import Model
 
@@ -16,14 +16,21 @@ from catenary.solver.model import Model
 class Touch(NamedTuple):
     """A place on the contact wire.
 
-    element : its number along the wire; value, slope : (4,) Hermite functions N and N' of the
-    element's unknowns; rest : (4,) the unknowns of the line at rest, heights [m] and slopes.
+    element : its number along the wire; xi : place in it, 0 to 1; length : of the element [m];
+    value : (4,) Hermite functions N of the element's unknowns; rest : (4,) the unknowns of the
+    line at rest, heights [m] and slopes.
     """
 
     element: int
+    xi: float
+    length: float
     value: np.ndarray
-    slope: np.ndarray
     rest: np.ndarray
+
+    @property
+    def slope(self) -> np.ndarray:
+        """Derivatives N' of the Hermite functions along the track, shape (4,)."""
+        return shape_slopes(self.xi, self.length)
 
 
 class ContactWire:
@@ -53,8 +60,8 @@ class ContactWire:
         element = int(self._x.searchsorted(x)) - 1
         element = min(max(element, 0), self._length.size - 1)
         length = float(self._length[element])
-        value, slope = shape_functions((x - float(self._x[element])) / length, length)
-        return Touch(element, value, slope, self._rest[element])
+        xi = (x - float(self._x[element])) / length
+        return Touch(element, xi, length, shape_values(xi, length), self._rest[element])
 
     def rest_height(self, x: float) -> float:
         """Height of the line at rest [m]."""

@@ -59,13 +59,10 @@ def uniform_load(length: np.ndarray) -> np.ndarray:
     return np.stack([half, moment, half, -moment], axis=1)
 
 
-def shape_functions(xi: float, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Hermite functions and their derivatives along x at ``xi`` in [0, 1], each shape (4,).
-
-    w(x) = N @ unknowns [m], dw/dx = N' @ unknowns [-].
-    """
+def shape_values(xi: float, length: float) -> np.ndarray:
+    """Hermite functions N at ``xi`` in [0, 1], shape (4,): w(x) = N @ unknowns [m]."""
     square, cube = xi * xi, xi * xi * xi
-    value = np.array(
+    return np.array(
         [
             1 - 3 * square + 2 * cube,
             length * (xi - 2 * square + cube),
@@ -73,7 +70,12 @@ def shape_functions(xi: float, length: float) -> tuple[np.ndarray, np.ndarray]:
             length * (cube - square),
         ]
     )
-    slope = np.array(
+
+
+def shape_slopes(xi: float, length: float) -> np.ndarray:
+    """Derivatives N' of the Hermite functions along x, shape (4,): dw/dx = N' @ unknowns [-]."""
+    square = xi * xi
+    return np.array(
         [
             6 * (square - xi) / length,
             1 - 4 * xi + 3 * square,
@@ -81,7 +83,6 @@ def shape_functions(xi: float, length: float) -> tuple[np.ndarray, np.ndarray]:
             3 * square - 2 * xi,
         ]
     )
-    return value, slope
 
 
 def _matrix(*upper_rows: list[np.ndarray]) -> np.ndarray:

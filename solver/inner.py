@@ -14,9 +14,11 @@ iteration (semismooth Newton) finds, mostly in one or two rounds.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import lapack
 
 from catenary.mbs.interface import HeadState
 from catenary.solver.errors import RunBroken
@@ -78,9 +80,12 @@ class InnerProblem:
         self._released = 1.0 - kept_ratio
 
     def solve(
-        self, line: LineResponse, heads: list[HeadState], tension_by_slack: np.ndarray
+        self,
+        line: LineResponse,
+        heads: list[HeadState],
+        tension_by_slack: Callable[[np.ndarray], np.ndarray],
     ) -> InnerSolution:
-        """Forces of the step; ``tension_by_slack`` is G (m, m) of ``line.droppers`` [-].
+        """Forces of the step; ``tension_by_slack`` gives G (m, m) of some droppers (m,) [-].
 
         Raises
         ------
@@ -88,53 +93,62 @@ class InnerProblem:
             If the active set does not settle.
         """
         k, c, n, m = self._k, self._c, line.height.size, line.droppers.size
-        push = np.array([k * (h.height) + c * h.velocity for h in heads])
+        push = np.array([k * head.height + c * head.velocity for head in heads])
         push -= k * line.height + c * line.rate
         softness = k * line.height_by_force + c * line.rate_by_force
         for i, head in enumerate(heads):
-            softness[i, i] += k * head.height_compliance + c * head.velocity_compliance
-        if m == 0 and n == 1:
-            force = push / (1.0 + softness[0, 0])
-            if self._may_lose_contact and force[0] < 0.0:
-                force[0] = 0.0
-            height = line.height + line.height_by_force[0] * force
-            return InnerSolution(force, np.zeros(0), height, 1)
-        matrix = np.empty((n + m, n + m))
-        matrix[:n, :n] = softness
-        matrix[:n, n:] = -(k * line.height_by_slack + c * line.rate_by_slack).T
-        matrix[n:, :n] = self._released * line.tension_by_force
-        matrix[n:, n:] = -self._released * tension_by_slack
-        matrix[np.diag_indices(n + m)] += 1.0
-        right = np.concatenate([push, -self._released * line.tension])
-        solution, rounds = self._settle(matrix, right, n)
-        force, slack = solution[:n], solution[n:]
-        height = line.height + line.height_by_force @ force - line.height_by_slack.T @ slack
+            softness[i, i] += 1.0 + k * head.height_compliance + c * head.velocity_compliance
+        always = np.full(n, not self._may_lose_contact)
+        force, rounds = self._settle(softness, push, always)
+        slack = np.zeros(m)
+        if m and (line.tension + line.tension_by_force @ force < 0.0).any():
+            force, slack, rounds = self._with_slack(line, push, softness, tension_by_slack, always)
+        height = line.height + line.height_by_force @ force
+        if m:
+            height -= line.height_by_slack.T @ slack
         return InnerSolution(force, slack, height, rounds)
 
-    def _settle(self, matrix: np.ndarray, right: np.ndarray, n: int) -> tuple[np.ndarray, int]:
-        """Solve x = max(0, x - (matrix x - right)) entry by entry, contacts first."""
-        acts = right > 0.0
-        if self._may_lose_contact:
-            acts[:n] = True
-        always = np.zeros(right.size, dtype=bool)
-        always[:n] = not self._may_lose_contact
-        acts |= always
+    def _with_slack(
+        self,
+        line: LineResponse,
+        push: np.ndarray,
+        softness: np.ndarray,
+        tension_by_slack: Callable[[np.ndarray], np.ndarray],
+        always: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray, int]:
+        """Contact forces (n,) and compensations (m,) together [N], and the rounds needed."""
+        n, m = push.size, line.tension.size
+        matrix = np.empty((n + m, n + m))
+        matrix[:n, :n] = softness
+        matrix[:n, n:] = -(self._k * line.height_by_slack + self._c * line.rate_by_slack).T
+        matrix[n:, :n] = self._released * line.tension_by_force
+        matrix[n:, n:] = np.eye(m) - self._released * tension_by_slack(line.droppers)
+        right = np.concatenate([push, -self._released * line.tension])
+        solution, rounds = self._settle(
+            matrix, right, np.concatenate([always, np.zeros(m, dtype=bool)])
+        )
+        return solution[:n], solution[n:], rounds
+
+    def _settle(
+        self, matrix: np.ndarray, right: np.ndarray, always: np.ndarray
+    ) -> tuple[np.ndarray, int]:
+        """Solve x = max(0, x - (matrix x - right)) entry by entry, or freely where ``always``."""
+        if right.size == 1:
+            value = right / matrix[0, 0]
+            return (value if always[0] or value[0] > 0.0 else np.zeros(1)), 1
+        acts = (right > 0.0) | always
         seen = set()
         for rounds in range(1, _MAX_ROUNDS + 1):
-            index = np.flatnonzero(acts)
-            solution = np.zeros(right.size)
-            if index.size:
-                solution[index] = np.linalg.solve(matrix[np.ix_(index, index)], right[index])
-            residual = matrix @ solution - right
-            now = (solution - residual > 0.0) | always
+            solution = _solve_on(matrix, right, acts)
+            now = (solution - (matrix @ solution - right) > 0.0) | always
             if np.array_equal(now, acts):
                 return solution, rounds
             key = now.tobytes()
             if key in seen:
-                return self._pivot(matrix, right, always, rounds)
+                break
             seen.add(key)
             acts = now
-        return self._pivot(matrix, right, always, _MAX_ROUNDS)
+        return self._pivot(matrix, right, always, rounds)
 
     @staticmethod
     def _pivot(
@@ -144,10 +158,7 @@ class InnerProblem:
         acts = always.copy()
         scale = 1e-12 * (1.0 + np.abs(right).max())
         for extra in range(1, 20 * right.size + 100):
-            index = np.flatnonzero(acts)
-            solution = np.zeros(right.size)
-            if index.size:
-                solution[index] = np.linalg.solve(matrix[np.ix_(index, index)], right[index])
+            solution = _solve_on(matrix, right, acts)
             residual = matrix @ solution - right
             wrong = np.where(acts, (solution < -scale) & ~always, residual < -scale)
             if not wrong.any():
@@ -155,3 +166,13 @@ class InnerProblem:
             first = int(np.argmax(wrong))
             acts[first] = not acts[first]
         raise RunBroken("contacts and slack droppers of this step have no common solution")
+
+
+def _solve_on(matrix: np.ndarray, right: np.ndarray, acts: np.ndarray) -> np.ndarray:
+    """Solution of the rows and columns that act, zero elsewhere."""
+    index = np.flatnonzero(acts)
+    solution = np.zeros(right.size)
+    if index.size:
+        part = matrix[np.ix_(index, index)]
+        solution[index] = lapack.dgesv(part, right[index])[2]
+    return solution

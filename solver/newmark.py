@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
+from scipy.linalg import blas
 
 from catenary.solver.compliance import Windows
 from catenary.solver.distribution import Ownership
@@ -84,7 +85,7 @@ class NewmarkLine:
         n = ownership.n_local
         self._vectors = {
             name: PETSc.Vec().createWithArray(np.zeros(n), size=(n, None), comm=comm)
-            for name in ("displacement", "velocity", "acceleration", "work", "right", "free")
+            for name in ("displacement", "velocity", "acceleration", "work", "right")
         }
         # Views of the vectors' own memory; nothing in the loop makes or copies arrays.
         arrays = {name: vector.getArray() for name, vector in self._vectors.items()}
@@ -93,17 +94,12 @@ class NewmarkLine:
         self.acceleration = arrays["acceleration"]
         self._work = arrays["work"]
         self._right = arrays["right"]
-        self._scratch = np.empty(n)
 
     def predict(self) -> None:
         """Turn displacement and velocity into their predictions of eq. (2.5)."""
-        scratch = self._scratch
-        np.multiply(self.velocity, self._dt, out=scratch)
-        self.displacement += scratch
-        np.multiply(self.acceleration, self._predict_position, out=scratch)
-        self.displacement += scratch
-        np.multiply(self.acceleration, self._predict_velocity, out=scratch)
-        self.velocity += scratch
+        _add(self._dt, self.velocity, self.displacement)
+        _add(self._predict_position, self.acceleration, self.displacement)
+        _add(self._predict_velocity, self.acceleration, self.velocity)
 
     def free_acceleration(self, loads: list[tuple[np.ndarray, np.ndarray]]) -> None:
         """Fill the acceleration from the predictions and local loads (eq. 2.4). Collective.
@@ -116,40 +112,33 @@ class NewmarkLine:
 
     def internal_forces(self) -> None:
         """Right-hand side -C v - K d of eq. (2.4) from the predictions. Collective."""
-        work, scratch = self._work, self._scratch
+        work, operators, vectors = self._work, self._operators, self._vectors
         if self._proportional:
-            np.multiply(self.velocity, self._alpha_share, out=work)
-            work += self.displacement
-            self._operators["stiffness"].mult(self._vectors["work"], self._vectors["right"])
-        else:
-            self._operators["damping"].mult(self._vectors["velocity"], self._vectors["right"])
-            np.copyto(scratch, self._right)
-            self._operators["stiffness"].mult(
-                self._vectors["displacement"], self._vectors["right"]
-            )
-            self._right += scratch
-        np.negative(self._right, out=self._right)
+            np.multiply(self.velocity, -self._alpha_share, out=work)
+            work -= self.displacement
+            operators["stiffness"].mult(vectors["work"], vectors["right"])
+            return
+        np.negative(self.velocity, out=work)
+        operators["damping"].mult(vectors["work"], vectors["right"])
+        np.negative(self.displacement, out=work)
+        operators["stiffness"].multAdd(vectors["work"], vectors["right"], vectors["right"])
 
     def solve(self, loads: list[tuple[np.ndarray, np.ndarray]]) -> None:
         """Acceleration for the internal forces plus ``loads``; may be called again. Collective."""
-        right, name = self._right, "right"
+        name = "right"
         if loads:
-            right, name = self._work, "work"
-            np.copyto(right, self._right)
+            name = "work"
+            np.copyto(self._work, self._right)
             for dofs, values in loads:
-                np.add.at(right, dofs, values)
+                np.add.at(self._work, dofs, values)
         self.solver.solve(self._vectors[name], self._vectors["acceleration"])
         if self._proportional and self._beta:
-            np.multiply(self.velocity, self._beta_share, out=self._scratch)
-            self.acceleration -= self._scratch
+            _add(-self._beta_share, self.velocity, self.acceleration)
 
     def correct(self) -> None:
         """Turn predictions into the new displacement and velocity (eq. 2.6)."""
-        scratch = self._scratch
-        np.multiply(self.acceleration, self.position_factor, out=scratch)
-        self.displacement += scratch
-        np.multiply(self.acceleration, self.velocity_factor, out=scratch)
-        self.velocity += scratch
+        _add(self.position_factor, self.acceleration, self.displacement)
+        _add(self.velocity_factor, self.acceleration, self.velocity)
 
     def energies(self) -> tuple[float, float]:
         """Kinetic and elastic energy relative to equilibrium, all droppers taut [J]. Collective."""
@@ -181,6 +170,12 @@ class NewmarkLine:
         self.solver.destroy()
         for held in (*self._operators.values(), *self._vectors.values()):
             held.destroy()
+
+
+def _add(factor: float, x: np.ndarray, y: np.ndarray) -> None:
+    """y += factor x without a temporary."""
+    if x.size:
+        blas.daxpy(x, y, a=factor)
 
 
 def _row_positions(model: Model) -> np.ndarray:

@@ -118,6 +118,12 @@ class OneSolve:
             else:
                 return reply
 
+    def _coupling_among(self, droppers: np.ndarray) -> np.ndarray:
+        """How compensations of these droppers change each other's tension, (m, m) [-]."""
+        coupling = self.interaction.slack_coupling
+        assert coupling is not None
+        return coupling.among(droppers)
+
     def _answer(self, merged: Merged, heads: list[HeadState]) -> Reply:
         """What rank 0 makes of all shares."""
         n = self.pantographs.n
@@ -127,25 +133,24 @@ class OneSolve:
             return Reply(Verdict.BROKEN, np.zeros(n), empty, none)
         if merged.overflow:
             return Reply(Verdict.ENLARGE, np.full(n, float(2 * merged.overflow)), empty, none)
-        among = (
-            coupling.among(response.droppers)
-            if coupling is not None and response.droppers.size
-            else np.zeros((0, 0))
-        )
         try:
-            result = self.inner.solve(response, heads, among)
-        except (RunBroken, np.linalg.LinAlgError):
+            result = self.inner.solve(response, heads, self._coupling_among)
+        except RunBroken:
             return Reply(Verdict.BROKEN, np.zeros(n), empty, none)
-        slack = np.flatnonzero(result.compensation)
-        droppers, compensation = response.droppers[slack], result.compensation[slack]
+        droppers, compensation = empty, none
         if coupling is not None:
-            missed = slack.size and self._margin < coupling.largest_drop_elsewhere(
-                response.droppers, result.compensation
-            )
+            if result.compensation.any():
+                slack = np.flatnonzero(result.compensation)
+                droppers, compensation = response.droppers[slack], result.compensation[slack]
+                missed = self._margin < coupling.largest_drop_elsewhere(
+                    response.droppers, result.compensation
+                )
+            else:
+                missed = False
             if missed or (result.contact_force > self._bound).any():
                 return Reply(Verdict.REPEAT, np.zeros(n), empty, none)
         self.counters.rounds += result.rounds
-        self.counters.slack_dropper_steps += int(slack.size)
+        self.counters.slack_dropper_steps += droppers.size
         self._advance = lambda: self.pantographs.advance(
             result.contact_force, heads, result.wire_height
         )
