@@ -66,6 +66,7 @@ class ResultFile:
         width = sum(columns or 1 for _, columns in table.values())
         # An append touches the chunk begun last and one more.
         self._room = 2 * 8 * rows_per_append * width + MARGIN
+        self._start_time = stage.start_time
         self._n_states = 0
         self._file.attrs["outcome"] = RUNNING
         self._file.flush()
@@ -103,6 +104,8 @@ class ResultFile:
         attributes["outcome"] = outcome
         attributes["n_steps"] = max(time.shape[0] - 1, 0)
         attributes["simulated_s"] = float(time[-1] - time[0]) if time.shape[0] else 0.0
+        # Of a resumed run the part that its wall time belongs to.
+        attributes["marched_s"] = float(time[-1]) - self._start_time if time.shape[0] else 0.0
         self._file.flush()
 
     def close(self, performance: Mapping[str, Any]) -> None:

@@ -182,6 +182,7 @@ class Results:
         middle = 0.5 * sum(self.evaluation)
         return int(np.clip(np.searchsorted(masts, middle, side="right") - 1, 0, masts.size - 2))
 
+    @property
     def checkpoint(self) -> dict[str, Any]:
         """The latest state to continue from.
 

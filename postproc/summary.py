@@ -61,9 +61,12 @@ def as_json(summary: dict[str, Any]) -> str:
 
 
 def real_time_factor(results: Results) -> float | None:
-    """Simulated time over the wall time of the march: above 1 the run is faster than the train."""
+    """Simulated time over the wall time of the march: above 1 the run is faster than the train.
+
+    Of a resumed run this is the speed of its last part.
+    """
     wall = results.attributes.get("march_wall_s")
-    return results.simulated / wall if wall else None
+    return results.attributes["marched_s"] / wall if wall else None
 
 
 def _pantograph(p: PantographStatistics) -> dict[str, Any]:

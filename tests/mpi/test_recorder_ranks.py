@@ -131,7 +131,7 @@ def test_all_channels_reach_the_file(folder: Path, share: Share, flush_every: in
         }
         for name, values in expected.items():
             np.testing.assert_array_equal(results.channel(name), values, name)
-        state = results.checkpoint()
+        state = results.checkpoint
         assert state["step"] == N_STEPS
         np.testing.assert_array_equal(state["ranks"], np.arange(COMM.size))
         np.testing.assert_array_equal(results.energies()["kinetic"], np.full(14, float(COMM.size)))

@@ -18,6 +18,7 @@ from catenary.postproc.header import Header
 from catenary.postproc.recorder import Recorder
 from catenary.postproc.results import Results
 from catenary.postproc.storage import NoRoom
+from catenary.postproc.summary import real_time_factor
 from catenary.solver.errors import InputError, RunBroken
 
 CONFTEST = Path(__file__).with_name("conftest.py")
@@ -46,7 +47,7 @@ def test_round_trip_of_a_finished_run(run_folder: Path, march: Any) -> None:
         energies = results.energies()
         np.testing.assert_allclose(energies["time"], 0.1 * np.arange(81))
         np.testing.assert_array_equal(energies["kinetic"], 2.0 + np.sin(energies["time"]))
-        state = results.checkpoint()
+        state = results.checkpoint
         assert state["step"] == march.n_steps and state["kind"] == "made up"
         np.testing.assert_array_equal(state["state"], np.full(50, 8000.0))
 
@@ -69,7 +70,7 @@ def test_every_flush_length_records_every_step(
     path = record_run(tmp_path / "run.h5", march, flush_every=flush_every)
     with Results(path) as results:
         assert results.n_steps == 100
-        assert results.checkpoint()["step"] == 100
+        assert results.checkpoint["step"] == 100
         assert_true_to_march(results, march)
 
 
@@ -80,7 +81,7 @@ def test_an_interrupted_run_is_continued_in_its_file(tmp_path: Path, make_march:
     first.close()
     with Results(path) as results:
         assert results.outcome == "interrupted" and not results.complete
-        assert results.checkpoint()["step"] == 170
+        assert results.checkpoint["step"] == 170
     second = Recorder(
         march.comm, path, march.header(), flush_every=40, energy_every=10, resume=True
     )
@@ -89,6 +90,8 @@ def test_an_interrupted_run_is_continued_in_its_file(tmp_path: Path, make_march:
     with Results(path) as results:
         assert results.complete and results.n_steps == 300
         assert results.attributes["n_steps"] == 300
+        assert results.simulated == pytest.approx(0.3)
+        assert real_time_factor(results) == pytest.approx(0.14 / 1.5)  # of the last part
         assert_true_to_march(results, march)
         np.testing.assert_allclose(results.energies()["time"], 0.01 * np.arange(31))
 
@@ -101,7 +104,7 @@ def test_a_broken_run_keeps_its_last_good_state(tmp_path: Path, make_march: Any)
     with Results(path) as results:
         assert results.outcome == "no convergence at t = 0.120 s"
         assert results.n_steps == 119
-        assert results.checkpoint()["step"] == 100
+        assert results.checkpoint["step"] == 100
 
 
 def test_a_line_without_arms_or_droppers_is_recorded(tmp_path: Path, make_march: Any) -> None:
@@ -164,7 +167,7 @@ def test_a_killed_run_is_readable_up_to_its_last_flush(tmp_path: Path, make_marc
         assert results.outcome == "running" and not results.complete
         assert results.n_steps >= 200 and results.n_steps % 20 == 0
         assert_true_to_march(results, make_march())
-        state = results.checkpoint()
+        state = results.checkpoint
         assert 180 <= state["step"] <= results.n_steps
         assert (state["state"] == state["step"]).all()
 
@@ -200,7 +203,7 @@ def test_a_full_disk_ends_the_run_with_a_sentence_and_keeps_the_record(
         assert f"t = {results.time[-1]:.3f} s" in last
         assert results.n_steps >= 100
         assert_true_to_march(results, make_march())
-        assert results.checkpoint()["step"] == results.n_steps
+        assert results.checkpoint["step"] == results.n_steps
 
 
 def test_a_write_that_hdf5_itself_fails_to_do_breaks_the_run(
@@ -222,7 +225,7 @@ def test_a_write_that_hdf5_itself_fails_to_do_breaks_the_run(
     watcher.finish("the disk is full")
     with Results(path) as results:
         assert results.n_steps == 20 and results.outcome == "running"
-        assert results.checkpoint()["step"] == 10
+        assert results.checkpoint["step"] == 10
         assert_true_to_march(results, march)
 
 
