@@ -7,13 +7,14 @@ import sys
 from pathlib import Path
 
 import pytest
-from catenary.cases.cli import app
 from typer.testing import CliRunner
+
+from catenary.cases.cli import app
 
 # A scene of its own, so that a shipped case may change its numbers without a change here.
 SOUND = Path(__file__).with_name("sound.toml")
 
-# Assignments on the sound scene beside this file, and what the sentence must hold besides the first one's key.
+# Assignments on the sound scene, and what the sentence must hold.
 ASSIGNMENTS = {
     "negative tension": (
         ["line.contact_wire.tension_N=-5"],

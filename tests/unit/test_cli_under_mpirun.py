@@ -1,0 +1,56 @@
+"""Under mpirun one rank speaks, all ranks end with the same exit code, and none is left behind."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+MPIRUN = shutil.which("mpirun")
+ENTRY = "from catenary.cases.cli import main; main()"
+ENVIRONMENT = {
+    **os.environ,
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "OMP_NUM_THREADS": "1",
+}
+
+pytestmark = pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
+
+
+def under_mpirun(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    command = [str(MPIRUN), "-n", "2", "--oversubscribe", sys.executable, "-c", ENTRY, *words]
+    return subprocess.run(
+        command, cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["run", "en50318_2002", "-o", "out", "--set", "train.speed_km_h=-1"], "must be at least"),
+        (["run", "no_such_case", "-o", "out"], "there is no case or file"),
+        (["run", "en50318_2002"], "Missing option"),
+        (["run", "en50318_2002", "-o", "out", "fast"], "neither key=value nor"),
+        (["check", "en50318_2002", "--set", "line.encumbrance_m=0.1"], "below the contact wire"),
+    ],
+)
+def test_bad_input_is_told_once_and_every_rank_ends_with_2(
+    words: list[str], sentence: str, tmp_path: Path
+) -> None:
+    done = under_mpirun(*words, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.count(sentence) == 1, done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_serial_verb_is_done_once(tmp_path: Path) -> None:
+    done = under_mpirun("mesh", "en50318_2002", "-o", "line.msh", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("line.msh") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["line.msh"]

@@ -1,0 +1,322 @@
+"""The verbs of the command line: help, lists, plan, check, mesh, static, exit codes of run."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+import types
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from catenary.cases import console
+from catenary.cases.catalogue import shipped
+from catenary.cases.cli import app
+from catenary.cases.scene import load_scene
+from catenary.solver import effects
+from catenary.solver.errors import RunBroken
+
+VERBS = ["run", "restart", "list", "plan", "check", "mesh", "static", "report", "compare"]
+SUMMARY = {
+    "case": "en50318_2002",
+    "speed_km_h": 250.0,
+    "n_steps": 10,
+    "n_dofs": 20,
+    "n_ranks": 1,
+    "real_time_factor": None,
+    "evaluation_m": [360.0, 600.0],
+    "pantographs": [
+        {
+            "name": "leading",
+            "mean_N": 119.25,
+            "std_N": 26.4,
+            "max_N": 178.6,
+            "min_N": 61.6,
+            "stat_max_N": 198.5,
+            "stat_min_N": None,
+            "loss_percent": 0.0,
+        }
+    ],
+    "supports": {"max_uplift_mm": 51.4},
+    "droppers": {"n_slackened": 5},
+    "acceptance": [
+        {"criterion": "mean contact force", "value": 119.25, "limit": 130.6, "passed": True},
+        {"criterion": "maximum contact force", "value": None, "limit": 350.0, "passed": None},
+    ],
+}
+
+
+def invoke(*words: str) -> Any:
+    return CliRunner().invoke(app, list(words))
+
+
+@pytest.fixture
+def runner(monkeypatch: pytest.MonkeyPatch) -> types.SimpleNamespace:
+    """Stands in for the runner: what it was called with, and what it is to return or raise."""
+    told = types.SimpleNamespace(result=None, error=None, calls=[])
+
+    def run_case(scene: Any, out: Path, comm: Any, **options: Any) -> Any:
+        told.calls.append((scene, out, options))
+        if told.error is not None:
+            raise told.error
+        return told.result
+
+    module = types.ModuleType("catenary.cases.runner")
+    module.run_case = run_case  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "catenary.cases.runner", module)
+    monkeypatch.setattr("catenary.cases.petsc_options.start_petsc", lambda arguments: None)
+    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
+    return told
+
+
+def outcome(said: str, accepted: bool | None) -> types.SimpleNamespace:
+    return types.SimpleNamespace(outcome=said, accepted=accepted, summary=SUMMARY)
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_has_help_with_an_example(verb: str) -> None:
+    result = invoke(verb, "--help")
+    assert result.exit_code == 0
+    assert f"Example: catenary {verb}" in result.stdout
+
+
+def test_the_help_lists_every_verb() -> None:
+    result = invoke("--help")
+    assert result.exit_code == 0
+    for verb in VERBS:
+        assert f"  {verb} " in result.stdout
+
+
+def test_importing_the_command_line_loads_no_backend() -> None:
+    heavy = ("petsc4py", "mpi4py", "gmsh", "matplotlib", "h5py", "scipy", "numpy", "pydantic")
+    script = (
+        "import sys, catenary.cases.cli\n"
+        f"print([name for name in {heavy!r} if name in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert done.stdout.strip() == "[]"
+
+
+def test_list_names_every_shipped_case_with_its_title() -> None:
+    lines = invoke("list").stdout.splitlines()
+    assert [line.split()[0] for line in lines] == list(shipped())
+    for line in lines:
+        assert load_scene(line.split()[0]).case.title in line
+
+
+def test_list_keys_names_every_key_and_every_effect() -> None:
+    text = invoke("list", "--keys").stdout
+    keys = {line.split()[0] for line in text.splitlines()}
+    assert {"train.speed_km_h", "numerics.scheme", "pantographs.*.masses_kg", "test"} <= keys
+    assert {f"effects.{name}" for name in effects.registry()} <= keys
+
+
+@pytest.mark.parametrize("case", list(shipped()))
+def test_plan_names_all_effects_and_the_size(case: str) -> None:
+    result = invoke("plan", case)
+    assert result.exit_code == 0, result.output
+    simulated, left_out = result.stdout.split("Not simulated:")
+    for name, effect in effects.registry().items():
+        assert (f"\n  {name} " in simulated) != (f"\n  {name} " in left_out)
+        assert effect.title in result.stdout
+    assert "nodes x 2 (w, theta_y)" in simulated
+    assert "real-time factor" in simulated
+
+
+def test_plan_shows_how_near_the_speed_is_to_the_wave_speed() -> None:
+    # 250 km/h over 438.18 km/h
+    assert (
+        "0.57 of the contact wire's wave speed (438.2 km/h)"
+        in invoke("plan", "en50318_2002").stdout
+    )
+
+
+def test_check_writes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = invoke("check", "ac_simple", "--set", "line.n_spans=24")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith("ac_simple is sound: 24 spans, 1320 m, 216 droppers")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_several_assignments_may_follow_one_set() -> None:
+    result = invoke("check", "ac_simple", "--set", "line.n_spans=24", "line.span_m=55")
+    assert result.exit_code == 0, result.output
+    assert "24 spans" in result.stdout
+
+
+def test_a_stray_word_is_no_assignment() -> None:
+    result = invoke("check", "ac_simple", "fast")
+    assert result.exit_code == 2
+    assert '"fast" on the command line is neither' in result.stderr
+
+
+def test_mesh_writes_a_file_once(tmp_path: Path) -> None:
+    out = tmp_path / "line.msh"
+    assert invoke("mesh", "ac_simple", "-o", str(out)).exit_code == 0
+    first = out.read_bytes()
+    assert b"contact_wire" in first
+    again = invoke("mesh", "ac_simple", "-o", str(out), "--set", "mesh.elements_per_gap=2")
+    assert again.exit_code == 2
+    assert "--force" in again.stderr
+    assert out.read_bytes() == first
+    words = ["-o", str(out), "--force", "--set", "mesh.elements_per_gap=2"]
+    assert invoke("mesh", "ac_simple", *words).exit_code == 0
+    assert len(out.read_bytes()) < len(first)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("line.vtk", "ends in .msh"),
+        ("nowhere/line.msh", "there is no folder"),
+        ("folder.msh", "is a folder"),
+    ],
+)
+def test_mesh_refuses_impossible_files(name: str, expected: str, tmp_path: Path) -> None:
+    (tmp_path / "folder.msh").mkdir()
+    result = invoke("mesh", "ac_simple", "-o", str(tmp_path / name))
+    assert result.exit_code == 2
+    assert expected in result.stderr
+
+
+def test_a_made_mesh_can_be_given_back(tmp_path: Path) -> None:
+    out = tmp_path / "line.msh"
+    assert invoke("mesh", "ac_simple", "-o", str(out)).exit_code == 0
+    words = ["--set", f"mesh.file={out}", "--set", "mesh.elements_per_gap="]
+    plain, given = invoke("check", "ac_simple"), invoke("check", "ac_simple", *words)
+    assert given.exit_code == 0, given.output
+    assert given.stdout == plain.stdout
+    refused = invoke("mesh", "ac_simple", "-o", str(tmp_path / "other.msh"), *words)
+    assert refused.exit_code == 2
+    assert "names a mesh already" in refused.stderr
+
+
+def test_static_prints_the_dropper_table_and_writes_it(tmp_path: Path) -> None:
+    out = tmp_path / "droppers.csv"
+    result = invoke("static", "ac_simple", "-o", str(out))
+    assert result.exit_code == 0, result.output
+    assert "Elasticity from" in result.stdout
+    with out.open() as stream:
+        rows = list(csv.DictReader(stream))
+    scene = load_scene("ac_simple")
+    assert len(rows) == 9 * scene.line.n_spans
+    assert {row["span"] for row in rows} == {str(i + 1) for i in range(scene.line.n_spans)}
+    # A later span may only be printed as equal to an earlier one, the first is printed in full,
+    # to a tenth of a millimetre.
+    printed = [float(line.split()[2]) for line in result.stdout.splitlines()[1:10]]
+    assert printed == pytest.approx([float(row["length_m"]) for row in rows[:9]], abs=6e-5)
+    everything = tmp_path / "rest.json"
+    assert invoke("static", "ac_simple", "-o", str(everything)).exit_code == 0
+    table = json.loads(everything.read_text())
+    assert np.allclose(table["dropper_length"], [float(row["length_m"]) for row in rows], atol=1e-5)
+
+
+def test_compare_and_report_name_a_folder_that_holds_no_run(tmp_path: Path) -> None:
+    for words in (["compare", str(tmp_path), str(tmp_path)], ["report", str(tmp_path)]):
+        result = invoke(*words)
+        assert result.exit_code == 2, result.output
+        assert str(tmp_path) in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("said", "accepted", "strict", "code"),
+    [
+        ("done", True, True, console.DONE),
+        ("done", None, True, console.DONE),
+        ("done", False, False, console.DONE),
+        ("done", False, True, console.NOT_ACCEPTED),
+        ("interrupted", None, True, console.BROKEN),
+        ("the contact force is not finite at 1.2 s", None, False, console.BROKEN),
+    ],
+)
+def test_exit_codes_of_run(
+    said: str,
+    accepted: bool | None,
+    strict: bool,
+    code: int,
+    runner: types.SimpleNamespace,
+    tmp_path: Path,
+) -> None:
+    runner.result = outcome(said, accepted)
+    words = ["run", "en50318_2002", "-o", str(tmp_path / "out"), *(["--strict"] if strict else [])]
+    result = invoke(*words)
+    assert result.exit_code == code, result.output
+    if said == "done":
+        assert "119.2" in result.stdout and "mean contact force" in result.stdout
+    else:
+        assert said in result.stderr
+        assert result.stdout == ""
+
+
+def test_run_hands_everything_over(runner: types.SimpleNamespace, tmp_path: Path) -> None:
+    runner.result = outcome("done", True)
+    words = ["--set", "train.speed_km_h=300", "petsc.step_ksp_type=cg", "--force", "--short"]
+    out = tmp_path / "out"
+    result = invoke("run", "en50318_2002", "-o", str(out), *words, "--", "-step_ksp_type", "gmres")
+    assert result.exit_code == 0, result.output
+    ((scene, folder, options),) = runner.calls
+    assert folder == out
+    assert scene.train.speed_km_h == 300
+    assert scene.line.n_spans == load_scene("en50318_2002", shortened=True).line.n_spans
+    assert options["force"] is True
+    assert options["petsc_options"] == ["-step_ksp_type", "cg", "-step_ksp_type", "gmres"]
+
+
+def test_a_run_that_breaks_ends_in_its_sentence(
+    runner: types.SimpleNamespace, tmp_path: Path
+) -> None:
+    runner.error = RunBroken("the disk is full at 3.2 s")
+    result = invoke("run", "en50318_2002", "-o", str(tmp_path / "out"))
+    assert result.exit_code == 1
+    assert result.stderr == "catenary: the disk is full at 3.2 s\n"
+
+
+def test_an_interrupt_ends_without_a_traceback(
+    runner: types.SimpleNamespace, tmp_path: Path
+) -> None:
+    runner.error = KeyboardInterrupt()
+    result = invoke("run", "en50318_2002", "-o", str(tmp_path / "out"))
+    assert result.exit_code == 1
+    assert result.stderr == "catenary: interrupted\n"
+
+
+def test_run_refuses_a_file_as_its_folder(runner: types.SimpleNamespace, tmp_path: Path) -> None:
+    file = tmp_path / "out"
+    file.write_text("mine")
+    result = invoke("run", "en50318_2002", "-o", str(file))
+    assert result.exit_code == 2
+    assert "is a file" in result.stderr
+    assert runner.calls == [] and file.read_text() == "mine"
+
+
+def test_restart_takes_no_assignments(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
+    result = invoke("restart", str(tmp_path), "line.n_spans=3")
+    assert result.exit_code == 2
+    assert "cannot be changed" in result.stderr
+    result = invoke("restart", str(tmp_path))
+    assert result.exit_code == 2
+    assert "run.h5" in result.stderr
+
+
+def test_the_reader_of_a_pipe_may_leave(tmp_path: Path) -> None:
+    script = "from catenary.cases.cli import main; main()"
+    done = subprocess.run(
+        f"'{sys.executable}' -c '{script}' list --keys | head -n 1",
+        shell=True,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    assert done.stdout.count("\n") == 1
+    assert "Traceback" not in done.stderr
