@@ -92,9 +92,15 @@ class Interaction:
         self._first_node = first
         dofs = self.wire.dofs[first:last].reshape(-1, 1)
         at = np.repeat(self.wire.x[first:last], 2)
-        self._wire_columns = compliance.compute(
+        columns = compliance.compute(
             comm, line.solver, line.ownership, line.windows, dofs, np.ones(dofs.shape), at
         )
+        # Both unknowns of a node share a window: one row each.
+        self._node_start = columns.start[0::2].tolist()
+        self._node_answers = [
+            np.stack(pair)
+            for pair in zip(columns.values[0::2], columns.values[1::2], strict=True)
+        ]
         self.slack_coupling: SlackCoupling | None = None
         if may_slacken:
             ends = model.dofs(model.mesh.droppers)
@@ -246,15 +252,15 @@ class Interaction:
 
     def _combine(self, touch: Touch, weights: np.ndarray, target: np.ndarray) -> slice:
         """Sum the columns of an element's unknowns into ``target``; the slice that it fills."""
-        columns = self._wire_columns
-        first = 2 * (touch.element - self._first_node)
-        low, high = target.size, 0
-        for column, weight in zip(range(first, first + 4), weights, strict=True):
-            columns.add(column, float(weight), target)
-            if columns.values[column].size:
-                low = min(low, int(columns.start[column]))
-                high = max(high, int(columns.start[column]) + columns.values[column].size)
-        return slice(low, max(low, high))
+        first = touch.element - self._first_node
+        left, right = self._node_answers[first], self._node_answers[first + 1]
+        low, split = self._node_start[first], self._node_start[first + 1]
+        end, high = low + left.shape[1], split + right.shape[1]
+        if left.shape[1]:
+            np.dot(weights[:2], left, out=target[low:end])
+        if right.shape[1]:
+            target[split:high] += weights[2:] @ right
+        return slice(min(low, split), max(end, high))
 
 
 class SlackCoupling:
