@@ -208,7 +208,8 @@ def arm_uplift(results: Results, statistics: RunStatistics, limit: float | None)
             behind[p], color=colour(p), linestyle="--", linewidth=1.1, label=f"{name} passes"
         )
     passing.set_xlim(-60.0, float(behind.max()) + 140.0)
-    tidy(passing, "position of the leading pantograph relative to the arm [m]", "uplift [mm]")
+    who = "leading pantograph" if results.n_pantographs > 1 else "pantograph"
+    tidy(passing, f"position of the {who} relative to the arm [m]", "uplift [mm]")
     legend_above(passing)
 
     mark_line(along, results, float(supports.x.min(initial=0)), float(supports.x.max(initial=1)))
@@ -293,7 +294,8 @@ def static_line(results: Results) -> Figure:
     legend_above(profile)
 
     compliance.plot(at, 1e3 * lift, color=COLOURS[0], linewidth=1.5, label="elasticity")
-    _mark_static(compliance, results, float(at.min(initial=start)), float(at.max(initial=at[0])))
+    if at.size:
+        _mark_static(compliance, results, float(at.min()), float(at.max()))
     compliance.set_ylim(bottom=0.0)
     tidy(
         compliance,

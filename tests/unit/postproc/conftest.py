@@ -86,7 +86,7 @@ def make_header(line: Line, mesh: LineMesh, **attributes: Any) -> Header:
     length = height[mesh.droppers[:, 0]] - height[mesh.droppers[:, 1]]
     force = np.full(length.size, 65.0) + 8.0 * np.cos(mesh.x(mesh.droppers[:, 1]))
     equilibrium = Equilibrium(height, np.zeros(height.size), force, length)
-    x = 7 * SPAN + np.linspace(0.0, SPAN, 41)
+    x = 8 * SPAN + np.linspace(0.0, SPAN, 41)
     elasticity = Elasticity(x, 1e-3 * (0.33 + 0.12 * np.sin(np.pi * (x - x[0]) / SPAN) ** 2))
     known: dict[str, Any] = {
         "case": "made_up",

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from catenary.postproc import export
+from catenary.postproc import export, plots
 from catenary.postproc.compare import compare
 from catenary.postproc.report import write_report
 from catenary.postproc.results import Results
@@ -145,6 +145,13 @@ def test_pictures_are_pictures(report_folder: Path) -> None:
         data = (report_folder / f"{name}.png").read_bytes()
         width, height = (int.from_bytes(data[i : i + 4], "big") for i in (16, 20))
         assert data.startswith(PNG) and width >= 1000 and height >= 300
+
+
+def test_static_picture_shows_three_spans_and_the_span_of_the_elasticity(run_folder: Path) -> None:
+    with Results(run_folder) as results:
+        profile, elasticity = plots.static_line(results).axes
+    assert profile.get_xlim() == pytest.approx((350.0, 500.0), abs=3.0)
+    assert elasticity.get_xlim() == pytest.approx((400.0, 450.0), abs=1.0)
 
 
 def test_dropper_table_has_what_an_installer_cuts_by(report_folder: Path, march: Any) -> None:
