@@ -10,17 +10,18 @@ from catenary.cases.scene import Scene
 from catenary.solver import effects
 from catenary.solver.problem import Problem
 
-# Cost model of the march on one rank, least squares over runs of 6e3 to 1e5 unknowns of the case
-# ac_simple on a two-core machine of 2026 (Debian 12, PETSc 3.18): per step and per unknown. Other
-# machines differ by a factor of two either way; the plan calls it an estimate.
-STEP_OVERHEAD = 1.1e-4  # [s]
+# Cost model of the march on one rank, fitted to the processor time of runs of the case ac_simple
+# with 3e3 to 1e5 unknowns on a two-core machine of 2026 (Debian 12, PETSc 3.18): overhead of a
+# step, and time per unknown. The fit is good to 40 % there, and machines differ by a factor of
+# two; the plan calls it an estimate.
+STEP_OVERHEAD = 2.0e-4  # [s]
 STEP_PER_UNKNOWN = 1.6e-8  # [s]
-# Each correction of the fixed-point scheme repeats the solve; two a step were measured.
-FIXED_POINT_FACTOR = 1.6
+# The fixed-point scheme repeats the solve; 1.7 to 2.4 times the time of one_solve was measured.
+FIXED_POINT_FACTOR = 2.0
 
-# Resident memory of the same runs: interpreter with its libraries, then per unknown.
-MEMORY_BASE = 160e6  # [B]
-MEMORY_PER_UNKNOWN = 2200.0  # [B]
+# Resident memory of the same runs, report included: program and libraries, then per unknown.
+MEMORY_BASE = 2.3e8  # [B]
+MEMORY_PER_UNKNOWN = 3400.0  # [B]
 _BYTES = 8
 _PER_PANTOGRAPH = 4  # channels of a pantograph in the result file
 

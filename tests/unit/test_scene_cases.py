@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from catenary.cases.catalogue import shipped
 from catenary.cases.checks import estimated_dropper_lengths
 from catenary.cases.meshing import mesh_of

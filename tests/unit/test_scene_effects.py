@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+
 from catenary.cases.plan import effect_rows
 from catenary.cases.scene import load_scene
 from catenary.solver import effects

@@ -5,14 +5,15 @@ from __future__ import annotations
 import string
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
 from catenary.cases.cli import app
 from catenary.cases.keys import known_keys
 from catenary.cases.messages import Origin
 from catenary.cases.scene import Scene, load_scene, scene_from
 from catenary.solver.errors import InputError
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
-from typer.testing import CliRunner
 
 KEYS = [key.replace("*", "0") for key in known_keys(Scene)]
 NUMBERS = st.one_of(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from catenary.cases.catalogue import find_case, shipped
 from catenary.cases.messages import Origin
 from catenary.cases.scene import Scene, load_scene, scene_from

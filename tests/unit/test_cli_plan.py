@@ -1,0 +1,62 @@
+"""The plan: its counts are those of mesh and march, its estimates have the right trend."""
+
+from __future__ import annotations
+
+import pytest
+
+from catenary.cases.meshing import mesh_of
+from catenary.cases.plan import estimate_march, estimate_memory, make_plan, plan_text
+from catenary.cases.scene import load_scene
+
+
+def test_unknowns_are_the_nodes_of_the_mesh_times_the_unknowns_of_the_effects() -> None:
+    scene = load_scene("en50318_2002", ["mesh.elements_per_gap=4"])
+    plan = make_plan(scene)
+    # Per wire: 22 spans of 9 droppers make 10 gaps of 4 elements each, and one node more.
+    assert plan.n_nodes == 2 * (22 * 10 * 4 + 1) == mesh_of(scene).n_nodes
+    assert plan.unknowns == ("w", "theta_y")
+    assert plan.n_dofs == 2 * plan.n_nodes
+    assert plan.n_droppers == 22 * 9
+    assert plan.element_lengths == pytest.approx((5.0 / 4, 6.5 / 4))
+
+
+def test_steps_cover_the_run() -> None:
+    plan = make_plan(
+        load_scene("en50318_2002", ["train.start_m=90", "train.end_m=840", "numerics.dt_s=1e-3"])
+    )
+    # 750 m at 250 km/h are 10.8 s.
+    assert plan.simulated == pytest.approx(10.8, rel=1e-12)
+    assert plan.n_steps == 10800
+    assert plan.start == 90 and plan.end == 840
+
+
+def test_estimates_grow_with_size_steps_and_scheme() -> None:
+    assert estimate_memory(20_000) > estimate_memory(10_000) > 0
+    small = estimate_march(10_000, 1000, "one_solve")
+    assert estimate_march(20_000, 1000, "one_solve") > small
+    assert estimate_march(10_000, 2000, "one_solve") == pytest.approx(2 * small)
+    assert estimate_march(10_000, 1000, "fixed_point") > small
+
+
+def test_the_text_tells_trains_of_several_pantographs() -> None:
+    text = plan_text(
+        make_plan(
+            load_scene(
+                "ac_simple",
+                [
+                    "train.start_m=310",
+                    "train.pantographs.1.name=three_masses",
+                    "train.pantographs.1.behind_m=200",
+                ],
+            )
+        )
+    )
+    assert "2 pantographs" in text
+    simulated, _ = text.split("Not simulated:")
+    assert "several_pantographs" in simulated
+
+
+def test_long_estimates_are_told_in_minutes() -> None:
+    scene = load_scene("en50318_2002", ["numerics.dt_s=1e-6"])
+    text = plan_text(make_plan(scene))
+    assert " min on one rank" in text
