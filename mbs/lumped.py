@@ -75,7 +75,7 @@ class LumpedPantograph:
         # force, which compresses every spring between head and last mass.
         compression = sum(static_force / k for k in data.stiffnesses[:-1])
         self._base_height = nominal_height + compression
-        base_force = data.stiffnesses[-1] * self._base_height
+        self._base_force = data.stiffnesses[-1] * self._base_height
         # A step is linear: new state = step @ state + lift * by_lift + by_base - force * by_force,
         # with the state (positions, velocities, accelerations).
         one, none = np.eye(n), np.zeros((n, n))
@@ -93,7 +93,7 @@ class LumpedPantograph:
         unit = np.vstack([beta * dt**2 * inverse, gamma * dt * inverse, inverse])
         self._by_force = unit[:, 0].copy()
         self._by_lift = unit[:, -1].copy()
-        self._by_base = base_force * self._by_lift
+        self._by_base = self._base_force * self._by_lift
         self._n = n
         self._state = np.zeros(3 * n)
         self._free = np.zeros(3 * n)
@@ -116,8 +116,13 @@ class LumpedPantograph:
 
     def place(self, head_height: float) -> None:
         """Put all masses at rest at ``head_height`` [m], springs relaxed, no contact."""
-        self._state[: self._n] = head_height
-        self._state[self._n :] = 0.0
+        n = self._n
+        self._state[:n] = head_height
+        self._state[n : 2 * n] = 0.0
+        force = -self._stiffness @ self.position
+        force[-1] += self.lift(0.0) + self._base_force
+        # A start from any other acceleration than what these forces cause loses an order in dt.
+        self._state[2 * n :] = linalg.solve(self._mass, force)
 
     def predict(self, time: float) -> HeadState:
         """Head at ``time`` [s] as an affine function of the contact force in the coming step."""
