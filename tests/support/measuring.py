@@ -1,0 +1,180 @@
+"""What tests measure with: checks that print what they compare, matrices, marches, orders."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from scipy import sparse
+from scipy.sparse import linalg as sparse_linalg
+
+from catenary.meshgen.mesh import LineMesh
+from catenary.solver.distribution import distribute
+from catenary.solver.equilibrium import Equilibrium, elasticity, find_form, middle_span
+from catenary.solver.march import March, Outcome
+from catenary.solver.model import Model, iterate_entries
+from catenary.solver.newmark import NewmarkLine
+from catenary.solver.observation import Stage, StepView
+from catenary.solver.problem import Numerics, Problem
+
+COMM = MPI.COMM_WORLD
+
+
+def check(what: str, observed: Any, expected: Any, *, within: Any) -> None:
+    """Print observed and expected values and fail if they differ by more than ``within``.
+
+    Arrays are compared entry by entry; what is printed is the entry that comes closest to its
+    limit.
+    """
+    observed, expected, limit = np.broadcast_arrays(
+        np.asarray(observed, dtype=float), expected, np.asarray(within, dtype=float)
+    )
+    difference = np.abs(observed - expected)
+    worst = np.unravel_index(np.argmax(difference / limit), difference.shape)
+    print(
+        f"{what}: observed {observed[worst]:.10g}, expected {expected[worst]:.10g}, "
+        f"difference {difference[worst]:.2e}, allowed {limit[worst]:.2e}"
+    )
+    assert (difference <= limit).all(), what
+
+
+def orders(errors: list[float], ratio: float = 2.0) -> np.ndarray:
+    """Observed orders between neighbours of a refinement by ``ratio``, shape (n - 1,)."""
+    values = np.asarray(errors)
+    return np.log(values[:-1] / values[1:]) / np.log(ratio)
+
+
+def print_table(title: str, parameter: list[Any], errors: list[float]) -> np.ndarray:
+    """Print a refinement table and return its observed orders (n - 1,)."""
+    observed = orders(errors)
+    print(title)
+    for value, error, order in zip(parameter, errors, [np.nan, *observed], strict=True):
+        print(f"  {value!s:>8}  error {error:.4e}  order {order:.3f}")
+    return observed
+
+
+def free_dofs(model: Model) -> np.ndarray:
+    """Numbers of the unknowns that are not held."""
+    return np.setdiff1d(np.arange(model.n_dofs), model.constrained)
+
+
+def matrix_of(
+    model: Model, mass: float = 0.0, stiffness: float = 0.0, damping: float = 0.0
+) -> sparse.csc_matrix:
+    """``mass`` M + ``stiffness`` K + ``damping`` C on all unknowns; held ones are empty."""
+    n = model.n_dofs
+    rows, columns, values = (
+        np.concatenate(part)
+        for part in zip(*iterate_entries(model, 0, n, mass, stiffness, damping), strict=True)
+    )
+    return sparse.csc_matrix((values, (rows, columns)), shape=(n, n))
+
+
+def free_matrices(model: Model) -> tuple[sparse.csc_matrix, sparse.csc_matrix]:
+    """M and K on the unknowns that are not held."""
+    free = free_dofs(model)
+    mass, stiffness = matrix_of(model, mass=1.0), matrix_of(model, stiffness=1.0)
+    return mass[free][:, free].tocsc(), stiffness[free][:, free].tocsc()
+
+
+def solve_free(matrix: sparse.csc_matrix, model: Model, right: np.ndarray) -> np.ndarray:
+    """Solution of a system on the unknowns that are not held, zero at the held ones."""
+    free = free_dofs(model)
+    result = np.zeros(model.n_dofs)
+    result[free] = sparse_linalg.spsolve(matrix[free][:, free].tocsc(), right[free])
+    return result
+
+
+@contextmanager
+def newmark_line(model: Model, numerics: Numerics) -> Iterator[NewmarkLine]:
+    """The time stepper of a line alone, all droppers taut."""
+    line = NewmarkLine(COMM, model, distribute(model, COMM.size, COMM.rank), numerics)
+    try:
+        yield line
+    finally:
+        line.destroy()
+
+
+def release(line: NewmarkLine, displacement: np.ndarray, velocity: np.ndarray, model: Model) -> None:
+    """Start from a state with the acceleration that belongs to it: M a = -K d - C v."""
+    line.displacement[:] = displacement
+    line.velocity[:] = velocity
+    force = matrix_of(model, stiffness=1.0) @ displacement
+    force += matrix_of(model, damping=1.0) @ velocity
+    line.acceleration[:] = solve_free(matrix_of(model, mass=1.0), model, -force)
+
+
+def step(line: NewmarkLine) -> None:
+    """One step of the line without loads."""
+    line.predict()
+    line.free_acceleration([])
+    line.correct()
+
+
+@dataclass
+class History:
+    """Records what the march shows: arrays with one row a step, the initial state included."""
+
+    watch: Callable[[StepView], Any] = lambda view: None
+    time: list[float] = field(default_factory=list)
+    watched: list[Any] = field(default_factory=list)
+    stage: Stage | None = None
+    outcome: Outcome | None = None
+
+    def __post_init__(self) -> None:
+        self._rows: dict[str, list[np.ndarray]] = {
+            name: []
+            for name in (
+                "contact_position",
+                "contact_force",
+                "head_height",
+                "wire_height",
+                "dropper_force",
+                "arm_uplift",
+            )
+        }
+
+    def start(self, stage: Stage) -> None:
+        self.stage = stage
+
+    def observe(self, view: StepView) -> None:
+        self.time.append(view.time)
+        self.watched.append(self.watch(view))
+        for name, rows in self._rows.items():
+            rows.append(getattr(view, name).copy())
+
+    def finish(self, outcome: str) -> None:
+        pass
+
+    def __getitem__(self, channel: str) -> np.ndarray:
+        return np.array(self._rows[channel])
+
+
+def start_march(
+    problem: Problem, mesh: LineMesh, change_form: Callable[[Equilibrium], Equilibrium] = lambda f: f
+) -> tuple[March, Model]:
+    """A march on a line at rest, or on what ``change_form`` makes of its shape at rest."""
+    model, form = find_form(problem, mesh)
+    lift = elasticity(model, *middle_span(problem.line))
+    return March(COMM, problem, model, change_form(form), lift), model
+
+
+def march(
+    problem: Problem,
+    mesh: LineMesh,
+    watch: Callable[[StepView], Any] = lambda view: None,
+    change_form: Callable[[Equilibrium], Equilibrium] = lambda f: f,
+) -> History:
+    """March to the end and return what was seen."""
+    run, _ = start_march(problem, mesh, change_form)
+    history = History(watch)
+    try:
+        history.outcome = run.run([history])
+    finally:
+        run.destroy()
+    assert history.outcome.outcome == "done", history.outcome.outcome
+    return history
