@@ -1,0 +1,53 @@
+"""Static lift of the contact wire under a unit force: closed form and a dense solve."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from measuring import check, free_dofs, free_matrices
+from small_lines import BARE, EN_CONTACT_WIRE, HANGING, ac_simple_line, bare_wires, mesh_of, problem_of
+
+from catenary.meshgen.mesh import CONTACT_WIRE
+from catenary.solver.equilibrium import elasticity, find_form
+from catenary.solver.model import build
+
+
+def test_lift_of_a_single_wire_is_that_of_a_tensioned_beam() -> None:
+    """Unit force at a: a (L - a) / (T L) - sinh(lambda a) sinh(lambda b) / (T lambda sinh(lambda L)),
+
+    b = L - a: the triangle of a string, rounded over the length 1 / lambda = sqrt(EI / T).
+    """
+    length, rounding, n_elements = 20.0, 0.5, 160
+    tension = EN_CONTACT_WIRE.tension
+    wire = replace(EN_CONTACT_WIRE, bending_stiffness=tension * rounding**2)
+    line = bare_wires(length, contact_wire=wire)
+    model = build(problem_of(line, BARE), mesh_of(line, n_elements), np.zeros(0))
+    found = elasticity(model, 1.0, length - 1.0)
+    a, b = found.x, length - found.x
+    layer = np.sinh(a / rounding) * np.sinh(b / rounding) / np.sinh(length / rounding)
+    expected = a * b / (tension * length) - rounding * layer / tension
+    # The force stands on a node, so that elements see a smooth boundary layer, lambda / (2 T) in
+    # its fourth derivative times lambda^2; the nodes are off by (lambda h)^2 of its interpolation.
+    h = length / n_elements
+    within = h**4 / (384 * 2 * tension * rounding**3)
+    check("lift [m/N]", found.lift, expected, within=within)
+
+
+def test_lift_of_a_span_agrees_with_a_dense_solve() -> None:
+    line = ac_simple_line(3)
+    model, _ = find_form(problem_of(line, HANGING), mesh_of(line, 4))
+    found = elasticity(model, 55.0, 110.0)
+    _, stiffness = free_matrices(model)
+    compliance = np.linalg.inv(stiffness.toarray())
+    nodes = model.mesh.wires[CONTACT_WIRE]
+    inside = (model.contact_x > 55.0 - 1e-6) & (model.contact_x < 110.0 + 1e-6)
+    rows = np.searchsorted(free_dofs(model), model.dofs(nodes[inside]))
+    check("positions [m]", found.x, model.contact_x[inside], within=1e-12)
+    # Two solves of the same equations: round-off times the condition number.
+    condition = np.linalg.cond(stiffness.toarray())
+    expected = np.diag(compliance)[rows]
+    check("lift [m/N]", found.lift, expected, within=np.finfo(float).eps * condition * expected)
+    print(f"condition number {condition:.1e}, lift {1e3 * found.lift.max():.3f} mm/N at most")
+    # A span is stiffest near its masts and softest in its middle.
+    assert 70.0 < found.x[np.argmax(found.lift)] < 95.0
