@@ -1,0 +1,147 @@
+"""Order in the time step of every Newmark scheme, in one table.
+
+Newmark's method is of order 2 for gamma = 1/2 and of order 1 otherwise, whatever beta is: the
+frequency of a mode is off by (omega dt)^2 (1/12 + (beta - 1/4) / 2), its decay by
+(gamma - 1/2) omega dt / 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from measuring import (
+    check,
+    free_dofs,
+    free_matrices,
+    march,
+    matrix_of,
+    newmark_line,
+    orders,
+    print_table,
+    release,
+    step,
+)
+from scipy import linalg
+from small_lines import (
+    EN_PANTOGRAPH,
+    HANGING,
+    en50318_line,
+    mesh_of,
+    numerics,
+    problem_of,
+    train,
+)
+
+from catenary.meshgen.mesh import CONTACT_WIRE
+from catenary.solver.equilibrium import find_form
+from catenary.solver.model import Model
+from catenary.solver.problem import Damping
+
+# gamma, beta, order: average acceleration, a softer relative, and two that damp.
+SCHEMES = [(0.5, 0.25, 2), (0.5, 0.3025, 2), (0.6, 0.3025, 1), (0.55, 0.275625, 1)]
+DAMPINGS = {
+    "undamped": Damping(0.0, 0.0),
+    "proportional": Damping(2.75e-3, 0.0125),
+    "per component": Damping(1e-4, 0.0125, {"droppers": (1e-3, 0.0), "contact_wire": (5e-3, 0.0)}),
+}
+DURATION = 0.4
+MODES = 6
+
+
+def whole_line(damping: Damping) -> Model:
+    """Two spans of the EN line with droppers, arms and supports, as a linear system."""
+    line = en50318_line(2)
+    effects = HANGING | {"structural_damping"}
+    model, _ = find_form(problem_of(line, effects, damping=damping), mesh_of(line, 2))
+    return model
+
+
+def lowest_modes(model: Model) -> tuple[np.ndarray, float]:
+    """An initial shape of the lowest modes (n_dofs,) and the highest omega in it [1/s]."""
+    mass, stiffness = free_matrices(model)
+    square, shapes = linalg.eigh(
+        stiffness.toarray(), mass.toarray(), subset_by_index=[0, MODES - 1]
+    )
+    displacement = np.zeros(model.n_dofs)
+    displacement[free_dofs(model)] = shapes.sum(axis=1)
+    return displacement / np.abs(displacement).max(), float(np.sqrt(square[-1]))
+
+
+def exact(model: Model, displacement: np.ndarray) -> np.ndarray:
+    """The state after ``DURATION``, started from rest: exponential of the first-order system."""
+    free = free_dofs(model)
+    n = free.size
+    mass, stiffness = (matrix.toarray() for matrix in free_matrices(model))
+    damping = matrix_of(model, damping=1.0)[free][:, free].toarray()
+    system = np.zeros((2 * n, 2 * n))
+    system[:n, n:] = np.eye(n)
+    system[n:, :n] = -linalg.solve(mass, stiffness)
+    system[n:, n:] = -linalg.solve(mass, damping)
+    start = np.concatenate([displacement[free], np.zeros(n)])
+    result = np.zeros(model.n_dofs)
+    result[free] = (linalg.expm(DURATION * system) @ start)[:n]
+    return result
+
+
+@pytest.mark.parametrize("damping", DAMPINGS.values(), ids=DAMPINGS.keys())
+def test_schemes_converge_with_their_order_to_the_matrix_exponential(damping: Damping) -> None:
+    model = whole_line(damping)
+    assert model.damping_is_proportional == (not damping.per_component)
+    shape, omega = lowest_modes(model)
+    reference = exact(model, shape)
+    sizes = [DURATION / n for n in (100, 200, 400, 800)]
+    for gamma, beta, order in SCHEMES:
+        errors = []
+        for dt in sizes:
+            with newmark_line(model, numerics(dt, gamma=gamma, beta=beta)) as line:
+                release(line, shape, np.zeros_like(shape), model)
+                for _ in range(round(DURATION / dt)):
+                    step(line)
+                errors.append(float(np.abs(line.displacement - reference).max()))
+        title = f"gamma {gamma}, beta {beta}: expected order {order}"
+        observed = print_table(title, [f"{1e3 * dt:g} ms" for dt in sizes], errors)
+        # The next term, seen by the coarser step of the last pair: with gamma = 1/2 odd powers
+        # vanish and it is smaller by (omega dt)^2, omega being the highest one in the motion;
+        # otherwise it is the error of the frequency beside that of the decay.
+        x = omega * sizes[-2]
+        following = x**2 if order == 2 else x * (1 / 6 + beta - 1 / 4) / (gamma - 1 / 2)
+        check(title, observed[-1], order, within=np.log2(1 + following))
+
+
+def test_the_march_with_a_pantograph_is_of_order_2() -> None:
+    """Contact force of a linear line under a moving pantograph, against a fine reference."""
+    line, speed = en50318_line(3), 50.0
+    mesh = mesh_of(line, 3)
+    problem = problem_of(
+        line,
+        HANGING | {"structural_damping", "contact_damping"},
+        train=train(speed, 70.0, 110.0, raise_time=0.2),
+    )
+    problem = replace(problem, contact=replace(problem.contact, damping=50.0))
+
+    def force(dt: float) -> np.ndarray:
+        """Contact force every 4 ms."""
+        found = march(replace(problem, numerics=numerics(dt)), mesh)["contact_force"][:, 0]
+        return found[:: round(4e-3 / dt)]
+
+    steps = [1e-3 / 2**k for k in range(4)]
+    reference = force(1e-3 / 32)
+    errors = [float(np.sqrt(((force(dt) - reference) ** 2).mean())) for dt in steps]
+    observed = print_table(
+        "rms error of the contact force [N], expected order 2",
+        [f"{1e3 * dt:g} ms" for dt in steps],
+        errors,
+    )
+    # The reference has an error of its own, (1/4)^2 of that of the finest step, which all errors
+    # lack.
+    expected = orders([1 / 4**2 - 1 / 32**2, 1 / 8**2 - 1 / 32**2])[0]
+    # The next terms: (omega dt)^2 of the fastest motion, the head against half an element of wire
+    # on the contact spring; and the share V dt / h of the steps that pass from one element to the
+    # next, where the second derivative of the contact's place in the equations jumps.
+    h = float(np.diff(mesh.x(mesh.wires[CONTACT_WIRE])).min())
+    masses = (EN_PANTOGRAPH.masses[0], line.contact_wire.mass_per_length * h / 2)
+    omega = np.sqrt(problem.contact.stiffness * sum(1 / mass for mass in masses))
+    following = (omega * steps[-2]) ** 2 + speed * steps[-2] / h
+    check("order of the march", observed[-1], expected, within=np.log2(1 + following))
