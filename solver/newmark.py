@@ -83,12 +83,14 @@ class NewmarkLine:
             overlap = self.windows.around(float(ends[0]), float(ends[1]))
         self.solver = StepSolver(comm, operators["step"], ownership, overlap)
         n = ownership.n_local
+        names = ("displacement", "velocity", "acceleration", "work", "right")
+        # The vectors wrap our arrays, so that nothing in the loop makes or copies arrays. An array
+        # asked from a vector would keep it, and the communicator, alive beyond ``destroy``.
+        arrays = {name: np.zeros(n) for name in names}
         self._vectors = {
-            name: PETSc.Vec().createWithArray(np.zeros(n), size=(n, None), comm=comm)
-            for name in ("displacement", "velocity", "acceleration", "work", "right")
+            name: PETSc.Vec().createWithArray(array, size=(n, None), comm=comm)
+            for name, array in arrays.items()
         }
-        # Views of the vectors' own memory; nothing in the loop makes or copies arrays.
-        arrays = {name: vector.getArray() for name, vector in self._vectors.items()}
         self.displacement = arrays["displacement"]
         self.velocity = arrays["velocity"]
         self.acceleration = arrays["acceleration"]

@@ -1,0 +1,173 @@
+"""The same run on one rank and on all ranks: contact force, uplift and dropper forces agree.
+
+Run by ``mpirun -n N python -m mpi4py -m pytest tests/mpi``; on one rank it compares a run with
+itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from catenary.cases.meshing import mesh_of
+from catenary.cases.scene import load_scene
+from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
+from catenary.solver.distribution import distribute
+from catenary.solver.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.march import March
+from catenary.solver.observation import Stage, StepView
+from catenary.solver.parallel import on_root
+from catenary.solver.problem import Problem
+
+# The parallel solve leaves a relative residual of 1e-16 a step; over some thousand steps of a
+# lightly damped line that grows at most in proportion, and 1e-9 leaves room for a run ten times
+# as long with droppers that switch at round-off.
+TOLERANCE = 1e-9
+
+# Two pantographs 31 m apart that cross the cuts between 2 and between 3 ranks, with slackening
+# droppers, viscous contact and losses of contact while they are raised.
+SCENE = (
+    "line.n_spans=10",
+    "train.start_m=150",
+    "train.end_m=460",
+    "evaluation.from_m=240",
+    "evaluation.to_m=400",
+    "train.pantographs=[{name='reference'},{name='reference',behind_m=31.0}]",
+    "effects.contact_damping=true",
+    "contact.damping_N_s_per_m=50",
+)
+
+
+class Histories:
+    """Observer that keeps what it is shown and joins the ranks' parts."""
+
+    def __init__(self, comm: Any) -> None:
+        self._comm = comm
+        self._rows: dict[str, list[np.ndarray]] = {"force": [], "arms": [], "droppers": []}
+
+    def start(self, stage: Stage) -> None:
+        self._stage = stage
+
+    def observe(self, view: StepView) -> None:
+        self._rows["force"].append(view.contact_force.copy())
+        self._rows["arms"].append(view.arm_uplift.copy())
+        self._rows["droppers"].append(view.dropper_force.copy())
+
+    def finish(self, outcome: str) -> None:
+        assert outcome == "done"
+
+    def joined(self) -> dict[str, np.ndarray] | None:
+        """All histories on rank 0, None elsewhere. Collective."""
+        stage = self._stage
+        result = {"force": np.array(self._rows["force"])}
+        for name, owned, total in (
+            ("arms", stage.owned_arms, stage.arm_x.size),
+            ("droppers", stage.owned_droppers, stage.dropper_x.size),
+        ):
+            parts = self._comm.gather((owned, np.array(self._rows[name])), root=0)
+            if parts is not None:
+                whole = np.full((len(self._rows[name]), total), np.nan)
+                for numbers, values in parts:
+                    whole[:, numbers] = values
+                result[name] = whole
+        return result if self._comm.rank == 0 else None
+
+
+def histories(comm: Any, problem: Problem, mesh: LineMesh) -> dict[str, np.ndarray] | None:
+    """March a problem on ``comm`` and return its histories on rank 0. Collective."""
+    model, form = find_form(problem, mesh)
+    march = March(comm, problem, model, form, elasticity(model, *middle_span(problem.line)))
+    watched = Histories(comm)
+    march.run([watched])
+    march.destroy()
+    return watched.joined()
+
+
+def relative(values: np.ndarray, reference: np.ndarray) -> float:
+    """Largest difference over the largest reference; 0 for histories of nothing."""
+    if reference.size == 0:
+        return 0.0
+    return float(np.abs(values - reference).max() / np.abs(reference).max())
+
+
+def largest_difference(problem: Problem, mesh: LineMesh) -> dict[str, float]:
+    """Largest relative difference of each history between one rank and all, on all ranks."""
+    alone = histories(MPI.COMM_SELF, problem, mesh)
+    together = histories(MPI.COMM_WORLD, problem, mesh)
+    found = {}
+    if together is not None and alone is not None:
+        found = {
+            name: relative(together[name], alone[name])
+            for name in together
+        }
+    return dict(MPI.COMM_WORLD.bcast(found, root=0))
+
+
+@pytest.fixture(scope="module")
+def case() -> tuple[Problem, LineMesh]:
+    def make() -> tuple[Problem, LineMesh]:
+        scene = load_scene("en50318_2002", SCENE)
+        return scene.to_problem(), mesh_of(scene)
+
+    return on_root(MPI.COMM_WORLD, make)
+
+
+@pytest.mark.parametrize("scheme", ["one_solve", "fixed_point"])
+def test_all_ranks_give_the_answer_of_one(case: tuple[Problem, LineMesh], scheme: str) -> None:
+    problem, mesh = case
+    # The correction stops at its own tolerance, which a round-off may cross one iteration earlier.
+    numerics = replace(problem.numerics, scheme=scheme, eps_d=1e-13, eps_v=1e-10)
+    train = problem.train
+    if scheme == "fixed_point":
+        train = replace(train, end=train.start + 60.0)
+    found = largest_difference(replace(problem, numerics=numerics, train=train), mesh)
+    if MPI.COMM_WORLD.rank == 0:
+        print(f"{MPI.COMM_WORLD.size} ranks, {scheme}: {found}, expected below {TOLERANCE}")
+    assert set(found) == {"force", "arms", "droppers"}
+    assert max(found.values()) < TOLERANCE
+
+
+def test_damping_by_component_in_parallel(case: tuple[Problem, LineMesh]) -> None:
+    problem, mesh = case
+    damping = replace(problem.damping, per_component={"droppers": (0.0, 0.0)})
+    train = replace(problem.train, end=problem.train.start + 80.0)
+    found = largest_difference(replace(problem, damping=damping, train=train), mesh)
+    assert max(found.values()) < TOLERANCE
+
+
+def test_a_rank_without_any_station_is_legal(case: tuple[Problem, LineMesh]) -> None:
+    """Two bare wires of one element have two stations: on three ranks one owns nothing."""
+    problem, _ = case
+    length = 60.0
+    mesh = LineMesh(
+        points=np.array(
+            [[0.0, 0.0, 5.0], [length, 0.0, 5.0], [0.0, 0.0, 6.2], [length, 0.0, 6.2]]
+        ),
+        wires={CONTACT_WIRE: np.array([0, 1]), MESSENGER_WIRE: np.array([2, 3])},
+        droppers=np.zeros((0, 2), dtype=int),
+        steady_arms=np.zeros(0, dtype=int),
+        supports=np.zeros(0, dtype=int),
+        anchors=np.array([0, 1, 2, 3]),
+    )
+    line = replace(
+        problem.line,
+        span_lengths=(length,),
+        dropper_positions=((),),
+        pre_sag=((),),
+        stagger=(0.0, 0.0),
+    )
+    train = replace(
+        problem.train, start=5.0, end=50.0, placements=problem.train.placements[:1]
+    )
+    bare = replace(problem, line=line, train=train)
+    model, _ = find_form(bare, mesh)
+    owned = np.diff(distribute(model, MPI.COMM_WORLD.size, MPI.COMM_WORLD.rank).bounds)
+    assert owned.sum() == model.n_dofs
+    if MPI.COMM_WORLD.size > 2:
+        assert (owned == 0).any()
+    found = largest_difference(bare, mesh)
+    assert found["force"] < TOLERANCE
