@@ -30,7 +30,7 @@ class LumpedData:
         return len(self.masses)
 
     def chain(self, values: tuple[float, ...]) -> np.ndarray:
-        """Matrix of springs (or dampers) ``values`` between neighbours, the last to ground, (n, n)."""
+        """Matrix of springs (or dampers) between neighbours, the last to ground, shape (n, n)."""
         matrix = np.diag(np.asarray(values, dtype=float))
         for i, value in enumerate(values[:-1]):
             matrix[i + 1, i + 1] += value

@@ -105,8 +105,9 @@ register(
         "lumped masses on both wires",
         "paper section 2 and Table 1",
         default=True,
-        applies=lambda p: p.line.dropper.messenger_clamp_mass + p.line.dropper.contact_clamp_mass
-        > 0,
+        applies=lambda p: (
+            p.line.dropper.messenger_clamp_mass + p.line.dropper.contact_clamp_mass > 0
+        ),
         build=_clamp_mass,
     )
 )
@@ -117,9 +118,11 @@ register(
         "a third of the hinged arm's mass and its clamp on the contact wire",
         "paper Table 1; hinged rod",
         default=True,
-        applies=lambda p: p.line.steady_arm.clamp_mass
-        + p.line.steady_arm.mass_per_length * p.line.steady_arm.length
-        > 0,
+        applies=lambda p: (
+            p.line.steady_arm.clamp_mass
+            + p.line.steady_arm.mass_per_length * p.line.steady_arm.length
+            > 0
+        ),
         build=_arm_inertia,
     )
 )
@@ -141,9 +144,11 @@ register(
         "C = alpha K + beta M, globally or per component",
         "paper eq. (2.2)",
         default=True,
-        applies=lambda p: p.damping.alpha > 0
-        or p.damping.beta > 0
-        or any(any(pair) for pair in p.damping.per_component.values()),
+        applies=lambda p: (
+            p.damping.alpha > 0
+            or p.damping.beta > 0
+            or any(any(pair) for pair in p.damping.per_component.values())
+        ),
         build=lambda builder: builder.count_term(),
     )
 )

@@ -89,9 +89,7 @@ def compute(
         right.zeroEntries()
         own = ownership.owned(dofs[group])
         with right as array:
-            np.add.at(
-                array, dofs[group][own] - ownership.first, coefficients[group][own]
-            )
+            np.add.at(array, dofs[group][own] - ownership.first, coefficients[group][own])
         solver.solve(right, solution)
         with solution as array:
             largest[0, number] = np.abs(array).max(initial=0.0)

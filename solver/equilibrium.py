@@ -46,7 +46,7 @@ class Equilibrium:
 
 @dataclass(frozen=True)
 class Elasticity:
-    """Static lift of the contact wire under a unit force, ``lift`` [m/N] at ``x`` [m], both (n,)."""
+    """Static lift of the contact wire under a unit force, ``lift`` [m/N] at ``x`` [m], (n,)."""
 
     x: np.ndarray
     lift: np.ndarray

@@ -98,8 +98,7 @@ class Interaction:
         # Both unknowns of a node share a window: one row each.
         self._node_start = columns.start[0::2].tolist()
         self._node_answers = [
-            np.stack(pair)
-            for pair in zip(columns.values[0::2], columns.values[1::2], strict=True)
+            np.stack(pair) for pair in zip(columns.values[0::2], columns.values[1::2], strict=True)
         ]
         self.slack_coupling: SlackCoupling | None = None
         if may_slacken:

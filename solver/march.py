@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from catenary.meshgen.mesh import LineMesh
 from catenary.solver.distribution import distribute
 from catenary.solver.equilibrium import Elasticity, Equilibrium
 from catenary.solver.errors import InputError, RunBroken
@@ -222,7 +221,7 @@ class March:
         if "dropper_slackening" not in on:
             return droppers.tension
         kept = self._kept_ratio
-        
+
         def tension() -> np.ndarray:
             linear = droppers.tension()
             return np.maximum(linear, kept * linear)
@@ -262,9 +261,7 @@ class March:
             )
         return ts
 
-    def _show(
-        self, ts: PETSc.TS, observers: Sequence[Observer], step: int, time: float
-    ) -> None:
+    def _show(self, ts: PETSc.TS, observers: Sequence[Observer], step: int, time: float) -> None:
         if self._stepper.broken:
             return
         pantographs, line = self._pantographs, self._line

@@ -129,7 +129,7 @@ class ModelBuilder:
         self._n_terms = 0
 
     def add_wire(self, wire: str, unknowns: tuple[str, str] = ("w", "theta_y")) -> None:
-        """Bending and tension of a wire in the plane of two of the unknowns; its mass and weight."""
+        """Bending and tension of a wire in the plane of two unknowns; its mass and weight."""
         dofs, length = _wire_elements(self.model, wire, unknowns)
         data = getattr(self.problem.line, wire)
         self._add_block(

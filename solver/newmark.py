@@ -34,9 +34,7 @@ class NewmarkLine:
     position_factor, velocity_factor : beta dt^2 and gamma dt
     """
 
-    def __init__(
-        self, comm: Any, model: Model, ownership: Ownership, numerics: Numerics
-    ) -> None:
+    def __init__(self, comm: Any, model: Model, ownership: Ownership, numerics: Numerics) -> None:
         dt, beta, gamma = numerics.dt, numerics.beta, numerics.gamma
         self._comm = comm
         self.ownership = ownership
@@ -46,9 +44,7 @@ class NewmarkLine:
         self._predict_position = 0.5 * dt**2 * (1.0 - 2.0 * beta)
         self._predict_velocity = dt * (1.0 - gamma)
         coefficients = (1.0, self.position_factor, self.velocity_factor)
-        self.windows = Windows(
-            _row_positions(model), model.block_size, reach(model, coefficients)
-        )
+        self.windows = Windows(_row_positions(model), model.block_size, reach(model, coefficients))
         operators = {
             "step": assemble(
                 comm,

@@ -77,4 +77,4 @@ class Observer(Protocol):
         only on ``view.step``."""
 
     def finish(self, outcome: str) -> None:
-        """After the last step. ``outcome`` is "done", "interrupted" or the sentence of what broke."""
+        """After the last step: "done", "interrupted" or the sentence of what broke."""

@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 
 def on_root(comm: Any, work: Callable[[], T]) -> T:
-    """Result of ``work()`` run on rank 0 only, given to all ranks; its error is raised on all ranks.
+    """Result of ``work()`` run on rank 0 only, given to all ranks; they all raise its error.
 
     Collective. Used for everything that touches files or gmsh: after it every rank knows whether
     the work failed, and all raise the same error, so that none waits for another.

@@ -1,4 +1,4 @@
-"""Everything that a run is made of, in SI units: what the scene says once its units are converted."""
+"""Everything that a run is made of, in SI units: what a scene says once units are converted."""
 
 from __future__ import annotations
 

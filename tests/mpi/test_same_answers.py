@@ -100,10 +100,7 @@ def largest_difference(problem: Problem, mesh: LineMesh) -> dict[str, float]:
     together = histories(MPI.COMM_WORLD, problem, mesh)
     found = {}
     if together is not None and alone is not None:
-        found = {
-            name: relative(together[name], alone[name])
-            for name in together
-        }
+        found = {name: relative(together[name], alone[name]) for name in together}
     return dict(MPI.COMM_WORLD.bcast(found, root=0))
 
 
@@ -144,9 +141,7 @@ def test_a_rank_without_any_station_is_legal(case: tuple[Problem, LineMesh]) -> 
     problem, _ = case
     length = 60.0
     mesh = LineMesh(
-        points=np.array(
-            [[0.0, 0.0, 5.0], [length, 0.0, 5.0], [0.0, 0.0, 6.2], [length, 0.0, 6.2]]
-        ),
+        points=np.array([[0.0, 0.0, 5.0], [length, 0.0, 5.0], [0.0, 0.0, 6.2], [length, 0.0, 6.2]]),
         wires={CONTACT_WIRE: np.array([0, 1]), MESSENGER_WIRE: np.array([2, 3])},
         droppers=np.zeros((0, 2), dtype=int),
         steady_arms=np.zeros(0, dtype=int),
@@ -160,9 +155,7 @@ def test_a_rank_without_any_station_is_legal(case: tuple[Problem, LineMesh]) -> 
         pre_sag=((),),
         stagger=(0.0, 0.0),
     )
-    train = replace(
-        problem.train, start=5.0, end=50.0, placements=problem.train.placements[:1]
-    )
+    train = replace(problem.train, start=5.0, end=50.0, placements=problem.train.placements[:1])
     bare = replace(problem, line=line, train=train)
     model, _ = find_form(bare, mesh)
     owned = np.diff(distribute(model, MPI.COMM_WORLD.size, MPI.COMM_WORLD.rank).bounds)
