@@ -14,6 +14,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.distribution import distribute
+from catenary.solver.effects import Effect, register, registry, unregister
 from catenary.solver.equilibrium import Equilibrium, elasticity, find_form, middle_span
 from catenary.solver.march import March, Outcome
 from catenary.solver.model import Model, iterate_entries
@@ -178,3 +179,14 @@ def march(
         run.destroy()
     assert history.outcome.outcome == "done", history.outcome.outcome
     return history
+
+
+@contextmanager
+def registered(effect: Effect) -> Iterator[None]:
+    """An effect of the test's own, known to the registry while the block runs."""
+    registry()  # the shipped ones come first
+    register(effect)
+    try:
+        yield
+    finally:
+        unregister(effect.name)

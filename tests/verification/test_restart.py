@@ -1,0 +1,73 @@
+"""A run that is continued from a checkpoint is the run that was never interrupted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from measuring import History, check, start_march
+from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
+
+from catenary.solver.problem import ContactLaw
+
+
+@pytest.mark.parametrize("scheme", ["one_solve", "fixed_point"])
+def test_continued_run_equals_the_uninterrupted_one(scheme: str) -> None:
+    line = en50318_line(6)
+    mesh = mesh_of(line, 3)
+    problem = problem_of(
+        line,
+        WHOLE | {"contact_damping"},
+        contact=ContactLaw(5e4, 50.0),
+        train=train(70.0, 120.0, 180.0, behind=(0.0, 31.0), raise_time=0.3),
+        numerics=numerics(1e-3, scheme),
+    )
+    at = 400
+    checkpoints = {}
+
+    def keep(view: object) -> None:
+        if view.step == at:
+            checkpoints[at] = view.checkpoint()
+
+    whole, rest = History(keep), History()
+    run, _ = start_march(problem, mesh)
+    run.run([whole])
+    run.destroy()
+    again, _ = start_march(problem, mesh)
+    again.restore({name: np.array(value) for name, value in checkpoints[at].items()})
+    rest.outcome = again.run([rest])
+    again.destroy()
+    assert rest.outcome.outcome == "done"
+    assert len(rest.time) == len(whole.time) - at
+    assert rest.stage.start_time == pytest.approx(at * problem.numerics.dt, rel=1e-15)
+    check("times [s]", rest.time, whole.time[at:], within=1e-15)
+    # The same operations on the same numbers; relative to the largest of each.
+    for channel in (
+        "contact_position",
+        "contact_force",
+        "head_height",
+        "wire_height",
+        "dropper_force",
+        "arm_uplift",
+    ):
+        expected = whole[channel][at:]
+        within = 1e-12 * np.abs(expected).max()
+        check(channel, rest[channel], expected, within=within)
+
+
+def test_step_numbers_go_on() -> None:
+    """A longer run picks up where the shorter one ended, so that files can be appended to."""
+    line = en50318_line(3)
+    mesh = mesh_of(line, 2)
+    problem = problem_of(line, train=train(70.0, 70.0, 71.0))
+    first, second = History(lambda view: view.checkpoint()), History(lambda view: view.step)
+    run, _ = start_march(problem, mesh)
+    run.run([first])
+    run.destroy()
+    longer = replace(problem, train=replace(problem.train, end=72.0))
+    again, _ = start_march(longer, mesh)
+    again.restore(first.watched[-1])
+    again.run([second])
+    again.destroy()
+    assert second.watched == list(range(len(first.time) - 1, again.n_steps + 1))
