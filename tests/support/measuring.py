@@ -100,7 +100,9 @@ def newmark_line(model: Model, numerics: Numerics) -> Iterator[NewmarkLine]:
         line.destroy()
 
 
-def release(line: NewmarkLine, displacement: np.ndarray, velocity: np.ndarray, model: Model) -> None:
+def release(
+    line: NewmarkLine, displacement: np.ndarray, velocity: np.ndarray, model: Model
+) -> None:
     """Start from a state with the acceleration that belongs to it: M a = -K d - C v."""
     line.displacement[:] = displacement
     line.velocity[:] = velocity
@@ -156,7 +158,9 @@ class History:
 
 
 def start_march(
-    problem: Problem, mesh: LineMesh, change_form: Callable[[Equilibrium], Equilibrium] = lambda f: f
+    problem: Problem,
+    mesh: LineMesh,
+    change_form: Callable[[Equilibrium], Equilibrium] = lambda f: f,
 ) -> tuple[March, Model]:
     """A march on a line at rest, or on what ``change_form`` makes of its shape at rest."""
     model, form = find_form(problem, mesh)

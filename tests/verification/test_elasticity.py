@@ -6,7 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 from measuring import check, free_dofs, free_matrices
-from small_lines import BARE, EN_CONTACT_WIRE, HANGING, ac_simple_line, bare_wires, mesh_of, problem_of
+from small_lines import (
+    BARE,
+    EN_CONTACT_WIRE,
+    HANGING,
+    ac_simple_line,
+    bare_wires,
+    mesh_of,
+    problem_of,
+)
 
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.equilibrium import elasticity, find_form
@@ -14,9 +22,9 @@ from catenary.solver.model import build
 
 
 def test_lift_of_a_single_wire_is_that_of_a_tensioned_beam() -> None:
-    """Unit force at a: a (L - a) / (T L) - sinh(lambda a) sinh(lambda b) / (T lambda sinh(lambda L)),
+    """Unit force at a, b = L - a from the other end, lambda = sqrt(T / EI):
 
-    b = L - a: the triangle of a string, rounded over the length 1 / lambda = sqrt(EI / T).
+    w = a b / (T L) - sinh(lambda a) sinh(lambda b) / (T lambda sinh(lambda L)), the triangle of a string, rounded over 1 / lambda.
     """
     length, rounding, n_elements = 20.0, 0.5, 160
     tension = EN_CONTACT_WIRE.tension

@@ -7,8 +7,6 @@ between sqrt(n) eps and, should they all have one sign, n eps.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from measuring import check, march, newmark_line, release, step
 from scipy.sparse import linalg as sparse_linalg

@@ -31,7 +31,9 @@ from catenary.solver.model import Model, build
 LENGTH = 60.0
 STRING = Wire(tension=20e3, mass_per_length=1.35, bending_stiffness=0.0)
 # EI k^2 / T reaches 1 in the fifth mode: neither tension nor bending can be missed.
-BEAM = Wire(tension=16e3, mass_per_length=1.07, bending_stiffness=16e3 * (LENGTH / (5 * np.pi)) ** 2)
+BEAM = Wire(
+    tension=16e3, mass_per_length=1.07, bending_stiffness=16e3 * (LENGTH / (5 * np.pi)) ** 2
+)
 
 STRING_NEXT, BEAM_NEXT = 5 / 14, 1 / 35
 
@@ -108,7 +110,9 @@ def test_eigenvalues_converge_with_the_order_of_the_theory(
     errors = [
         float(eigenvalues(n, name, mode)[-1] / exact(wire, np.array(mode)) - 1) for n in sizes
     ]
-    observed = print_table(f"{name}: eigenvalue of mode {mode}, expected order {theory}", sizes, errors)
+    observed = print_table(
+        f"{name}: eigenvalue of mode {mode}, expected order {theory}", sizes, errors
+    )
     # The next term lowers the order that two meshes show by log2(1 + c (k h)^2) at most, with the
     # k h of the coarser one.
     following = STRING_NEXT if wire is STRING else BEAM_NEXT

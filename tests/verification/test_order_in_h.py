@@ -64,7 +64,9 @@ def errors(n_elements: int) -> tuple[float, float, float]:
 
 
 def test_height_inside_elements_is_of_order_4_and_slope_of_order_3() -> None:
-    largest, mean, slope = (list(column) for column in zip(*(errors(n) for n in SIZES), strict=True))
+    largest, mean, slope = (
+        list(column) for column in zip(*(errors(n) for n in SIZES), strict=True)
+    )
     # w'''' falls off from the pinned ends as exp(-lambda x). The largest error of the height stands
     # in the middle of the first element and that of the slope at 0.211 of it, so that the errors
     # go with h^4 exp(-lambda h / 2) and h^3 exp(-0.211 lambda h); what follows is (lambda h)^2.

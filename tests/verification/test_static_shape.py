@@ -9,7 +9,6 @@ import pytest
 from measuring import check
 from small_lines import (
     EN_CONTACT_WIRE,
-    EN_MESSENGER_WIRE,
     HANGING,
     ac_simple_line,
     bare_wires,
