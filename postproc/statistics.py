@@ -85,7 +85,7 @@ class DropperStatistics:
     x : (n_droppers,) positions of all droppers [m]
     highest, lowest : (n_droppers,) largest and smallest force of each [N]
     evaluated : (n_droppers,) bool, whether the dropper hangs in the evaluation stretch
-    n_slackened : evaluated droppers whose force was zero or less at some time
+    n_slackened : evaluated droppers whose force was zero at some time, 0 if none can slacken
     maximum, minimum : largest and smallest force of the evaluated ones [N], NaN if there are none
     """
 
@@ -240,12 +240,14 @@ def _droppers(results: Results) -> DropperStatistics:
     force = results.channel("dropper_force")
     highest, lowest = _extreme(force, np.max), _extreme(force, np.min)
     evaluated = _inside(x, results.evaluation)
+    # Droppers that may push, or that carry nothing at rest, do not slacken at zero force.
+    slackens = any(name == "dropper_slackening" for name, *_ in results.attributes["effects_on"])
     return DropperStatistics(
         x,
         highest,
         lowest,
         evaluated,
-        int(np.count_nonzero(lowest[evaluated] <= 0.0)),
+        int(np.count_nonzero(lowest[evaluated] <= 0.0)) if slackens else 0,
         _of(highest[evaluated], np.max),
         _of(lowest[evaluated], np.min),
     )

@@ -98,7 +98,10 @@ def make_header(line: Line, mesh: LineMesh, **attributes: Any) -> Header:
         "edition": "2006",
         "versions": {"catenary": "0.1.0", "petsc": "3.18.5", "python": "3.11"},
         "config": {"line": {"n_spans": N_SPANS}, "numerics": {"dt_s": 1e-3, "scheme": "one_solve"}},
-        "effects_on": [("vertical", "vertical motion of the tensioned wires", "always")],
+        "effects_on": [
+            ("vertical", "vertical motion of the tensioned wires", "always"),
+            ("dropper_slackening", "droppers that slacken", "default"),
+        ],
         "effects_off": [("lateral", "stagger and lateral motion", "not asked for")],
     }
     datasets = {
