@@ -24,7 +24,9 @@ from catenary.solver.model import build
 def test_lift_of_a_single_wire_is_that_of_a_tensioned_beam() -> None:
     """Unit force at a, b = L - a from the other end, lambda = sqrt(T / EI):
 
-    w = a b / (T L) - sinh(lambda a) sinh(lambda b) / (T lambda sinh(lambda L)), the triangle of a string, rounded over 1 / lambda.
+    w = a b / (T L) - sinh(lambda a) sinh(lambda b) / (T lambda sinh(lambda L)),
+
+    the triangle of a string, rounded over 1 / lambda.
     """
     length, rounding, n_elements = 20.0, 0.5, 160
     tension = EN_CONTACT_WIRE.tension

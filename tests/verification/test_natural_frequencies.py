@@ -2,7 +2,8 @@
 
 A tensioned beam of length L, pinned at both ends, vibrates in sin(k_n x), k_n = n pi / L, with
 
-    omega_n^2 = (T k^2 + EI k^4) / rho,   f_n = n / (2 L) sqrt(T / rho) sqrt(1 + n^2 pi^2 EI / (T L^2)).
+    omega_n^2 = (T k^2 + EI k^4) / rho,
+    f_n = n / (2 L) sqrt(T / rho) sqrt(1 + n^2 pi^2 EI / (T L^2)).
 
 What the finite elements add to omega^2 follows from Galerkin's principle: the eigenvalue is in
 error by the energy of what the element functions cannot represent of the mode. The error of

@@ -1,4 +1,4 @@
-"""The default scheme against the paper's fixed-point correction, with everything nonlinear in play."""
+"""The default scheme against the paper's fixed-point correction, all nonlinearities in play."""
 
 from __future__ import annotations
 

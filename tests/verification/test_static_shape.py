@@ -73,8 +73,8 @@ def test_a_stiff_wire_sags_like_a_tensioned_beam() -> None:
     inverse = np.sqrt(tension / wire.bending_stiffness)
     layer = 1 - np.cosh(inverse * (s - length / 2)) / np.cosh(inverse * length / 2)
     sag = q * s * (length - s) / (2 * tension) - q / (tension * inverse**2) * layer
-    # Interpolation error of the elements, |w''''| <= q lambda^2 / T at the ends, and round-off times
-    # the condition number, bending of one element EI / h^4 against tension of all T / l^2.
+    # Interpolation error of the elements, |w''''| <= q lambda^2 / T at the ends, and round-off
+    # times the condition number, bending of an element EI / h^4 against tension of all T / l^2.
     h = length / n_elements
     element = q * inverse**2 / tension * h**4 / 384
     round_off = EPS * line.contact_height * length**2 / (inverse**2 * h**4)
