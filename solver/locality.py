@@ -51,4 +51,5 @@ def reach(model: Model, coefficients: tuple[float, float, float]) -> float:
         big = column > DECAY * column.max()
         furthest = max(furthest, float(np.abs(x[big] - x[load]).max()))
     total = float(positions[-1] - positions[0])
-    return total if furthest > 0.9 * _WINDOW else min(total, _MARGIN * furthest)
+    seen = min(_WINDOW, 0.5 * total)
+    return total if furthest > 0.9 * seen else min(total, _MARGIN * furthest)
