@@ -1,0 +1,106 @@
+"""Every state of a march put into the equations of motion, all laws written out once more."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from measuring import History, check, matrix_of, start_march
+from small_lines import (
+    WHOLE,
+    ac_simple_line,
+    mesh_of,
+    numerics,
+    problem_of,
+    train,
+)
+
+from catenary.meshgen.mesh import CONTACT_WIRE
+from catenary.solver.elements import shape_slopes, shape_values
+from catenary.solver.equilibrium import find_form
+from catenary.solver.problem import ContactLaw
+
+EPS = np.finfo(float).eps
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.01], ids=["slack droppers", "residual stiffness 1/100"])
+@pytest.mark.parametrize("scheme", ["one_solve", "fixed_point"])
+def test_states_satisfy_the_equations_of_motion(scheme: str, kept: float) -> None:
+    """M a + C v + K u = sum of f N - sum of s L, f = max(0, k g + c g'), s = (1 - r) max(0, -T).
+
+    g = z - h; h' = dw/dt + V dw/dx; T as if droppers could push, with their damping.
+    """
+    line = ac_simple_line(5)
+    mesh = mesh_of(line, 3)
+    law = ContactLaw(5e4, 60.0)
+    problem = problem_of(
+        line,
+        WHOLE | {"contact_damping", "residual_dropper_stiffness"},
+        contact=law,
+        train=train(85.0, 110.0, 165.0, behind=(0.0, 31.0), static_force=220.0, raise_time=0.1),
+        numerics=numerics(1e-3, scheme),
+        residual_stiffness_ratio=kept,
+    )
+    model, form = find_form(problem, mesh)
+    run, _ = start_march(problem, mesh)
+    history = History(lambda view: view.checkpoint() if view.step % 5 == 0 else None)
+    run.run([history])
+    run.destroy()
+    mass, damping, stiffness = (
+        matrix_of(model, **{name: 1.0}) for name in ("mass", "damping", "stiffness")
+    )
+    ends = model.dofs(mesh.droppers)
+    nodes = mesh.wires[CONTACT_WIRE]
+    x = mesh.x(nodes)
+    unknowns = np.stack([model.dofs(nodes), model.dofs(nodes, "theta_y")], axis=1)
+    rest = np.stack([form.height[nodes], form.slope[nodes]], axis=1)
+    worst_motion = worst_contact = worst_shown = largest = 0.0
+    n_slack = n_lost = 0
+    for step, state in enumerate(history.watched):
+        if state is None or step == 0:
+            continue
+        u, v, a = state["displacement"], state["velocity"], state["acceleration"]
+        residual = mass @ a + damping @ v + stiffness @ u
+        scale = abs(mass) @ abs(a) + abs(damping) @ abs(v) + abs(stiffness) @ abs(u)
+        spread = u[ends[:, 0]] - u[ends[:, 1]]
+        spread_rate = v[ends[:, 0]] - v[ends[:, 1]]
+        tension = form.dropper_force + model.dropper_stiffness * spread
+        tension += model.dropper_damping * spread_rate
+        slack = (1.0 - kept) * np.maximum(0.0, -tension)
+        np.add.at(residual, ends[:, 0], slack)
+        np.add.at(residual, ends[:, 1], -slack)
+        shown = np.where(tension > 0, tension, kept * tension)
+        worst_shown = max(worst_shown, np.abs(history["dropper_force"][step] - shown).max())
+        n_slack += np.count_nonzero(slack)
+        for i, force in enumerate(history["contact_force"][step]):
+            position = history["contact_position"][step, i]
+            e = int(np.searchsorted(x, position)) - 1
+            length = x[e + 1] - x[e]
+            value = shape_values((position - x[e]) / length, length)
+            slope = shape_slopes((position - x[e]) / length, length)
+            own = unknowns[e : e + 2].ravel()
+            shape = u[own] + rest[e : e + 2].ravel()
+            z, _, head_speed = state[f"pantograph_{i}"][[0, 1, 2]]
+            gap = z - value @ shape
+            rate = head_speed - (value @ v[own] + problem.train.speed * slope @ shape)
+            expected = max(0.0, law.stiffness * gap + law.damping * rate)
+            worst_contact = max(worst_contact, abs(expected - force))
+            n_lost += force == 0.0
+            residual[own] -= force * value
+        residual[model.constrained] = 0.0
+        worst_motion = max(worst_motion, np.abs(residual).max())
+        largest = max(largest, scale.max())
+    print(f"{n_slack} times a slack dropper, {n_lost} times contact lost")
+    assert n_slack > 50
+    assert n_lost > 3
+    # Round-off: a row has up to 16 entries; a gap is the difference of two heights of 5 m, from a
+    # few operations each. The fixed-point correction stops when displacements change by less
+    # than eps_d and velocities by less than eps_v, which forces see through their stiffnesses.
+    loose = scheme == "fixed_point"
+    eps_d, eps_v = (problem.numerics.eps_d, problem.numerics.eps_v) if loose else (0.0, 0.0)
+    of_contact = law.stiffness * eps_d + law.damping * eps_v
+    of_droppers = model.dropper_stiffness.max() * eps_d + model.dropper_damping.max() * eps_v
+    check("residual of motion [N]", worst_motion, 0.0, within=16 * EPS * largest + of_droppers)
+    gap_round_off = 8 * EPS * line.contact_height * law.stiffness
+    check("contact law [N]", worst_contact, 0.0, within=gap_round_off + of_contact)
+    dropper_round_off = 8 * EPS * np.abs(history["dropper_force"]).max()
+    check("forces of droppers [N]", worst_shown, 0.0, within=dropper_round_off)
