@@ -340,7 +340,8 @@ class _Stepper:
     def give_up(self, ts: PETSc.TS, why: str) -> None:
         """End the time loop because of an error that the march reports."""
         self.broken = why
-        ts.setConvergedReason(PETSc.TS.ConvergedReason.DIVERGED_STEP_REJECTED)
+        # Not a reason of failure, for which PETSc would raise an error of its own.
+        ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
 
     def view(self, ts: PETSc.TS, viewer: PETSc.Viewer) -> None:
         """Name the scheme in -march_ts_view."""

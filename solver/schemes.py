@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from catenary.mbs.interface import HeadState
-from catenary.solver.contact import Touch
+from catenary.solver.contact import Touches
 from catenary.solver.errors import RunBroken
 from catenary.solver.exchange import Exchange, Merged, Reply, Verdict
 from catenary.solver.inner import InnerProblem
@@ -94,7 +94,7 @@ class OneSolve:
         self.counters.solves += 1
         return reply.verdict == Verdict.ADVANCE
 
-    def _solve_inner(self, time: float, stop: bool, touches: list[Touch]) -> Reply:
+    def _solve_inner(self, time: float, stop: bool, touches: Touches) -> Reply:
         line = self.interaction.line
         heads = self.pantographs.predict(time) if self.comm.rank == 0 else []
         while True:
@@ -199,7 +199,6 @@ class FixedPoint:
         force = self.pantographs.contact_force.copy()
         self.comm.Bcast(force, root=0)
         height = np.zeros_like(force)
-        converged = False
         for _ in range(self.numerics.max_iterations):
             force, height = self._contact(touches, heads, force)
             compensation = self._compensation()
@@ -211,17 +210,18 @@ class FixedPoint:
             line.correct()
             self.counters.rounds += 1
             if self._settled(time):
-                converged = True
                 break
+        else:
+            self.counters.unconverged_steps += 1
+            raise self._broken("does not converge", time)
         self.counters.steps += 1
         self.counters.solves = self.counters.rounds
-        self.counters.unconverged_steps += not converged
         if self.comm.rank == 0:
             self.pantographs.advance(force, heads, height)
         return not stop
 
     def _contact(
-        self, touches: list[Touch], heads: list[HeadState], force: np.ndarray
+        self, touches: Touches, heads: list[HeadState], force: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Contact forces [N] and wire heights [m] from the latest iterate, on all ranks."""
         height, rate = self.interaction.heights(touches)
@@ -257,8 +257,13 @@ class FixedPoint:
         if self.comm.size > 1:
             largest = self.comm.allreduce(largest, op=MPI.MAX)
         if not np.isfinite(largest):
-            raise RunBroken(
-                f"the fixed-point correction diverges at t = {time:.4f} s; take numerics.scheme "
-                '= "one_solve" or a smaller numerics.dt_s'
-            )
+            raise self._broken("diverges", time)
         return largest < 1.0
+
+    def _broken(self, how: str, time: float) -> RunBroken:
+        return RunBroken(
+            f"the fixed-point correction {how} at t = {time:.4f} s (at most "
+            f"{self.numerics.max_iterations} iterations, numerics.max_iterations) with the train "
+            f"at {float(self.pantographs.position[0]):.1f} m; take numerics.scheme = "
+            '"one_solve" or a smaller numerics.dt_s'
+        )
