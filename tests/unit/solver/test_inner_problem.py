@@ -1,0 +1,178 @@
+"""The small problem of a step: contact forces and slack droppers, against its own definition."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from catenary.mbs.interface import HeadState
+from catenary.solver import inner
+from catenary.solver.inner import InnerProblem, InnerSolution, LineResponse
+from catenary.solver.problem import ContactLaw
+
+EPS = np.finfo(float).eps
+
+
+@dataclass
+class Case:
+    """An inner problem made from a random symmetric system, as a step of a line makes it."""
+
+    law: ContactLaw
+    kept: float
+    may_lose_contact: bool
+    line: LineResponse
+    heads: list[HeadState]
+    coupling: np.ndarray
+
+    def solve(self) -> InnerSolution:
+        problem = InnerProblem(self.law, self.may_lose_contact, self.kept)
+        return problem.solve(self.line, self.heads, lambda droppers: self.coupling)
+
+    def violation(self, found: InnerSolution) -> float:
+        """Largest difference between the two sides of the definitions in the module's docstring."""
+        line, force, slack = self.line, found.contact_force, found.compensation
+        height = line.height + line.height_by_force @ force - line.height_by_slack.T @ slack
+        rate = line.rate + line.rate_by_force @ force - line.rate_by_slack.T @ slack
+        tension = line.tension + line.tension_by_force @ force - self.coupling @ slack
+        push = np.array(
+            [
+                self.law.stiffness * (head.height - head.height_compliance * f - h)
+                + self.law.damping * (head.velocity - head.velocity_compliance * f - r)
+                for head, f, h, r in zip(self.heads, force, height, rate, strict=True)
+            ]
+        )
+        if self.may_lose_contact:
+            push = np.maximum(0.0, push)
+        released = (1.0 - self.kept) * np.maximum(0.0, -tension)
+        apart = [force - push, slack - released, found.wire_height - height]
+        return float(np.abs(np.concatenate(apart)).max())
+
+
+def make_case(
+    seed: int, n: int, m: int, damping: float, kept: float, may_lose_contact: bool
+) -> Case:
+    """Forces act on a line A = A_0 + sum of kappa L L^T, kappa what a dropper adds to a step.
+
+    All numbers are of the order of one, so that absolute errors mean something.
+    """
+    rng = np.random.default_rng(seed)
+    size = n + m + 2
+    root = rng.normal(size=(size, size))
+    contacts, droppers = rng.normal(size=(size, n)), rng.normal(size=(size, m))
+    per_acceleration = rng.uniform(0.0, 3.0, m)
+    step = root @ root.T + np.eye(size) + (droppers * per_acceleration) @ droppers.T
+    inverse = np.linalg.inv(step)
+    position, velocity = rng.uniform(0.1, 1.0, 2)
+    among_contacts = contacts.T @ inverse @ contacts
+    between = droppers.T @ inverse @ contacts
+    among_droppers = droppers.T @ inverse @ droppers
+    line = LineResponse(
+        height=rng.normal(size=n),
+        rate=rng.normal(size=n),
+        height_by_force=position * among_contacts,
+        rate_by_force=velocity * among_contacts,
+        droppers=np.arange(m),
+        tension=rng.normal(size=m),
+        tension_by_force=per_acceleration[:, None] * between,
+        height_by_slack=position * between,
+        rate_by_slack=velocity * between,
+    )
+    heads = [
+        HeadState(*rng.normal(size=2), *rng.uniform(0.0, 1.0, 2))  # heights, then compliances
+        for _ in range(n)
+    ]
+    law = ContactLaw(float(rng.uniform(0.5, 20.0)), damping)
+    return Case(law, kept, may_lose_contact, line, heads, per_acceleration[:, None] * among_droppers)
+
+
+cases = st.builds(
+    make_case,
+    seed=st.integers(0, 2**32 - 1),
+    n=st.integers(1, 3),
+    m=st.integers(0, 6),
+    damping=st.sampled_from([0.0, 0.3, 5.0]),
+    kept=st.sampled_from([0.0, 0.01, 0.5]),
+    may_lose_contact=st.booleans(),
+)
+
+# The matrices are those of A_0 >= 1 and at most 20 times the identity: their condition numbers
+# stay below 1e4, and the pivoting accepts what is negative by 1e-12 of the right-hand side (~100).
+TOLERANCE = 1e4 * 20 * EPS + 1e-10
+
+
+@given(cases)
+@settings(max_examples=300, deadline=None)
+def test_solution_satisfies_contact_and_dropper_laws(case: Case) -> None:
+    found = case.solve()
+    assert case.violation(found) < TOLERANCE
+    if case.may_lose_contact:
+        assert (found.contact_force >= -TOLERANCE).all()
+    assert (found.compensation >= -TOLERANCE).all()
+
+
+@given(cases)
+@settings(max_examples=150, deadline=None)
+def test_pivoting_finds_the_same_solution(case: Case) -> None:
+    """Without any round of the active set, the fallback has to do all the work."""
+    usual = case.solve()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(inner, "_MAX_ROUNDS", 0)
+        pivoted = case.solve()
+    assert case.violation(pivoted) < TOLERANCE
+    assert pivoted.contact_force == pytest.approx(usual.contact_force, abs=10 * TOLERANCE)
+    assert pivoted.compensation == pytest.approx(usual.compensation, abs=10 * TOLERANCE)
+
+
+def test_a_problem_that_cycles_is_handed_to_the_pivoting() -> None:
+    """For this P-matrix the active set comes back to one that it has had."""
+    matrix = np.array([[1.0, -3.0, 2.0], [3.0, 1.0, 0.0], [-3.0, -2.0, 1.0]])
+    right = np.array([1.0, -2.0, 3.0])
+    none = np.zeros(0)
+    line = LineResponse(
+        none, none, np.zeros((0, 0)), np.zeros((0, 0)), np.arange(3), -right, *[np.zeros((3, 0))] * 3
+    )
+    problem = InnerProblem(ContactLaw(1.0, 0.0), True, 0.0)
+    found = problem.solve(line, [], lambda droppers: np.eye(3) - matrix)
+    solutions = []
+    for acts in itertools.product([False, True], repeat=3):
+        index = np.flatnonzero(acts)
+        x = np.zeros(3)
+        x[index] = np.linalg.solve(matrix[np.ix_(index, index)], right[index])
+        if (x >= 0).all() and (matrix @ x - right >= -1e-12).all():
+            solutions.append(x)
+    assert len(solutions) == 1
+    assert found.compensation == pytest.approx(solutions[0], abs=100 * EPS * np.abs(right).max())
+
+
+def one_contact(height: float, may_lose_contact: bool = True) -> InnerSolution:
+    """A head at 0 m with a compliance of 2e-5 m/N under a wire at ``height`` with 3e-5 m/N."""
+    line = LineResponse(
+        np.array([height]),
+        np.zeros(1),
+        np.array([[3e-5]]),
+        np.zeros((1, 1)),
+        np.zeros(0, dtype=int),
+        np.zeros(0),
+        *[np.zeros((0, 1))] * 3,
+    )
+    head = HeadState(0.0, 0.0, 2e-5, 0.0)
+    law = ContactLaw(5e4, 0.0)
+    return InnerProblem(law, may_lose_contact, 0.0).solve(line, [head], lambda droppers: None)
+
+
+def test_one_contact_has_its_closed_form() -> None:
+    """k g / (1 + k (b + c)) for a free gap g: springs and compliances in a row."""
+    force = one_contact(-0.007).contact_force[0]
+    expected = 5e4 * 0.007 / (1 + 5e4 * 5e-5)
+    assert force == pytest.approx(expected, rel=4 * EPS)
+    assert one_contact(-0.007).wire_height[0] == pytest.approx(-0.007 + 3e-5 * force, rel=4 * EPS)
+
+
+def test_an_open_gap_has_no_force_unless_contact_is_bilateral() -> None:
+    assert one_contact(0.007).contact_force[0] == 0.0
+    assert one_contact(0.007, may_lose_contact=False).contact_force[0] < 0.0
