@@ -87,7 +87,9 @@ def make_case(
         for _ in range(n)
     ]
     law = ContactLaw(float(rng.uniform(0.5, 20.0)), damping)
-    return Case(law, kept, may_lose_contact, line, heads, per_acceleration[:, None] * among_droppers)
+    return Case(
+        law, kept, may_lose_contact, line, heads, per_acceleration[:, None] * among_droppers
+    )
 
 
 cases = st.builds(
@@ -134,7 +136,13 @@ def test_a_problem_that_cycles_is_handed_to_the_pivoting() -> None:
     right = np.array([1.0, -2.0, 3.0])
     none = np.zeros(0)
     line = LineResponse(
-        none, none, np.zeros((0, 0)), np.zeros((0, 0)), np.arange(3), -right, *[np.zeros((3, 0))] * 3
+        none,
+        none,
+        np.zeros((0, 0)),
+        np.zeros((0, 0)),
+        np.arange(3),
+        -right,
+        *[np.zeros((3, 0))] * 3,
     )
     problem = InnerProblem(ContactLaw(1.0, 0.0), True, 0.0)
     found = problem.solve(line, [], lambda droppers: np.eye(3) - matrix)

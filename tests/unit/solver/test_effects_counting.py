@@ -1,0 +1,238 @@
+"""What a scene leaves out does not exist: counted in the model, one effect at a time."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_lines import BARE, ac_simple_line, mesh_of, problem_of, train
+
+from catenary.meshgen.line import Line
+from catenary.meshgen.mesh import LineMesh
+from catenary.solver import effects
+from catenary.solver.equilibrium import find_form
+from catenary.solver.model import Model, build
+from catenary.solver.problem import ContactLaw, Damping, Problem
+
+N_SPANS = 4
+
+
+def full_line() -> Line:
+    """A line on which every shipped effect finds something to act on."""
+    line = ac_simple_line(N_SPANS)
+    return replace(
+        line,
+        steady_arm=replace(line.steady_arm, stiffness=300.0),
+        n_transition=(1, 1),
+        transition_rise=0.2,
+    )
+
+
+def full_problem(names: frozenset[str]) -> Problem:
+    line = full_line()
+    return problem_of(
+        line,
+        names,
+        damping=Damping(1e-4, 0.0125),
+        contact=ContactLaw(5e4, 50.0),
+        train=train(1.1 * line.contact_wire.wave_speed, 60.0, 160.0, behind=(0.0, 31.0)),
+        residual_stiffness_ratio=0.01,
+    )
+
+
+@pytest.fixture(scope="module")
+def mesh() -> LineMesh:
+    return mesh_of(full_line(), 2)
+
+
+def model_with(names: frozenset[str], mesh: LineMesh) -> Model:
+    lengths = np.full(mesh.droppers.shape[0], 1.0)
+    return build(full_problem(BARE | names), mesh, lengths)
+
+
+def contents(model: Model) -> Counter[tuple[str, int, bool, bool]]:
+    """Every block as component, number of elements, and which matrices it has."""
+    return Counter(
+        (block.component, block.dofs.shape[0], block.mass is not None, block.stiffness is not None)
+        for block in model.blocks
+    )
+
+
+def counts(mesh: LineMesh) -> dict[str, int]:
+    return {
+        "elements": mesh.n_nodes - 2,
+        "droppers": mesh.droppers.shape[0],
+        "arms": mesh.steady_arms.size,
+        "supports": mesh.supports.size,
+    }
+
+
+def test_a_bare_line_is_wires_droppers_and_supports(mesh: LineMesh) -> None:
+    model = model_with(frozenset(), mesh)
+    n = counts(mesh)
+    assert model.terms_of == {"vertical": n["elements"] + n["droppers"] + n["supports"]}
+    assert model.unknowns == ("w", "theta_y")
+    assert model.n_dofs == 2 * mesh.n_nodes
+    assert contents(model) == {
+        ("messenger_wire", n["elements"] // 2, True, True): 1,
+        ("contact_wire", n["elements"] // 2, True, True): 1,
+        ("droppers", n["droppers"], False, True): 1,
+        ("supports", n["supports"], False, True): 1,
+    }
+    assert model.constrained.size == 4
+    assert not model.weight.any()
+    assert model.step_loads == []
+    assert not model.dropper_damping.any()
+
+
+# Effect: the blocks that it adds, and the number of terms that it counts.
+BLOCKS = {
+    "gravity": ({}, 1),
+    "pre_sag": ({}, 1),
+    "transition_spans": ({}, 1),
+    "dropper_mass": ({("droppers", "droppers", True, False): 2}, ("droppers", 2)),
+    "clamp_mass": (
+        {
+            ("messenger_wire", "droppers", True, False): 1,
+            ("contact_wire", "droppers", True, False): 1,
+        },
+        ("droppers", 2),
+    ),
+    "arm_inertia": ({("steady_arms", "arms", True, False): 1}, ("arms", 1)),
+    "arm_stiffness": ({("steady_arms", "arms", False, True): 1}, ("arms", 1)),
+    "structural_damping": ({}, 1),
+    "dropper_slackening": ({}, 1),
+    "residual_dropper_stiffness": ({}, 1),
+    "contact_loss": ({}, 1),
+    "contact_damping": ({}, 1),
+    "several_pantographs": ({}, 1),
+    "supercritical_speed": ({}, 1),
+}
+
+
+def test_the_table_names_every_shipped_effect() -> None:
+    """A new effect must be counted here as well."""
+    assert set(effects.registry()) == {"vertical", *BLOCKS}
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_an_effect_alone_adds_what_it_declares_and_nothing_else(name: str, mesh: LineMesh) -> None:
+    bare, model = model_with(frozenset(), mesh), model_with(frozenset({name}), mesh)
+    blocks, terms = BLOCKS[name]
+    n = counts(mesh)
+    added = contents(model) - contents(bare)
+    assert added == {(part, n[size], *has): many for (part, size, *has), many in blocks.items()}
+    assert not contents(bare) - contents(model)
+    assert set(model.terms_of) == {"vertical", name}
+    assert model.terms_of[name] == (terms if isinstance(terms, int) else terms[1] * n[terms[0]])
+    assert model.terms_of["vertical"] == bare.terms_of["vertical"]
+    assert model.unknowns == bare.unknowns
+    assert np.array_equal(model.constrained, bare.constrained)
+    assert model.weight.any() == (name == "gravity")
+    assert model.dropper_damping.any() == (name == "structural_damping")
+    # What was there before is the same to the bit.
+    for old, new in zip(bare.blocks, model.blocks, strict=False):
+        assert np.array_equal(old.dofs, new.dofs)
+        for ours, theirs in ((old.mass, new.mass), (old.stiffness, new.stiffness)):
+            assert (ours is None and theirs is None) or np.array_equal(ours, theirs)
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_a_scene_without_an_effect_has_no_trace_of_it(name: str, mesh: LineMesh) -> None:
+    others = frozenset(BLOCKS) - {name}
+    everything, model = model_with(frozenset(BLOCKS), mesh), model_with(others, mesh)
+    blocks, _ = BLOCKS[name]
+    n = counts(mesh)
+    assert name not in model.terms_of
+    assert name not in {effect.name for effect in model.active}
+    assert {k: v for k, v in everything.terms_of.items() if k != name} == model.terms_of
+    missing = contents(everything) - contents(model)
+    assert missing == {(part, n[size], *has): many for (part, size, *has), many in blocks.items()}
+    assert model.n_dofs == everything.n_dofs
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("dropper_mass", lambda p: with_dropper(p, mass_per_length=0.0)),
+        (
+            "clamp_mass",
+            lambda p: with_dropper(p, messenger_clamp_mass=0.0, contact_clamp_mass=0.0),
+        ),
+        ("arm_stiffness", lambda p: with_arm(p, stiffness=0.0)),
+        ("arm_inertia", lambda p: with_arm(p, mass_per_length=0.0, clamp_mass=0.0)),
+        ("transition_spans", lambda p: with_line(p, transition_rise=0.0)),
+        ("pre_sag", lambda p: with_line(p, pre_sag=((0.0,) * 9,) * N_SPANS)),
+        ("structural_damping", lambda p: replace(p, damping=Damping(0.0, 0.0))),
+        ("contact_damping", lambda p: replace(p, contact=ContactLaw(5e4, 0.0))),
+        ("residual_dropper_stiffness", lambda p: replace(p, residual_stiffness_ratio=0.0)),
+        (
+            "several_pantographs",
+            lambda p: replace(p, train=replace(p.train, placements=p.train.placements[:1])),
+        ),
+        ("supercritical_speed", lambda p: replace(p, train=replace(p.train, speed=70.0))),
+    ],
+)
+def test_an_effect_with_nothing_to_act_on_does_not_exist(
+    name: str, change: object, mesh: LineMesh
+) -> None:
+    problem = full_problem(BARE | frozenset(BLOCKS))
+    lengths = np.full(mesh.droppers.shape[0], 1.0)
+    assert name in build(problem, mesh, lengths).terms_of
+    assert name not in build(change(problem), mesh, lengths).terms_of
+
+
+def with_line(problem: Problem, **changes: object) -> Problem:
+    return replace(problem, line=replace(problem.line, **changes))
+
+
+def with_dropper(problem: Problem, **changes: float) -> Problem:
+    return with_line(problem, dropper=replace(problem.line.dropper, **changes))
+
+
+def with_arm(problem: Problem, **changes: float) -> Problem:
+    return with_line(problem, steady_arm=replace(problem.line.steady_arm, **changes))
+
+
+def test_weights_are_those_of_the_masses_that_exist(mesh: LineMesh) -> None:
+    """Gravity acts on what the other effects hang on the line, half of a hinged arm included."""
+    line, n = full_line(), counts(mesh)
+    gravity = 9.81
+    wires = line.support_positions[-1] * (
+        line.contact_wire.mass_per_length + line.messenger_wire.mass_per_length
+    )
+    clamps = n["droppers"] * (line.dropper.messenger_clamp_mass + line.dropper.contact_clamp_mass)
+    droppers = n["droppers"] * line.dropper.mass_per_length * 1.0  # all 1 m long here
+    arm = line.steady_arm
+    arms = n["arms"] * (0.5 * arm.mass_per_length * arm.length + arm.clamp_mass)
+    hanging = {
+        frozenset(): wires,
+        frozenset({"clamp_mass"}): wires + clamps,
+        frozenset({"dropper_mass"}): wires + droppers,
+        frozenset({"arm_inertia"}): wires + arms,
+        frozenset({"clamp_mass", "dropper_mass", "arm_inertia"}): wires + clamps + droppers + arms,
+    }
+    for names, mass in hanging.items():
+        model = model_with(names | {"gravity"}, mesh)
+        vertical = model.weight[model.dofs(np.arange(mesh.n_nodes))]
+        assert vertical.sum() == pytest.approx(-gravity * mass, rel=1e-13)
+
+
+def test_form_finding_knows_pre_sag_and_transitions_only_if_asked(mesh: LineMesh) -> None:
+    whole = BARE | {"gravity", "pre_sag", "transition_spans"}
+    lower = mesh.droppers[:, 1]
+    level, line = 5.08, full_line()
+    sag = np.concatenate([np.asarray(span) for span in line.pre_sag])
+    rise = line.target_height(mesh.x(lower)) - level
+    for names, expected in (
+        (whole, level + rise - sag),
+        (whole - {"pre_sag"}, level + rise),
+        (whole - {"transition_spans"}, level - sag),
+        (BARE | {"gravity"}, np.full(lower.size, level)),
+    ):
+        _, form = find_form(full_problem(names), mesh)
+        assert form.height[lower] == pytest.approx(expected, abs=1e-14)
+    _, form = find_form(full_problem(BARE), mesh)
+    assert not form.dropper_force.any()

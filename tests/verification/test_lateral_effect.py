@@ -1,0 +1,197 @@
+"""The door for new effects: lateral motion under wind, registered by a test in a few lines.
+
+It asks for two more unknowns at every wire node and adds wires in the lateral plane, anchors and
+a load that changes with time. The vertical motion must not notice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from measuring import check, march, matrix_of, registered, solve_free
+from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
+
+from catenary.meshgen.line import Wire
+from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
+from catenary.solver import effects
+from catenary.solver.effects import Effect
+from catenary.solver.elements import uniform_load
+from catenary.solver.equilibrium import find_form
+from catenary.solver.model import ModelBuilder
+from catenary.solver.problem import Damping, Problem
+
+NAME = "lateral_wind"
+WIND = 8.0  # [N/m] on both wires
+
+
+class Wind:
+    """A lateral load per length on all wires, full from the first step on."""
+
+    def __init__(self, builder: ModelBuilder) -> None:
+        model, mesh = builder.model, builder.mesh
+        dofs, values = [], []
+        for wire in (CONTACT_WIRE, MESSENGER_WIRE):
+            nodes = mesh.wires[wire]
+            v, theta = model.dofs(nodes, "v"), model.dofs(nodes, "theta_z")
+            dofs.append(np.stack([v[:-1], theta[:-1], v[1:], theta[1:]], axis=1))
+            values.append(WIND * uniform_load(np.diff(mesh.x(nodes))))
+        self.dofs = np.concatenate(dofs).ravel()
+        self._values = np.concatenate(values).ravel()
+
+    def values(self, time: float) -> np.ndarray:
+        return self._values if time > 0 else np.zeros_like(self._values)
+
+
+def build_lateral(builder: ModelBuilder) -> None:
+    for wire in (CONTACT_WIRE, MESSENGER_WIRE):
+        builder.add_wire(wire, ("v", "theta_z"))
+    builder.hold(builder.mesh.anchors, "v")
+    builder.add_step_load(Wind(builder))
+
+
+LATERAL = Effect(
+    NAME,
+    "lateral motion of the wires under wind",
+    "lateral unknowns, wires and anchors; a load per length",
+    "test",
+    default=False,
+    unknowns=("v", "theta_z"),
+    build=build_lateral,
+)
+
+
+@pytest.fixture(autouse=True)
+def door() -> Iterator[None]:
+    """Every test here knows the effect; none leaves it behind."""
+    before = list(effects.registry())
+    with registered(LATERAL):
+        yield
+    assert list(effects.registry()) == before
+
+
+def scene(names: frozenset[str], damping: Damping, end: float, dt: float) -> Problem:
+    line = en50318_line(3)
+    return problem_of(
+        line,
+        names,
+        damping=damping,
+        train=train(70.0, 70.0, end, behind=(0.0, 31.0)),
+        numerics=numerics(dt),
+    )
+
+
+@pytest.fixture(scope="module")
+def mesh() -> LineMesh:
+    return mesh_of(en50318_line(3), 3)
+
+
+def test_a_second_effect_of_the_same_name_is_an_error() -> None:
+    with pytest.raises(ValueError, match=NAME):
+        effects.register(LATERAL)
+
+
+def test_four_unknowns_a_node_if_asked_for_and_two_otherwise(mesh: LineMesh) -> None:
+    damping = Damping(1e-4, 0.0125)
+    with_wind, _ = find_form(scene(WHOLE | {NAME}, damping, 80.0, 1e-3), mesh)
+    without, _ = find_form(scene(WHOLE, damping, 80.0, 1e-3), mesh)
+    assert with_wind.unknowns == ("w", "theta_y", "v", "theta_z")
+    assert with_wind.n_dofs == 4 * mesh.n_nodes
+    assert without.unknowns == ("w", "theta_y")
+    assert without.n_dofs == 2 * mesh.n_nodes
+    assert NAME not in without.terms_of and not without.step_loads
+    n_elements = mesh.n_nodes - 2
+    # Lateral wires and one load on the four unknowns of each element.
+    assert with_wind.terms_of[NAME] == n_elements + 4 * n_elements
+    assert len(with_wind.blocks) == len(without.blocks) + 2
+    assert with_wind.constrained.size == without.constrained.size + mesh.anchors.size
+    assert not with_wind.weight[with_wind.dofs(np.arange(mesh.n_nodes), "v")].any()
+
+
+def blown_out(wire: Wire, x: np.ndarray) -> tuple[np.ndarray, float]:
+    """Deflection q x (L - x) / (2 T) - q EI / T^2 (1 - exp(-lambda x) - exp(-lambda (L - x))) [m],
+
+    lambda^2 = T / EI, and what elements much longer than 1 / lambda leave out of it: they spread
+    the boundary layer over the last two of them, a seventh of it over the second.
+    """
+    inverse = np.sqrt(wire.tension / wire.bending_stiffness)
+    length = x[-1]
+    layers = 1 - np.exp(-inverse * x) - np.exp(-inverse * (length - x))
+    lift = WIND * wire.bending_stiffness / wire.tension**2
+    return WIND * x * (length - x) / (2 * wire.tension) - lift * layers, lift / 6
+
+
+@pytest.mark.parametrize("wire", [CONTACT_WIRE, MESSENGER_WIRE])
+def test_wind_deflects_a_wire_like_a_tensioned_beam(wire: str, mesh: LineMesh) -> None:
+    """Nothing holds the wires laterally but the anchors, the string is as long as the line."""
+    problem = scene(WHOLE | {NAME}, Damping(1e-4, 0.0125), 80.0, 1e-3)
+    model, _ = find_form(problem, mesh)
+    load = np.zeros(model.n_dofs)
+    (wind,) = model.step_loads
+    np.add.at(load, wind.dofs, wind.values(1.0))
+    solution = solve_free(matrix_of(model, stiffness=1.0), model, load)
+    nodes = mesh.wires[wire]
+    expected, left_out = blown_out(getattr(problem.line, wire), mesh.x(nodes))
+    found = solution[model.dofs(nodes, "v")]
+    check(f"{wire} [m]", found, expected, within=left_out)
+    assert not solution[model.dofs(nodes)].any()
+
+
+def test_a_damped_march_under_wind_ends_at_the_static_deflection(mesh: LineMesh) -> None:
+    """Critical damping of the lowest mode, beta = 2 omega_1, of which exp(-omega_1 t) is left."""
+    line = en50318_line(3)
+    omega = np.pi / 180.0 * line.messenger_wire.wave_speed
+    duration, dt = 12.0, 4e-3
+    problem = scene(
+        frozenset({"vertical", NAME, "structural_damping"}),
+        Damping(0.0, 2 * omega),
+        70.0 + 70.0 * duration,
+        dt,
+    )
+    # The train creeps, so that it stays on the line.
+    creep = train(1.0, 70.0, 70.0 + duration + 0.5 * dt, static_force=0.0)
+    problem = problem_of(
+        line, problem.effects, damping=problem.damping, train=creep, numerics=numerics(dt)
+    )
+    history = march(
+        problem,
+        mesh,
+        lambda view: view.checkpoint()["displacement"] if view.time > duration - 1e-6 else None,
+    )
+    model, _ = find_form(problem, mesh)
+    nodes = mesh.wires[MESSENGER_WIRE]
+    expected, left_out = blown_out(line.messenger_wire, mesh.x(nodes))
+    found = history.watched[-1][model.dofs(nodes, "v")]
+    left = (1 + omega * duration) * np.exp(-omega * duration)
+    print(f"omega_1 t = {omega * duration:.1f}: {left:.1e} of the first mode is left")
+    # The first mode holds 32 / pi^3 of the parabola's height.
+    check(
+        "messenger wire [m]",
+        found,
+        expected,
+        within=left_out + 32 / np.pi**3 * left * expected.max(),
+    )
+
+
+def test_vertical_results_do_not_notice_the_wind(mesh: LineMesh) -> None:
+    damping = Damping(1e-4, 0.0125)
+    runs = [march(scene(names, damping, 100.0, 1e-3), mesh) for names in (WHOLE, WHOLE | {NAME})]
+    # The same equations in another numbering: round-off, which differs in the factorisation and
+    # adds up as the square root of the number of steps; a contact force is the difference of two
+    # heights of 5.5 m on the contact spring.
+    steps = len(runs[0].time)
+    round_off = 8 * np.sqrt(steps) * np.finfo(float).eps * 5.5
+    check(
+        "contact force [N]",
+        runs[1]["contact_force"],
+        runs[0]["contact_force"],
+        within=round_off * 5e4,
+    )
+    check(
+        "dropper force [N]",
+        runs[1]["dropper_force"],
+        runs[0]["dropper_force"],
+        within=round_off * 1e5,
+    )
+    check("arm uplift [m]", runs[1]["arm_uplift"], runs[0]["arm_uplift"], within=round_off)
