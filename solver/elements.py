@@ -6,6 +6,7 @@ Unknowns of an element: (w1, theta1, w2, theta2) with theta = dw/dx. Source: pap
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 
 def stiffness(length: np.ndarray, bending_stiffness: float, tension: float) -> np.ndarray:
@@ -59,7 +60,8 @@ def uniform_load(length: np.ndarray) -> np.ndarray:
     return np.stack([half, moment, half, -moment], axis=1)
 
 
-def shape_values(xi: float, length: float) -> np.ndarray:
+@njit(cache=True)
+def shape_values(xi, length):  # type: ignore[no-untyped-def]
     """Hermite functions N at ``xi`` in [0, 1], shape (4,): w(x) = N @ unknowns [m]."""
     square, cube = xi * xi, xi * xi * xi
     return np.array(
@@ -72,7 +74,8 @@ def shape_values(xi: float, length: float) -> np.ndarray:
     )
 
 
-def shape_slopes(xi: float, length: float) -> np.ndarray:
+@njit(cache=True)
+def shape_slopes(xi, length):  # type: ignore[no-untyped-def]
     """Derivatives N' of the Hermite functions along x, shape (4,): dw/dx = N' @ unknowns [-]."""
     square = xi * xi
     return np.array(

@@ -18,13 +18,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import lapack
 
 from catenary.mbs.interface import HeadState
+from catenary.solver import kernels
 from catenary.solver.errors import RunBroken
 from catenary.solver.problem import ContactLaw
 
-_MAX_ROUNDS = 60
+# Mostly one or two rounds are needed; a set that cycles shows within a few.
+_MAX_ROUNDS = 30
 
 
 @dataclass
@@ -133,22 +134,10 @@ class InnerProblem:
         self, matrix: np.ndarray, right: np.ndarray, always: np.ndarray
     ) -> tuple[np.ndarray, int]:
         """Solve x = max(0, x - (matrix x - right)) entry by entry, or freely where ``always``."""
-        if right.size == 1:
-            value = right / matrix[0, 0]
-            return (value if always[0] or value[0] > 0.0 else np.zeros(1)), 1
-        acts = (right > 0.0) | always
-        seen = set()
-        for rounds in range(1, _MAX_ROUNDS + 1):
-            solution = _solve_on(matrix, right, acts)
-            now = (solution - (matrix @ solution - right) > 0.0) | always
-            if np.array_equal(now, acts):
-                return solution, rounds
-            key = now.tobytes()
-            if key in seen:
-                break
-            seen.add(key)
-            acts = now
-        return self._pivot(matrix, right, always, rounds)
+        solution, rounds = kernels.settle(matrix, right, always, _MAX_ROUNDS)
+        if rounds > 0:
+            return solution, rounds
+        return self._pivot(matrix, right, always, -rounds)
 
     @staticmethod
     def _pivot(
@@ -156,9 +145,10 @@ class InnerProblem:
     ) -> tuple[np.ndarray, int]:
         """Murty's least-index pivoting: slower, but it cannot cycle for a P-matrix."""
         acts = always.copy()
+        solution = np.zeros(right.size)
         scale = 1e-12 * (1.0 + np.abs(right).max())
         for extra in range(1, 20 * right.size + 100):
-            solution = _solve_on(matrix, right, acts)
+            kernels.solve_on(matrix, right, acts, solution)
             residual = matrix @ solution - right
             wrong = np.where(acts, (solution < -scale) & ~always, residual < -scale)
             if not wrong.any():
@@ -166,13 +156,3 @@ class InnerProblem:
             first = int(np.argmax(wrong))
             acts[first] = not acts[first]
         raise RunBroken("contacts and slack droppers of this step have no common solution")
-
-
-def _solve_on(matrix: np.ndarray, right: np.ndarray, acts: np.ndarray) -> np.ndarray:
-    """Solution of the rows and columns that act, zero elsewhere."""
-    index = np.flatnonzero(acts)
-    solution = np.zeros(right.size)
-    if index.size:
-        part = matrix[np.ix_(index, index)]
-        solution[index] = lapack.dgesv(part, right[index])[2]
-    return solution

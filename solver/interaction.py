@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from catenary.solver import compliance
-from catenary.solver.contact import ContactWire, Touch
+from catenary.solver import compliance, kernels
+from catenary.solver.contact import ContactWire, Touches
 from catenary.solver.equilibrium import Equilibrium
 from catenary.solver.inner import LineResponse
 from catenary.solver.model import Model
@@ -22,6 +22,7 @@ class Droppers:
     numbers : (n,) their numbers in the mesh; x : (n,) [m]
     upper, lower : (n,) local unknowns of their ends
     rest, stiffness, damping : (n,) force at rest [N], [N/m], [N s/m]
+    latest_tension : (n,) what ``tension`` found last [N]
     """
 
     def __init__(self, model: Model, form: Equilibrium, line: NewmarkLine) -> None:
@@ -39,18 +40,22 @@ class Droppers:
         self.per_acceleration = (
             self.stiffness * line.position_factor + self.damping * line.velocity_factor
         )
-        self._is_damped = bool(self.damping.any())
-
-    def spread(self, values: np.ndarray) -> np.ndarray:
-        """Difference upper minus lower of a local array, shape (n,)."""
-        return np.asarray(values[self.upper] - values[self.lower])
+        self.latest_tension = np.zeros(self.numbers.size)
 
     def tension(self) -> np.ndarray:
-        """Tension from the line's present displacement and velocity [N], shape (n,)."""
-        result = self.rest + self.stiffness * self.spread(self._line.displacement)
-        if self._is_damped:
-            result += self.damping * self.spread(self._line.velocity)
-        return result
+        """Tension from the line's present motion [N], shape (n,), overwritten by the next call."""
+        line = self._line
+        kernels.tension(
+            line.displacement,
+            line.velocity,
+            self.upper,
+            self.lower,
+            self.rest,
+            self.stiffness,
+            self.damping,
+            self.latest_tension,
+        )
+        return self.latest_tension
 
     def near(self, x: float, distance: float) -> slice:
         """The droppers within ``distance`` of ``x`` [m]."""
@@ -95,11 +100,11 @@ class Interaction:
         columns = compliance.compute(
             comm, line.solver, line.ownership, line.windows, dofs, np.ones(dofs.shape), at
         )
-        # Both unknowns of a node share a window: one row each.
-        self._node_start = columns.start[0::2].tolist()
-        self._node_answers = [
-            np.stack(pair) for pair in zip(columns.values[0::2], columns.values[1::2], strict=True)
-        ]
+        # Both unknowns of a node share a window; their columns stand one after the other.
+        sizes = np.array([values.size for values in columns.values], dtype=np.int64)
+        self._node_start = columns.start[0::2].copy()
+        self._node_offset = np.concatenate([[0], np.cumsum(sizes[0::2] + sizes[1::2])])
+        self._node_columns = np.concatenate([*columns.values, np.zeros(0)])
         self.slack_coupling: SlackCoupling | None = None
         if may_slacken:
             ends = model.dofs(model.mesh.droppers)
@@ -117,84 +122,65 @@ class Interaction:
             )
         shape = (n_contacts, line.ownership.n_local)
         self._answers = np.zeros(shape)
-        self._slope_answers = np.zeros(shape if uses_rate else (0, 0))
-        self._filled = [slice(0, 0)] * n_contacts
+        self._filled = np.zeros((n_contacts, 2), dtype=np.int64)
+        self._slope_answers = np.zeros(shape if uses_rate else (n_contacts, 0))
+        self._slope_filled = np.zeros((n_contacts, 2), dtype=np.int64)
+        self._chosen = np.zeros(self.droppers.numbers.size, dtype=np.int64)
 
-    def place(self, touches: list[Touch]) -> None:
+    def place(self, touches: Touches) -> None:
         """Work out the line's answer to a unit force at each touch."""
-        for i, touch in enumerate(touches):
-            self._answers[i, self._filled[i]] = 0.0
-            self._filled[i] = self._combine(touch, touch.value, self._answers[i])
-            if self._uses_rate:
-                self._slope_answers[i] = 0.0
-                self._combine(touch, touch.slope, self._slope_answers[i])
+        self._combine(touches.element, touches.whole_value, self._answers, self._filled)
+        if self._uses_rate:
+            self._combine(
+                touches.element, touches.whole_slope, self._slope_answers, self._slope_filled
+            )
 
-    def heights(self, touches: list[Touch]) -> tuple[np.ndarray, np.ndarray]:
+    def heights(self, touches: Touches) -> tuple[np.ndarray, np.ndarray]:
         """This rank's share of wire height [m] and its total rate [m/s] at each touch, (n,).
 
         The total rate is what the pan head meets: dw/dt + V dw/dx. Shares add up over the ranks.
         """
-        line, wire, n = self.line, self.wire, len(touches)
-        height, rate = np.zeros(n), np.zeros(n)
-        if line.ownership.n_local == 0:
-            return height, rate
-        for i, touch in enumerate(touches):
-            local, owned = wire.local[touch.element], wire.owned[touch.element]
-            value = touch.value * owned
-            total = touch.rest + line.displacement[local]
-            height[i] = value @ total
-            if self._uses_rate:
-                rate[i] = value @ line.velocity[local] + self._speed * (
-                    (touch.slope * owned) @ total
-                )
+        height, rate = np.empty(touches.n), np.empty(touches.n)
+        kernels.heights(
+            self.line.displacement,
+            self.line.velocity,
+            touches.local,
+            touches.value,
+            touches.slope,
+            touches.rest,
+            self._speed,
+            height,
+            rate,
+        )
         return height, rate
 
-    def response(
-        self, touches: list[Touch], force_bound: np.ndarray, margin: float
-    ) -> LineResponse:
+    def response(self, touches: Touches, force_bound: np.ndarray, margin: float) -> LineResponse:
         """This rank's share of the inner problem, after ``place`` and the free solve.
 
         The line must hold the end of the step without contact forces and with all droppers taut.
         Droppers are included if their tension may fall below ``margin`` [N] under contact
         forces up to ``force_bound`` (n,) [N].
         """
-        line, n = self.line, len(touches)
+        line, n = self.line, touches.n
         height, rate = self.heights(touches)
         by_force, rate_by_force = np.zeros((n, n)), np.zeros((n, n))
-        for i, touch in enumerate(touches):
-            local, owned = self.wire.local[touch.element], self.wire.owned[touch.element]
-            if not line.ownership.n_local:
-                break
-            reached = self._answers[:, local]
-            by_force[i] = line.position_factor * (reached @ (touch.value * owned))
-            if self._uses_rate:
-                rate_by_force[i] = line.velocity_factor * (
-                    reached @ (touch.value * owned)
-                ) + self._speed * line.position_factor * (reached @ (touch.slope * owned))
-        if not self._may_slacken:
-            empty, none = np.zeros(0), np.zeros((0, n))
+        kernels.influence(self._answers, touches.local, touches.value, by_force)
+        if self._uses_rate:
+            kernels.influence(self._answers, touches.local, touches.slope, rate_by_force)
+            rate_by_force *= self._speed * line.position_factor
+            rate_by_force += line.velocity_factor * by_force
+        by_force *= line.position_factor
+        chosen = self._droppers_to_watch(touches, force_bound, margin)
+        if chosen.size == 0:
             return LineResponse(
-                height, rate, by_force, rate_by_force, empty.astype(int), empty, none, none, none
+                height, rate, by_force, rate_by_force, chosen, np.zeros(0), *[np.zeros((0, n))] * 3
             )
         droppers = self.droppers
-        tension = droppers.tension()
-        candidate = tension < margin
-        for i, touch in enumerate(touches):
-            near = droppers.near(self.wire.x[touch.element], line.windows.reach)
-            spread = self._answers[i, droppers.upper[near]] - self._answers[i, droppers.lower[near]]
-            candidate[near] |= (
-                tension[near] + droppers.per_acceleration[near] * spread * force_bound[i] < margin
-            )
-        chosen = np.flatnonzero(candidate)
-        spread = (
-            self._answers[:, droppers.upper[chosen]] - self._answers[:, droppers.lower[chosen]]
-        ).T
+        upper, lower = droppers.upper[chosen], droppers.lower[chosen]
+        spread = (self._answers[:, upper] - self._answers[:, lower]).T
         rate_spread = np.zeros_like(spread)
         if self._uses_rate:
-            slope_spread = (
-                self._slope_answers[:, droppers.upper[chosen]]
-                - self._slope_answers[:, droppers.lower[chosen]]
-            ).T
+            slope_spread = (self._slope_answers[:, upper] - self._slope_answers[:, lower]).T
             rate_spread = (
                 line.velocity_factor * spread + self._speed * line.position_factor * slope_spread
             )
@@ -204,7 +190,7 @@ class Interaction:
             by_force,
             rate_by_force,
             droppers.numbers[chosen],
-            tension[chosen],
+            droppers.latest_tension[chosen],
             droppers.per_acceleration[chosen, None] * spread,
             line.position_factor * spread,
             rate_spread,
@@ -216,50 +202,78 @@ class Interaction:
         """Add the answer to contact forces (n,) and compensations (m,) [N] to the line's state."""
         for i, force in enumerate(contact_force.tolist()):
             if force:
-                filled = self._filled[i]
-                self._move(filled, force * self._answers[i, filled])
+                low, high = self._filled[i].tolist()
+                self._move(low, self._answers[i, low:high], force)
         columns = self._dropper_columns if droppers.size else None
         for dropper, force in zip(droppers.tolist(), compensation.tolist(), strict=True):
             assert columns is not None
-            values, start = columns.values[dropper], int(columns.start[dropper])
-            if values.size:
-                self._move(slice(start, start + values.size), -force * values)
+            self._move(int(columns.start[dropper]), columns.values[dropper], -force)
 
-    def _move(self, where: slice, acceleration: np.ndarray) -> None:
+    def _move(self, begin: int, values: np.ndarray, factor: float) -> None:
         """Add to the acceleration, and what follows from it to displacement and velocity."""
         line = self.line
-        line.acceleration[where] += acceleration
-        line.displacement[where] += line.position_factor * acceleration
-        line.velocity[where] += line.velocity_factor * acceleration
+        kernels.move(
+            begin,
+            values,
+            factor,
+            line.acceleration,
+            line.displacement,
+            line.velocity,
+            line.position_factor,
+            line.velocity_factor,
+        )
+
+    def _droppers_to_watch(
+        self, touches: Touches, force_bound: np.ndarray, margin: float
+    ) -> np.ndarray:
+        """Places among the owned droppers of those that may slacken in this step."""
+        droppers = self.droppers
+        if not self._may_slacken:
+            return self._chosen[:0]
+        count = kernels.may_slacken(
+            droppers.tension(),
+            margin,
+            force_bound,
+            droppers.per_acceleration,
+            droppers.upper,
+            droppers.lower,
+            droppers.x,
+            touches.x,
+            self.line.windows.reach,
+            self._answers,
+            self._chosen,
+        )
+        return self._chosen[:count]
 
     def loads(
-        self, touches: list[Touch], contact_force: np.ndarray, compensation: np.ndarray
+        self, touches: Touches, contact_force: np.ndarray, compensation: np.ndarray
     ) -> list[tuple[np.ndarray, np.ndarray]]:
         """Local unknowns and forces of contacts (n,) and of all owned droppers' compensations."""
         result = []
         if self.line.ownership.n_local == 0:
             return []
-        for touch, force in zip(touches, contact_force, strict=True):
+        for local, value, force in zip(touches.local, touches.value, contact_force, strict=True):
             if force:
-                values = force * touch.value * self.wire.owned[touch.element]
-                result.append((self.wire.local[touch.element], values))
+                result.append((local, force * value))
         slack = np.flatnonzero(compensation)
         if slack.size:
             result.append((self.droppers.upper[slack], -compensation[slack]))
             result.append((self.droppers.lower[slack], compensation[slack]))
         return result
 
-    def _combine(self, touch: Touch, weights: np.ndarray, target: np.ndarray) -> slice:
-        """Sum the columns of an element's unknowns into ``target``; the slice that it fills."""
-        first = touch.element - self._first_node
-        left, right = self._node_answers[first], self._node_answers[first + 1]
-        low, split = self._node_start[first], self._node_start[first + 1]
-        end, high = low + left.shape[1], split + right.shape[1]
-        if left.shape[1]:
-            np.dot(weights[:2], left, out=target[low:end])
-        if right.shape[1]:
-            target[split:high] += weights[2:] @ right
-        return slice(min(low, split), max(end, high))
+    def _combine(
+        self, elements: np.ndarray, weights: np.ndarray, answers: np.ndarray, filled: np.ndarray
+    ) -> None:
+        kernels.combine(
+            elements,
+            weights,
+            self._first_node,
+            self._node_start,
+            self._node_offset,
+            self._node_columns,
+            answers,
+            filled,
+        )
 
 
 class SlackCoupling:

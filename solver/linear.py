@@ -9,19 +9,40 @@ same preconditioner is iterated.
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
 
 from catenary.solver.distribution import Ownership
-from catenary.solver.errors import RunBroken
+from catenary.solver.errors import InputError, RunBroken
 
 logger = logging.getLogger(__name__)
 
 PREFIX = "march_"
 # A direct solve of a matrix as well conditioned as A (below 1e6) leaves about 1e-15.
 _DIRECT = 1e-12
+
+
+@contextmanager
+def refused_options() -> Iterator[None]:
+    """Turn PETSc's error about an option into one for the user. Every rank meets the same one.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        yield
+    except PETSc.Error as error:
+        words = [line for line in str(error).splitlines() if line.strip()]
+        last = words[-1].partition("] ")[2] or words[-1]
+        raise InputError(
+            f"PETSc refuses the options under -{PREFIX}, which the scene's [petsc] table and the "
+            f"words after -- give: {last}"
+        ) from error
 
 
 class StepSolver:
@@ -48,14 +69,25 @@ class StepSolver:
             pc.setFactorOrdering(PETSc.Mat.OrderingType.ND)
         else:
             self._set_up_schwarz(pc, ownership, overlap)
-        self._ksp.setFromOptions()
-        self._ksp.setUp()
-        self.iterations = 0
+        # Of an iteration that the options ask for; a direct solver has no tolerance.
+        self._ksp.setTolerances(rtol=_DIRECT)
+        with refused_options():
+            self._ksp.setFromOptions()
+            self._ksp.setUp()
         self._verify(matrix)
+        self._direct = self.is_direct
 
     def solve(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
-        """Solve A ``solution`` = ``right``. Collective."""
+        """Solve A ``solution`` = ``right``. Collective.
+
+        Raises
+        ------
+        RunBroken
+            If an iteration does not converge; a direct solver was verified when it was made.
+        """
         self._ksp.solve(right, solution)
+        if not self._direct:
+            self.check()
 
     def check(self) -> None:
         """Raise RunBroken if the last solve did not converge. Collective only in its effect."""

@@ -10,6 +10,7 @@ import math
 import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -17,16 +18,17 @@ from petsc4py import PETSc
 
 from catenary.solver.distribution import distribute
 from catenary.solver.equilibrium import Elasticity, Equilibrium
-from catenary.solver.errors import InputError, RunBroken
+from catenary.solver.errors import CatenaryError, InputError, RunBroken
 from catenary.solver.inner import InnerProblem
 from catenary.solver.interaction import Interaction
-from catenary.solver.linear import PREFIX
+from catenary.solver.linear import PREFIX, refused_options
 from catenary.solver.model import Model
 from catenary.solver.newmark import NewmarkLine
 from catenary.solver.observation import Observer, Stage, StepView
 from catenary.solver.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.problem import Problem
 from catenary.solver.schemes import FixedPoint, LoadSource, OneSolve, Scheme
+from catenary.solver.stepper import Stepper
 
 
 @dataclass
@@ -46,6 +48,8 @@ class Outcome:
 
 class March:
     """A line with its train, ready to run. Collective to make; ``destroy`` is collective too.
+
+    A context manager that destroys itself.
 
     Parameters
     ----------
@@ -126,24 +130,31 @@ class March:
 
         A step that breaks ends the march with its sentence as the outcome; observers have then
         seen everything up to the last good step.
+
+        Raises
+        ------
+        InputError
+            If an option under ``-march_`` is refused; no observer was started then.
+        RunBroken
+            If an observer cannot start.
         """
         ts = self._make_ts(observers, stop_requested)
-        stage = self._make_stage(self._form)
-        for observer in observers:
-            observer.start(stage)
-        begin = clock.perf_counter()
-        outcome = "done"
         try:
+            self._start(observers, self._make_stage(self._form))
+            begin = clock.perf_counter()
             ts.solve(self._line.solution)
-            if self._stepper.broken:
-                outcome = self._stepper.broken
-            elif self._stepper.stopped:
-                outcome = "interrupted"
-        finally:
             wall = clock.perf_counter() - begin
+        except RunBroken:
             ts.destroy()
-        for observer in observers:
-            observer.finish(outcome)
+            raise
+        ts.destroy()
+        outcome = "done"
+        if self._stepper.broken:
+            outcome = self._stepper.broken
+        elif self._stepper.stopped or self._stepper.step_number < self.n_steps:
+            # The latter if PETSc was told to end early, for instance by -march_ts_max_steps.
+            outcome = "interrupted"
+        outcome = _finish(observers, outcome)
         n_steps = self._stepper.step_number - self._first_step
         return Outcome(
             outcome,
@@ -156,6 +167,28 @@ class March:
     def destroy(self) -> None:
         """Free all PETSc objects. Collective."""
         self._line.destroy()
+
+    def __enter__(self) -> March:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        # Errors of ours reach all ranks; at any other the rest may be waiting elsewhere.
+        if error is None or isinstance(error, CatenaryError):
+            self.destroy()
+
+    @staticmethod
+    def _start(observers: Sequence[Observer], stage: Stage) -> None:
+        for number, observer in enumerate(observers):
+            try:
+                observer.start(stage)
+            except RunBroken as error:
+                _finish(observers[:number], str(error))
+                raise
 
     def _make_scheme(self, on: dict[str, int]) -> Scheme:
         problem = self._problem
@@ -239,7 +272,7 @@ class March:
         self, observers: Sequence[Observer], stop_requested: Callable[[], bool]
     ) -> PETSc.TS:
         dt = self._problem.numerics.dt
-        self._stepper = _Stepper(self._scheme, self._first_step, dt, stop_requested)
+        self._stepper = Stepper(self._scheme, self._first_step, dt, stop_requested)
         ts = PETSc.TS().create(self._comm)
         ts.setOptionsPrefix(PREFIX)
         ts.setProblemType(PETSc.TS.ProblemType.NONLINEAR)
@@ -253,13 +286,32 @@ class March:
         ts.setExactFinalTime(PETSc.TS.ExactFinalTime.STEPOVER)
         if observers:
             ts.setMonitor(lambda ts, step, time, _u: self._show(ts, observers, step, time))
-        ts.setFromOptions()
-        if abs(ts.getTimeStep() - dt) > 1e-12 * dt:
-            raise InputError(
-                f"the PETSc option -{PREFIX}ts_dt is {ts.getTimeStep():g}; the time step is part "
-                f"of the scene: give numerics.dt_s instead, which is {dt:g} s"
-            )
+        with refused_options():
+            ts.setFromOptions()
+        self._refuse_what_the_scene_says(ts)
         return ts
+
+    def _refuse_what_the_scene_says(self, ts: PETSc.TS) -> None:
+        dt = self._problem.numerics.dt
+        found = ""
+        if abs(ts.getTimeStep() - dt) > 1e-12 * dt:
+            found = (
+                f"_dt is {ts.getTimeStep():g}; the time step is part of the scene: give "
+                f"numerics.dt_s instead, which is {dt:g} s"
+            )
+        elif ts.getTime() != self._start_time:
+            found = (
+                f"_init_time is {ts.getTime():g}, but the run starts at {self._start_time:g} s; "
+                "give train.start_m instead"
+            )
+        elif ts.getType() != PETSc.TS.Type.PYTHON:
+            found = (
+                f"_type is {ts.getType()}; the method is part of the scene: give "
+                "numerics.scheme, numerics.newmark_beta or numerics.newmark_gamma instead"
+            )
+        if found:
+            ts.destroy()
+            raise InputError(f"the PETSc option -{PREFIX}ts{found}")
 
     def _show(self, ts: PETSc.TS, observers: Sequence[Observer], step: int, time: float) -> None:
         if self._stepper.broken:
@@ -309,40 +361,15 @@ class March:
         return result
 
 
-class _Stepper:
-    """Context of the TS of type python: one step of the scheme at a time."""
+def _finish(observers: Sequence[Observer], outcome: str) -> str:
+    """Tell observers how the march ended, the last one first; return how it ended after that.
 
-    def __init__(
-        self, scheme: Scheme, first_step: int, dt: float, stop_requested: Callable[[], bool]
-    ) -> None:
-        self._scheme = scheme
-        self._dt = dt
-        self._stop_requested = stop_requested
-        self.step_number = first_step
-        self.stopped = False
-        self.broken = ""
-
-    def step(self, ts: PETSc.TS) -> None:
-        """Called by PETSc; errors may not pass through it, so they are kept for the march."""
-        # Times are multiples of dt, not sums, so that a long run does not drift.
-        time = (self.step_number + 1) * self._dt
+    An observer that breaks now changes a good end to its sentence for those before it.
+    """
+    for observer in reversed(observers):
         try:
-            goes_on = self._scheme.step(time, self._stop_requested())
+            observer.finish(outcome)
         except RunBroken as error:
-            self.give_up(ts, str(error))
-            return
-        self.step_number += 1
-        ts.setTime(time)
-        if not goes_on:
-            self.stopped = True
-            ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
-
-    def give_up(self, ts: PETSc.TS, why: str) -> None:
-        """End the time loop because of an error that the march reports."""
-        self.broken = why
-        # Not a reason of failure, for which PETSc would raise an error of its own.
-        ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
-
-    def view(self, ts: PETSc.TS, viewer: PETSc.Viewer) -> None:
-        """Name the scheme in -march_ts_view."""
-        viewer.printfASCII(f"  Newmark step by scheme {type(self._scheme).__name__}\n")
+            if outcome in ("done", "interrupted"):
+                outcome = str(error)
+    return outcome

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
-from scipy.linalg import blas
 
+from catenary.solver import kernels
 from catenary.solver.compliance import Windows
 from catenary.solver.distribution import Ownership
 from catenary.solver.errors import RunBroken
@@ -35,6 +35,7 @@ class NewmarkLine:
     """
 
     def __init__(self, comm: Any, model: Model, ownership: Ownership, numerics: Numerics) -> None:
+        kernels.warm_up()
         dt, beta, gamma = numerics.dt, numerics.beta, numerics.gamma
         self._comm = comm
         self.ownership = ownership
@@ -58,13 +59,15 @@ class NewmarkLine:
             "stiffness": assemble(comm, model, ownership, stiffness=1.0),
         }
         self._proportional = model.damping_is_proportional
+        # What is folded into the product with K, and what is left to do after the solve.
+        self._alpha_share = self._beta_share = 0.0
         if self._proportional:
-            alpha, self._beta = (
+            alpha, beta_damping = (
                 model.damping_of(model.blocks[0].component) if model.blocks else (0.0, 0.0)
             )
-            mass_share = 1.0 + self.velocity_factor * self._beta
+            mass_share = 1.0 + self.velocity_factor * beta_damping
             stiffness_share = self.position_factor + self.velocity_factor * alpha
-            self._beta_share = self._beta / mass_share
+            self._beta_share = beta_damping / mass_share
             self._alpha_share = alpha - self._beta_share * stiffness_share
             self._mass_from_step = (1.0 / mass_share, -stiffness_share / mass_share)
         else:
@@ -95,9 +98,16 @@ class NewmarkLine:
 
     def predict(self) -> None:
         """Turn displacement and velocity into their predictions of eq. (2.5)."""
-        _add(self._dt, self.velocity, self.displacement)
-        _add(self._predict_position, self.acceleration, self.displacement)
-        _add(self._predict_velocity, self.acceleration, self.velocity)
+        kernels.predict(
+            self.displacement,
+            self.velocity,
+            self.acceleration,
+            self._work,
+            self._dt,
+            self._predict_position,
+            self._predict_velocity,
+            self._alpha_share,
+        )
 
     def free_acceleration(self, loads: list[tuple[np.ndarray, np.ndarray]]) -> None:
         """Fill the acceleration from the predictions and local loads (eq. 2.4). Collective.
@@ -109,20 +119,16 @@ class NewmarkLine:
         self.solve(loads)
 
     def internal_forces(self) -> None:
-        """Right-hand side -C v - K d of eq. (2.4) from the predictions. Collective."""
-        work, operators, vectors = self._work, self._operators, self._vectors
-        if self._proportional:
-            np.multiply(self.velocity, -self._alpha_share, out=work)
-            work -= self.displacement
-            operators["stiffness"].mult(vectors["work"], vectors["right"])
-            return
-        np.negative(self.velocity, out=work)
-        operators["damping"].mult(vectors["work"], vectors["right"])
-        np.negative(self.displacement, out=work)
-        operators["stiffness"].multAdd(vectors["work"], vectors["right"], vectors["right"])
+        """Right-hand side -C v - K d of eq. (2.4); only right after ``predict``. Collective."""
+        operators, vectors = self._operators, self._vectors
+        operators["stiffness"].mult(vectors["work"], vectors["right"])
+        if not self._proportional:
+            np.negative(self.velocity, out=self._work)
+            operators["damping"].multAdd(vectors["work"], vectors["right"], vectors["right"])
 
     def solve(self, loads: list[tuple[np.ndarray, np.ndarray]]) -> None:
-        """Acceleration for the internal forces plus ``loads``; may be called again. Collective."""
+        """Acceleration for the internal forces plus ``loads``, but for its part by damping on mass,
+        which ``correct`` takes off. May be called again for other loads. Collective."""
         name = "right"
         if loads:
             name = "work"
@@ -130,13 +136,17 @@ class NewmarkLine:
             for dofs, values in loads:
                 np.add.at(self._work, dofs, values)
         self.solver.solve(self._vectors[name], self._vectors["acceleration"])
-        if self._proportional and self._beta:
-            _add(-self._beta_share, self.velocity, self.acceleration)
 
     def correct(self) -> None:
         """Turn predictions into the new displacement and velocity (eq. 2.6)."""
-        _add(self.position_factor, self.acceleration, self.displacement)
-        _add(self.velocity_factor, self.acceleration, self.velocity)
+        kernels.correct(
+            self.displacement,
+            self.velocity,
+            self.acceleration,
+            self.position_factor,
+            self.velocity_factor,
+            self._beta_share,
+        )
 
     def energies(self) -> tuple[float, float]:
         """Kinetic and elastic energy relative to equilibrium, all droppers taut [J]. Collective."""
@@ -168,12 +178,6 @@ class NewmarkLine:
         self.solver.destroy()
         for held in (*self._operators.values(), *self._vectors.values()):
             held.destroy()
-
-
-def _add(factor: float, x: np.ndarray, y: np.ndarray) -> None:
-    """y += factor x without a temporary."""
-    if x.size:
-        blas.daxpy(x, y, a=factor)
 
 
 def _row_positions(model: Model) -> np.ndarray:

@@ -10,7 +10,7 @@ from scipy import integrate
 from catenary.mbs.interface import HeadState, Pantograph
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.solver.contact import ContactWire, Touch
+from catenary.solver.contact import ContactWire, Touches
 from catenary.solver.equilibrium import Elasticity, Equilibrium
 from catenary.solver.model import Model
 from catenary.solver.problem import Placement, Problem
@@ -37,10 +37,12 @@ class Pantographs:
         self._wire = wire
         self._start = np.array([train.start - p.behind for p in train.placements])
         self._speed = train.speed
-        self.position = self._start.copy()
+        self._touches = Touches(self.n)
+        self.position = self._touches.x
+        self.position[:] = self._start
         self.contact_force = np.zeros(self.n)
         self.head_height = np.zeros(self.n)
-        self.wire_height = np.array([wire.rest_height(x) for x in self._start])
+        self.wire_height = wire.rest_height(self._start)
         self.models: list[Pantograph] = []
         if on_this_rank:
             for placement, height in zip(train.placements, self.wire_height, strict=True):
@@ -61,11 +63,12 @@ class Pantographs:
     def n(self) -> int:
         return int(self._start.size)
 
-    def move_to(self, time: float) -> list[Touch]:
+    def move_to(self, time: float) -> Touches:
         """Move the contacts to where they are at ``time`` [s]; their places on the wire."""
         np.multiply(self._speed, time, out=self.position)
         self.position += self._start
-        return [self._wire.touch(x) for x in self.position.tolist()]
+        self._wire.locate(self._touches)
+        return self._touches
 
     def predict(self, time: float) -> list[HeadState]:
         """Heads at ``time`` as functions of the contact forces. Rank 0 only."""

@@ -1,0 +1,56 @@
+"""One step at a time, as PETSc's TS of type ``python`` asks for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from petsc4py import PETSc
+
+from catenary.solver.errors import RunBroken
+from catenary.solver.schemes import Scheme
+
+
+class Stepper:
+    """Context of a TS of type ``python`` that advances a scheme.
+
+    Attributes
+    ----------
+    step_number : of the last good step
+    stopped : whether the scheme wanted no further step
+    broken : the sentence of what broke, empty if nothing did
+    """
+
+    def __init__(
+        self, scheme: Scheme, first_step: int, dt: float, stop_requested: Callable[[], bool]
+    ) -> None:
+        self._scheme = scheme
+        self._dt = dt
+        self._stop_requested = stop_requested
+        self.step_number = first_step
+        self.stopped = False
+        self.broken = ""
+
+    def step(self, ts: PETSc.TS) -> None:
+        """Called by PETSc; errors may not pass through it, so they are kept for the march."""
+        # Times are multiples of dt, not sums, so that a long run does not drift.
+        time = (self.step_number + 1) * self._dt
+        try:
+            goes_on = self._scheme.step(time, self._stop_requested())
+        except RunBroken as error:
+            self.give_up(ts, str(error))
+            return
+        self.step_number += 1
+        ts.setTime(time)
+        if not goes_on:
+            self.stopped = True
+            ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
+
+    def give_up(self, ts: PETSc.TS, why: str) -> None:
+        """End the time loop because of an error that the march reports."""
+        self.broken = why
+        # Not a reason of failure, for which PETSc would raise an error of its own.
+        ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
+
+    def view(self, ts: PETSc.TS, viewer: PETSc.Viewer) -> None:
+        """Name the scheme in -march_ts_view."""
+        viewer.printfASCII(f"  Newmark step by scheme {type(self._scheme).__name__}\n")
