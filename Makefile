@@ -20,7 +20,7 @@ endif
 .DEFAULT_GOAL := help
 # The targets share .venv and two cores: one after the other, also under make -j.
 .NOTPARALLEL:
-.PHONY: help setup run test test-unit test-verification test-mpi test-regression lint format clean
+.PHONY: help setup run test test-unit test-verification test-mpi test-regression bench lint format clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -50,6 +50,10 @@ test-regression: setup ## every case, shortened, against published ranges
 test-mpi: setup ## the same answers on 2 and 3 ranks
 	timeout 600 mpirun -n 2 $(MPI_FLAGS) $(MPI_PYTEST) tests/mpi
 	timeout 600 mpirun -n 3 $(MPI_FLAGS) $(MPI_PYTEST) tests/mpi
+
+bench: setup ## what a step costs against its floor and against the paper's correction
+	@mkdir -p results
+	$(PYTEST) -q -s tests/benchmarks --benchmark-json=results/bench.json
 
 lint: setup ## ruff (lint and format) and mypy
 	$(PYTHON) -m ruff check .

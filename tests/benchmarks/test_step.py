@@ -1,0 +1,91 @@
+"""What a step costs: against its floor, and against the paper's correction. Run by ``make bench``.
+
+The floor is what no implicit step of this model can do without: one solve with the factored
+operator and one product with K, measured in the same process. Figures are medians of rounds; read
+them as ratios, absolute times depend on the machine and on what else it does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from mpi4py import MPI
+
+from catenary.cases.meshing import mesh_of
+from catenary.cases.scene import load_scene
+from catenary.solver.distribution import distribute
+from catenary.solver.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.march import March
+from catenary.solver.newmark import NewmarkLine
+
+CASE = "ambrosio2012"
+N_STEPS = 1000
+ROUNDS = 7
+_median_us: dict[str, float] = {}
+
+
+@pytest.fixture(scope="module")
+def at_rest() -> tuple[Any, ...]:
+    """Problem, model, equilibrium and elasticity of the case."""
+    problem = load_scene(CASE).to_problem()
+    model, form = find_form(problem, mesh_of(load_scene(CASE)))
+    return problem, model, form, elasticity(model, *middle_span(problem.line))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def table() -> Iterator[None]:
+    """Print the ratios when all is measured."""
+    yield
+    floor = _median_us["floor"]
+    print(f"\n{CASE}, one rank, median of {ROUNDS} rounds\n")
+    print(f"{'':14}{'us a step':>10}{'x floor':>9}{'x real time':>13}")
+    dt = load_scene(CASE).numerics.dt_s
+    for name, cost in _median_us.items():
+        factor = "" if name == "floor" else f"{1e6 * dt / cost:13.1f}"
+        print(f"{name:14}{cost:10.1f}{cost / floor:9.2f}{factor}")
+
+
+def keep(name: str, benchmark: Any, per_call: int) -> None:
+    """Store the median of a benchmark per step and add it to the JSON."""
+    _median_us[name] = 1e6 * benchmark.stats.stats.median / per_call
+    benchmark.extra_info["us_per_step"] = _median_us[name]
+
+
+def test_floor(benchmark: Any, at_rest: tuple[Any, ...]) -> None:
+    problem, model, _, _ = at_rest
+    line = NewmarkLine(MPI.COMM_SELF, model, distribute(model, 1, 0), problem.numerics)
+
+    def solve_and_multiply() -> None:
+        for _ in range(N_STEPS):
+            line.internal_forces()
+            line.solve([])
+
+    benchmark.pedantic(solve_and_multiply, rounds=ROUNDS, warmup_rounds=1)
+    line.destroy()
+    keep("floor", benchmark, N_STEPS)
+
+
+@pytest.mark.parametrize("scheme", ["one_solve", "fixed_point"])
+def test_step(benchmark: Any, at_rest: tuple[Any, ...], scheme: str) -> None:
+    problem, model, form, lift = at_rest
+    train = problem.train
+    length = N_STEPS * problem.numerics.dt * train.speed
+    problem = replace(
+        problem,
+        train=replace(train, end=train.start + length),
+        numerics=replace(problem.numerics, scheme=scheme),
+    )
+    marches = []
+
+    def fresh() -> tuple[tuple[March], dict[str, Any]]:
+        marches.append(March(MPI.COMM_SELF, problem, model, form, lift))
+        return (marches[-1],), {}
+
+    benchmark.pedantic(lambda march: march.run([]), setup=fresh, rounds=ROUNDS)
+    n_steps = marches[0].n_steps
+    for march in marches:
+        march.destroy()
+    keep(scheme, benchmark, n_steps)
