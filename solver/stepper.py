@@ -32,6 +32,10 @@ class Stepper:
 
     def step(self, ts: PETSc.TS) -> None:
         """Called by PETSc; errors may not pass through it, so they are kept for the march."""
+        if self.broken:
+            # An observer gave up since the last step, and PETSc forgot it on its way here.
+            self.give_up(ts, self.broken)
+            return
         # Times are multiples of dt, not sums, so that a long run does not drift.
         time = (self.step_number + 1) * self._dt
         try:
