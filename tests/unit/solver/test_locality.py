@@ -1,0 +1,145 @@
+"""How far A^-1 reaches: decay as promised, for the dampings and time steps of the trade."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from measuring import COMM, matrix_of, newmark_line
+from scipy.sparse import identity
+from scipy.sparse import linalg as sparse_linalg
+from small_lines import (
+    BARE,
+    HANGING,
+    ac_simple_line,
+    bare_wires,
+    en50318_line,
+    mesh_of,
+    numerics,
+    problem_of,
+)
+
+from catenary.solver import compliance
+from catenary.solver.compliance import Windows
+from catenary.solver.equilibrium import find_form
+from catenary.solver.errors import RunBroken
+from catenary.solver.locality import DECAY, reach
+from catenary.solver.model import Model, build
+from catenary.solver.newmark import NewmarkLine
+from catenary.solver.problem import Damping
+
+DAMPED = HANGING | {"structural_damping"}
+
+
+def line_model(alpha: float, n_spans: int = 12, elements: int = 5) -> Model:
+    """The AC line, with the damping on stiffness alone that the paper varies."""
+    line = ac_simple_line(n_spans)
+    problem = problem_of(line, DAMPED, damping=Damping(alpha, 0.0))
+    return find_form(problem, mesh_of(line, elements))[0]
+
+
+def positions(model: Model) -> np.ndarray:
+    """Place of every unknown along the track [m]."""
+    x = np.empty(model.mesh.n_nodes)
+    x[model.row_of_node] = model.mesh.points[:, 0]
+    return np.repeat(x, model.block_size)
+
+
+def inverse_columns(
+    model: Model, coefficients: tuple[float, float, float], rows: np.ndarray
+) -> np.ndarray:
+    """Columns of A^-1 by an independent factorisation of the whole line."""
+    mass, stiffness, damping = coefficients
+    matrix = matrix_of(model, mass, stiffness, damping)
+    held = np.zeros(model.n_dofs)
+    held[model.constrained] = 1.0
+    factor = sparse_linalg.splu((matrix + identity(model.n_dofs).multiply(held)).tocsc())
+    return factor.solve(np.eye(model.n_dofs)[:, rows])
+
+
+@pytest.mark.parametrize("dt", [0.25e-3, 1e-3, 4e-3])
+@pytest.mark.parametrize("alpha", [0.0, 2.75e-3, 2.75e-2])
+def test_columns_vanish_beyond_a_reach_of_less_than_a_span(alpha: float, dt: float) -> None:
+    """beta dt^2 and gamma dt of average acceleration; paper's dampings; steps from 0.25 to 4 ms."""
+    model = line_model(alpha)
+    coefficients = (1.0, 0.25 * dt**2, 0.5 * dt)
+    found = reach(model, coefficients)
+    x = positions(model)
+    # Loads in every part of two spans: on wires, near droppers, masts, in gaps.
+    rows = np.flatnonzero((x > 270.0) & (x < 335.0))[:: max(1, model.block_size + 1)]
+    columns = np.abs(inverse_columns(model, coefficients, rows))
+    outside = np.abs(x[:, None] - x[rows]) > found
+    leak = np.where(outside, columns, 0.0).max(axis=0) / columns.max(axis=0)
+    print(f"alpha {alpha:g} s, dt {1e3 * dt:g} ms: reach {found:.1f} m, leak {leak.max():.1e}")
+    assert leak.max() <= DECAY
+    assert found < 55.0
+    # Not wasteful either: within half of it columns have not yet vanished.
+    inside = np.abs(x[:, None] - x[rows]) > 0.5 * found
+    assert np.where(inside, columns, 0.0).max() > DECAY * columns.max()
+
+
+def test_a_line_too_short_for_the_decay_is_taken_whole() -> None:
+    """20 m of wire in elements of 1 m at 4 ms: nothing vanishes within 10 m."""
+    line = bare_wires(20.0)
+    model = build(problem_of(line, BARE), mesh_of(line, 20), np.zeros(0))
+    assert reach(model, (1.0, 0.25 * 4e-3**2, 2e-3)) == 20.0
+
+
+def test_droppers_far_apart_do_not_lengthen_the_reach() -> None:
+    """The reach is a matter of wires and steps, not of the length of the line."""
+    line = en50318_line(4), en50318_line(12)
+    found = []
+    for one in line:
+        model, _ = find_form(problem_of(one, DAMPED), mesh_of(one, 4))
+        found.append(reach(model, (1.0, 0.25e-6, 0.5e-3)))
+    # The middle falls on a mast in both: the same surroundings.
+    assert found[0] == pytest.approx(found[1], abs=1e-9)
+
+
+@pytest.fixture(scope="module")
+def stepper() -> Iterator[NewmarkLine]:
+    with newmark_line(line_model(2.75e-3, n_spans=6), numerics(1e-3)) as line:
+        yield line
+
+
+def test_short_columns_are_the_columns_of_full_solves(stepper: NewmarkLine) -> None:
+    """Many columns come from one solve, and only windows are stored: nothing is lost by that."""
+    model = line_model(2.75e-3, n_spans=6)
+    ends = model.dofs(model.mesh.droppers)
+    x = model.mesh.x(model.mesh.droppers[:, 1])
+    pair = np.broadcast_to(np.array([1.0, -1.0]), ends.shape)
+    found = compliance.compute(
+        COMM, stepper.solver, stepper.ownership, stepper.windows, ends, pair, x
+    )
+    coefficients = (1.0, stepper.position_factor, stepper.velocity_factor)
+    exact = inverse_columns(model, coefficients, ends[:, 0])
+    exact -= inverse_columns(model, coefficients, ends[:, 1])
+    short = np.zeros_like(exact)
+    for column in range(x.size):
+        found.add(column, 1.0, short[:, column])
+    peak = np.abs(exact).max(axis=0)
+    worst = (np.abs(short - exact).max(axis=0) / peak).max()
+    stored = sum(values.size for values in found.values) / exact.size
+    # Two factorisations of a matrix with a condition number of about 1e3.
+    print(f"largest difference {worst:.1e} of the peak; {stored:.0%} of the entries stored")
+    assert worst < 1e3 * np.finfo(float).eps
+    assert stored < 0.5
+
+
+def test_columns_that_leak_are_refused(stepper: NewmarkLine) -> None:
+    model = line_model(2.75e-3, n_spans=6)
+    nodes = model.mesh.wires["contact_wire"][40:44]
+    dofs, x = model.dofs(nodes)[:, None], model.mesh.x(nodes)
+    too_short = Windows(positions(model)[:: model.block_size], model.block_size, 4.0)
+    with pytest.raises(RunBroken, match=r"does not decay within 4 m.*numerics\.dt_s"):
+        compliance.compute(
+            COMM, stepper.solver, stepper.ownership, too_short, dofs, np.ones(dofs.shape), x
+        )
+
+
+def test_windows_hold_all_unknowns_within_reach() -> None:
+    windows = Windows(np.array([0.0, 0.0, 1.0, 1.0, 2.5, 2.5, 4.0]), 2, 1.5)
+    assert windows.around(2.5, 2.5) == (2 * 2, 7 * 2)
+    assert windows.around(0.0, 0.0) == (0, 4 * 2)
+    assert windows.around(0.0, 2.5) == (0, 7 * 2)

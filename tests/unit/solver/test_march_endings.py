@@ -1,0 +1,132 @@
+"""How a march ends: done, on request, or broken with a sentence; what observers have then seen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from measuring import History, registered, start_march
+from petsc4py import PETSc
+from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
+
+from catenary.meshgen.mesh import LineMesh
+from catenary.solver.effects import Effect
+from catenary.solver.errors import InputError, RunBroken
+from catenary.solver.model import ModelBuilder
+from catenary.solver.observation import StepView
+from catenary.solver.problem import Problem
+
+LINE = en50318_line(3)
+BREAKS_AT = 0.0105
+
+
+@pytest.fixture(scope="module")
+def mesh() -> LineMesh:
+    return mesh_of(LINE, 2)
+
+
+def problem(scheme: str = "one_solve", **changes: object) -> Problem:
+    usual = problem_of(
+        LINE, train=train(70.0, 70.0, 72.1), numerics=numerics(1e-3, scheme, max_iterations=200)
+    )
+    return replace(usual, **changes)
+
+
+class Explosion:
+    """A load that is no number from some time on."""
+
+    def __init__(self, builder: ModelBuilder) -> None:
+        self.dofs = builder.model.dofs(builder.mesh.droppers[:1, 1])
+
+    def values(self, time: float) -> np.ndarray:
+        return np.array([np.nan if time > BREAKS_AT else 0.0])
+
+
+EXPLODING = Effect(
+    "explosion",
+    "a load that is no number",
+    "nothing good",
+    "test",
+    default=False,
+    build=lambda builder: builder.add_step_load(Explosion(builder)),
+)
+
+
+def test_a_march_runs_to_the_end_of_its_stretch(mesh: LineMesh) -> None:
+    run, _ = start_march(problem(), mesh)
+    history = History()
+    outcome = run.run([history])
+    run.destroy()
+    assert outcome.outcome == "done"
+    # 2.1 m at 70 m/s are 30 ms.
+    assert run.n_steps == outcome.n_steps == 30
+    assert outcome.simulated == pytest.approx(0.030)
+    assert history.time == pytest.approx(1e-3 * np.arange(31), abs=1e-15)
+    assert history.stage.n_steps == 30 and history.stage.dt == 1e-3
+    assert history["contact_position"][:, 0] == pytest.approx(70.0 + 0.07 * np.arange(31))
+    assert outcome.counters["steps"] == 30
+
+
+def test_a_stop_request_ends_it_after_the_step(mesh: LineMesh) -> None:
+    run, _ = start_march(problem(), mesh)
+    history, asked = History(), []
+
+    def stop() -> bool:
+        asked.append(True)
+        return len(asked) == 8
+
+    outcome = run.run([history], stop)
+    run.destroy()
+    assert outcome.outcome == "interrupted"
+    assert outcome.n_steps == 8
+    assert len(history.time) == 9
+
+
+@pytest.mark.parametrize("scheme", ["one_solve", "fixed_point"])
+def test_what_is_no_number_breaks_the_run_with_a_sentence(scheme: str, mesh: LineMesh) -> None:
+    with registered(EXPLODING):
+        run, _ = start_march(problem(scheme, effects=WHOLE | {"explosion"}), mesh)
+        history = History()
+        outcome = run.run([history])
+        run.destroy()
+    # The step to 11 ms is the first to see it; everything up to 10 ms has been shown, and is good.
+    assert "t = 0.0110 s" in outcome.outcome
+    assert outcome.n_steps == 10
+    assert len(history.time) == 11
+    assert np.isfinite(history["contact_force"]).all()
+
+
+def test_an_observer_that_cannot_go_on_ends_the_run(mesh: LineMesh) -> None:
+    def full_disk(view: StepView) -> None:
+        if view.step == 5:
+            raise RunBroken("the disk is full")
+
+    run, _ = start_march(problem(), mesh)
+    outcome = run.run([History(full_disk)])
+    run.destroy()
+    assert outcome.outcome == "the disk is full"
+    assert outcome.n_steps == 5
+
+
+def test_a_correction_that_does_not_settle_breaks_the_run(mesh: LineMesh) -> None:
+    bad = problem("fixed_point", numerics=numerics(1e-3, "fixed_point", max_iterations=1))
+    run, _ = start_march(bad, mesh)
+    history = History()
+    outcome = run.run([history])
+    run.destroy()
+    assert "does not converge" in outcome.outcome and "max_iterations" in outcome.outcome
+    assert outcome.counters["unconverged_steps"] == 1
+    assert len(history.time) == outcome.n_steps + 1 < 31
+
+
+def test_the_time_step_cannot_be_changed_by_an_option(mesh: LineMesh) -> None:
+    options = PETSc.Options()
+    options["march_ts_dt"] = 5e-4
+    try:
+        run, _ = start_march(problem(), mesh)
+        with pytest.raises(InputError, match=r"march_ts_dt.*numerics\.dt_s"):
+            run.run([])
+        run.destroy()
+    finally:
+        del options["march_ts_dt"]
