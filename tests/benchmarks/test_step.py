@@ -22,8 +22,8 @@ from catenary.solver.march import March
 from catenary.solver.newmark import NewmarkLine
 
 CASE = "ambrosio2012"
-N_STEPS = 1000
-ROUNDS = 7
+N_STEPS = 3000
+ROUNDS = 5
 _median_us: dict[str, float] = {}
 
 
