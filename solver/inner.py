@@ -77,7 +77,7 @@ class InnerProblem:
     def __init__(self, law: ContactLaw, may_lose_contact: bool, kept_ratio: float) -> None:
         self._k = law.stiffness
         self._c = law.damping
-        self._may_lose_contact = may_lose_contact
+        self._may_pull = not may_lose_contact
         self._released = 1.0 - kept_ratio
 
     def solve(
@@ -93,16 +93,23 @@ class InnerProblem:
         RunBroken
             If the active set does not settle.
         """
-        k, c, n, m = self._k, self._c, line.height.size, line.droppers.size
-        push = np.array([k * head.height + c * head.velocity for head in heads])
-        push -= k * line.height + c * line.rate
-        softness = k * line.height_by_force + c * line.rate_by_force
-        for i, head in enumerate(heads):
-            softness[i, i] += 1.0 + k * head.height_compliance + c * head.velocity_compliance
-        always = np.full(n, not self._may_lose_contact)
+        n, m = line.height.size, line.droppers.size
+        push, softness = np.empty(n), np.empty((n, n))
+        kernels.press(
+            np.array(heads),
+            line.height,
+            line.rate,
+            line.height_by_force,
+            line.rate_by_force,
+            self._k,
+            self._c,
+            push,
+            softness,
+        )
+        always = np.full(n, self._may_pull)
         force, rounds = self._settle(softness, push, always)
         slack = np.zeros(m)
-        if m and (line.tension + line.tension_by_force @ force < 0.0).any():
+        if m and kernels.any_pushed(line.tension, line.tension_by_force, force):
             force, slack, rounds = self._with_slack(line, push, softness, tension_by_slack, always)
         height = line.height + line.height_by_force @ force
         if m:

@@ -169,6 +169,31 @@ def move(begin, values, factor, acceleration, displacement, velocity, c_position
 
 
 @compiled
+def press(heads, height, rate, by_force, rate_by_force, stiffness, damping, push, softness):
+    """Right-hand side and matrix of the contact forces when no dropper is slack.
+
+    ``heads`` (n, 4) holds free height, velocity and both compliances of each head.
+    """
+    for i in range(heads.shape[0]):
+        push[i] = stiffness * (heads[i, 0] - height[i]) + damping * (heads[i, 1] - rate[i])
+        for j in range(heads.shape[0]):
+            softness[i, j] = stiffness * by_force[i, j] + damping * rate_by_force[i, j]
+        softness[i, i] += 1.0 + stiffness * heads[i, 2] + damping * heads[i, 3]
+
+
+@compiled
+def any_pushed(free_tension, by_force, force):
+    """Whether contact forces alone leave any of the droppers in compression."""
+    for d in range(free_tension.size):
+        value = free_tension[d]
+        for i in range(force.size):
+            value += by_force[d, i] * force[i]
+        if value < 0.0:
+            return True
+    return False
+
+
+@compiled
 def solve_on(matrix, right, acts, solution):
     """Solution of the rows and columns that act, zero elsewhere, by elimination with pivoting."""
     index = np.flatnonzero(acts)
@@ -254,4 +279,6 @@ def warm_up() -> None:
     tension(reals, reals, numbers, numbers, one, one, one, one)
     may_slacken(one, 1.0, one, one, numbers, numbers, one, one, 1.0, table, numbers)
     move(0, reals, 1.0, reals, reals, reals, 1.0, 1.0)
+    press(table, one, one, np.eye(1), np.eye(1), 1.0, 1.0, one, np.eye(1))
+    any_pushed(one, np.eye(1), one)
     settle(np.eye(1), one, np.zeros(1, dtype=np.bool_), 1)

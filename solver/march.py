@@ -6,6 +6,7 @@ The Newmark family runs as a TS of type ``python``: PETSc owns the time loop, it
 
 from __future__ import annotations
 
+import gc
 import math
 import time as clock
 from collections.abc import Callable, Sequence
@@ -147,6 +148,10 @@ class March:
         except RunBroken:
             ts.destroy()
             raise
+        if self._stepper.broken:
+            # The error's traceback may still hold the TS, which PETSc would then free, with the
+            # help of Python, when Python has ended.
+            gc.collect()
         ts.destroy()
         outcome = "done"
         if self._stepper.broken:
