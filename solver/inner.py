@@ -96,7 +96,7 @@ class InnerProblem:
         n, m = line.height.size, line.droppers.size
         push, softness = np.empty(n), np.empty((n, n))
         kernels.press(
-            np.array(heads),
+            np.array(heads).reshape(n, 4),
             line.height,
             line.rate,
             line.height_by_force,
