@@ -100,7 +100,8 @@ def run(
     comm, scene, arguments = _begin(read, verbose)
     from catenary.cases.runner import run_case
 
-    result = run_case(scene, out, comm, force=force, petsc_options=arguments)
+    tell = _teller(out)
+    result = run_case(scene, out, comm, force=force, petsc_options=arguments, tell=tell)
     return _end(result, out, strict)
 
 
@@ -136,7 +137,7 @@ def restart(
     comm, scene, arguments = _begin(read, verbose)
     from catenary.cases.runner import restart_case
 
-    result = restart_case(scene, folder, comm, petsc_options=arguments)
+    result = restart_case(scene, folder, comm, petsc_options=arguments, tell=_teller(folder))
     return _end(result, folder, strict)
 
 
@@ -156,14 +157,23 @@ def _begin(
     return comm, scene, arguments
 
 
+def _teller(folder: Path) -> Callable[[str], None]:
+    """What says how a run ended unless it is done. Not collective."""
+
+    def tell(outcome: str) -> None:
+        if outcome == "interrupted":
+            outcome = f"the run was interrupted; `catenary restart {folder}` continues it"
+        if outcome != "done":
+            console.complain(outcome)
+
+    return tell
+
+
 def _end(result: RunOutcome, folder: Path, strict: bool) -> int:
-    """Tell how a run ended and return its exit code. Not collective."""
+    """Print the summary of a run that is done and return the exit code. Not collective."""
     from catenary.cases import printing
 
     if result.outcome != "done":
-        interrupted = result.outcome == "interrupted"
-        hint = f"the run was interrupted; `catenary restart {folder}` continues it"
-        console.complain(hint if interrupted else result.outcome)
         return console.BROKEN
     console.say(printing.summary_text(result.summary, folder))
     return console.NOT_ACCEPTED if strict and result.accepted is False else console.DONE

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import metadata
@@ -36,7 +37,7 @@ from catenary.solver.equilibrium import (
     find_form,
     middle_span,
 )
-from catenary.solver.errors import InputError
+from catenary.solver.errors import InputError, RunBroken
 from catenary.solver.march import March, Outcome
 from catenary.solver.model import Model, build
 from catenary.solver.observation import Observer
@@ -96,6 +97,7 @@ def run_case(
     *,
     force: bool = False,
     petsc_options: Sequence[str] = (),
+    tell: Callable[[str], None] = lambda outcome: None,
 ) -> RunOutcome:
     """Simulate a scene and write results, fields and report into ``out_dir``. Collective.
 
@@ -104,25 +106,36 @@ def run_case(
     scene : Scene, the same on all ranks
     force : whether results that are there may be replaced
     petsc_options : the options that PETSc was started with, for the record
+    tell : called with the outcome on all ranks when the result file is closed, before the report
+        is drawn: an MPI launcher that is interrupted leaves its processes a second
 
     Raises
     ------
     InputError
-        If the line is impossible or results are there already; nothing is written then.
+        If the line or an option of PETSc is impossible, if results are there already or the
+        folder cannot be written to; nothing is written then.
+    RunBroken
+        If files cannot be written.
     """
-    on_root(comm, lambda: _refuse_to_overwrite(out_dir, force))
+    on_root(comm, lambda: _refuse_to_write(out_dir, force))
     phases = Phases()
     problem = scene.to_problem()
     at_rest = _at_rest(scene, problem, comm, phases)
-    return _march(scene, problem, at_rest, out_dir, comm, phases, petsc_options, resume=False)
+    return _march(scene, problem, at_rest, out_dir, comm, phases, petsc_options, tell, resume=False)
 
 
 def restart_case(
-    scene: Scene, out_dir: Path, comm: Any, *, petsc_options: Sequence[str] = ()
+    scene: Scene,
+    out_dir: Path,
+    comm: Any,
+    *,
+    petsc_options: Sequence[str] = (),
+    tell: Callable[[str], None] = lambda outcome: None,
 ) -> RunOutcome:
     """Continue an interrupted or broken run from its last checkpoint. Collective.
 
     ``scene`` must be the one that the run was started with; any number of ranks may continue.
+    ``petsc_options`` and ``tell`` are those of ``run_case``.
 
     Raises
     ------
@@ -133,7 +146,7 @@ def restart_case(
     phases = Phases()
     problem = scene.to_problem()
     at_rest = _at_rest(scene, problem, comm, phases)
-    return _march(scene, problem, at_rest, out_dir, comm, phases, petsc_options, resume=True)
+    return _march(scene, problem, at_rest, out_dir, comm, phases, petsc_options, tell, resume=True)
 
 
 def static_table(scene: Scene) -> dict[str, np.ndarray]:
@@ -174,13 +187,13 @@ def _march(
     comm: Any,
     phases: Phases,
     petsc_options: Sequence[str],
+    tell: Callable[[str], None],
     resume: bool,
 ) -> RunOutcome:
     with phases("distribute"):
         march = March(comm, problem, at_rest.model, at_rest.form, at_rest.lift)
         if resume:
             march.restore(on_root(comm, lambda: _checkpoint(out_dir)))
-    on_root(comm, lambda: out_dir.mkdir(parents=True, exist_ok=True))
     header = _header(scene, problem, at_rest, petsc_options) if comm.rank == 0 else None
     dt, output = problem.numerics.dt, scene.output
     recorder = Recorder(
@@ -204,10 +217,10 @@ def _march(
                 resume=resume,
             )
         )
-    with phases("march"), StopRequest() as stop:
+    with march, phases("march"), StopRequest() as stop:
         outcome = march.run(observers, stop)
-    march.destroy()
     recorder.close(_performance(outcome, phases))
+    tell(outcome.outcome)
     with phases("report"):
         result = on_root(comm, lambda: _report(out_dir, outcome))
     logger.debug("phases [s]: %s", {name: round(wall, 3) for name, wall in phases.wall.items()})
@@ -215,8 +228,16 @@ def _march(
 
 
 def _report(out_dir: Path, outcome: Outcome) -> RunOutcome:
-    report = write_report(out_dir / RESULT, out_dir)
-    summary = json.loads((out_dir / "summary.json").read_text(encoding="utf-8"))
+    try:
+        report = write_report(out_dir / RESULT, out_dir)
+        summary = json.loads((out_dir / "summary.json").read_text(encoding="utf-8"))
+    except OSError as error:
+        if outcome.outcome != "done":  # that has been told, and this adds nothing
+            return RunOutcome(outcome.outcome, None)
+        raise RunBroken(
+            f"writing the report into {out_dir} failed ({error.strerror or error}); the results "
+            f"are complete: `catenary report {out_dir}` writes it again"
+        ) from error
     return RunOutcome(outcome.outcome, report.verdict, summary)
 
 
@@ -278,7 +299,13 @@ def _checkpoint(out_dir: Path) -> dict[str, Any]:
         return results.checkpoint
 
 
-def _refuse_to_overwrite(out_dir: Path, force: bool) -> None:
+def _refuse_to_write(out_dir: Path, force: bool) -> None:
+    place = next(p for p in (out_dir, *out_dir.absolute().parents) if p.exists())
+    if not place.is_dir() or not os.access(place, os.W_OK | os.X_OK):
+        raise InputError(
+            f"the folder {out_dir} for the results cannot be made or written to, because {place} "
+            f"is {'read-only' if place.is_dir() else 'no folder'}; name another one with -o"
+        )
     result = out_dir / RESULT
     if result.exists() and not force:
         raise InputError(

@@ -32,7 +32,7 @@ class Recorder:
     Parameters
     ----------
     comm : mpi4py communicator
-    path : the result file, overwritten unless ``resume``
+    path : the result file, overwritten unless ``resume``; its folder is made
     header : on rank 0 what the runner knows before the first step; ignored elsewhere
     flush_every : steps between two flushes
     energy_every : steps between two records of the energies, None for none
@@ -164,6 +164,7 @@ class Recorder:
 
     def _open(self, stage: Stage) -> None:
         assert self._header is not None
+        self._path.parent.mkdir(parents=True, exist_ok=True)
         self._file = ResultFile(
             self._path,
             stage,

@@ -53,24 +53,28 @@ class ResultFile:
         resume: bool,
     ) -> None:
         self._path = path
-        self._file = h5py.File(path, "r+" if resume else "w")
         table = _table(stage, with_energies)
-        if resume:
-            _cut(self._file, stage.start_time - 0.5 * stage.dt)
-        else:
-            _write_head(self._file, stage, header, n_ranks)
-            for name, (channel, columns) in table.items():
-                _create_growing(self._file, name, channel, columns, rows_per_append)
-        # Kept open: closing a dataset writes what is left of it, and h5py ignores errors there.
-        self._growing = {name: self._file[name] for name in table}
         width = sum(columns or 1 for _, columns in table.values())
         # An append touches the chunk begun last and one more.
         self._room = 2 * 8 * rows_per_append * width + MARGIN
         self._start_time = stage.start_time
         self._n_states = 0
-        self._file.attrs["outcome"] = RUNNING
-        self._file.flush()
-        self._reserve()
+        self._file = h5py.File(path, "r+" if resume else "w")
+        try:
+            if resume:
+                _cut(self._file, stage.start_time - 0.5 * stage.dt)
+            else:
+                _write_head(self._file, stage, header, n_ranks)
+                for name, (channel, columns) in table.items():
+                    _create_growing(self._file, name, channel, columns, rows_per_append)
+            # Kept open: closing a dataset writes what is left of it, and h5py ignores errors there.
+            self._growing = {name: self._file[name] for name in table}
+            self._file.attrs["outcome"] = RUNNING
+            self._file.flush()
+            self._reserve()
+        except (OSError, RuntimeError):
+            self.abandon()
+            raise
 
     def append(self, blocks: Mapping[str, np.ndarray], state: Mapping[str, Any] | None) -> None:
         """Append rows to growing datasets and store a state to continue from.

@@ -190,8 +190,10 @@ def test_a_full_disk_on_rank_0_breaks_the_run_on_all_ranks_at_the_same_step(
 
 
 def test_a_file_that_cannot_be_opened_raises_on_all_ranks(folder: Path) -> None:
-    recorder = Recorder(COMM, folder / "nowhere" / "run.h5", make_header())
-    with pytest.raises(RunBroken, match="No such file or directory"):
+    if COMM.rank == 0:
+        (folder / "file").write_text("no folder")
+    recorder = Recorder(COMM, folder / "file" / "nowhere" / "run.h5", make_header())
+    with pytest.raises(RunBroken, match="Not a directory"):
         recorder.start(make_stage(in_runs))
 
 

@@ -64,6 +64,7 @@ def runner(monkeypatch: pytest.MonkeyPatch) -> types.SimpleNamespace:
         told.calls.append((scene, out, options))
         if told.error is not None:
             raise told.error
+        options["tell"](told.result.outcome)
         return told.result
 
     module = types.ModuleType("catenary.cases.runner")

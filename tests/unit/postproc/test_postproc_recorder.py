@@ -131,12 +131,22 @@ def test_a_column_with_two_owners_is_refused(tmp_path: Path, make_march: Any) ->
         Recorder(march.comm, tmp_path / "run.h5", march.header()).start(march.stage())
 
 
-def test_a_folder_that_is_not_there_breaks_the_run_with_a_sentence(
+def test_the_folder_of_the_result_file_is_made(tmp_path: Path, make_march: Any) -> None:
+    march = make_march()
+    watcher = Recorder(march.comm, tmp_path / "some" / "where" / "run.h5", march.header())
+    watcher.start(march.stage())
+    watcher.finish("done")
+    watcher.close()
+    assert [path.name for path in (tmp_path / "some" / "where").iterdir()] == ["run.h5"]
+
+
+def test_a_folder_that_cannot_be_made_breaks_the_run_with_a_sentence(
     tmp_path: Path, make_march: Any
 ) -> None:
     march = make_march()
-    watcher = Recorder(march.comm, tmp_path / "nowhere" / "run.h5", march.header())
-    with pytest.raises(RunBroken, match="No such file or directory"):
+    (tmp_path / "file").write_text("mine")
+    watcher = Recorder(march.comm, tmp_path / "file" / "nowhere" / "run.h5", march.header())
+    with pytest.raises(RunBroken, match="Not a directory"):
         watcher.start(march.stage())
 
 
