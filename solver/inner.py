@@ -8,8 +8,10 @@ All forces act through the line's and the pantographs' compliance within the ste
     f_i = max(0, k delta_i + c delta_i'),  delta = z - h  contact law
     s_d = (1 - r) max(0, -T_d)                            compensation of a slack dropper (2.7)
 
-This is a linear complementarity problem with a P-matrix: it has one solution, which an active-set
-iteration (semismooth Newton) finds, mostly in one or two rounds.
+This is a linear complementarity problem. Its matrix is a P-matrix, so that it has one solution,
+unless the convective part of a contact damper outweighs the compliances (docs/theory.md). An
+active-set iteration (semismooth Newton) finds it, mostly in one or two rounds; a set that cycles is
+handed to least-index pivoting, and a step without solution ends the run with a sentence.
 """
 
 from __future__ import annotations
