@@ -204,19 +204,20 @@ def _march(
         energy_every=_cadence(output.energy_every_s, dt),
         resume=resume,
     )
-    observers: list[Observer] = [recorder, Progress(comm)]
+    # The recorder is the last to write: the state to continue from stands for all before it.
+    observers: list[Observer] = [Progress(comm), recorder]
     field_every = _cadence(output.field_every_s, dt)
     if field_every:
-        observers.append(
-            FieldRecorder(
-                comm,
-                out_dir / "fields.xdmf",
-                at_rest.mesh.wires,
-                at_rest.mesh.droppers,
-                every=field_every,
-                resume=resume,
-            )
+        fields = FieldRecorder(
+            comm,
+            out_dir / "fields.xdmf",
+            at_rest.mesh.wires,
+            at_rest.mesh.droppers,
+            every=field_every,
+            flush_every=output.flush_every_steps,
+            resume=resume,
         )
+        observers.insert(0, fields)
     with march, phases("march"), StopRequest() as stop:
         outcome = march.run(observers, stop)
     recorder.close(_performance(outcome, phases))

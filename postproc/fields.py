@@ -33,11 +33,14 @@ class FieldRecorder:
     Parameters
     ----------
     comm : mpi4py communicator
-    path_xdmf : the XDMF file; the numbers go into the file of the same name ending in ``.h5``
+    path_xdmf : the XDMF file; the numbers go into the file of the same name ending in ``.h5``;
+        its folder is made
     wires : name -> (n,) int, nodes of each wire in order of x
     droppers : (n_droppers, 2) int, upper and lower node of each
     every : steps between two snapshots
-    snapshots_per_flush : snapshots kept in memory between two flushes
+    flush_every : steps after which what is kept in memory is written; if it is the ``Recorder``'s,
+        which is to follow in the list of observers, a killed run can be continued without a gap
+    snapshots_per_flush : most snapshots kept in memory
     resume : continue the files: snapshots from the stage's start time on are replaced
     """
 
@@ -49,6 +52,7 @@ class FieldRecorder:
         droppers: np.ndarray,
         *,
         every: int,
+        flush_every: int = 500,
         snapshots_per_flush: int = 50,
         resume: bool = False,
     ) -> None:
@@ -57,11 +61,11 @@ class FieldRecorder:
         self._h5 = self._xdmf.with_suffix(".h5")
         self._cells, self._component = line_cells(wires, droppers)
         self._every = every
+        self._flush_every = flush_every
         self._capacity = snapshots_per_flush
         self._resume = resume
         self._buffered: list[float] = []
         self._written: list[float] = []
-        self._flushed_once = False
         self._broken = False
 
     def start(self, stage: Stage) -> None:
@@ -72,6 +76,7 @@ class FieldRecorder:
         RunBroken
             On all ranks, if the files cannot be written.
         """
+        self._first_step = round(stage.start_time / stage.dt)
         self._n_nodes = int(stage.node_points.shape[0])
         self._capacity = max(1, min(self._capacity, _MAX_BUFFER // (8 * self._n_nodes)))
         self._gather = ColumnGather(self._comm, stage.owned_nodes, self._n_nodes, self._capacity)
@@ -79,13 +84,13 @@ class FieldRecorder:
         self._guarded(lambda: self._open(stage), stage.start_time)
 
     def observe(self, view: StepView) -> None:
-        """Keep a snapshot if one is due; collective when the buffer is full."""
-        if view.step % self._every:
-            return
-        self._uplift[len(self._buffered)] = view.node_uplift()
-        self._buffered.append(view.time)
+        """Keep a snapshot if one is due; collective when the buffer is to be written."""
+        if view.step % self._every == 0:
+            self._uplift[len(self._buffered)] = view.node_uplift()
+            self._buffered.append(view.time)
         # The first snapshot is written at once: from then on there is something to look at.
-        if len(self._buffered) == self._capacity or not self._flushed_once:
+        due = (view.step - self._first_step) % self._flush_every == 0
+        if len(self._buffered) == self._capacity or (due and self._buffered):
             self._flush()
 
     def finish(self, outcome: str) -> None:
@@ -97,7 +102,6 @@ class FieldRecorder:
         times = list(self._buffered)
         uplift = self._gather(self._uplift[: len(times)])
         self._buffered.clear()
-        self._flushed_once = True
         if times:
             self._guarded(lambda: self._append(times, uplift), times[-1])
 
@@ -119,7 +123,8 @@ class FieldRecorder:
     # ---- rank 0 ------------------------------------------------------------------------------
 
     def _open(self, stage: Stage) -> None:
-        if self._resume:
+        self._h5.parent.mkdir(parents=True, exist_ok=True)
+        if self._resume and self._h5.exists():
             self._cut(stage.start_time - 0.5 * stage.dt)
             self._describe()
         else:

@@ -367,11 +367,11 @@ class March:
 
 
 def _finish(observers: Sequence[Observer], outcome: str) -> str:
-    """Tell observers how the march ended, the last one first; return how it ended after that.
+    """Tell observers how the march ended; return how it ended after that.
 
-    An observer that breaks now changes a good end to its sentence for those before it.
+    An observer that breaks now changes a good end to its sentence for those that follow.
     """
-    for observer in reversed(observers):
+    for observer in observers:
         try:
             observer.finish(outcome)
         except RunBroken as error:
