@@ -220,7 +220,7 @@ def _march(
         observers.insert(0, fields)
     with march, phases("march"), StopRequest() as stop:
         outcome = march.run(observers, stop)
-    recorder.close(_performance(outcome, phases))
+    recorder.close(_performance(outcome, phases, comm.size))
     tell(outcome.outcome)
     with phases("report"):
         result = on_root(comm, lambda: _report(out_dir, outcome))
@@ -282,8 +282,10 @@ def _versions() -> dict[str, str]:
     }
 
 
-def _performance(outcome: Outcome, phases: Phases) -> dict[str, Any]:
+def _performance(outcome: Outcome, phases: Phases, n_ranks: int) -> dict[str, Any]:
+    """What is known at the end; after a restart, of the last part."""
     return {
+        "n_ranks": n_ranks,
         "march_wall_s": outcome.wall,
         "phase_wall_s": phases.wall,
         "inner_iterations": outcome.counters,
