@@ -10,6 +10,9 @@ from catenary.solver.distribution import Ownership
 from catenary.solver.equilibrium import Equilibrium
 from catenary.solver.model import Model
 
+# Far more than the round-off of a position, far less than an element [m].
+_SLIP = 1e-6
+
 
 class Touches:
     """Places of n contacts on the contact wire; the arrays are overwritten at every step.
@@ -80,7 +83,8 @@ class ContactWire:
         return np.asarray((touches.whole_value * touches.rest).sum(axis=1))
 
     def nodes_between(self, low: float, high: float) -> tuple[int, int]:
-        """Range of the wire's nodes whose elements cover [low, high] [m]."""
-        first = int(np.searchsorted(self.x, low, side="right")) - 1
-        last = int(np.searchsorted(self.x, high)) + 1
+        """Range of the wire's nodes whose elements cover [low, high] [m], ends included."""
+        # A position that is start + V t may miss an end by round-off and fall in the next element.
+        first = int(np.searchsorted(self.x, low - _SLIP, side="right")) - 1
+        last = int(np.searchsorted(self.x, high + _SLIP)) + 1
         return max(first, 0), min(last, self.x.size)
