@@ -177,7 +177,7 @@ class OutputTable(Table):
         0.05, ge=0, le=1e4, description="cadence of field snapshots; 0 writes none"
     )
     energy_every_s: float = Field(
-        0.0, ge=0, le=1e4, description="cadence of the line's energy; 0 writes none"
+        0.05, ge=0, le=1e4, description="cadence of the line's energy; 0 writes none"
     )
     flush_every_steps: int = Field(
         500, ge=1, le=10**7, description="steps after which the result file is brought up to date"
