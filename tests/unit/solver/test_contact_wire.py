@@ -1,0 +1,89 @@
+"""Where heads touch the wire: location, interpolation, and the stretch that a run covers."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from measuring import march
+from small_lines import HANGING, WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
+
+from catenary.solver.contact import ContactWire, Touches
+from catenary.solver.distribution import distribute
+from catenary.solver.equilibrium import find_form
+
+LINE = ac_simple_line(4)
+EPS = np.finfo(float).eps
+
+
+@pytest.fixture(scope="module")
+def wire() -> ContactWire:
+    model, form = find_form(problem_of(LINE, HANGING), mesh_of(LINE, 3))
+    return ContactWire(model, form, distribute(model, 1, 0))
+
+
+def located(wire: ContactWire, x: np.ndarray) -> Touches:
+    touches = Touches(x.size)
+    touches.x[:] = x
+    wire.locate(touches)
+    return touches
+
+
+def test_positions_fall_into_the_elements_that_hold_them(wire: ContactWire) -> None:
+    x = np.linspace(0.0, wire.x[-1], 997)
+    touches = located(wire, x)
+    assert (wire.x[touches.element] <= x).all()
+    assert (x <= wire.x[touches.element + 1]).all()
+    # A node belongs to the element that it ends, the first one to the first element.
+    at_nodes = located(wire, wire.x)
+    assert np.array_equal(at_nodes.element, np.maximum(np.arange(wire.x.size) - 1, 0))
+
+
+def test_slopes_are_the_derivatives_of_the_values(wire: ContactWire) -> None:
+    """Central differences over 2 mm: error h^2 / 6 of a cubic's third derivative, 12 / l^3."""
+    step = 1e-3
+    middle = (wire.x[:-1] + wire.x[1:]) / 2 + 0.1
+    before, at, after = (located(wire, middle + shift) for shift in (-step, 0.0, step))
+    difference = (after.whole_value - before.whole_value) / (2 * step)
+    shortest = np.diff(wire.x).min()
+    round_off = 4 * EPS * wire.x[-1] / (shortest * step)
+    error = step**2 / 6 * 12 / shortest**3 + round_off
+    assert np.abs(difference - at.whole_slope).max() < error
+    assert np.array_equal(at.value, at.whole_value)  # one rank owns everything
+
+
+def test_height_at_rest_is_continuous_and_that_of_the_nodes(wire: ContactWire) -> None:
+    before, after = located(wire, wire.x[1:-1] - 1e-9), located(wire, wire.x[1:-1] + 1e-9)
+    heights = [(t.whole_value * t.rest).sum(axis=1) for t in (before, after)]
+    # 2 nm further along a slope below 1/10.
+    assert np.abs(heights[1] - heights[0]).max() < 2e-10 + 16 * EPS * LINE.contact_height
+
+
+def test_a_run_that_ends_at_a_node_stays_within_its_stretch(wire: ContactWire) -> None:
+    """Positions are start + V t: their last bit must not lead out of the tabulated columns."""
+    passed, outside = 0, 0
+    for speed, dt in itertools.product((50.0, 250 / 3.6, 83.3), (1e-3, 0.7e-3)):
+        for node in wire.x[20:]:
+            for n_steps in range(300, 305):
+                start = node - speed * n_steps * dt
+                at_end = start + speed * (n_steps * dt)
+                first, last = wire.nodes_between(start, node)
+                element = int(located(wire, np.array([at_end])).element[0])
+                passed += at_end > node
+                outside += not first <= element < last - 1
+    print(f"{passed} positions pass the end by round-off")
+    assert passed > 0
+    assert outside == 0
+
+
+def test_a_march_may_end_exactly_at_a_node() -> None:
+    """The mast at 110 m; what comes behind the end of a run does not change the run."""
+    problem = problem_of(LINE, WHOLE, train=train(50.0, 74.0, 110.0), numerics=numerics(1e-3))
+    mesh = mesh_of(LINE, 3)
+    history = march(problem, mesh)
+    further = march(replace(problem, train=replace(problem.train, end=112.0)), mesh)
+    assert len(history.time) == 721
+    force = further["contact_force"][:721]
+    assert np.abs(history["contact_force"] - force).max() <= 1e-9 * np.abs(force).max()
