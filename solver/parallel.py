@@ -55,14 +55,17 @@ def _portable(error: BaseException | None) -> BaseException | None:
 def abort_on_unforeseen_error(comm: Any) -> None:
     """Install an exception hook that ends all ranks when one dies of an unforeseen error.
 
-    Not collective to trigger: a single rank's traceback aborts the communicator.
+    Not collective to trigger: a single rank's traceback aborts the communicator. One rank alone
+    ends at once too, with code 1: freeing what the traceback holds may need what has ended already.
     """
 
     def hook(kind: type[BaseException], error: BaseException, trace: Any) -> None:
         traceback.print_exception(kind, error, trace)
+        sys.stdout.flush()
         sys.stderr.flush()
         if comm.size > 1:
             comm.Abort(1)
+        os._exit(1)
 
     sys.excepthook = hook
 

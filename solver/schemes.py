@@ -183,6 +183,8 @@ class FixedPoint:
         self._predicted = np.zeros((2, n))
         self._latest = np.zeros((2, n))
 
+    # Iterates that grow beyond all numbers are told by ``_settled``, not by NumPy.
+    @np.errstate(over="ignore", invalid="ignore")
     def step(self, time: float, stop: bool) -> bool:
         line = self.interaction.line
         if self.comm.size > 1:
@@ -253,7 +255,7 @@ class FixedPoint:
                 np.abs(line.velocity - self._latest[1]).max(initial=0.0) / numerics.eps_v,
             ]
         )
-        largest = float(np.nan_to_num(change, nan=np.inf).max())
+        largest = float(np.nan_to_num(change, nan=np.inf, posinf=np.inf).max())
         if self.comm.size > 1:
             largest = self.comm.allreduce(largest, op=MPI.MAX)
         if not np.isfinite(largest):
