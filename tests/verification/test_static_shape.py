@@ -200,6 +200,20 @@ def test_ac_simple_catenary_has_its_nominal_dropper_lengths() -> None:
     check("dropper lengths [m]", length, nominal, within=0.005)
 
 
+def test_droppers_are_cut_shorter_than_they_hang() -> None:
+    """Unstretched length + force / stiffness is the distance of the wires at rest."""
+    line = ac_simple_line(3)
+    for stiff in (line.dropper, replace(line.dropper, stiffness=None, axial_stiffness=9e4)):
+        problem = problem_of(replace(line, dropper=stiff), HANGING)
+        model, form = find_form(problem, mesh_of(line, 3))
+        distance = form.height[model.mesh.droppers[:, 0]] - form.height[model.mesh.droppers[:, 1]]
+        stiffness = 1e5 if stiff.axial_stiffness is None else 9e4 / distance
+        stretched = form.dropper_length + form.dropper_force / stiffness
+        # With EA the stiffness belongs to the length of the last pass, 1e-10 m away at most.
+        check("distance of the wires [m]", stretched, distance, within=1e-10)
+        print(f"stretched by {(distance - form.dropper_length).max() * 1e3:.2f} mm at most")
+
+
 def test_pre_sag_is_what_the_form_finding_delivers() -> None:
     """At the droppers the contact wire hangs below its height by the pre-sag."""
     line = ac_simple_line(5)

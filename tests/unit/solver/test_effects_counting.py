@@ -236,3 +236,55 @@ def test_form_finding_knows_pre_sag_and_transitions_only_if_asked(mesh: LineMesh
         assert form.height[lower] == pytest.approx(expected, abs=1e-14)
     _, form = find_form(full_problem(BARE), mesh)
     assert not form.dropper_force.any()
+
+
+def test_point_masses_are_those_of_the_parts(mesh: LineMesh) -> None:
+    """Half a dropper at either end, clamps, and a third of an arm that is hinged at its far end."""
+    line, n = full_line(), counts(mesh)
+    kind, arm = line.dropper, line.steady_arm
+    lengths = np.linspace(0.8, 1.2, n["droppers"])
+    whole = build(full_problem(BARE | frozenset(BLOCKS)), mesh, lengths)
+    bare = build(full_problem(BARE), mesh, lengths)
+    dofs = whole.dofs(np.arange(mesh.n_nodes))
+
+    def masses(model: Model) -> np.ndarray:
+        diagonal = np.zeros(model.n_dofs)
+        for block in model.blocks:
+            if block.mass is not None:
+                np.add.at(diagonal, block.dofs, np.diagonal(block.mass, axis1=1, axis2=2))
+        return diagonal[dofs]
+
+    expected = np.zeros(mesh.n_nodes)
+    upper, lower = mesh.droppers.T
+    expected[upper] = kind.messenger_clamp_mass + 0.5 * kind.mass_per_length * lengths
+    expected[lower] = kind.contact_clamp_mass + 0.5 * kind.mass_per_length * lengths
+    # Kinetic energy of a hinged rod: its moment of inertia m l^2 / 3 turned into a mass at its end.
+    expected[mesh.steady_arms] += arm.mass_per_length * arm.length / 3 + arm.clamp_mass
+    assert masses(whole) - masses(bare) == pytest.approx(expected, abs=1e-13)
+
+
+def test_droppers_are_springs_of_their_stiffness_or_of_their_length(mesh: LineMesh) -> None:
+    lengths = np.linspace(0.8, 1.2, mesh.droppers.shape[0])
+    given = full_problem(BARE)
+    by_length = with_dropper(given, stiffness=None, axial_stiffness=8e4)
+    assert build(given, mesh, lengths).dropper_stiffness == pytest.approx(1e5)
+    model = build(by_length, mesh, lengths)
+    assert model.dropper_stiffness == pytest.approx(8e4 / lengths, rel=1e-15)
+    (links,) = [block for block in model.blocks if block.component == "droppers"]
+    assert links.stiffness[3, 0, 1] == pytest.approx(-8e4 / lengths[3], rel=1e-15)
+    damped = replace(given, effects=BARE | {"structural_damping"})
+    alpha = given.damping.alpha
+    assert build(damped, mesh, lengths).dropper_damping == pytest.approx(alpha * 1e5, rel=1e-15)
+
+
+def test_damping_may_differ_from_component_to_component(mesh: LineMesh) -> None:
+    lengths = np.ones(mesh.droppers.shape[0])
+    damping = Damping(1e-4, 0.01, {"droppers": (1e-3, 0.0)})
+    on = replace(full_problem(BARE | {"structural_damping"}), damping=damping)
+    model = build(on, mesh, lengths)
+    assert model.damping_of("droppers") == (1e-3, 0.0)
+    assert model.damping_of("contact_wire") == (1e-4, 0.01)
+    assert not model.damping_is_proportional
+    off = build(replace(on, effects=BARE), mesh, lengths)
+    assert off.damping_of("droppers") == (0.0, 0.0)
+    assert off.damping_is_proportional
