@@ -57,6 +57,12 @@ class Droppers:
         )
         return self.latest_tension
 
+    def energy_of_pushing(self) -> float:
+        """Elastic energy that the owned droppers would hold by pushing, were they springs [J]."""
+        stretch = self._line.displacement[self.upper] - self._line.displacement[self.lower]
+        pushing = np.minimum(self.rest + self.stiffness * stretch, 0.0)
+        return float((pushing**2 / (2.0 * self.stiffness)).sum())
+
     def near(self, x: float, distance: float) -> slice:
         """The droppers within ``distance`` of ``x`` [m]."""
         low, high = self.x.searchsorted([x - distance, x + distance])

@@ -332,7 +332,7 @@ class March:
             dropper_force=self._tension(),
             arm_uplift=line.displacement[self._arm_rows],
             node_uplift=lambda: line.displacement[self._node_rows],
-            energies=line.energies,
+            energies=self._energies,
             checkpoint=lambda: self._checkpoint(step),
         )
         try:
@@ -341,6 +341,17 @@ class March:
         except RunBroken as error:
             # An exception must not pass through PETSc; observers raise it on all ranks.
             self._stepper.give_up(ts, str(error))
+
+    def _energies(self) -> tuple[float, float]:
+        """Kinetic and elastic energy relative to equilibrium, slack droppers as they are [J].
+
+        Collective.
+        """
+        kinetic, elastic = self._line.energies()
+        if "dropper_slackening" in self._model.terms_of:
+            pushing = self._comm.allreduce(self._interaction.droppers.energy_of_pushing())
+            elastic -= (1.0 - self._kept_ratio) * pushing
+        return kinetic, elastic
 
     def _checkpoint(self, step: int) -> dict[str, Any] | None:
         """Everything needed to continue after ``step``, on rank 0. Collective."""
