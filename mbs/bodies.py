@@ -12,7 +12,7 @@ import numpy as np
 
 from catenary.solver.errors import InputError
 
-Vector = Sequence[float]
+Vector = Sequence[float] | np.ndarray
 
 # What bodies can be joined to besides each other: the frame at rest.
 SPACE = "space"
