@@ -1,0 +1,139 @@
+"""PETSc's options after -- are obeyed, or refused with a sentence; none changes the answer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from program import MPIRUN, assert_sound, catenary, short_run
+
+from catenary.postproc.results import Results
+
+STAGES = ["mesh", "equilibrium", "distribute", "march", "report"]
+
+
+def run(out: Path, *options: str, ranks: int = 1) -> str:
+    """What a run with options prints."""
+    done = catenary(*short_run(out), "--", *options, cwd=out.parent, ranks=ranks)
+    assert done.code == 0, done.stderr
+    assert_sound(out / "run.h5")
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("plain") / "out"
+    run(out)
+    return out
+
+
+def test_views_show_stepper_solver_and_stages(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    options = ["-march_ts_view", "-march_ksp_view", "-march_ts_monitor", "-log_view"]
+    text = run(out, *options)
+    stepper = text.split("TS Object: (march_) 1 MPI process", 1)[1]
+    assert "type: python" in stepper and "Newmark step by scheme OneSolve" in stepper
+    solver = text.split("KSP Object: (march_) 1 MPI process", 1)[1]
+    assert "type: preonly" in solver and "type: lu" in solver
+    with Results(out) as results:
+        n_steps = results.n_steps
+        assert results.attributes["petsc_options"] == str(options).replace("'", '"')
+    monitor = [line for line in text.splitlines() if " TS dt 0.001 time " in line]
+    assert [int(line.split()[0]) for line in monitor] == list(range(n_steps + 1))
+    log = [line for line in text.splitlines() if line.startswith("--- Event Stage ")]
+    found = [line.rsplit(": ", 1)[1] for line in log]
+    # Twice: a table of times and one of memory.
+    assert [name for name in found if name in STAGES] == [*STAGES, *STAGES]
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["-march_pc_type", "cholesky"],
+        ["-march_pc_factor_mat_ordering_type", "rcm"],
+        ["-march_ksp_type", "cg", "-march_pc_type", "jacobi"],
+        ["-march_pc_type", "ilu"],
+    ],
+)
+def test_another_solver_gives_the_same_answer(
+    options: list[str], plain: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    run(out, *options)
+    # A direct solver leaves 1e-16 a step, an iteration is asked for 1e-12; the line forgets within
+    # some ten steps per element what it was told wrongly, so that errors hardly add up.
+    with Results(out) as found, Results(plain) as expected:
+        for name in ("contact_force", "arm_uplift", "dropper_force"):
+            values = expected.channel(name)
+            difference = np.abs(found.channel(name) - values).max() / np.abs(values).max()
+            print(f"{name}: relative difference {difference:.1e}, allowed 1e-09")
+            assert difference < 1e-9
+
+
+def test_the_scene_may_hold_options_and_the_command_line_wins(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = short_run(out, "petsc.march_pc_type=cholesky", "petsc.march_ksp_view=true")
+    plain = catenary(*words, cwd=tmp_path)
+    assert plain.code == 0, plain.stderr
+    assert "type: cholesky" in plain.stdout
+    other = catenary(*words, "--force", "--", "-march_pc_type", "lu", cwd=tmp_path)
+    assert other.code == 0, other.stderr
+    assert "type: lu" in other.stdout and "type: cholesky" not in other.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (["-march_ts_dt", "0.002"], "give numerics.dt_s instead, which is 0.001 s"),
+        (["-march_ts_init_time", "0.5"], "the run starts at 0 s"),
+        (["-march_ts_type", "alpha2"], "give numerics.scheme"),
+        (["-march_ts_type", "nonsense"], "PETSc refuses the options under -march_"),
+        (["-march_pc_factor_mat_ordering_type", "nonsense"], "type: nonsense"),
+    ],
+)
+def test_impossible_options_are_refused_before_anything_is_written(
+    options: list[str], expected: str, tmp_path: Path
+) -> None:
+    done = catenary(*short_run(tmp_path / "out"), "--", *options, cwd=tmp_path)
+    assert done.code == 2, done.stderr
+    (sentence,) = done.stderr.splitlines()
+    assert sentence.startswith("catenary: ") and expected in sentence
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_iteration_that_is_too_short_breaks_the_run(tmp_path: Path) -> None:
+    options = ["-march_ksp_type", "cg", "-march_pc_type", "jacobi", "-march_ksp_max_it", "2"]
+    done = catenary(*short_run(tmp_path / "out"), "--", *options, cwd=tmp_path)
+    assert done.code == 1
+    (sentence,) = done.stderr.splitlines()
+    assert "the linear solver did not converge" in sentence
+
+
+@pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
+def test_a_direct_solver_for_all_ranks_gives_the_same_answer(tmp_path: Path) -> None:
+    # Few steps: on a small line MUMPS takes a hundred times as long as our solver.
+    options = ["-march_pc_type", "lu", "-march_pc_factor_mat_solver_type", "mumps"]
+    histories = []
+    for out, more, ranks in ((tmp_path / "own", [], 1), (tmp_path / "mumps", options, 2)):
+        words = short_run(out, "numerics.dt_s=1e-2")
+        done = catenary(*words, "--", *more, cwd=tmp_path, ranks=ranks)
+        assert done.code == 0, done.stderr
+        with Results(out) as results:
+            histories.append(results.channel("contact_force"))
+    difference = np.abs(histories[1] - histories[0]).max() / histories[0].max()
+    print(f"relative difference {difference:.1e}, allowed 1e-09")
+    assert difference < 1e-9
+
+
+def test_fewer_steps_than_the_scene_has_are_an_interruption(plain: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    done = catenary(*short_run(out), "--", "-march_ts_max_steps", "100", cwd=tmp_path)
+    assert done.code == 1
+    assert "catenary restart" in done.stderr
+    assert assert_sound(out / "run.h5") == 101
+    again = catenary("restart", str(out), cwd=tmp_path)
+    assert again.code == 0, again.stderr
+    with Results(out) as found, Results(plain) as expected:
+        force = expected.channel("contact_force")
+        assert np.abs(found.channel("contact_force") - force).max() < 1e-12 * force.max()

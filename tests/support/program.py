@@ -1,0 +1,184 @@
+"""The program as a user starts it: a process of its own, alone or under mpirun, always with a limit.
+
+Every process inherits a mark, by which those that outlive their launcher are found.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from catenary.postproc.channels import CHANNELS
+from catenary.postproc.results import Results
+
+MPIRUN = shutil.which("mpirun")
+LIMIT = 120.0  # for anything that is to end by itself [s]; a loaded machine takes ten times as long
+
+# Ten spans of the reference line of EN 50318, run through for two seconds: 2016 steps of 1 ms.
+SHORT_SCENE = (
+    "line.n_spans=10",
+    "train.start_m=120",
+    "train.end_m=260",
+    "train.raise_time_s=0.2",
+    "evaluation.from_m=180",
+    "evaluation.to_m=240",
+    "output.energy_every_s=0.02",
+)
+_ENTRY = "from catenary.cases.cli import main; main()"
+_MARK = "CATENARY_TEST_MARK"
+_PROC = Path("/proc")
+
+
+def short_run(out: Path, *assignments: str) -> list[str]:
+    """Words of ``catenary run`` for the short scene with further assignments."""
+    return ["run", "en50318_2002", "-o", str(out), "--set", *SHORT_SCENE, *assignments]
+
+
+@dataclass
+class Done:
+    """A program that has ended: exit code, what it said, and the processes it left behind."""
+
+    code: int
+    stdout: str
+    stderr: str
+    left: list[int]
+
+    @property
+    def sentences(self) -> list[str]:
+        """What the program told its user on standard error; the launcher's words are left out."""
+        return [line for line in self.stderr.splitlines() if line.startswith("catenary: ")]
+
+
+@dataclass
+class Program:
+    """A program that is running."""
+
+    process: subprocess.Popen[str]
+    mark: str
+
+    def wait_for(
+        self, what: Callable[[], bool], limit: float = LIMIT, *, may_have_ended: bool = False
+    ) -> None:
+        """Wait until something is so; fail if the program ends before or the limit passes."""
+        end = time.monotonic() + limit
+        while not what():
+            if self.process.poll() is not None:
+                assert may_have_ended and what(), f"ended early: {self.process.communicate()}"
+            assert time.monotonic() < end, f"not so after {limit} s"
+            time.sleep(0.01)
+
+    def send(self, number: signal.Signals) -> None:
+        """Send a signal to the process that was started, which is mpirun if there is one."""
+        self.process.send_signal(number)
+
+    def pid_of_rank(self, rank: int) -> int:
+        """Process of a rank, by the variable that Open MPI gives it."""
+        wanted = f"OMPI_COMM_WORLD_RANK={rank}".encode()
+        (found,) = [pid for pid, words in _processes(self.mark) if wanted in words]
+        return found
+
+    def end(self, limit: float = LIMIT) -> Done:
+        """Wait for the end and for the last of its processes."""
+        stdout, stderr = self.process.communicate(timeout=limit)
+        for _ in range(200):  # the launcher may end a moment before those it has killed
+            left = [pid for pid, _ in _processes(self.mark)]
+            if not left:
+                break
+            time.sleep(0.05)
+        return Done(self.process.returncode, stdout, stderr, left)
+
+
+@contextmanager
+def started(command: list[str], cwd: Path, ranks: int = 1) -> Iterator[Program]:
+    """A command that runs while the block does; whatever is left of it is killed at the end."""
+    if ranks > 1:
+        assert MPIRUN is not None
+        command = [MPIRUN, "-n", str(ranks), "--oversubscribe", "--bind-to", "none", *command]
+    mark = uuid.uuid4().hex
+    environment = {
+        **os.environ,
+        _MARK: mark,
+        "OMPI_ALLOW_RUN_AS_ROOT": "1",
+        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+        "OMP_NUM_THREADS": "1",
+    }
+    pipe = subprocess.PIPE
+    with subprocess.Popen(
+        command, cwd=cwd, env=environment, stdout=pipe, stderr=pipe, text=True
+    ) as process:
+        try:
+            yield Program(process, mark)
+        finally:
+            if process.poll() is None:
+                process.kill()
+            for pid, _ in _processes(mark):
+                os.kill(pid, signal.SIGKILL)
+
+
+def python(*words: str) -> list[str]:
+    """This interpreter, which takes warnings for errors."""
+    return [sys.executable, "-W", "error", *words]
+
+
+def catenary(*words: str, cwd: Path, ranks: int = 1, limit: float = LIMIT) -> Done:
+    """Run the command line to its end."""
+    with started(python("-c", _ENTRY, *words), cwd, ranks) as program:
+        return program.end(limit)
+
+
+@contextmanager
+def catenary_started(*words: str, cwd: Path, ranks: int = 1) -> Iterator[Program]:
+    """The command line, running."""
+    with started(python("-c", _ENTRY, *words), cwd, ranks) as program:
+        yield program
+
+
+def n_rows(result: Path) -> int:
+    """Rows that a result file holds by now, 0 if it cannot be read yet."""
+    try:
+        with h5py.File(result, "r", locking=False) as file:
+            return int(file["time"].shape[0])
+    except (OSError, KeyError, RuntimeError):
+        return 0
+
+
+def assert_sound(result: Path) -> int:
+    """Check that a result file is closed, whole and finite; return its number of rows."""
+    with h5py.File(result, "r") as file:  # with its lock: no writer has it open
+        lengths = {name: file[f"channels/{name}"].shape[0] for name in CHANNELS}
+        assert set(lengths.values()) == {file["time"].shape[0]}, lengths
+        energies = {name: values.shape[0] for name, values in file["energy"].items()}
+        assert len(set(energies.values())) == 1, energies
+    with Results(result) as results:
+        for name in CHANNELS:
+            assert np.isfinite(results.channel(name)).all(), name
+        time = results.time
+        steps = np.arange(time.size) * results.dt
+        assert np.abs(time - steps).max() < 1e-9 * results.dt * time.size
+        return int(time.size)
+
+
+def _processes(mark: str) -> list[tuple[int, list[bytes]]]:
+    """Living processes that carry a mark and their environment; none where there is no /proc."""
+    wanted = f"{_MARK}={mark}".encode()
+    found = []
+    for place in _PROC.glob("[0-9]*/environ"):
+        try:
+            words = place.read_bytes().split(b"\0")
+        except OSError:  # it has ended, or is another user's
+            continue
+        if wanted in words:
+            found.append((int(place.parent.name), words))
+    return found
