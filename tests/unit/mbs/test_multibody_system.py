@@ -1,0 +1,171 @@
+"""Equations of motion, reactions, assembly and projections of small systems."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from measuring import check
+
+from catenary.mbs.bodies import SPACE, Body, Motion
+from catenary.mbs.forces import Gravity, PointForce
+from catenary.mbs.joints import (
+    Fixed,
+    PointOnLine,
+    PrescribedPoint,
+    Prismatic,
+    Revolute,
+    Spherical,
+    constant,
+    steady,
+)
+from catenary.mbs.system import System, independent_rows
+from catenary.solver.errors import InputError
+
+EPS = np.finfo(float).eps
+G = 9.81
+
+
+def rod(name: str, mass: float, length: float, x: float, z: float = 0.0) -> Body:
+    """A thin rod along its first axis."""
+    moment = mass * length**2 / 12
+    return Body(name, mass, (1e-3 * moment, moment, moment), (x, 0.0, z))
+
+
+def four_bar() -> tuple[System, Motion]:
+    """A parallelogram of two upright rods under a horizontal one, all hinges about y.
+
+    The upright rods turn by -90 degrees about y, so that their first axes point up.
+    """
+    up = (0.0, -np.sqrt(0.5), 0.0)
+    left = Body("left", 1.0, (0.01, 1 / 12, 1 / 12), (0, 0, 0.5), up)
+    right = Body("right", 1.0, (0.01, 1 / 12, 1 / 12), (2, 0, 0.5), up)
+    top = rod("top", 2.0, 2.0, 1.0, 1.0)
+    low, high = (-0.5, 0, 0), (0.5, 0, 0)
+    system = System(
+        (left, right, top),
+        (
+            Revolute("hinge left", SPACE, "left", at_j=low),
+            Revolute("hinge right", SPACE, "right", (2, 0, 0), low),
+            Revolute("top left", "left", "top", high, (-1, 0, 0)),
+            Revolute("top right", "right", "top", high, (1, 0, 0)),
+        ),
+        (Gravity((1.0, 1.0, 2.0), G),),
+    )
+    return system, system.start()
+
+
+def test_held_rod_has_the_reactions_of_statics() -> None:
+    """A cantilever of weight m g with a load F at its end: the wall carries m g + F.
+
+    Its moment about the centre of mass balances the load's, F L / 2.
+    """
+    mass, length, load = 3.0, 2.0, 7.0
+    system = System(
+        (rod("rod", mass, length, 1.0),),
+        (Fixed("wall", "rod", at_j=(-length / 2, 0, 0)),),
+        (Gravity((mass,), G), PointForce("load", "rod", (0, 0, -load), (length / 2, 0, 0))),
+    )
+    motion = system.start()
+    solution = system.accelerations(motion, 0.0)
+    check("acceleration", solution.acceleration, 0.0, within=1e-12)
+    reaction = system.reaction("wall", "rod", motion, 0.0, solution.multipliers)
+    check("force [N]", reaction.force, (0, 0, mass * G + load), within=1e-12)
+    # A load down at +x turns about +y; the joint turns back.
+    check("moment [N m]", reaction.moment, (0, -load * length / 2, 0), within=1e-12)
+
+
+def test_swinging_rod_let_go_level_falls_and_pulls_like_by_hand() -> None:
+    """alpha = 3 g / (2 L); the hinge carries m g / 4; at spin w, along the rod m w^2 L / 2."""
+    mass, length, spin = 3.0, 2.0, 1.7
+    body = rod("rod", mass, length, length / 2)
+    system = System(
+        (body,),
+        (Revolute("hinge", SPACE, "rod", at_j=(-length / 2, 0, 0)),),
+        (Gravity((mass,), G),),
+    )
+    motion = system.start().with_velocities(np.array([0, 0, -spin * length / 2, 0, spin, 0]))
+    check("rate", system.constraints(motion, 0.0).rate, 0.0, within=4 * EPS)
+    solution = system.accelerations(motion, 0.0)
+    check("alpha [rad/s^2]", solution.acceleration[4], 1.5 * G / length, within=1e-12)
+    reaction = system.reaction("hinge", "rod", motion, 0.0, solution.multipliers)
+    expected = (-mass * spin**2 * length / 2, 0.0, mass * G / 4)
+    check("hinge force [N]", reaction.force, expected, within=1e-12)
+
+
+def test_redundant_rows_of_a_plane_mechanism_are_named_and_do_no_harm() -> None:
+    """Four hinges: 20 rows leave -2 by count, but one degree of freedom: three are redundant."""
+    system, motion = four_bar()
+    assert system.redundant(motion) == ("top right (3)",)
+    assert system.n_degrees_of_freedom(motion) == 1
+    solution = system.accelerations(motion, 0.0)
+    check("upright, at rest: accelerations", solution.acceleration, 0.0, within=1e-12)
+    feet = sum(
+        system.reaction(name, body, motion, 0.0, solution.multipliers).force
+        for name, body in (("hinge left", "left"), ("hinge right", "right"))
+    )
+    check("carried by the hinges [N]", feet, (0.0, 0.0, 4 * G), within=1e-11)
+    assert list(independent_rows(np.array([[1.0, 0], [2, 0], [0, 0], [0, 3]]))) == [0, 3]
+
+
+def test_assembly_closes_joints_and_says_what_each_missed() -> None:
+    system, motion = four_bar()
+    off = np.zeros(18)
+    off[12:15] = (0.03, 0.0, 0.04)  # the whole top, by 50 mm
+    assembly = system.assemble(motion.moved(off))
+    missed = {miss.joint: miss.gap for miss in assembly.missed}
+    expected = {"hinge left": 0, "hinge right": 0, "top left": 0.05, "top right": 0.05}
+    check("missed [m]", list(missed.values()), list(expected.values()), within=1e-15)
+    assert list(missed) == list(expected)
+    after = system.misses(assembly.motion)
+    check("left open [m]", [m.gap for m in after], 0.0, within=2e-12)
+    check("left open (cosine)", [m.tilt for m in after], 0.0, within=2e-12)
+    assert assembly.n_iterations < 10
+
+
+def test_joints_that_cannot_be_closed_are_named() -> None:
+    body = rod("rod", 1.0, 2.0, 1.0)
+    system = System(
+        (body,),
+        (
+            Spherical("near", SPACE, "rod", at_j=(-1, 0, 0)),
+            Spherical("far", SPACE, "rod", (5, 0, 0), (1, 0, 0)),
+        ),
+    )
+    with pytest.raises(InputError, match="joint '(near|far)' misses by 1.5 m"):
+        system.assemble(system.start())
+
+
+def test_velocity_projection_keeps_what_joints_allow() -> None:
+    """A mass on a rail along x: the velocity along stays, the others go; a drive sets its own."""
+    body = rod("slider", 1.0, 1.0, 0.0)
+    rail = System((body,), (Prismatic("rail", SPACE, "slider"),))
+    moving = rail.start().with_velocities(np.array([2.0, 3.0, 4.0, 0.1, 0.2, 0.3]))
+    projected = rail.project_velocities(moving)
+    check("velocities", projected.velocities, (2, 0, 0, 0, 0, 0), within=1e-14)
+    drive = PrescribedPoint("drive", "slider", steady(0.0, 5.0), along=(1, 0, 0))
+    driven = rail.with_joints(drive).project_velocities(moving)
+    check("driven", driven.velocities, (5, 0, 0, 0, 0, 0), within=1e-13)
+    against = PrescribedPoint("brake", "slider", constant(0.0), along=(1, 0, 0))
+    with pytest.raises(InputError, match="contradict each other"):
+        rail.with_joints(drive, against).project_velocities(moving)
+
+
+def test_names_must_be_different_and_known() -> None:
+    body = rod("rod", 1.0, 2.0, 1.0)
+    joint = PointOnLine("same", SPACE, "rod")
+    with pytest.raises(InputError, match="different names.*same"):
+        System((body,), (joint, joint))
+    system = System((body,), (joint,), (Gravity((1.0,)),))
+    with pytest.raises(InputError, match="no force 'lift'"):
+        system.with_force_changed("lift", force=3.0)
+    assert system.with_force_changed("gravity", acceleration=1.6).forces == (Gravity((1.0,), 1.6),)
+
+
+def test_system_without_joints_is_free() -> None:
+    system = System((rod("rod", 2.0, 1.0, 0.0),), (), (Gravity((2.0,), G),))
+    motion = system.start()
+    assert system.assemble(motion).motion is motion
+    assert system.project_velocities(motion) is motion
+    check(
+        "falls", system.accelerations(motion, 0.0).acceleration, (0, 0, -G, 0, 0, 0), within=1e-14
+    )
