@@ -227,9 +227,11 @@ def elasticity(model: Model, x_from: float, x_to: float) -> Elasticity:
     inside = np.flatnonzero((x >= x_from - 1e-9) & (x <= x_to + 1e-9))
     factor = sparse_linalg.splu(stiffness_matrix(model))
     dofs = model.dofs(nodes[inside])
-    lift = np.empty(inside.size)
+    # Where the wire is held it does not give way; the matrix has a one there, which is no spring.
+    gives_way = ~np.isin(dofs, model.constrained)
+    lift = np.zeros(inside.size)
     unit = np.zeros(model.n_dofs)
-    for i, dof in enumerate(dofs):
+    for i, dof in zip(np.flatnonzero(gives_way), dofs[gives_way], strict=True):
         unit[dof] = 1.0
         lift[i] = factor.solve(unit)[dof]
         unit[dof] = 0.0
