@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -129,7 +130,8 @@ class OneSolve:
         n = self.pantographs.n
         empty, none = np.zeros(0, dtype=int), np.zeros(0)
         response, coupling = merged.response, self.interaction.slack_coupling
-        if merged.broken:
+        # A head that is no number would compare as out of contact and go unnoticed.
+        if merged.broken or not all(math.isfinite(sum(head)) for head in heads):
             return Reply(Verdict.BROKEN, np.zeros(n), empty, none)
         if merged.overflow:
             return Reply(Verdict.ENLARGE, np.full(n, float(2 * merged.overflow)), empty, none)

@@ -97,6 +97,22 @@ def test_what_is_no_number_breaks_the_run_with_a_sentence(scheme: str, mesh: Lin
     assert np.isfinite(history["contact_force"]).all()
 
 
+@pytest.mark.parametrize("scheme", ["one_solve", "fixed_point"])
+def test_a_head_that_is_no_number_breaks_the_run(scheme: str, mesh: LineMesh) -> None:
+    run, _ = start_march(problem(scheme), mesh)
+    history = History(lambda view: view.checkpoint())
+    run.run([history])
+    run.destroy()
+    lost = history.watched[10]
+    lost["pantograph_0"][:] = np.nan
+    again, _ = start_march(problem(scheme), mesh)
+    again.restore(lost)
+    outcome = again.run([])
+    again.destroy()
+    assert "t = 0.0110 s" in outcome.outcome
+    assert outcome.n_steps == 0
+
+
 def test_an_observer_that_cannot_go_on_ends_the_run(mesh: LineMesh) -> None:
     def full_disk(view: StepView) -> None:
         if view.step == 5:
