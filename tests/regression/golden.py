@@ -24,8 +24,8 @@ from catenary.cases.catalogue import shipped
 FILE = Path(__file__).with_name("golden.csv")
 COLUMNS = ["case", "pantograph", "mean_N", "std_N", "date", "reason"]
 ORIGIN = (
-    "# Mean and standard deviation [N] of the 20 Hz contact force of every shipped case, shortened\n"
-    "# by its [test] table, as computed by this program on one rank. Made by golden.py beside this.\n"
+    "# Mean and standard deviation [N] of the 20 Hz contact force of every shipped case,\n"
+    "# shortened by its [test] table, as this program found them on one rank. Made by golden.py.\n"
 )
 
 

@@ -1,4 +1,4 @@
-"""A mesh of the user's own gives the forces of the mesh it equals; one that lacks a group is refused."""
+"""A user's own mesh gives the forces of the mesh it equals; one that lacks a group is refused."""
 
 from __future__ import annotations
 

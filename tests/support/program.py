@@ -1,4 +1,4 @@
-"""The program as a user starts it: a process of its own, alone or under mpirun, always with a limit.
+"""The program as a user starts it: a process of its own, alone or under mpirun, with a limit.
 
 Every process inherits a mark, by which those that outlive their launcher are found.
 """
