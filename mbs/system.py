@@ -102,10 +102,16 @@ class System:
         """The same with further forces."""
         return replace(self, forces=(*self.forces, *forces))
 
+    def force(self, name: str) -> Force:
+        """The force of this name; raises InputError if there is none."""
+        for force in self.forces:
+            if force.name == name:
+                return force
+        raise InputError(f"There is no force {name!r} among {[f.name for f in self.forces]}.")
+
     def with_force_changed(self, name: str, **changes: Any) -> System:
         """The same with other values in the force of this name."""
-        if name not in [force.name for force in self.forces]:
-            raise InputError(f"There is no force {name!r} among {[f.name for f in self.forces]}.")
+        self.force(name)
         return replace(
             self,
             forces=tuple(
