@@ -117,8 +117,8 @@ def forces(as_published: bool = False) -> tuple[Force, ...]:
 def pantograph(as_published: bool = False) -> System:
     """The seven bodies on a base at rest; joints are closed by `System.assemble`.
 
-    With ``as_published`` the misprints are left as they are: the joints do not close then from
-    the published positions without a large change of shape.
+    With ``as_published`` the misprints are left as they are: the joints close then only in a
+    shape more than a metre away from the published one, and not with the arm at its height.
     """
     return System(BODIES, joints(as_published), forces(as_published))
 

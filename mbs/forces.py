@@ -112,13 +112,16 @@ class SpringDamper(_BetweenPoints):
 
     def pull(self, motion: Motion) -> float:
         """Force with which it pulls its points together [N]."""
-        line = self.line(motion)
+        return self._pull(self.line(motion))
+
+    def _pull(self, line: _Line) -> float:
         elastic = _force_of(self.stiffness, line.length - self.free_length)
         return elastic + _force_of(self.damping, line.rate)
 
     def generalised(self, motion: Motion, time: float) -> np.ndarray:
         """Generalised forces (6 n,)."""
-        return -self.pull(motion) * self.line(motion).gradient
+        line = self.line(motion)
+        return -self._pull(line) * line.gradient
 
     def energy(self, motion: Motion) -> float:
         """Elastic energy [J]; of a function that is not a `Table` by quadrature."""

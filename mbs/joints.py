@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -22,6 +23,7 @@ from catenary.mbs.kinematics import (
     Quantity,
     along,
     applied_to,
+    cross,
     difference,
     direction,
     dot,
@@ -55,19 +57,29 @@ class Joint(Protocol):
 
 def across(axis: Vector) -> tuple[np.ndarray, np.ndarray]:
     """Two unit vectors that are perpendicular to an axis and to each other."""
-    a = np.asarray(axis, dtype=float)
-    length = np.linalg.norm(a)
-    if not length > 0.0:
-        raise InputError("The axis of a joint must not have zero length.")
-    first = np.cross(a, AXES[np.argmin(np.abs(a))])
-    first /= np.linalg.norm(first)
-    return first, np.cross(a / length, first)
+    first, second, _ = _frame(*(float(x) for x in axis))
+    return first, second
 
 
 def unit(axis: Vector) -> np.ndarray:
     """The axis with length one."""
-    first, second = across(axis)
-    return np.cross(first, second)
+    return _frame(*(float(x) for x in axis))[2]
+
+
+@lru_cache(maxsize=4096)
+def _frame(x: float, y: float, z: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Two unit vectors across an axis, and the axis with length one, not to be written to."""
+    axis = np.array([x, y, z])
+    length = np.linalg.norm(axis)
+    if not length > 0.0:
+        raise InputError("The axis of a joint must not have zero length.")
+    axis /= length
+    first = np.cross(axis, AXES[np.argmin(np.abs(axis))])
+    first /= np.linalg.norm(first)
+    frame = first, np.cross(axis, first), axis
+    for vector in frame:
+        vector.flags.writeable = False
+    return frame
 
 
 def constant(value: float) -> TimeLaw:
@@ -176,7 +188,7 @@ class Prismatic:
         """Phi with its derivatives."""
         normals = across(self.axis_i)
         gap = same_point(motion, self.j, self.at_j, self.i, self.at_i)
-        side = np.cross(unit(self.axis_i), unit(self.normal_i))
+        side = cross(unit(self.axis_i), unit(self.normal_i))
         return stacked(
             [
                 right_angles(motion, self.i, normals, gap),
@@ -317,7 +329,7 @@ class PrescribedAngle:
         angle, rate, acceleration = self.law(time)
         sine, cosine = np.sin(angle), np.cos(angle)
         forward = unit(self.normal_i)
-        side = np.cross(unit(self.axis_i), forward)
+        side = cross(unit(self.axis_i), forward)
         # The normal of the turned body: cos(angle) side - sin(angle) forward.
         by_side = Law(cosine, -sine * rate, -cosine * rate**2 - sine * acceleration)
         by_forward = Law(-sine, -cosine * rate, sine * rate**2 - cosine * acceleration)

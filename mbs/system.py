@@ -64,14 +64,15 @@ def independent_rows(jacobian: np.ndarray) -> np.ndarray:
 
     Gram-Schmidt row by row, so that of several rows that say the same the first one is kept.
     """
-    basis = np.zeros((0, jacobian.shape[1]))
-    kept = []
+    basis = np.empty_like(jacobian)
+    kept: list[int] = []
     for number, row in enumerate(jacobian):
-        rest = row - basis.T @ (basis @ row)
-        rest -= basis.T @ (basis @ rest)
-        length = np.linalg.norm(rest)
-        if length > DEPENDENT * np.linalg.norm(row) and length > 0.0:
-            basis = np.vstack([basis, rest / length])
+        before = basis[: len(kept)]
+        rest = row - (before @ row) @ before
+        rest -= (before @ rest) @ before
+        length, whole = np.sqrt(rest @ rest), np.sqrt(row @ row)
+        if length > DEPENDENT * whole:
+            basis[len(kept)] = rest / length
             kept.append(number)
     return np.array(kept, dtype=int)
 

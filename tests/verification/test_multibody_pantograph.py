@@ -22,6 +22,7 @@ from catenary.mbs.joints import PrescribedPoint, constant
 from catenary.mbs.kinematics import point
 from catenary.mbs.statics import calibrate_actuator, equilibrium, equivalent_mass, held_force
 from catenary.mbs.system import System
+from catenary.solver.errors import InputError
 
 ARM, HEAD = ambrosio.STABILISATION_ARM, ambrosio.HEAD
 HOLDER = PrescribedPoint("holder", ARM, constant(ambrosio.INITIAL_ARM_HEIGHT))
@@ -59,6 +60,8 @@ def test_published_values_do_not_fit_where_they_are_corrected() -> None:
         for system in (published, corrected)
     ]
     check("raising spring [m]", lengths, (0.056, 0.462), within=5e-4)
+    with pytest.raises(InputError, match="joints cannot be closed"):
+        published.with_joints(HOLDER).assemble(published.start())
     for correction in ambrosio.CORRECTIONS.values():
         assert correction.published != correction.corrected and correction.reason
 
