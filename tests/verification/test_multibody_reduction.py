@@ -1,0 +1,104 @@
+"""Mechanisms reduced to one height: a lever in closed form, the paper's frame with all bodies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from measuring import check
+from scipy.integrate import solve_ivp
+
+from catenary.mbs import ambrosio
+from catenary.mbs.bodies import SPACE, Body
+from catenary.mbs.constraint_handling import Baumgarte
+from catenary.mbs.forces import Gravity, SpringDamper
+from catenary.mbs.integrators import integrate
+from catenary.mbs.joints import PrescribedPoint, Revolute, constant
+from catenary.mbs.kinematics import point
+from catenary.mbs.reduction import reduce_mechanism
+from catenary.mbs.statics import equivalent_mass
+from catenary.mbs.system import System
+from catenary.solver.errors import InputError
+
+ARM = ambrosio.STABILISATION_ARM
+G = 9.81
+
+
+def test_lever_in_closed_form() -> None:
+    """A rod at the angle a, its end at h = L sin a: m = m_rod / (3 cos^2 a), lift - m_rod g / 2.
+
+    A damper c upright from a point far below its end damps with c.
+    """
+    length, mass, damping = 2.0, 3.0, 40.0
+    moment = mass * length**2 / 12
+    end, far = (length / 2, 0, 0), 1e6
+    system = System(
+        (Body("rod", mass, (1e-3 * moment, moment, moment), (length / 2, 0, 0)),),
+        (Revolute("hinge", SPACE, "rod", at_j=(-length / 2, 0, 0)),),
+        (
+            Gravity((mass,), G),
+            SpringDamper("damper", SPACE, "rod", (length, 0, -far), end, damping=damping),
+        ),
+    )
+    heights = np.linspace(-0.5, 1.0, 16)
+    found = reduce_mechanism(system, "rod", heights, end)
+    cosine_squared = 1 - (heights / length) ** 2
+    check("mass [kg]", found.masses, mass / (3 * cosine_squared), within=1e-9)
+    check("lift [N]", found.lifts, -mass * G / 2, within=1e-9)
+    # The damper leans by (L - L cos a) / far, at most 3e-7.
+    check("damping [N s/m]", found.dampings, damping, within=damping * 1e-6)
+    speed, push, at = 0.7, 25.0, 0.5
+    slope = 2 * at / length**2 * mass / 3 / (1 - (at / length) ** 2) ** 2
+    force = push - mass * G / 2 - damping * speed - slope * speed**2 / 2
+    expected = force / (mass / 3 / (1 - (at / length) ** 2))
+    # Cubic splines over 0.1 m: 0.1^3 of the fourth derivative of 1 / (1 - h^2 / 4), below 5, / 24.
+    within = 5 * 0.1**3 / 24 * speed**2 + 1e-4
+    check("acceleration [m/s^2]", found.acceleration(at, speed, push), expected, within=within)
+    with pytest.raises(InputError, match="height 1.2 m is not within the -0.5 m to 1 m"):
+        found.acceleration(1.2, 0.0)
+
+
+def test_frame_of_the_paper_rises_like_all_its_bodies() -> None:
+    """0.3 s from rest at 1.35 m with the actuator at full force: the same to the tables' error.
+
+    Heights every 25 mm; refined to 12.5 mm the tables change the rise by what is allowed here.
+    """
+    frame = ambrosio.frame()
+    holder = PrescribedPoint("holder", ARM, constant(1.35))
+    start = frame.with_joints(holder).assemble(frame.start()).motion
+    times = np.array([0.0, 0.1, 0.2, 0.3])
+    way = integrate(frame, Baumgarte(), start, times, rtol=1e-9)
+    full = np.array([point(motion, ARM, (0, 0, 0)).value[2] for motion in way.motions])
+    rises = []
+    for n in (21, 41):
+        reduced = reduce_mechanism(frame, ARM, np.linspace(1.3, 1.8, n))
+        rises.append(
+            solve_ivp(
+                lambda t, y, r=reduced: (y[1], r.acceleration(y[0], y[1])),
+                (0.0, times[-1]),
+                (1.35, 0.0),
+                "DOP853",
+                t_eval=times,
+                rtol=1e-10,
+                atol=1e-12,
+            ).y[0]
+        )
+    print(f"rises by {full[-1] - full[0]:.4f} m")
+    assert full[-1] - full[0] > 0.2
+    refined = np.abs(rises[1] - rises[0]).max()
+    check("arm [m]", rises[1], full, within=max(refined, 1e-8))
+
+
+def test_mass_of_the_frame_is_its_equivalent_mass_and_heights_must_be_reached() -> None:
+    frame = ambrosio.frame()
+    heights = [1.3, 1.4, ambrosio.INITIAL_ARM_HEIGHT, 1.5]
+    reduced = reduce_mechanism(frame, ARM, heights)
+    for height, mass in zip(heights, reduced.masses, strict=True):
+        holder = PrescribedPoint("holder", ARM, constant(height))
+        motion = frame.with_joints(holder).assemble(frame.start()).motion
+        expected = equivalent_mass(frame, motion, ARM)
+        check(f"mass at {height} m [kg]", mass, expected, within=1e-8 * expected)
+    print(f"lift {reduced.lifts} N, damping {reduced.dampings} N s/m")
+    with pytest.raises(InputError, match="joints cannot be closed"):
+        reduce_mechanism(frame, ARM, [1.4, 1.5, 1.6, 9.0])
+    with pytest.raises(InputError, match="at least four growing heights"):
+        reduce_mechanism(frame, ARM, [1.4, 1.5])
