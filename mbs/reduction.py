@@ -41,10 +41,8 @@ class ReducedMechanism:
         object.__setattr__(self, "_table", CubicSpline(self.heights, columns))
         object.__setattr__(self, "_slopes", self._table.derivative())
 
-    def acceleration(self, height: float, speed: float, push: float = 0.0) -> float:
-        """Acceleration upward [m/s^2] at a height [m] and speed upward [m/s].
-
-        ``push`` [N] is a further force on the point, upward. The height must be within the tables.
+    def at(self, height: float) -> tuple[np.ndarray, np.ndarray]:
+        """Mass, lift and damping at a height [m], shape (3,), and their slopes, per metre.
 
         Raises
         ------
@@ -56,8 +54,14 @@ class ReducedMechanism:
                 f"The height {height:g} m is not within the {self.heights[0]:g} m to "
                 f"{self.heights[-1]:g} m that the mechanism was reduced for."
             )
-        mass, lift, damping = self._table(height)
-        mass_slope = self._slopes(height)[0]
+        return self._table(height), self._slopes(height)
+
+    def acceleration(self, height: float, speed: float, push: float = 0.0) -> float:
+        """Acceleration upward [m/s^2] at a height [m] and speed upward [m/s].
+
+        ``push`` [N] is a further force on the point, upward. Raises InputError as ``at`` does.
+        """
+        (mass, lift, damping), (mass_slope, _, _) = self.at(height)
         force = lift - damping * speed - 0.5 * mass_slope * speed**2 + push
         return float(force / mass)
 
