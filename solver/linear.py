@@ -74,6 +74,7 @@ class StepSolver:
         with refused_options():
             self._ksp.setFromOptions()
             self._ksp.setUp()
+            self._ksp.setUpOnBlocks()
         self._verify(matrix)
         self._direct = self.is_direct
 
