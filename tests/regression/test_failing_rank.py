@@ -62,7 +62,7 @@ from catenary.solver.pantographs import Pantographs
 move_to = Pantographs.move_to
 
 def move_or_fail(self, time):
-    if MPI.COMM_WORLD.rank == {failing} and time > 0.3:
+    if MPI.COMM_WORLD.rank == {failing} and time > 0.05:
         fail()
     return move_to(self, time)
 

@@ -111,29 +111,21 @@ def test_an_iteration_that_is_too_short_breaks_the_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
-def test_a_direct_solver_for_all_ranks_gives_the_same_answer(tmp_path: Path) -> None:
-    # Few steps: on a small line MUMPS takes a hundred times as long as our solver.
-    options = ["-march_pc_type", "lu", "-march_pc_factor_mat_solver_type", "mumps"]
-    histories = []
-    for out, more, ranks in ((tmp_path / "own", [], 1), (tmp_path / "mumps", options, 2)):
-        words = short_run(out, "numerics.dt_s=1e-2")
-        done = catenary(*words, "--", *more, cwd=tmp_path, ranks=ranks)
-        assert done.code == 0, done.stderr
-        with Results(out) as results:
-            histories.append(results.channel("contact_force"))
-    difference = np.abs(histories[1] - histories[0]).max() / histories[0].max()
-    print(f"relative difference {difference:.1e}, allowed 1e-09")
-    assert difference < 1e-9
-
-
-def test_fewer_steps_than_the_scene_has_are_an_interruption(plain: Path, tmp_path: Path) -> None:
+def test_options_of_the_ranks_own_solvers_are_obeyed(plain: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    done = catenary(*short_run(out), "--", "-march_ts_max_steps", "100", cwd=tmp_path)
-    assert done.code == 1
-    assert "catenary restart" in done.stderr
-    assert assert_sound(out / "run.h5") == 101
-    again = catenary("restart", str(out), cwd=tmp_path)
-    assert again.code == 0, again.stderr
+    options = ["-march_ksp_view", "-march_ts_max_steps", "100", "-march_sub_pc_type", "cholesky"]
+    # PETSc's Cholesky of a block matrix keeps the order of the unknowns, and says so otherwise.
+    done = catenary(*short_run(out), "--", *options, cwd=tmp_path, ranks=2)
+    assert done.code == 2, done.stderr
+    (sentence,) = done.sentences
+    assert "PETSc refuses the options under -march_" in sentence and "reordering" in sentence
+    assert not out.exists()
+    options += ["-march_sub_pc_factor_mat_ordering_type", "natural"]
+    done = catenary(*short_run(out), "--", *options, cwd=tmp_path, ranks=2)
+    assert done.code == 1, done.stderr
+    assert "type: asm" in done.stdout and "type: cholesky" in done.stdout
     with Results(out) as found, Results(plain) as expected:
-        force = expected.channel("contact_force")
-        assert np.abs(found.channel("contact_force") - force).max() < 1e-12 * force.max()
+        force = expected.channel("contact_force")[:101]
+        difference = np.abs(found.channel("contact_force") - force).max() / force.max()
+        print(f"relative difference {difference:.1e}, allowed 1e-09")
+        assert difference < 1e-9
