@@ -7,6 +7,7 @@ dataset lose their arrays silently in the Xdmf3 reader, hence the layout. Warp b
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,8 @@ from catenary.postproc.storage import MARGIN, broken_write, opened, reserve, wri
 from catenary.solver.errors import RunBroken
 from catenary.solver.observation import Stage, StepView
 from catenary.solver.parallel import on_root
+
+logger = logging.getLogger("catenary.fields")
 
 COMPONENTS = {CONTACT_WIRE: 0, MESSENGER_WIRE: 1, "droppers": 2}
 _MAX_BUFFER = 32 * 1024 * 1024
@@ -124,29 +127,39 @@ class FieldRecorder:
 
     def _open(self, stage: Stage) -> None:
         self._h5.parent.mkdir(parents=True, exist_ok=True)
-        if self._resume and self._h5.exists():
-            self._cut(stage.start_time - 0.5 * stage.dt)
+        if self._resume and self._h5.exists() and self._cut(stage):
             self._describe()
-        else:
-            self._xdmf.unlink(missing_ok=True)  # one of an earlier run would name other numbers
-            with opened(self._h5, "w") as file:
-                file["mesh/points"] = stage.node_points
-                file["mesh/cells"] = self._cells
-                file["mesh/component"] = self._component
-                file.create_dataset(
-                    "times", shape=(0,), maxshape=(None,), chunks=(256,), dtype="f8"
-                )
-                file.create_group("uplift")
-                file.create_group("displacement")
+            return
+        self._xdmf.unlink(missing_ok=True)  # one of an earlier run would name other numbers
+        with opened(self._h5, "w") as file:
+            file["mesh/points"] = stage.node_points
+            file["mesh/cells"] = self._cells
+            file["mesh/component"] = self._component
+            file.create_dataset("times", shape=(0,), maxshape=(None,), chunks=(256,), dtype="f8")
+            file.create_group("uplift")
+            file.create_group("displacement")
 
-    def _cut(self, time: float) -> None:
-        with opened(self._h5, "r+") as file:
-            times = file["times"][...]
-            keep = int(np.searchsorted(times, time))
-            for number in range(keep, times.size):
-                del file["uplift"][_name(number)], file["displacement"][_name(number)]
-            file["times"].resize(keep, axis=0)
-            self._written = times[:keep].tolist()
+    def _cut(self, stage: Stage) -> bool:
+        """Drop the snapshots from the stage's start on; False if a kill has spoilt the file."""
+        try:
+            with opened(self._h5, "r+") as file:
+                times = file["times"][...]
+                keep = int(np.searchsorted(times, stage.start_time - 0.5 * stage.dt))
+                for group in (file["uplift"], file["displacement"]):
+                    # Also what was being written when the run was killed.
+                    for name in [name for name in group if int(name) >= keep]:
+                        del group[name]
+                file["times"].resize(keep, axis=0)
+        except (OSError, KeyError, RuntimeError):
+            logger.warning(
+                "%s cannot be continued, it was being written when the run was killed: its "
+                "snapshots now begin at t = %.3f s",
+                self._h5,
+                stage.start_time,
+            )
+            return False
+        self._written = times[:keep].tolist()
+        return True
 
     def _append(self, times: list[float], uplift: np.ndarray) -> None:
         # Room for uncompressed snapshots, so that a full disk cannot spoil what is there.

@@ -100,12 +100,12 @@ def abandon(file: h5py.File) -> None:
 
 @contextlib.contextmanager
 def opened(path: Path, mode: str) -> Iterator[h5py.File]:
-    """An HDF5 file for writing, abandoned if a write fails. A context manager."""
+    """An HDF5 file for writing, abandoned if something fails. A context manager."""
     file = h5py.File(path, mode)
     try:
         yield file
         file.flush()
-    except (OSError, RuntimeError):
+    except Exception:
         abandon(file)
         raise
     file.close()

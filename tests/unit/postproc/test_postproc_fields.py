@@ -90,6 +90,39 @@ def test_resumed_fields_replace_what_follows(tmp_path: Path, make_march: Any) ->
     np.testing.assert_allclose(reader.time_values, 0.05 * np.arange(21), rtol=1e-12)
 
 
+def test_a_snapshot_that_a_kill_left_half_written_is_replaced(
+    tmp_path: Path, make_march: Any
+) -> None:
+    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
+    march.drive(watch(march, path), outcome="interrupted", last=620)
+    with h5py.File(tmp_path / "fields.h5", "r+") as file:
+        # In the file, but not yet among its times.
+        file["uplift/000013"] = np.zeros(3)
+    march.drive(watch(march, path, resume=True), first_step=600)
+    reader = pyvista.get_reader(path)
+    np.testing.assert_allclose(reader.time_values, 0.05 * np.arange(21), rtol=1e-12)
+    reader.set_active_time_value(reader.time_values[13])
+    expected = march.wave(0.65, march.mesh.points[:, 0])
+    np.testing.assert_allclose(reader.read().point_data["uplift"], expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.6])
+def test_a_file_that_a_kill_has_spoilt_is_begun_anew(
+    share: float, tmp_path: Path, make_march: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
+    march.drive(watch(march, path), outcome="interrupted", last=620)
+    numbers = tmp_path / "fields.h5"
+    numbers.write_bytes(numbers.read_bytes()[: int(share * numbers.stat().st_size)])
+    said: list[str] = []
+    monkeypatch.setattr(fields.logger, "warning", lambda text, *words: said.append(text % words))
+    march.drive(watch(march, path, resume=True), first_step=500)
+    (sentence,) = said
+    assert str(numbers) in sentence and "its snapshots now begin at t = 0.500 s" in sentence
+    reader = pyvista.get_reader(path)
+    np.testing.assert_allclose(reader.time_values, 0.05 * np.arange(10, 21), rtol=1e-12)
+
+
 def test_a_full_disk_breaks_the_run_and_keeps_the_snapshots(
     tmp_path: Path, make_march: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
