@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy import integrate
 
+from catenary.mbs.build import Operation, make_pantograph
 from catenary.mbs.interface import HeadState, Pantograph
-from catenary.mbs.lumped import LumpedPantograph
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.contact import ContactWire, Touches
 from catenary.solver.equilibrium import Elasticity, Equilibrium
@@ -46,8 +46,7 @@ class Pantographs:
         self.models: list[Pantograph] = []
         if on_this_rank:
             for placement, height in zip(train.placements, self.wire_height, strict=True):
-                model = LumpedPantograph(
-                    placement.data,
+                operation = Operation(
                     placement.static_force,
                     nominal_height(placement),
                     train.raise_time,
@@ -55,6 +54,7 @@ class Pantographs:
                     numerics.beta,
                     numerics.gamma,
                 )
+                model = make_pantograph(placement.data, operation)
                 model.place(float(height))
                 self.models.append(model)
             self.head_height[:] = self.wire_height

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.build import PantographData
 from catenary.meshgen.line import Line
 
 
@@ -40,7 +40,7 @@ class Placement:
     None stands for the mean height of the wire under the static force.
     """
 
-    data: LumpedData
+    data: PantographData
     static_force: float
     behind: float
     nominal_height: float | None = None
