@@ -50,8 +50,15 @@ class Table:
                 f"The {what} must have at least two points and as many values as growing "
                 f"arguments; it has arguments {list(x)} and values {list(y)}."
             )
+        self._points = tuple(zip(map(float, x), map(float, y), strict=True))
         self._line: BSpline = make_interp_spline(x, y, k=1)
         self._work: BSpline = self._line.antiderivative()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Table) and self._points == other._points
+
+    def __hash__(self) -> int:
+        return hash(self._points)
 
     def __call__(self, x: float) -> float:
         return float(self._line(x))

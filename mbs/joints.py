@@ -82,9 +82,19 @@ def _frame(x: float, y: float, z: float) -> tuple[np.ndarray, np.ndarray, np.nda
     return frame
 
 
+@dataclass(frozen=True)
+class Constant:
+    """A prescribed number that stays as it is."""
+
+    number: float
+
+    def __call__(self, time: float) -> Law:
+        return Law(self.number, 0.0, 0.0)
+
+
 def constant(value: float) -> TimeLaw:
     """A prescribed number that stays as it is."""
-    return lambda time: Law(value, 0.0, 0.0)
+    return Constant(value)
 
 
 def steady(start: float, speed: float) -> TimeLaw:
