@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from catenary.mbs import kernels
 from catenary.solver.errors import InputError
 
 Vector = Sequence[float] | np.ndarray
@@ -20,13 +21,9 @@ SPACE = "space"
 
 def rotation_matrix(parameters: np.ndarray) -> np.ndarray:
     """Matrices from body to space axes of unit Euler parameters (..., 4), shape (..., 3, 3)."""
-    e0, e1, e2, e3 = np.moveaxis(np.asarray(parameters, dtype=float), -1, 0)
-    rows = [
-        [e0 * e0 + e1 * e1 - 0.5, e1 * e2 - e0 * e3, e1 * e3 + e0 * e2],
-        [e1 * e2 + e0 * e3, e0 * e0 + e2 * e2 - 0.5, e2 * e3 - e0 * e1],
-        [e1 * e3 - e0 * e2, e2 * e3 + e0 * e1, e0 * e0 + e3 * e3 - 0.5],
-    ]
-    return np.stack([np.stack([2.0 * x for x in row], axis=-1) for row in rows], axis=-2)
+    rows = np.asarray(parameters, dtype=float)
+    matrices = kernels.rotation_matrices(np.ascontiguousarray(rows.reshape(-1, 4)))
+    return matrices.reshape(*rows.shape[:-1], 3, 3)
 
 
 def quaternion_product(p: np.ndarray, r: np.ndarray) -> np.ndarray:
@@ -51,17 +48,6 @@ def parameter_rates(parameters: np.ndarray, spin: np.ndarray) -> np.ndarray:
     """
     as_quaternion = np.concatenate([np.zeros((*spin.shape[:-1], 1)), spin], axis=-1)
     return 0.5 * quaternion_product(parameters, as_quaternion)
-
-
-def turned(parameters: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Unit Euler parameters after a further rotation by the vectors ``angles``, in body axes.
-
-    Shapes (..., 4) and (..., 3) [rad].
-    """
-    half = 0.5 * np.linalg.norm(angles, axis=-1, keepdims=True)
-    # numpy's sinc is sin(pi x) / (pi x), regular at zero.
-    turn = np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * angles], axis=-1)
-    return normalised(quaternion_product(parameters, turn))
 
 
 def normalised(parameters: np.ndarray) -> np.ndarray:
@@ -123,7 +109,7 @@ class Motion:
     rotation: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rotation", rotation_matrix(self.parameters))
+        object.__setattr__(self, "rotation", kernels.rotation_matrices(self.parameters))
 
     @property
     def n_bodies(self) -> int:
@@ -136,21 +122,13 @@ class Motion:
 
     def moved(self, displacement: np.ndarray) -> Motion:
         """The same velocities after a displacement (6 n,) [m, rad]."""
-        step = np.zeros((self.n_bodies + 1, 6))
-        step[:-1] = displacement.reshape(-1, 6)
-        return Motion(
-            self.numbers,
-            self.position + step[:, :3],
-            turned(self.parameters, step[:, 3:]),
-            self.velocity,
-            self.spin,
-        )
+        position, parameters = self.position.copy(), self.parameters.copy()
+        kernels.move(position, parameters, displacement)
+        return Motion(self.numbers, position, parameters, self.velocity, self.spin)
 
     def with_velocities(self, velocities: np.ndarray) -> Motion:
         """The same place with velocities (6 n,) [m/s, rad/s]."""
-        rates = np.zeros((self.n_bodies + 1, 6))
-        rates[:-1] = velocities.reshape(-1, 6)
-        return Motion(self.numbers, self.position, self.parameters, rates[:, :3], rates[:, 3:])
+        return Motion(self.numbers, self.position, self.parameters, *_split(velocities))
 
     def to_vector(self) -> np.ndarray:
         """Positions and Euler parameters (7 n), then velocities (6 n): shape (13 n,)."""
@@ -163,13 +141,19 @@ class Motion:
         places = state[: 7 * n].reshape(n, 7)
         position = np.vstack([places[:, :3], np.zeros(3)])
         parameters = np.vstack([normalised(places[:, 3:]), [1.0, 0.0, 0.0, 0.0]])
-        at_rest = Motion(self.numbers, position, parameters, self.velocity, self.spin)
-        return at_rest.with_velocities(state[7 * n :])
+        return Motion(self.numbers, position, parameters, *_split(state[7 * n :]))
 
     def place_rates(self) -> np.ndarray:
         """Rates of positions and Euler parameters, shape (7 n,)."""
         rates = parameter_rates(self.parameters, self.spin)
         return np.hstack([self.velocity, rates])[:-1].ravel()
+
+
+def _split(velocities: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Velocities and spins (n + 1, 3), the frame's included, of velocities (6 n,)."""
+    parts = np.zeros((2, len(velocities) // 6 + 1, 3))
+    parts[:, :-1] = velocities.reshape(-1, 2, 3).transpose(1, 0, 2)
+    return parts[0], parts[1]
 
 
 def initial_motion(bodies: Sequence[Body]) -> Motion:

@@ -119,16 +119,18 @@ class SpringDamper(_BetweenPoints):
 
     def pull(self, motion: Motion) -> float:
         """Force with which it pulls its points together [N]."""
-        return self._pull(self.line(motion))
+        line = self.line(motion)
+        return self.pull_at(line.length, line.rate)
 
-    def _pull(self, line: _Line) -> float:
-        elastic = _force_of(self.stiffness, line.length - self.free_length)
-        return elastic + _force_of(self.damping, line.rate)
+    def pull_at(self, length: float, rate: float) -> float:
+        """The pull [N] at a length [m] and its rate [m/s]."""
+        elastic = _force_of(self.stiffness, length - self.free_length)
+        return elastic + _force_of(self.damping, rate)
 
     def generalised(self, motion: Motion, time: float) -> np.ndarray:
         """Generalised forces (6 n,)."""
         line = self.line(motion)
-        return -self._pull(line) * line.gradient
+        return -self.pull_at(line.length, line.rate) * line.gradient
 
     def energy(self, motion: Motion) -> float:
         """Elastic energy [J]; of a function that is not a `Table` by quadrature."""
@@ -171,25 +173,28 @@ class BumpStop(_BetweenPoints):
     stiffness: float = 0.0
     damping: float = 0.0
 
-    def _depth(self, line: _Line) -> tuple[float, float]:
+    def _depth(self, length: float) -> tuple[float, float]:
         """How far beyond a limit [m], and the sign of the way back in length."""
-        if line.length < self.shortest:
-            return self.shortest - line.length, 1.0
-        return max(line.length - self.longest, 0.0), -1.0
+        if length < self.shortest:
+            return self.shortest - length, 1.0
+        return max(length - self.longest, 0.0), -1.0
+
+    def pull_at(self, length: float, rate: float) -> float:
+        """Force [N] that pulls the points together, at a length [m] and its rate [m/s]."""
+        depth, way_back = self._depth(length)
+        if depth == 0.0:
+            return 0.0
+        # A stop does not hold back what is leaving it.
+        return -way_back * max(self.stiffness * depth - way_back * self.damping * rate, 0.0)
 
     def generalised(self, motion: Motion, time: float) -> np.ndarray:
         """Generalised forces (6 n,)."""
         line = self.line(motion)
-        depth, way_back = self._depth(line)
-        if depth == 0.0:
-            return np.zeros_like(line.gradient)
-        # A stop does not hold back what is leaving it.
-        push = max(self.stiffness * depth - way_back * self.damping * line.rate, 0.0)
-        return way_back * push * line.gradient
+        return -self.pull_at(line.length, line.rate) * line.gradient
 
     def energy(self, motion: Motion) -> float:
         """Elastic energy [J]."""
-        return 0.5 * self.stiffness * self._depth(self.line(motion))[0] ** 2
+        return 0.5 * self.stiffness * self._depth(self.line(motion).length)[0] ** 2
 
 
 @dataclass(frozen=True)

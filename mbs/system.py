@@ -13,15 +13,18 @@ Sources: P. E. Nikravesh, 1988, chapters 6 and 11; Ambrosio et al., 2012, equati
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import linalg
 
+from catenary.mbs import kernels
 from catenary.mbs.bodies import Body, Motion, initial_motion
+from catenary.mbs.flat import FlatLines, FlatRows, line_of
 from catenary.mbs.forces import Force
 from catenary.mbs.joints import Joint
-from catenary.mbs.kinematics import Quantity, stacked
+from catenary.mbs.kinematics import Quantity
 from catenary.solver.errors import InputError, RunBroken
 
 # A row of Phi_q that the rows before it explain but for this part of its length is redundant.
@@ -64,17 +67,7 @@ def independent_rows(jacobian: np.ndarray) -> np.ndarray:
 
     Gram-Schmidt row by row, so that of several rows that say the same the first one is kept.
     """
-    basis = np.empty_like(jacobian)
-    kept: list[int] = []
-    for number, row in enumerate(jacobian):
-        before = basis[: len(kept)]
-        rest = row - (before @ row) @ before
-        rest -= (before @ rest) @ before
-        length, whole = np.sqrt(rest @ rest), np.sqrt(row @ row)
-        if length > DEPENDENT * whole:
-            basis[len(kept)] = rest / length
-            kept.append(number)
-    return np.array(kept, dtype=int)
+    return kernels.independent_rows(np.ascontiguousarray(jacobian), DEPENDENT)
 
 
 @dataclass(frozen=True)
@@ -121,31 +114,49 @@ class System:
             ),
         )
 
-    @property
+    @cached_property
     def inverse_mass(self) -> np.ndarray:
         """1 / M, which is diagonal in principal axes, shape (6 n,)."""
-        return 1.0 / self.mass
+        result = 1.0 / self.mass
+        result.flags.writeable = False
+        return result
 
-    @property
+    @cached_property
     def mass(self) -> np.ndarray:
         """M, which is diagonal in principal axes, shape (6 n,) [kg, kg m^2]."""
-        return np.concatenate([[b.mass] * 3 + list(b.inertia) for b in self.bodies])
+        result = np.concatenate([[b.mass] * 3 + list(b.inertia) for b in self.bodies])
+        result.flags.writeable = False
+        return result
 
     def constraints(self, motion: Motion, time: float) -> Quantity:
         """Phi of all joints with its derivatives, m rows."""
-        if not self.joints:
-            none = np.zeros(0)
-            return Quantity(none, np.zeros((0, 6 * motion.n_bodies)), none, none)
-        return stacked([joint.rows(motion, time) for joint in self.joints])
+        return self._rows(motion, time)
+
+    @cached_property
+    def _rows(self) -> FlatRows:
+        return FlatRows(self.joints, self.start())
+
+    @cached_property
+    def lines(self) -> FlatLines:
+        """The forces that act along lines."""
+        return FlatLines(self.forces, self.start())
+
+    @cached_property
+    def other_forces(self) -> tuple[Force, ...]:
+        """The forces that do not."""
+        return tuple(force for force in self.forces if line_of(force) is None)
+
+    @cached_property
+    def _inertia(self) -> np.ndarray:
+        return np.array([body.inertia for body in self.bodies], dtype=float)
 
     def generalised_forces(self, motion: Motion, time: float) -> np.ndarray:
         """g (6 n,) [N, N m]: all forces, and the gyroscopic moments -omega x J omega."""
-        result = np.zeros(6 * motion.n_bodies)
-        for force in self.forces:
+        length, rate, gradient = self.lines.geometry(motion)
+        result = self.lines.pulls(length, rate, time) @ -gradient
+        for force in self.other_forces:
             result += force.generalised(motion, time)
-        inertia = np.array([body.inertia for body in self.bodies])
-        spin = motion.spin[:-1]
-        result.reshape(-1, 6)[:, 3:] -= np.cross(spin, inertia * spin)
+        kernels.add_gyroscopic_moments(result, self._inertia, motion.spin)
         return result
 
     def energy(self, motion: Motion) -> float:
