@@ -12,7 +12,8 @@ from catenary.cases.units import length_from_mm, speed_from_km_h
 from catenary.mbs.lumped import LumpedData
 from catenary.meshgen.line import DropperKind, Line, SteadyArm, Wire
 from catenary.solver.errors import InputError
-from catenary.solver.problem import ContactLaw, Damping, Numerics, Placement, Problem, Train
+from catenary.solver.contact_laws import LinearLaw
+from catenary.solver.problem import Damping, Numerics, Placement, Problem, Train
 
 if TYPE_CHECKING:
     from catenary.cases.scene import Scene
@@ -74,7 +75,7 @@ def problem_of(scene: Scene) -> Problem:
     return Problem(
         line=line_of(scene),
         damping=_damping(scene.line),
-        contact=ContactLaw(scene.contact.stiffness_N_per_m, scene.contact.damping_N_s_per_m),
+        contact=LinearLaw(scene.contact.stiffness_N_per_m, scene.contact.damping_N_s_per_m),
         train=_train(scene),
         numerics=Numerics(
             dt=numerics.dt_s,

@@ -1,7 +1,8 @@
 """What the coupling asks of a pantograph, whatever its model: lumped masses or a multibody system.
 
 Heights are measured like the line's, z up [m]; contact forces are >= 0 in compression and push
-the head down. A pantograph lives on rank 0 and is never called elsewhere.
+the head down. A head touches the wire with s strips, mostly one. A pantograph lives on rank 0 and
+is never called elsewhere.
 """
 
 from __future__ import annotations
@@ -12,29 +13,39 @@ import numpy as np
 
 
 class HeadState(NamedTuple):
-    """Head at the end of the coming step as an affine function of the contact force f [N] in it.
+    """Strips at the end of the coming step as affine functions of the contact forces f (s,) [N].
 
     height = ``height`` - ``height_compliance`` f [m], velocity = ``velocity`` -
-    ``velocity_compliance`` f [m/s].
+    ``velocity_compliance`` f [m/s]; shapes (s,) and (s, s). Velocities are those of the points
+    that touch the wire, also where these move along a tilted strip.
     """
 
-    height: float
-    velocity: float
-    height_compliance: float
-    velocity_compliance: float
+    height: np.ndarray
+    velocity: np.ndarray
+    height_compliance: np.ndarray
+    velocity_compliance: np.ndarray
 
 
 class Pantograph(Protocol):
     """A pantograph that advances with the global contact step."""
 
+    @property
+    def strip_offsets(self) -> tuple[float, ...]:
+        """Places of the strips ahead of the pantograph's own place along the track [m], (s,)."""
+
     def place(self, head_height: float) -> None:
         """Put the pantograph at rest with its head at this height [m], without contact."""
 
-    def predict(self, time: float) -> HeadState:
-        """Head at ``time`` [s], the end of the coming step, as a function of the force in it."""
+    def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Heights [m] and velocities [m/s] of the strips at ``time`` [s], the end of the coming
+        step, from the present motion alone; (s,) each, overwritten by the next call."""
 
-    def advance(self, contact_force: float) -> None:
-        """Take the step predicted last with this contact force [N]."""
+    def predict(self, time: float) -> HeadState:
+        """Strips at ``time`` [s], the end of the coming step, as functions of the forces in it;
+        overwritten by the next call."""
+
+    def advance(self, contact_force: np.ndarray) -> None:
+        """Take the step predicted last with these contact forces (s,) [N]."""
 
     def state(self) -> np.ndarray:
         """Everything needed to continue, as one array."""

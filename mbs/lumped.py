@@ -29,6 +29,11 @@ class LumpedData:
     def n_masses(self) -> int:
         return len(self.masses)
 
+    @property
+    def strip_offsets(self) -> tuple[float, ...]:
+        """One strip, in the pantograph's own place [m]."""
+        return (0.0,)
+
     def chain(self, values: tuple[float, ...]) -> np.ndarray:
         """Matrix of springs (or dampers) between neighbours, the last to ground, shape (n, n)."""
         matrix = np.diag(np.asarray(values, dtype=float))
@@ -65,6 +70,7 @@ class LumpedPantograph:
         beta: float = 0.25,
         gamma: float = 0.5,
     ) -> None:
+        self.strip_offsets = data.strip_offsets
         self._lift_full = static_force
         self._raise_time = raise_time
         n = data.n_masses
@@ -97,6 +103,14 @@ class LumpedPantograph:
         self._n = n
         self._state = np.zeros(3 * n)
         self._free = np.zeros(3 * n)
+        # The head's share of the step, which shows what ``predict`` finds.
+        self._head = HeadState(
+            self._free[:1],
+            self._free[n : n + 1],
+            self._by_force[:1].reshape(1, 1),
+            self._by_force[n : n + 1].reshape(1, 1),
+        )
+        self._extrapolation = np.vstack([predict_position[:1], predict_velocity[:1]])
 
     def lift(self, time: float) -> float:
         """Net lift on the last mass at ``time`` [N]: a half cosine up to the static force."""
@@ -124,17 +138,21 @@ class LumpedPantograph:
         # A start from any other acceleration than what these forces cause loses an order in dt.
         self._state[2 * n :] = linalg.solve(self._mass, force)
 
+    def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Height and velocity of the head by Newmark's predictor (paper eq. 2.5), (1,) each."""
+        height, velocity = self._extrapolation @ self._state
+        return np.array([height]), np.array([velocity])
+
     def predict(self, time: float) -> HeadState:
         """Head at ``time`` [s] as an affine function of the contact force in the coming step."""
-        free = self._step @ self._state
-        free += self.lift(time) * self._by_lift + self._by_base
-        self._free = free
-        n, by_force = self._n, self._by_force
-        return HeadState(float(free[0]), float(free[n]), float(by_force[0]), float(by_force[n]))
+        np.matmul(self._step, self._state, out=self._free)
+        self._free += self.lift(time) * self._by_lift + self._by_base
+        return self._head
 
-    def advance(self, contact_force: float) -> None:
-        """Take the step predicted last with this contact force [N]."""
-        self._state = self._free - contact_force * self._by_force
+    def advance(self, contact_force: np.ndarray) -> None:
+        """Take the step predicted last with this contact force (1,) [N]."""
+        np.multiply(self._by_force, -contact_force[0], out=self._state)
+        self._state += self._free
 
     def state(self) -> np.ndarray:
         """Positions, velocities and accelerations, shape (3 n,)."""

@@ -65,7 +65,18 @@ class RaisingPantograph:
         self._position, self._velocity, self._acceleration = np.zeros((3, 2))
         self._free = np.zeros(6)
         self._by_force = np.zeros(6)
+        self._head = HeadState(
+            self._free[:1],
+            self._free[2:3],
+            self._by_force[:1].reshape(1, 1),
+            self._by_force[2:3].reshape(1, 1),
+        )
         self._between = np.array([[1.0, -1.0], [-1.0, 1.0]])
+
+    @property
+    def strip_offsets(self) -> tuple[float, ...]:
+        """One strip, in the pantograph's own place."""
+        return (0.0,)
 
     @property
     def position(self) -> np.ndarray:
@@ -90,18 +101,22 @@ class RaisingPantograph:
         matrix = np.diag(masses) + by_speed * damping + by_place * stiffness
         inverse = np.linalg.inv(matrix)
         free, unit = inverse @ force, inverse[:, 0]
-        self._free = np.concatenate([position + by_place * free, velocity + by_speed * free, free])
-        self._by_force = np.concatenate([by_place * unit, by_speed * unit, unit])
-        return HeadState(
-            float(self._free[0]),
-            float(self._free[2]),
-            float(self._by_force[0]),
-            float(self._by_force[2]),
+        np.concatenate(
+            [position + by_place * free, velocity + by_speed * free, free], out=self._free
         )
+        np.concatenate([by_place * unit, by_speed * unit, unit], out=self._by_force)
+        return self._head
 
-    def advance(self, contact_force: float) -> None:
-        """Take the step predicted last with this contact force [N]."""
-        self.restore(self._free - contact_force * self._by_force)
+    def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Height and velocity of the head by Newmark's predictor (paper eq. 2.5), (1,) each."""
+        dt, beta, gamma = self._dt, self._beta, self._gamma
+        acceleration = self._acceleration[:1]
+        height = self._position[:1] + dt * self._velocity[:1] + dt**2 * (0.5 - beta) * acceleration
+        return height, self._velocity[:1] + dt * (1 - gamma) * acceleration
+
+    def advance(self, contact_force: np.ndarray) -> None:
+        """Take the step predicted last with this contact force (1,) [N]."""
+        self.restore(self._free - contact_force[0] * self._by_force)
 
     def state(self) -> np.ndarray:
         """Positions, velocities and accelerations, shape (6,)."""

@@ -192,7 +192,7 @@ register(
         "a force on the gap rate, its convective part V dw/dx included",
         "penalty contact with a viscous term",
         default=False,
-        applies=lambda p: p.contact.damping > 0,
+        applies=lambda p: p.contact.dissipates,
         build=lambda builder: builder.count_term(),
     )
 )

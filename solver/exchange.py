@@ -46,18 +46,22 @@ class Reply(NamedTuple):
 
 
 class Exchange:
-    """Packs, gathers and broadcasts for ``n`` contacts. All methods are collective."""
+    """Packs, gathers and broadcasts for ``n`` contacts. All methods are collective.
 
-    def __init__(self, comm: Any, n_contacts: int) -> None:
+    ``early`` says whether shares hold what the line extrapolates to.
+    """
+
+    def __init__(self, comm: Any, n_contacts: int, early: bool) -> None:
         self._comm = comm
         self._n = n_contacts
+        self._n_early = n_contacts if early else 0
         self.enlarge(_FIRST_CAPACITY)
 
     def enlarge(self, capacity: int) -> None:
         """Make room for at least ``capacity`` droppers a rank."""
         n, size = self._n, self._comm.size
         self._capacity = capacity
-        self._head = 4 + 2 * n + 2 * n * n
+        self._head = 4 + 2 * n + 2 * n * n + 2 * self._n_early
         self._row = 2 + 3 * n
         self._packet = np.zeros(self._head + capacity * self._row)
         self._all = np.zeros((size if self._comm.rank == 0 else 0, self._packet.size))
@@ -71,7 +75,14 @@ class Exchange:
         packet[:4] = count, stop, broken, 0
         fitting = min(count, self._capacity)
         at = 4
-        for part in (share.height, share.rate, share.height_by_force, share.rate_by_force):
+        for part in (
+            share.height,
+            share.rate,
+            share.height_by_force,
+            share.rate_by_force,
+            share.early_height,
+            share.early_rate,
+        ):
             packet[at : at + part.size] = part.ravel()
             at += part.size
         rows = packet[self._head :].reshape(-1, self._row)[:fitting]
@@ -115,16 +126,22 @@ class Exchange:
         ]
         table = np.concatenate(rows)
         columns = table[:, 2:].reshape(-1, 3, n)
+        sizes = np.array([n, n, n * n, n * n, self._n_early, self._n_early])
+        height, rate, by_force, rate_by_force, early_height, early_rate = np.split(
+            total, np.cumsum(sizes)[:-1]
+        )
         response = LineResponse(
-            total[:n],
-            total[n : 2 * n],
-            total[2 * n : 2 * n + n * n].reshape(n, n),
-            total[2 * n + n * n :].reshape(n, n),
+            height,
+            rate,
+            by_force.reshape(n, n),
+            rate_by_force.reshape(n, n),
             table[:, 0].astype(int),
             table[:, 1],
             columns[:, 0],
             columns[:, 1],
             columns[:, 2],
+            early_height,
+            early_rate,
         )
         largest = int(counts.max())
         overflow = largest if largest > self._capacity else 0

@@ -169,16 +169,36 @@ def move(begin, values, factor, acceleration, displacement, velocity, c_position
 
 
 @compiled
-def press(heads, height, rate, by_force, rate_by_force, stiffness, damping, push, softness):
+def press(depth, rate, by_force, rate_by_force, own, offset, by_depth, by_rate, push, softness):
     """Right-hand side and matrix of the contact forces when no dropper is slack.
 
-    ``heads`` (n, 4) holds free height, velocity and both compliances of each head.
+    ``own`` f = ``offset`` + ``by_depth`` d + ``by_rate`` d' at each contact, with depth d and rate
+    d' that are ``depth`` - ``by_force`` f and ``rate`` - ``rate_by_force`` f.
     """
-    for i in range(heads.shape[0]):
-        push[i] = stiffness * (heads[i, 0] - height[i]) + damping * (heads[i, 1] - rate[i])
-        for j in range(heads.shape[0]):
-            softness[i, j] = stiffness * by_force[i, j] + damping * rate_by_force[i, j]
-        softness[i, i] += 1.0 + stiffness * heads[i, 2] + damping * heads[i, 3]
+    for i in range(depth.size):
+        push[i] = offset[i] + by_depth[i] * depth[i] + by_rate[i] * rate[i]
+        for j in range(depth.size):
+            softness[i, j] = by_depth[i] * by_force[i, j] + by_rate[i] * rate_by_force[i, j]
+        softness[i, i] += own[i]
+
+
+@compiled
+def hertz(depth, rate, speed, stiffness, exponent, hysteresis, offset, by_depth, by_rate, force):
+    """Tangents of f = K d^n (1 + chi d' / d0') at each contact, with f and what f is less them."""
+    for i in range(depth.size):
+        d = depth[i]
+        if d <= 0.0:
+            offset[i] = by_depth[i] = by_rate[i] = force[i] = 0.0
+            continue
+        spring = stiffness * d**exponent
+        loss = 1.0 + hysteresis * rate[i] / speed[i]
+        force[i] = spring * loss
+        by_depth[i] = exponent * spring / d * loss
+        by_rate[i] = spring * hysteresis / speed[i]
+        if by_depth[i] < 0.0:
+            # Beyond the speed at which the law would pull it has no spring either.
+            by_depth[i] = 0.0
+        offset[i] = force[i] - by_depth[i] * d - by_rate[i] * rate[i]
 
 
 @compiled
@@ -279,6 +299,7 @@ def warm_up() -> None:
     tension(reals, reals, numbers, numbers, one, one, one, one)
     may_slacken(one, 1.0, one, one, numbers, numbers, one, one, 1.0, table, numbers)
     move(0, reals, 1.0, reals, reals, reals, 1.0, 1.0)
-    press(table, one, one, np.eye(1), np.eye(1), 1.0, 1.0, one, np.eye(1))
+    press(one, one, np.eye(1), np.eye(1), one, one, one, one, one, np.eye(1))
+    hertz(one, one, one, 1.0, 1.5, 0.0, one, one, one, one)
     any_pushed(one, np.eye(1), one)
     settle(np.eye(1), one, np.zeros(1, dtype=np.bool_), 1)

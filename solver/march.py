@@ -17,18 +17,22 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
+from catenary.solver.contact_laws import KinematicLaw
+from catenary.solver.coupling import make_coupling
 from catenary.solver.distribution import distribute
 from catenary.solver.equilibrium import Elasticity, Equilibrium
 from catenary.solver.errors import CatenaryError, InputError, RunBroken
-from catenary.solver.inner import InnerProblem
+from catenary.solver.fixed_point import FixedPoint
 from catenary.solver.interaction import Interaction
+from catenary.solver.law_in_steps import law_in_steps
 from catenary.solver.linear import PREFIX, refused_options
 from catenary.solver.model import Model
 from catenary.solver.newmark import NewmarkLine
 from catenary.solver.observation import Observer, Stage, StepView
+from catenary.solver.one_solve import OneSolve
 from catenary.solver.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.problem import Problem
-from catenary.solver.schemes import FixedPoint, LoadSource, OneSolve, Scheme
+from catenary.solver.schemes import LoadSource, Scheme
 from catenary.solver.stepper import Stepper
 
 
@@ -75,14 +79,17 @@ class March:
         self._line = NewmarkLine(comm, model, self.ownership, numerics)
         on = model.terms_of
         trailing = max(placement.behind for placement in train.placements)
-        uses_rate = "contact_damping" in on
+        offsets = [x for placement in train.placements for x in placement.data.strip_offsets]
+        reach = (max(0.0, -min(offsets)), max(0.0, max(offsets)))
+        # A kinematic contact ends depths through their rates.
+        uses_rate = "contact_damping" in on or isinstance(problem.contact, KinematicLaw)
         self._interaction = Interaction(
             comm,
             model,
             form,
             self._line,
-            (train.start - trailing, train.end),
-            len(train.placements),
+            (train.start - trailing - reach[0], train.end + reach[1]),
+            sum(len(placement.data.strip_offsets) for placement in train.placements),
             train.speed,
             uses_rate,
             "dropper_slackening" in on,
@@ -119,6 +126,8 @@ class March:
         self._pantographs.contact_force[:] = checkpoint["contact_force"]
         self._pantographs.head_height[:] = checkpoint["head_height"]
         self._pantographs.wire_height[:] = checkpoint["wire_height"]
+        self._pantographs.strip_force[:] = checkpoint["strip_force"]
+        self._scheme.restore(checkpoint["contacts"])
         for i, pantograph in enumerate(self._pantographs.models):
             pantograph.restore(checkpoint[f"pantograph_{i}"])
 
@@ -196,24 +205,20 @@ class March:
                 raise
 
     def _make_scheme(self, on: dict[str, int]) -> Scheme:
-        problem = self._problem
-        may_lose = "contact_loss" in on
-        kept = self._kept_ratio
-        law = problem.contact
-        if "contact_damping" not in on:
-            law = type(law)(law.stiffness, 0.0)
-        if problem.numerics.scheme == "one_solve":
-            inner = InnerProblem(law, may_lose, kept)
-            return OneSolve(self._comm, self._interaction, self._pantographs, inner, self._loads())
+        numerics, n = self._problem.numerics, self._pantographs.n_contacts
+        self._law = law_in_steps(self._problem, n)
+        if numerics.scheme == "one_solve":
+            coupling = make_coupling(self._law, n, self._kept_ratio, numerics)
+            return OneSolve(
+                self._comm, self._interaction, self._pantographs, coupling, self._loads()
+            )
         return FixedPoint(
             self._comm,
             self._interaction,
             self._pantographs,
-            problem.numerics,
-            law.stiffness,
-            law.damping,
-            may_lose,
-            kept,
+            numerics,
+            self._law,
+            self._kept_ratio,
             "dropper_slackening" in on,
             self._loads(),
         )
@@ -372,6 +377,8 @@ class March:
         result["contact_force"] = pantographs.contact_force.copy()
         result["head_height"] = pantographs.head_height.copy()
         result["wire_height"] = pantographs.wire_height.copy()
+        result["strip_force"] = pantographs.strip_force.copy()
+        result["contacts"] = self._scheme.state()
         for i, pantograph in enumerate(pantographs.models):
             result[f"pantograph_{i}"] = pantograph.state()
         return result

@@ -1,29 +1,33 @@
-"""The train's pantographs: models on rank 0, their contacts' places and results on all ranks."""
+"""The train's pantographs: models on rank 0, their contacts' places on all ranks."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
 from scipy import integrate
 
 from catenary.mbs.build import Operation, make_pantograph
-from catenary.mbs.interface import HeadState, Pantograph
+from catenary.mbs.interface import Pantograph
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.contact import ContactWire, Touches
 from catenary.solver.equilibrium import Elasticity, Equilibrium
+from catenary.solver.heads import Heads
 from catenary.solver.model import Model
 from catenary.solver.problem import Placement, Problem
 
 
 class Pantographs:
-    """All pantographs of a train.
+    """All pantographs of a train, n of them, with their n_contacts strips.
 
     Attributes
     ----------
     models : the models on rank 0, empty elsewhere
-    contact_force, head_height, wire_height : (n,) after the latest step, rank 0 only
-    position : (n,) along the track [m], all ranks
+    position : (n,) of the pantographs along the track [m], all ranks
+    contact_force, head_height, wire_height : (n,) after the latest step, rank 0 only: the sum over
+        a pantograph's strips, and their means
+    strip_force : (n_contacts,) the same of each strip
     """
 
     def __init__(
@@ -33,56 +37,97 @@ class Pantographs:
         nominal_height: Callable[[Placement], float],
         on_this_rank: bool,
     ) -> None:
-        train, numerics = problem.train, problem.numerics
+        train = problem.train
         self._wire = wire
         self._start = np.array([train.start - p.behind for p in train.placements])
         self._speed = train.speed
-        self._touches = Touches(self.n)
-        self.position = self._touches.x
-        self.position[:] = self._start
+        offsets = [placement.data.strip_offsets for placement in train.placements]
+        counts = [len(own) for own in offsets]
+        ends = np.cumsum([0, *counts])
+        self._strips = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
+        self._contact_start = np.repeat(self._start, counts) + np.concatenate(offsets)
+        self._touches = Touches(self.n_contacts)
+        self._touches.x[:] = self._contact_start
+        self.position = self._start.copy()
         self.contact_force = np.zeros(self.n)
-        self.head_height = np.zeros(self.n)
+        self.strip_force = np.zeros(self.n_contacts)
         self.wire_height = wire.rest_height(self._start)
+        self.head_height = self.wire_height.copy()
+        self._heads = Heads(self.n_contacts)
         self.models: list[Pantograph] = []
         if on_this_rank:
-            for placement, height in zip(train.placements, self.wire_height, strict=True):
-                operation = Operation(
-                    placement.static_force,
-                    nominal_height(placement),
-                    train.raise_time,
-                    numerics.dt,
-                    numerics.beta,
-                    numerics.gamma,
-                )
-                model = make_pantograph(placement.data, operation)
-                model.place(float(height))
-                self.models.append(model)
-            self.head_height[:] = self.wire_height
+            self.models = [
+                self._make(problem, placement, nominal_height(placement), float(height))
+                for placement, height in zip(train.placements, self.wire_height, strict=True)
+            ]
 
     @property
     def n(self) -> int:
+        """Number of pantographs."""
         return int(self._start.size)
+
+    @property
+    def n_contacts(self) -> int:
+        """Number of strips that may touch the wire."""
+        return int(self._contact_start.size)
 
     def move_to(self, time: float) -> Touches:
         """Move the contacts to where they are at ``time`` [s]; their places on the wire."""
         np.multiply(self._speed, time, out=self.position)
+        np.add(self._contact_start, self._speed * time, out=self._touches.x)
         self.position += self._start
         self._wire.locate(self._touches)
         return self._touches
 
-    def predict(self, time: float) -> list[HeadState]:
-        """Heads at ``time`` as functions of the contact forces. Rank 0 only."""
-        return [model.predict(time) for model in self.models]
+    def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Heights and velocities (n_contacts,) at ``time`` from the motion alone. Rank 0 only."""
+        height, velocity = np.empty(self.n_contacts), np.empty(self.n_contacts)
+        for model, strips in zip(self.models, self._strips, strict=True):
+            height[strips], velocity[strips] = model.extrapolate(time)
+        return height, velocity
+
+    def predict(self, time: float) -> Heads:
+        """Strips at ``time`` as functions of the contact forces. Rank 0 only."""
+        heads = self._heads
+        for model, strips in zip(self.models, self._strips, strict=True):
+            head = model.predict(time)
+            heads.height[strips] = head.height
+            heads.velocity[strips] = head.velocity
+            heads.height_compliance[strips, strips] = head.height_compliance
+            heads.velocity_compliance[strips, strips] = head.velocity_compliance
+        return heads
 
     def advance(
-        self, contact_force: np.ndarray, heads: list[HeadState], wire_height: np.ndarray
+        self, contact_force: np.ndarray, reported: np.ndarray, wire_height: np.ndarray
     ) -> None:
-        """Take the step with these forces and heights. Rank 0 only."""
-        self.contact_force[:] = contact_force
-        self.wire_height[:] = wire_height
-        for i, (model, head) in enumerate(zip(self.models, heads, strict=True)):
-            model.advance(float(contact_force[i]))
-            self.head_height[i] = head.height - head.height_compliance * contact_force[i]
+        """Take the step with these forces and wire heights (n_contacts,). Rank 0 only.
+
+        ``reported`` is what of the forces counts as contact force in the records.
+        """
+        heads = self._heads
+        self.strip_force[:] = reported
+        head_height = heads.height - heads.height_compliance @ contact_force
+        for i, (model, strips) in enumerate(zip(self.models, self._strips, strict=True)):
+            model.advance(contact_force[strips])
+            self.contact_force[i] = reported[strips].sum()
+            self.head_height[i] = head_height[strips].mean()
+            self.wire_height[i] = wire_height[strips].mean()
+
+    def _make(
+        self, problem: Problem, placement: Placement, nominal_height: float, wire_height: float
+    ) -> Pantograph:
+        numerics = problem.numerics
+        operation = Operation(
+            placement.static_force,
+            nominal_height,
+            problem.train.raise_time,
+            numerics.dt,
+            numerics.beta,
+            numerics.gamma,
+        )
+        model = make_pantograph(placement.data, operation)
+        model.place(wire_height)
+        return model
 
 
 def nominal_height_rule(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from catenary.mbs.build import PantographData
 from catenary.meshgen.line import Line
+from catenary.solver.contact_laws import ContactLaw
 
 
 @dataclass(frozen=True)
@@ -21,14 +22,6 @@ class Damping:
     alpha: float
     beta: float
     per_component: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class ContactLaw:
-    """Penalty contact: stiffness [N/m] and damping [N s/m] of the gap between head and wire."""
-
-    stiffness: float
-    damping: float
 
 
 @dataclass(frozen=True)
@@ -64,6 +57,8 @@ class Numerics:
 
     ``scheme`` is ``one_solve`` or ``fixed_point`` (paper eqs. 2.4-2.7); ``eps_d`` [m] and
     ``eps_v`` [m/s] end the latter's iteration, at most ``max_iterations`` times a step.
+    ``coupling`` of ``one_solve`` is ``implicit``, ``iterated`` (until contact forces change by
+    less than ``eps_force`` [N], at most ``max_iterations`` times) or ``explicit``.
     """
 
     dt: float
@@ -73,6 +68,8 @@ class Numerics:
     eps_d: float
     eps_v: float
     max_iterations: int
+    coupling: str = "implicit"
+    eps_force: float = 1e-6
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ import numpy as np
 from catenary.mbs.lumped import LumpedData
 from catenary.meshgen.line import DropperKind, Line, SteadyArm, Wire
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
+from catenary.solver.contact_laws import LinearLaw
 from catenary.solver.problem import (
-    ContactLaw,
     Damping,
     Numerics,
     Placement,
@@ -164,7 +164,7 @@ def problem_of(line: Line, effects: frozenset[str] = WHOLE, **changes: object) -
     usual = Problem(
         line=line,
         damping=Damping(alpha=1e-4, beta=0.0125),
-        contact=ContactLaw(stiffness=5e4, damping=0.0),
+        contact=LinearLaw(stiffness=5e4, damping=0.0),
         train=train(70.0, first, last),
         numerics=numerics(1e-3),
         evaluation=(first, last),

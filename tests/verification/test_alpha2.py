@@ -29,9 +29,10 @@ from small_lines import (
 )
 
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
+from catenary.solver.contact_laws import LinearLaw
 from catenary.solver.elements import shape_slopes, shape_values
 from catenary.solver.equilibrium import find_form
-from catenary.solver.problem import ContactLaw, Problem
+from catenary.solver.problem import Problem
 
 PREFIX = "second_opinion_"
 NOMINAL_HEIGHT = 5.52
@@ -203,7 +204,7 @@ def test_tsalpha2_integrates_the_same_model_to_the_same_forces() -> None:
     problem = problem_of(
         line,
         WHOLE | {"contact_damping"},
-        contact=ContactLaw(5e4, 20.0),
+        contact=LinearLaw(5e4, 20.0),
         train=train(
             speed,
             START,

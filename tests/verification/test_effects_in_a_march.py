@@ -8,7 +8,8 @@ from measuring import History, check, march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.problem import ContactLaw, Problem
+from catenary.solver.contact_laws import LinearLaw
+from catenary.solver.problem import Problem
 
 LINE = en50318_line(5)
 EPS = np.finfo(float).eps
@@ -24,7 +25,7 @@ def scene(effects: frozenset[str], kept: float = 0.0, damping: float = 0.0) -> P
     return problem_of(
         LINE,
         effects,
-        contact=ContactLaw(5e4, damping),
+        contact=LinearLaw(5e4, damping),
         # From the dropper before a mast: the wire sags behind it, so that the head presses at once.
         train=train(80.0, 115.0, 195.0, static_force=150.0, raise_time=0.2, nominal_height=5.6),
         numerics=numerics(1e-3),

@@ -17,9 +17,10 @@ from small_lines import (
 )
 
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
+from catenary.solver.contact_laws import LinearLaw
 from catenary.solver.elements import shape_slopes, shape_values
 from catenary.solver.equilibrium import find_form
-from catenary.solver.problem import ContactLaw, Problem, Train
+from catenary.solver.problem import Problem, Train
 
 EPS = np.finfo(float).eps
 
@@ -79,7 +80,7 @@ def test_states_satisfy_the_equations_of_motion(
     """
     line = ac_simple_line(5)
     mesh = mesh_of(line, 3)
-    law = ContactLaw(5e4, 60.0)
+    law = LinearLaw(5e4, 60.0)
     problem = problem_of(
         line,
         WHOLE | {"contact_damping", "residual_dropper_stiffness"},

@@ -38,8 +38,8 @@ def test_mechanism_that_is_the_same_at_all_heights_is_two_lumped_masses() -> Non
         time = 1e-3 * (number + 1)
         mine, other = found.predict(time), expected.predict(time)
         force = 130.0 + 40.0 * np.sin(9.0 * time) if number > 300 else 0.0
-        found.advance(force)
-        expected.advance(force)
+        found.advance(np.array([force]))
+        expected.advance(np.array([force]))
     # Newmark's accelerations come from differences of heights on springs: 2000 steps of eps.
     within = 2000 * EPS * 5.0 * 10
     check("height [m]", mine.height, other.height, within=within)
@@ -77,7 +77,7 @@ def test_paper_s_pantograph_let_go_rises_like_all_its_bodies() -> None:
         pantograph.restore(np.array([start, z, 0.0, 0.0, force / 7.8, 0.0]))
         for number in range(round(end / dt)):
             pantograph.predict(dt * (number + 1))
-            pantograph.advance(0.0)
+            pantograph.advance(np.array([0.0]))
         ends.append(pantograph.position[0])
     rise = expected - start
     errors = [abs(found - ends[-1]) for found in ends[:-1]]
@@ -96,10 +96,10 @@ def test_state_is_all_that_is_needed_to_continue() -> None:
     assert one.energy() == 0.0
     for number in range(50):
         one.predict(1e-3 * (number + 1))
-        one.advance(20.0)
+        one.advance(np.array([20.0]))
     other.restore(one.state())
     for pantograph in (one, other):
         pantograph.predict(0.051)
-        pantograph.advance(30.0)
+        pantograph.advance(np.array([30.0]))
     assert (one.state() == other.state()).all()
     assert one.position[0] != 5.1

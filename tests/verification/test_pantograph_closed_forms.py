@@ -35,8 +35,8 @@ def test_one_mass_moves_like_the_exact_oscillator(damping: float) -> None:
         t = dt * np.arange(1, round(duration / dt) + 1)
         heads = []
         for now in t:
-            heads.append(pantograph.predict(now).height)
-            pantograph.advance(0.0)
+            heads.append(pantograph.predict(now).height[0])
+            pantograph.advance(np.array([0.0]))
         swing = np.cos(omega * t) + decay / omega * np.sin(omega * t)
         exact = settled + (start - settled) * np.exp(-decay * t) * swing
         errors.append(float(np.abs(np.array(heads) - exact).max()))
@@ -88,7 +88,7 @@ def test_several_masses_follow_the_matrix_exponential(
         pantograph.restore(state)
         for number in range(round(duration / dt)):
             pantograph.predict((number + 1) * dt)
-            pantograph.advance(force)
+            pantograph.advance(np.array([force]))
         errors.append(float(np.abs(pantograph.state()[:n] - exact).max()))
     observed = print_table(f"error at the end [m], expected order {theory}", steps, errors)
     fastest = np.sqrt(linalg.eigh(stiffness, mass, eigvals_only=True)[-1])
@@ -115,10 +115,11 @@ def test_pantograph_at_rest_presses_with_the_static_force(data: LumpedData) -> N
         for number in range(40_000):
             head = pantograph.predict((number + 1) * dt)
             # Contact spring and damper (500 N s/m, so that all motion dies out), implicit.
-            push = contact * (head.height - wire) + 500.0 * head.velocity
+            push = contact * (head.height[0] - wire) + 500.0 * head.velocity[0]
             softness = contact * head.height_compliance + 500.0 * head.velocity_compliance
+            softness = softness.item()
             force = push / (1.0 + softness)
-            pantograph.advance(force)
+            pantograph.advance(np.array([force]))
         expected = (lift - in_row * (wire - NOMINAL)) / (1.0 + in_row / contact)
         # 80 s are many decay times of the slowest motion. Round-off of heights, on the stiffest
         # spring, and of velocities, which are differences of heights over dt.
@@ -138,7 +139,7 @@ def test_undamped_pantograph_keeps_its_energy(data: LumpedData) -> None:
     check("energy [J]", energies[0], 0.5 * free.stiffnesses[-1] * 0.2**2, within=1e-13)
     for number in range(n_steps):
         pantograph.predict((number + 1) * dt)
-        pantograph.advance(0.0)
+        pantograph.advance(np.array([0.0]))
         energies.append(pantograph.energy())
     # Stretches are differences of heights of 5.5 m: their round-off on the stiffest spring.
     stretch = np.sqrt(2 * energies[0] / max(free.stiffnesses))
@@ -153,12 +154,12 @@ def test_work_of_contact_force_and_lift_is_what_the_energy_changes_by() -> None:
     pantograph = LumpedPantograph(free, lift, NOMINAL, 0.0, dt)
     pantograph.place(NOMINAL)
     pantograph.predict(dt)
-    pantograph.advance(force)
+    pantograph.advance(np.array([force]))
     first = pantograph.state()[:2]
     before = pantograph.energy()
     for number in range(1, 3000):
         pantograph.predict((number + 1) * dt)
-        pantograph.advance(force)
+        pantograph.advance(np.array([force]))
     moved = pantograph.state()[:2] - first
     work = lift * moved[1] - force * moved[0]
     print(f"the head rose by {moved[0]:.3f} m")

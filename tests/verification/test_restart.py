@@ -9,7 +9,7 @@ import pytest
 from measuring import History, check, start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.solver.problem import ContactLaw
+from catenary.solver.contact_laws import LinearLaw
 
 
 @pytest.mark.parametrize("scheme", ["one_solve", "fixed_point"])
@@ -19,7 +19,7 @@ def test_continued_run_equals_the_uninterrupted_one(scheme: str) -> None:
     problem = problem_of(
         line,
         WHOLE | {"contact_damping"},
-        contact=ContactLaw(5e4, 50.0),
+        contact=LinearLaw(5e4, 50.0),
         train=train(70.0, 120.0, 180.0, behind=(0.0, 31.0), raise_time=0.3),
         numerics=numerics(1e-3, scheme),
     )

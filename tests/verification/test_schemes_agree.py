@@ -7,7 +7,8 @@ import pytest
 from measuring import History, check, march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.solver.problem import ContactLaw, Problem
+from catenary.solver.contact_laws import LinearLaw
+from catenary.solver.problem import Problem
 
 
 def two_pantographs(scheme: str, effects: frozenset[str], damping: float) -> Problem:
@@ -15,7 +16,7 @@ def two_pantographs(scheme: str, effects: frozenset[str], damping: float) -> Pro
     return problem_of(
         en50318_line(8),
         effects,
-        contact=ContactLaw(5e4, damping),
+        contact=LinearLaw(5e4, damping),
         train=train(320 / 3.6, 120.0, 330.0, behind=(0.0, 31.0), raise_time=0.3),
         numerics=numerics(1e-3, scheme),
         residual_stiffness_ratio=0.01,

@@ -12,9 +12,10 @@ from small_lines import BARE, ac_simple_line, mesh_of, problem_of, train
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver import effects
+from catenary.solver.contact_laws import LinearLaw
 from catenary.solver.equilibrium import find_form
 from catenary.solver.model import Model, build
-from catenary.solver.problem import ContactLaw, Damping, Problem
+from catenary.solver.problem import Damping, Problem
 
 N_SPANS = 4
 
@@ -36,7 +37,7 @@ def full_problem(names: frozenset[str]) -> Problem:
         line,
         names,
         damping=Damping(1e-4, 0.0125),
-        contact=ContactLaw(5e4, 50.0),
+        contact=LinearLaw(5e4, 50.0),
         train=train(1.1 * line.contact_wire.wave_speed, 60.0, 160.0, behind=(0.0, 31.0)),
         residual_stiffness_ratio=0.01,
     )
@@ -166,7 +167,7 @@ def test_a_scene_without_an_effect_has_no_trace_of_it(name: str, mesh: LineMesh)
         ("transition_spans", lambda p: with_line(p, transition_rise=0.0)),
         ("pre_sag", lambda p: with_line(p, pre_sag=((0.0,) * 9,) * N_SPANS)),
         ("structural_damping", lambda p: replace(p, damping=Damping(0.0, 0.0))),
-        ("contact_damping", lambda p: replace(p, contact=ContactLaw(5e4, 0.0))),
+        ("contact_damping", lambda p: replace(p, contact=LinearLaw(5e4, 0.0))),
         ("residual_dropper_stiffness", lambda p: replace(p, residual_stiffness_ratio=0.0)),
         (
             "several_pantographs",

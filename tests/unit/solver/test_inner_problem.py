@@ -10,10 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from catenary.mbs.interface import HeadState
 from catenary.solver import inner
+from catenary.solver.contact_laws import LinearLaw
+from catenary.solver.heads import Heads
 from catenary.solver.inner import InnerProblem, InnerSolution, LineResponse
-from catenary.solver.problem import ContactLaw
+from catenary.solver.law_in_steps import LinearInSteps
 
 EPS = np.finfo(float).eps
 
@@ -22,15 +23,16 @@ EPS = np.finfo(float).eps
 class Case:
     """An inner problem made from a random symmetric system, as a step of a line makes it."""
 
-    law: ContactLaw
+    law: LinearLaw
     kept: float
     may_lose_contact: bool
     line: LineResponse
-    heads: list[HeadState]
+    heads: Heads
     coupling: np.ndarray
 
     def solve(self) -> InnerSolution:
-        problem = InnerProblem(self.law, self.may_lose_contact, self.kept)
+        law = LinearInSteps(self.law, self.heads.n, pulls=not self.may_lose_contact)
+        problem = InnerProblem(law, self.kept)
         return problem.solve(self.line, self.heads, lambda droppers: self.coupling)
 
     def violation(self, found: InnerSolution) -> float:
@@ -39,13 +41,10 @@ class Case:
         height = line.height + line.height_by_force @ force - line.height_by_slack.T @ slack
         rate = line.rate + line.rate_by_force @ force - line.rate_by_slack.T @ slack
         tension = line.tension + line.tension_by_force @ force - self.coupling @ slack
-        push = np.array(
-            [
-                self.law.stiffness * (head.height - head.height_compliance * f - h)
-                + self.law.damping * (head.velocity - head.velocity_compliance * f - r)
-                for head, f, h, r in zip(self.heads, force, height, rate, strict=True)
-            ]
-        )
+        heads = self.heads
+        depth = heads.height - heads.height_compliance @ force - height
+        closing = heads.velocity - heads.velocity_compliance @ force - rate
+        push = self.law.stiffness * depth + self.law.damping * closing
         if self.may_lose_contact:
             push = np.maximum(0.0, push)
         released = (1.0 - self.kept) * np.maximum(0.0, -tension)
@@ -82,11 +81,13 @@ def make_case(
         height_by_slack=position * between,
         rate_by_slack=velocity * between,
     )
-    heads = [
-        HeadState(*rng.normal(size=2), *rng.uniform(0.0, 1.0, 2))  # heights, then compliances
-        for _ in range(n)
-    ]
-    law = ContactLaw(float(rng.uniform(0.5, 20.0)), damping)
+    heads = Heads(n)
+    heads.height[:], heads.velocity[:] = rng.normal(size=(2, n))
+    # Strips of one head move each other.
+    softness = rng.normal(size=(n, n))
+    heads.height_compliance[:] = rng.uniform(0.0, 1.0) * softness @ softness.T
+    heads.velocity_compliance[:] = rng.uniform(0.0, 3.0) * heads.height_compliance
+    law = LinearLaw(float(rng.uniform(0.5, 20.0)), damping)
     return Case(
         law, kept, may_lose_contact, line, heads, per_acceleration[:, None] * among_droppers
     )
@@ -144,8 +145,8 @@ def test_a_problem_that_cycles_is_handed_to_the_pivoting() -> None:
         -right,
         *[np.zeros((3, 0))] * 3,
     )
-    problem = InnerProblem(ContactLaw(1.0, 0.0), True, 0.0)
-    found = problem.solve(line, [], lambda droppers: np.eye(3) - matrix)
+    problem = InnerProblem(LinearInSteps(LinearLaw(1.0, 0.0), 0, pulls=False), 0.0)
+    found = problem.solve(line, Heads(0), lambda droppers: np.eye(3) - matrix)
     solutions = []
     for acts in itertools.product([False, True], repeat=3):
         index = np.flatnonzero(acts)
@@ -168,9 +169,10 @@ def one_contact(height: float, may_lose_contact: bool = True) -> InnerSolution:
         np.zeros(0),
         *[np.zeros((0, 1))] * 3,
     )
-    head = HeadState(0.0, 0.0, 2e-5, 0.0)
-    law = ContactLaw(5e4, 0.0)
-    return InnerProblem(law, may_lose_contact, 0.0).solve(line, [head], lambda droppers: None)
+    heads = Heads(1)
+    heads.height_compliance[:] = 2e-5
+    law = LinearInSteps(LinearLaw(5e4, 0.0), 1, pulls=not may_lose_contact)
+    return InnerProblem(law, 0.0).solve(line, heads, lambda droppers: np.zeros((0, 0)))
 
 
 def test_one_contact_has_its_closed_form() -> None:

@@ -1,0 +1,149 @@
+"""The paper's way through a step: whole solves, repeated until they agree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from catenary.solver.contact import Touches
+from catenary.solver.errors import RunBroken
+from catenary.solver.heads import Heads
+from catenary.solver.interaction import Interaction
+from catenary.solver.law_in_steps import LawInSteps
+from catenary.solver.pantographs import Pantographs
+from catenary.solver.problem import Numerics
+from catenary.solver.schemes import Counters, LoadSource
+
+
+@dataclass
+class FixedPoint:
+    """The paper's correction: eqs. (2.4) to (2.7) repeated until the iterates agree.
+
+    Contact forces and the compensation of slack droppers are evaluated from the latest iterate
+    and the whole system is solved again.
+    """
+
+    comm: Any
+    interaction: Interaction
+    pantographs: Pantographs
+    numerics: Numerics
+    law: LawInSteps
+    kept_ratio: float
+    may_slacken: bool
+    loads: LoadSource
+    counters: Counters = field(default_factory=Counters)
+
+    def __post_init__(self) -> None:
+        n = self.interaction.line.ownership.n_local
+        self._predicted = np.zeros((2, n))
+        self._latest = np.zeros((2, n))
+        self._heads = Heads(self.pantographs.n_contacts)
+        self._force = np.zeros(self.pantographs.n_contacts)
+
+    # Iterates that grow beyond all numbers are told by ``_settled``, not by NumPy.
+    @np.errstate(over="ignore", invalid="ignore")
+    def step(self, time: float, stop: bool) -> bool:
+        line = self.interaction.line
+        if self.comm.size > 1:
+            stop = self.comm.allreduce(int(stop)) > 0
+        line.predict()
+        self._predicted[0] = line.displacement
+        self._predicted[1] = line.velocity
+        line.internal_forces()
+        touches = self.pantographs.move_to(time)
+        heads = self._heads_everywhere(time)
+        external = self.loads(time)
+        force = self._force
+        for _ in range(self.numerics.max_iterations):
+            force, height, depth, rate = self._contact(touches, heads, force)
+            compensation = self._compensation()
+            self._latest[0] = line.displacement
+            self._latest[1] = line.velocity
+            np.copyto(line.displacement, self._predicted[0])
+            np.copyto(line.velocity, self._predicted[1])
+            line.solve(external + self.interaction.loads(touches, force, compensation))
+            line.correct()
+            self.counters.rounds += 1
+            if self._settled(time):
+                break
+        else:
+            self.counters.unconverged_steps += 1
+            raise self._broken("does not converge", time)
+        self.counters.steps += 1
+        self.counters.solves = self.counters.rounds
+        self._force = force
+        # All ranks hold the same forces, so that all remember the same impacts.
+        self.law.accept(time, depth, rate, force)
+        if self.comm.rank == 0:
+            self.pantographs.advance(force, self.law.reported(force), height)
+        return not stop
+
+    def state(self) -> np.ndarray:
+        """The latest forces, and what the law remembers, as one array."""
+        return np.concatenate([self._force, self.law.state()])
+
+    def restore(self, state: np.ndarray) -> None:
+        """Continue from what ``state`` returned."""
+        n = self._force.size
+        self._force = state[:n].copy()
+        self.law.restore(state[n:])
+
+    def _heads_everywhere(self, time: float) -> Heads:
+        """Rank 0's prediction on all ranks."""
+        heads = self._heads
+        packed = np.zeros(2 * heads.n + 2 * heads.n**2)
+        if self.comm.rank == 0:
+            heads = self.pantographs.predict(time)
+            packed = heads.pack()
+        if self.comm.size > 1:
+            self.comm.Bcast(packed, root=0)
+            heads.unpack(packed)
+        return heads
+
+    def _contact(
+        self, touches: Touches, heads: Heads, force: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Contact forces [N], wire heights [m], depths [m] and their rates [m/s] from the latest
+        iterate, on all ranks."""
+        height, rate = self.interaction.heights(touches)
+        both = np.concatenate([height, rate])
+        if self.comm.size > 1:
+            self.comm.Allreduce(MPI.IN_PLACE, both)
+        height, rate = both[: force.size], both[force.size :]
+        depth = heads.height - heads.height_compliance @ force - height
+        speed = heads.velocity - heads.velocity_compliance @ force - rate
+        new = self.law.force(depth, speed).copy()
+        return (new if self.law.pulls else np.maximum(new, 0.0)), height, depth, speed
+
+    def _compensation(self) -> np.ndarray:
+        """Forces that cancel what owned droppers push (eq. 2.7) [N]."""
+        if not self.may_slacken:
+            return np.zeros(0)
+        tension = self.interaction.droppers.tension()
+        return np.asarray((1.0 - self.kept_ratio) * np.maximum(0.0, -tension))
+
+    def _settled(self, time: float) -> bool:
+        line, numerics = self.interaction.line, self.numerics
+        change = np.array(
+            [
+                np.abs(line.displacement - self._latest[0]).max(initial=0.0) / numerics.eps_d,
+                np.abs(line.velocity - self._latest[1]).max(initial=0.0) / numerics.eps_v,
+            ]
+        )
+        largest = float(np.nan_to_num(change, nan=np.inf, posinf=np.inf).max())
+        if self.comm.size > 1:
+            largest = self.comm.allreduce(largest, op=MPI.MAX)
+        if not np.isfinite(largest):
+            raise self._broken("diverges", time)
+        return largest < 1.0
+
+    def _broken(self, how: str, time: float) -> RunBroken:
+        return RunBroken(
+            f"the fixed-point correction {how} at t = {time:.4f} s (at most "
+            f"{self.numerics.max_iterations} iterations, numerics.max_iterations) with the train "
+            f"at {float(self.pantographs.position[0]):.1f} m; take numerics.scheme = "
+            '"one_solve" or a smaller numerics.dt_s'
+        )
