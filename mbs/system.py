@@ -165,9 +165,15 @@ class System:
         return kinetic + sum(force.energy(motion) for force in self.forces)
 
     def accelerations(
-        self, motion: Motion, time: float, rows: Quantity | None = None
+        self,
+        motion: Motion,
+        time: float,
+        rows: Quantity | None = None,
+        more_forces: np.ndarray | float = 0.0,
     ) -> Accelerations:
         """Solve (3.6); ``rows`` replace those of the joints, gamma being minus their drift.
+
+        ``more_forces`` (6 n,) act besides those of the system.
 
         Raises
         ------
@@ -176,7 +182,7 @@ class System:
         """
         if rows is None:
             rows = self.constraints(motion, time)
-        force, softness = self.generalised_forces(motion, time), self.inverse_mass
+        force, softness = self.generalised_forces(motion, time) + more_forces, self.inverse_mass
         kept = independent_rows(rows.jacobian)
         jacobian = rows.jacobian[kept]
         multipliers = np.zeros(len(rows.value))
