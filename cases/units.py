@@ -1,14 +1,20 @@
-"""Units of scene keys: which suffix stands for which unit, and the two conversions to SI."""
+"""Units of scene keys: which suffix stands for which unit, and the conversions to SI."""
 
 from __future__ import annotations
 
+import math
+
 # One table gives each key its unit. Longest suffix first, so that "_kg_per_m" is not read as "_m".
 SUFFIXES: dict[str, str] = {
+    "_N_s2_per_m2": "N s2/m2",
+    "_N_per_m1_5": "N/m^1.5",
     "_N_s_per_m": "N s/m",
     "_m_per_s": "m/s",
     "_kg_per_m": "kg/m",
     "_N_per_m": "N/m",
+    "_kg_m2": "kg m2",
     "_N_m2": "N m2",
+    "_deg": "deg",
     "_km_h": "km/h",
     "_per_s": "1/s",
     "_mm": "mm",
@@ -28,6 +34,11 @@ def unit_of(key: str) -> str:
 def speed_from_km_h(speed: float) -> float:
     """Speed [m/s] from ``speed`` [km/h]."""
     return speed / 3.6
+
+
+def angle_from_deg(angle: float) -> float:
+    """Angle [rad] from ``angle`` [deg]."""
+    return math.radians(angle)
 
 
 def length_from_mm(length: float) -> float:

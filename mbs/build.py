@@ -6,9 +6,11 @@ from typing import NamedTuple
 
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lumped import LumpedData, LumpedPantograph
+from catenary.mbs.multibody import MultibodyData, head_weight_under_way, reduced, stand
+from catenary.mbs.raising import RaisingData, RaisingPantograph
 
 # What a pantograph can be described by.
-PantographData = LumpedData
+PantographData = LumpedData | MultibodyData
 
 
 class Operation(NamedTuple):
@@ -28,4 +30,32 @@ class Operation(NamedTuple):
 
 def make_pantograph(data: PantographData, operation: Operation) -> Pantograph:
     """The model that ``data`` describes. Not collective."""
+    if isinstance(data, MultibodyData):
+        return RaisingPantograph(
+            raising_data(data, operation.static_force, operation.nominal_height),
+            operation.raise_time,
+            operation.dt,
+            operation.beta,
+            operation.gamma,
+        )
     return LumpedPantograph(data, *operation)
+
+
+def raising_data(data: MultibodyData, static_force: float, nominal_height: float) -> RaisingData:
+    """Head and mechanism of a multibody pantograph on a vehicle of the right height.
+
+    Its arm is at the working height when the head, at ``nominal_height`` [m], is pressed down by
+    ``static_force`` [N].
+    """
+    standing = stand(data)
+    head = standing.head
+    arm = nominal_height + static_force / head.stiffness - head.offset
+    return RaisingData(
+        frame=reduced(data),
+        head_mass=head.mass,
+        head_stiffness=head.stiffness,
+        head_damping=head.damping,
+        head_weight=head_weight_under_way(data),
+        head_offset=head.offset,
+        base_height=arm - standing.working_height,
+    )

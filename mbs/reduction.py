@@ -13,12 +13,16 @@ import numpy as np
 from scipy import linalg
 from scipy.interpolate import CubicSpline
 
-from catenary.mbs.bodies import Vector
+from catenary.mbs.bodies import Motion, Vector
 from catenary.mbs.joints import ORIGIN, PrescribedPoint, constant
 from catenary.mbs.kinematics import point
 from catenary.mbs.statics import equilibrium
 from catenary.mbs.system import System
-from catenary.solver.errors import InputError
+from catenary.solver.errors import InputError, RunBroken
+
+# A mechanism whose equivalent mass is so many times that at the start nearly locks: tables would
+# not follow it.
+LOCKING = 4.0
 
 
 @dataclass(frozen=True)
@@ -26,13 +30,15 @@ class ReducedMechanism:
     """Tables over the height of a point, joined by cubic splines.
 
     ``heights`` [m], growing; ``masses`` [kg], equivalent mass at the point; ``lifts`` [N], upward
-    force on the point at rest; ``dampings`` [N s/m]; all of shape (n,), n >= 4.
+    force on the point at rest; ``dampings`` [N s/m]; all of shape (n,), n >= 4. ``name`` is the
+    pantograph's, for messages.
     """
 
     heights: np.ndarray
     masses: np.ndarray
     lifts: np.ndarray
     dampings: np.ndarray
+    name: str = ""
     _table: CubicSpline = field(init=False, repr=False, compare=False)
     _slopes: CubicSpline = field(init=False, repr=False, compare=False)
 
@@ -46,20 +52,26 @@ class ReducedMechanism:
 
         Raises
         ------
-        InputError
+        RunBroken
             The height is not within the tables.
         """
         if not self.heights[0] <= height <= self.heights[-1]:
-            raise InputError(
-                f"The height {height:g} m is not within the {self.heights[0]:g} m to "
-                f"{self.heights[-1]:g} m that the mechanism was reduced for."
-            )
+            raise self.left(height)
         return self._table(height), self._slopes(height)
+
+    def left(self, height: float) -> RunBroken:
+        """The error of a mechanism that has left its tables at a height [m]."""
+        who = f"of pantograph {self.name!r} " if self.name else ""
+        return RunBroken(
+            f"The arm {who}is at {height:.4g} m above its base, but its mechanism moves between "
+            f"{self.heights[0]:.4g} m and {self.heights[-1]:.4g} m only: it was thrown off the "
+            "wire, or the line's heights are beyond its reach."
+        )
 
     def acceleration(self, height: float, speed: float, push: float = 0.0) -> float:
         """Acceleration upward [m/s^2] at a height [m] and speed upward [m/s].
 
-        ``push`` [N] is a further force on the point, upward. Raises InputError as ``at`` does.
+        ``push`` [N] is a further force on the point, upward. Raises RunBroken as ``at`` does.
         """
         (mass, lift, damping), (mass_slope, _, _) = self.at(height)
         force = lift - damping * speed - 0.5 * mass_slope * speed**2 + push
@@ -67,7 +79,13 @@ class ReducedMechanism:
 
 
 def reduce_mechanism(
-    system: System, body: str, heights: Vector, at: Vector = ORIGIN
+    system: System,
+    body: str,
+    heights: Vector,
+    at: Vector = ORIGIN,
+    start: Motion | None = None,
+    as_far_as_it_goes: bool = False,
+    name: str = "",
 ) -> ReducedMechanism:
     """Tables of a mechanism for heights of the point ``at`` of a body.
 
@@ -77,6 +95,10 @@ def reduce_mechanism(
     Parameters
     ----------
     heights : shape (n,) [m], growing, n >= 4
+    start : a motion near by to assemble from, that of the system's data if None
+    as_far_as_it_goes : leave out the heights beyond the first one, above and below the start,
+        that the mechanism does not reach or where it nearly locks
+    name : of the pantograph, for messages
 
     Raises
     ------
@@ -87,22 +109,44 @@ def reduce_mechanism(
     if len(table) < 4 or np.any(np.diff(table) <= 0.0):
         raise InputError(f"A mechanism is reduced for at least four growing heights, not {table}.")
     # Heights are visited from the one that is nearest to the start, each from its neighbour.
-    start = system.assemble(system.start()).motion
-    first = int(np.argmin(np.abs(table - point(start, body, at).value[2])))
-    columns = np.empty((len(table), 3))
-    for order in (range(first, len(table)), range(first, -1, -1)):
-        motion = start
-        for k in order:
-            holder = PrescribedPoint("height", body, constant(float(table[k])), at)
-            motion = equilibrium(system.with_joints(holder), motion).motion
-            rows = holder.rows(motion, 0.0)
-            jacobian = np.vstack([system.constraints(motion, 0.0).jacobian, rows.jacobian])
-            # Of all velocities with unit speed of the point those of least kinetic energy.
-            root = np.sqrt(system.inverse_mass)
-            unit_speed = np.append(np.zeros(len(jacobian) - 1), 1.0)
-            way = root * linalg.lstsq(jacobian * root, unit_speed, cond=1e-8)[0]
-            lift = way @ system.generalised_forces(motion, 0.0)
-            moving = motion.with_velocities(way)
-            damping = lift - way @ system.generalised_forces(moving, 0.0)
-            columns[k] = system.mass @ way**2, lift, damping
-    return ReducedMechanism(table, *columns.T)
+    motion = system.assemble(system.start() if start is None else start).motion
+    first = int(np.argmin(np.abs(table - point(motion, body, at).value[2])))
+    columns = np.full((len(table), 3), np.nan)
+    motion, columns[first] = _at_height(system, body, at, motion, table[first])
+    for way in (range(first + 1, len(table)), range(first - 1, -1, -1)):
+        there = motion
+        for k in way:
+            try:
+                there, columns[k] = _at_height(system, body, at, there, table[k])
+            except (InputError, RunBroken):
+                if not as_far_as_it_goes:
+                    raise
+                break
+            if as_far_as_it_goes and columns[k, 0] > LOCKING * columns[first, 0]:
+                columns[k] = np.nan
+                break
+    reached = ~np.isnan(columns[:, 0])
+    if reached.sum() < 4:
+        raise InputError(
+            f"The mechanism moves by less than {4 * np.diff(table).min():g} m from the height of "
+            f"{table[first]:g} m before it locks or comes apart."
+        )
+    masses, lifts, dampings = columns[reached].T
+    return ReducedMechanism(table[reached], masses, lifts, dampings, name)
+
+
+def _at_height(
+    system: System, body: str, at: Vector, near: Motion, height: float
+) -> tuple[Motion, np.ndarray]:
+    """The system at rest with a point at a height, and mass, lift and damping there, shape (3,)."""
+    holder = PrescribedPoint("height", body, constant(float(height)), at)
+    motion = equilibrium(system.with_joints(holder), near).motion
+    rows = holder.rows(motion, 0.0)
+    jacobian = np.vstack([system.constraints(motion, 0.0).jacobian, rows.jacobian])
+    # Of all velocities with unit speed of the point those of least kinetic energy.
+    root = np.sqrt(system.inverse_mass)
+    unit_speed = np.append(np.zeros(len(jacobian) - 1), 1.0)
+    way = root * linalg.lstsq(jacobian * root, unit_speed, cond=1e-8)[0]
+    lift = way @ system.generalised_forces(motion, 0.0)
+    damping = lift - way @ system.generalised_forces(motion.with_velocities(way), 0.0)
+    return motion, np.array([system.mass @ way**2, lift, damping])

@@ -103,6 +103,13 @@ def _multipliers(system: System, motion: Motion, time: float) -> np.ndarray:
     return linalg.lstsq(jacobian.T, force, cond=1e-8)[0]
 
 
+def unheld_force(system: System, motion: Motion, time: float = 0.0) -> float:
+    """Size of the forces on all free motions together [N], zero where a system is at rest."""
+    jacobian = system.constraints(motion, time).jacobian
+    free = linalg.null_space(jacobian, rcond=1e-8)
+    return float(np.linalg.norm(free.T @ system.generalised_forces(motion, time)))
+
+
 def held_force(system: System, holder: Joint, start: Motion, time: float = 0.0) -> float:
     """Force with which a system at rest presses on what holds it by one row [N].
 

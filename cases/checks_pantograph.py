@@ -1,0 +1,119 @@
+"""Whether the train's pantographs can be what their tables say."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NoReturn
+
+from catenary.cases.convert_pantograph import multibody_of, wanted_force
+from catenary.cases.messages import shown
+from catenary.cases.schema_mechanism import ActuatorTable
+from catenary.cases.schema_pantograph import MultibodyTable
+from catenary.mbs.bodies import SPACE
+from catenary.mbs.multibody import stand
+from catenary.solver.errors import InputError, RunBroken
+
+if TYPE_CHECKING:
+    from catenary.cases.scene import Scene
+
+
+def check_pantographs(scene: Scene) -> None:
+    """Raise ``InputError`` with the first thing that is wrong with a kind of pantograph.
+
+    Names and forces of every kind are checked; only those on the train are assembled.
+    """
+    on_the_train = {place.name for place in scene.train.pantographs}
+    for name, table in scene.pantographs.items():
+        if isinstance(table, MultibodyTable):
+            _names(scene, name, table)
+            _actuator(scene, name, table)
+    _static_forces(scene, on_the_train)
+    for name in scene.pantographs:
+        if name in on_the_train:
+            _mechanism(scene, name)
+
+
+def _names(scene: Scene, kind: str, table: MultibodyTable) -> None:
+    key = f"pantographs.{kind}"
+    bodies = list(table.bodies)
+    if SPACE in bodies:
+        _refuse(scene, f"{key}.bodies.{SPACE}", "is the name of the frame at rest; choose another")
+    for role in ("head", "arm"):
+        _known(scene, f"{key}.{role}", getattr(table, role), bodies)
+    if table.head == table.arm:
+        _refuse(scene, f"{key}.head", f"is {shown(table.head)} as the arm is; they are two bodies")
+    if table.actuator is not None:
+        _known(scene, f"{key}.actuator", table.actuator, list(table.forces))
+    for place, name in _uses(table):
+        _known(scene, f"{key}.{place}", name, [*bodies, SPACE])
+    for what in ("joints", "forces"):
+        for label, one in getattr(table, what).items():
+            if getattr(one, "i", None) == getattr(one, "j", SPACE):
+                _refuse(scene, f"{key}.{what}.{label}", f"has {shown(one.i)} on both sides")
+    for label in table.forces:
+        if label in table.joints or label == "gravity":
+            _refuse(scene, f"{key}.forces.{label}", "has the name of a joint or of gravity")
+
+
+def _uses(table: MultibodyTable) -> Iterator[tuple[str, str]]:
+    """Where names of bodies stand in joints and forces, and the names."""
+    for what in ("joints", "forces"):
+        for label, one in getattr(table, what).items():
+            for end in ("i", "j", "body"):
+                if hasattr(one, end):
+                    yield f"{what}.{label}.{end}", getattr(one, end)
+
+
+def _known(scene: Scene, key: str, name: str, known: list[str]) -> None:
+    if name in known:
+        return
+    near = difflib.get_close_matches(name, known, n=1)
+    hint = f"did you mean {near[0]}?" if near else f"it must be one of {', '.join(known)}"
+    _refuse(scene, key, f"is {shown(name)}", hint)
+
+
+def _actuator(scene: Scene, kind: str, table: MultibodyTable) -> None:
+    if not table.calibrate or table.actuator is None:
+        return
+    force = table.forces[table.actuator]
+    key = f"pantographs.{kind}.actuator"
+    if not isinstance(force, ActuatorTable):
+        _refuse(scene, key, f"is {shown(table.actuator)}", f"that is a {force.type}, no actuator")
+    if force.force_N is None:
+        _refuse(
+            scene,
+            key,
+            f"is {shown(table.actuator)}",
+            "its force is a table, so that it cannot be calibrated; write calibrate = false",
+        )
+
+
+def _static_forces(scene: Scene, on_the_train: set[str]) -> None:
+    speed = scene.train.speed_km_h
+    for name, table in scene.pantographs.items():
+        if name not in on_the_train or table.static_force_by_speed is None:
+            continue
+        if wanted_force(table, speed) is None:
+            first, last = table.static_force_by_speed[0][0], table.static_force_by_speed[-1][0]
+            key = "train.speed_km_h"
+            raise InputError(
+                f"{key} is {speed:g} km/h {scene.origin.of(key)}; "
+                f"pantographs.{name}.static_force_by_speed only holds forces for {first:g} to "
+                f"{last:g} km/h"
+            )
+
+
+def _mechanism(scene: Scene, name: str) -> None:
+    table = scene.pantographs[name]
+    if not isinstance(table, MultibodyTable):
+        return
+    try:
+        stand(multibody_of(name, table, scene.train.speed_km_h))
+    except (InputError, RunBroken) as error:
+        key = f"pantographs.{name}"
+        raise InputError(f"{key} {scene.origin.of(key)} cannot be built: {error}") from error
+
+
+def _refuse(scene: Scene, key: str, says: str, hint: str = "") -> NoReturn:
+    raise InputError(f"{key} {says} {scene.origin.of(key)}{f'; {hint}' if hint else ''}")
