@@ -89,7 +89,7 @@ def test_prescribed_slider_crank_follows_its_closed_form(method: str) -> None:
     root = np.sqrt(length**2 - (r * np.sin(turn)) ** 2)
     expected = r * np.cos(turn) + root
     velocity = -r * speed * np.sin(turn) * (1 + r * np.cos(turn) / root)
-    # Removed errors leave 1e-12; feedback the prediction's r w^3 h^3 / 6, and w h of it in velocity.
+    # Removed errors leave 1e-12; feedback r w^3 h^3 / 6 of the prediction, and that / h a second.
     within = 6 * r * (speed * dt) ** 3 / 6 if method == "baumgarte" else 1e-10
     check("slider [m]", [x for x, _ in found], expected, within=within)
     check("its velocity [m/s]", [v for _, v in found], velocity, within=max(1e-9, within / dt))
