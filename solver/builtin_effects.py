@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.solver.contact_laws import KinematicLaw
 from catenary.solver.effects import Effect, register
 from catenary.solver.model import ModelBuilder
 
@@ -182,6 +183,7 @@ register(
         "the contact force cannot pull",
         "paper section 4",
         default=True,
+        applies=lambda p: not isinstance(p.contact, KinematicLaw),
         build=lambda builder: builder.count_term(),
     )
 )
@@ -190,7 +192,7 @@ register(
         "contact_damping",
         "damping of the contact",
         "a force on the gap rate, its convective part V dw/dx included",
-        "penalty contact with a viscous term",
+        "penalty contact with a viscous term, or hysteresis (paper eq. 4.1)",
         default=False,
         applies=lambda p: p.contact.dissipates,
         build=lambda builder: builder.count_term(),

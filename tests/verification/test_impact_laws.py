@@ -1,4 +1,4 @@
-"""A ball on a fixed wire: coefficient of restitution of each contact law, energy of contact cycles.
+"""A ball on a fixed wire: restitution of each contact law, and the energy of contact cycles.
 
 For m dv/dt = -K d^n (1 + chi v / v0) the time drops out: m v dv / (1 + chi v / v0) = -K d^n dd. From
 touching with v0 to leaving with -e v0 this integrates to
