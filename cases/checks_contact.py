@@ -1,0 +1,92 @@
+"""Whether contact law, effects and numerics of a scene fit together."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from catenary.cases.messages import refuse
+from catenary.cases.schema_contact import HERTZ, WITH_RESTITUTION
+
+if TYPE_CHECKING:
+    from catenary.cases.scene import Scene
+
+
+def check_contact(scene: Scene) -> None:
+    """Raise ``InputError`` with the first thing about contact that contradicts itself."""
+    _damping(scene)
+    _loss(scene)
+    _kinematic(scene)
+
+
+def _damping(scene: Scene) -> None:
+    contact, switches = scene.contact, scene.switches()
+    law, on = contact.law, switches["contact_damping"]
+    said = "contact_damping" in scene.effects
+    if law == "linear":
+        key, value, dissipates = "damping_N_s_per_m", contact.damping_N_s_per_m, "greater than 0"
+        acts = value > 0
+    elif law in WITH_RESTITUTION:
+        assert contact.restitution is not None
+        key, value, dissipates = "restitution", contact.restitution, "below 1"
+        acts = value < 1
+    else:
+        if on:
+            refuse(
+                scene.origin,
+                "effects.contact_damping",
+                True,
+                f"contact.law {law} has no damping; leave it out or take another law",
+            )
+        return
+    key = f"contact.{key}"
+    if on and not acts:
+        why = f"effects.contact_damping is on and needs a value {dissipates}"
+        refuse(scene.origin, key, value, why)
+    if acts and not on and not said:
+        refuse(
+            scene.origin,
+            key,
+            value,
+            "it acts only with effects.contact_damping = true; write that, or false to leave it "
+            "out",
+        )
+
+
+def _loss(scene: Scene) -> None:
+    if scene.contact.law in HERTZ and not scene.switches()["contact_loss"]:
+        refuse(
+            scene.origin,
+            "effects.contact_loss",
+            False,
+            f"contact.law {scene.contact.law} has no force that pulls; take law linear",
+        )
+
+
+# Below it the force of a moving kinematic contact alternates with a growing amplitude: accelerations
+# of Newmark's average acceleration remember a jump forever.
+KINEMATIC_GAMMA = 0.55
+
+
+def _kinematic(scene: Scene) -> None:
+    if scene.contact.law != "kinematic":
+        return
+    numerics = scene.numerics
+    for key, value, needed in (
+        ("scheme", numerics.scheme, "one_solve"),
+        ("coupling", numerics.coupling or "implicit", "implicit"),
+    ):
+        if value != needed:
+            refuse(
+                scene.origin,
+                f"numerics.{key}",
+                value,
+                f"contact.law kinematic has no force before the motion is known: take {needed}",
+            )
+    if numerics.newmark_gamma < KINEMATIC_GAMMA:
+        refuse(
+            scene.origin,
+            "numerics.newmark_gamma",
+            numerics.newmark_gamma,
+            f"contact.law kinematic needs at least {KINEMATIC_GAMMA:g}, with "
+            "numerics.newmark_beta at least 0.28: without numerical damping its force alternates",
+        )
