@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from measuring import check
 from seven_bodies import ARM, HEAD, at_rest, calibrated, pressed
+from typer.testing import CliRunner
 
+from catenary.cases.cli import app
+from catenary.cases.loading import read_toml
 from catenary.mbs.bodies import SPACE, Body
 from catenary.mbs.constraint_handling import Baumgarte
 from catenary.mbs.forces import Gravity, PointForce, SpringDamper
@@ -218,6 +224,26 @@ def test_fixed_steps_answer_a_load_as_the_linearised_bodies_do() -> None:
     expected = model.push @ amplitudes
     check("amplitude [m/N]", abs(found), abs(expected), within=1e-3 * abs(expected))
     check("phase [rad]", np.angle(found / expected), 0.0, within=1e-3)
+
+
+def test_verb_tells_how_the_seven_bodies_of_the_case_stand(tmp_path: Path) -> None:
+    """The same figures from the scene's tables, at the command line; the fit loads as a table."""
+    words = ("pantograph", "ambrosio2012", "--kind", "seven_body", "-o", str(tmp_path / "new"))
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, result.output
+    figures = dict(
+        re.findall(
+            r"^  (force of actuator|joint_\d|frame .*?|head .*?)  +(\S+)  ", result.output, re.M
+        )
+    )
+    check("actuator [N]", float(figures["force of actuator"]), 9890.0, within=98.9)
+    check("joint 1 [mm]", float(figures["joint_1"]), 5.5, within=0.5)
+    frame = figures["frame at the arm (stabilisation_arm)"]
+    check("frame [kg]", float(frame), 25.7, within=0.257)
+    assert "of upper_link" in result.output
+    fragment = read_toml(tmp_path / "new" / "lumped.toml")
+    masses = fragment["pantographs"]["seven_body_lumped"]["masses_kg"]
+    check("masses [kg]", masses, (7.8, 25.7), within=(0.05, 0.26))
 
 
 def test_only_rest_is_linearised() -> None:
