@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from catenary.mbs import head_kernels
+from catenary.mbs.base_motion import BaseMotion
 from catenary.mbs.interface import Pantograph
+from catenary.mbs.lateral import LateralPath
 from catenary.mbs.lumped import LumpedData, LumpedPantograph
 from catenary.mbs.multibody import MultibodyData, head_weight_under_way, reduced, stand
 from catenary.mbs.raising import RaisingData, RaisingPantograph
@@ -18,6 +21,8 @@ class Operation(NamedTuple):
 
     ``static_force`` [N] on a wire at rest at ``nominal_height`` [m] of the head, raised from zero
     over ``raise_time`` [s]; ``dt`` [s], ``beta`` and ``gamma`` of the line's Newmark step.
+    ``lateral`` is where the wire crosses the strips, without which the head does not roll, and
+    ``base`` how the vehicle moves, without which it does not.
     """
 
     static_force: float
@@ -26,18 +31,16 @@ class Operation(NamedTuple):
     dt: float
     beta: float
     gamma: float
+    lateral: LateralPath | None = None
+    base: BaseMotion | None = None
 
 
 def make_pantograph(data: PantographData, operation: Operation) -> Pantograph:
     """The model that ``data`` describes. Not collective."""
+    head_kernels.warm_up()
     if isinstance(data, MultibodyData):
-        return RaisingPantograph(
-            raising_data(data, operation.static_force, operation.nominal_height),
-            operation.raise_time,
-            operation.dt,
-            operation.beta,
-            operation.gamma,
-        )
+        raising = raising_data(data, operation.static_force, operation.nominal_height)
+        return RaisingPantograph(raising, *operation[2:])
     return LumpedPantograph(data, *operation)
 
 
