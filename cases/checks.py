@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
-from catenary.cases.convert import static_force
+from catenary.cases.checks_pantograph import check_pantographs
 from catenary.cases.keys import is_known, known_keys
 from catenary.cases.messages import shown, unknown_key
 from catenary.cases.units import unit_of
@@ -43,7 +43,7 @@ def check(scene: Scene) -> None:
     _effect_data(scene)
     _pantograph_names(scene)
     _separations(scene)
-    _static_forces(scene)
+    check_pantographs(scene)
     line = scene.to_line()
     _droppers_inside_spans(scene, line)
     _dropper_lengths(scene, line)
@@ -143,22 +143,6 @@ def _separations(scene: Scene) -> None:
                 behind[i],
                 f"it must be at least {MIN_SEPARATION:g} m more than the {behind[i - 1]:g} m of "
                 "the pantograph before it",
-            )
-
-
-def _static_forces(scene: Scene) -> None:
-    speed = scene.train.speed_km_h
-    for place in scene.train.pantographs:
-        kind = scene.pantographs[place.name]
-        if static_force(kind, speed) is None:
-            assert kind.static_force_by_speed is not None
-            first, last = kind.static_force_by_speed[0][0], kind.static_force_by_speed[-1][0]
-            _refuse(
-                scene,
-                "train.speed_km_h",
-                speed,
-                f"pantographs.{place.name}.static_force_by_speed only holds forces for "
-                f"{first:g} to {last:g} km/h",
             )
 
 

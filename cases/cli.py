@@ -219,8 +219,8 @@ def plan(
 
 @app.command(
     "check",
-    help="Check a case: keys, bounds, geometry, effects, mesh, and that no dropper is slack at "
-    "rest. Writes nothing.",
+    help="Check a case: keys, bounds, geometry, effects, mesh, pantographs, and that no dropper is "
+    "slack at rest. Writes nothing.",
     epilog="Example: catenary check my_line/case.toml --set line.dropper.pre_sag_mid_mm=60",
 )
 @console.guarded
@@ -233,6 +233,7 @@ def check(
 ) -> None:
     """Serial."""
     from catenary.cases.meshing import mesh_of
+    from catenary.cases.pantograph_facts import kind_lines
     from catenary.solver.equilibrium import find_form
 
     scene = _load(case, assignments, extras, shortened)
@@ -244,6 +245,8 @@ def check(
         f"{problem.line.support_positions[-1]:g} m, {mesh.droppers.shape[0]} droppers, "
         f"{mesh.n_nodes} nodes"
     )
+    for name, lines in kind_lines(scene, problem).items():
+        console.say(f"pantograph {name}, " + "\n  ".join(lines))
 
 
 @app.command(

@@ -1,4 +1,7 @@
-"""From a scene's tables to the line and the problem in SI units. The only place of conversion."""
+"""From a scene's tables to the line and the problem in SI units.
+
+Conversion is here and, for pantographs, in `convert_pantograph`, and nowhere else.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from catenary.cases.convert_pantograph import pantograph_of, static_force
 from catenary.cases.schema_line import LineTable, WireTable
-from catenary.cases.schema_run import PantographTable
 from catenary.cases.units import length_from_mm, speed_from_km_h
-from catenary.mbs.lumped import LumpedData
 from catenary.meshgen.line import DropperKind, Line, SteadyArm, Wire
 from catenary.solver.errors import InputError
 from catenary.solver.contact_laws import LinearLaw
@@ -103,17 +105,6 @@ def span_lengths(table: LineTable) -> tuple[float, ...]:
     return ends * transition.n_spans_start + running + ends * transition.n_spans_end
 
 
-def static_force(pantograph: PantographTable, speed_km_h: float) -> float | None:
-    """Static force [N] at a speed, None if its table does not reach that speed."""
-    if pantograph.static_force_N is not None:
-        return pantograph.static_force_N
-    assert pantograph.static_force_by_speed is not None
-    speeds, forces = np.array(pantograph.static_force_by_speed).T
-    if not speeds[0] <= speed_km_h <= speeds[-1]:
-        return None
-    return float(np.interp(speed_km_h, speeds, forces))
-
-
 def _positions(scene: Scene, span: float) -> tuple[float, ...]:
     kind = scene.line.dropper
     if kind.positions_m is not None:
@@ -175,15 +166,11 @@ def _train(scene: Scene) -> Train:
     placements = []
     for place in scene.train.pantographs:
         kind = scene.pantographs[place.name]
-        force = static_force(kind, scene.train.speed_km_h)
-        assert force is not None  # checks.py has refused speeds outside the table
+        force = static_force(place.name, kind, scene.train.speed_km_h)
+        assert force is not None  # checks_pantograph.py has refused speeds outside the table
         placements.append(
             Placement(
-                data=LumpedData(
-                    tuple(kind.masses_kg),
-                    tuple(kind.stiffnesses_N_per_m),
-                    tuple(kind.dampings_N_s_per_m),
-                ),
+                data=pantograph_of(place.name, kind, scene.train.speed_km_h),
                 static_force=force,
                 behind=place.behind_m,
                 nominal_height=kind.nominal_height_m,

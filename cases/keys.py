@@ -5,9 +5,11 @@ from __future__ import annotations
 import difflib
 import types
 import typing
-from typing import Any
+from collections.abc import Sequence
+from typing import Annotated, Any
 
 from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 
 from catenary.cases.table import Table
 from catenary.solver import effects
@@ -16,39 +18,112 @@ from catenary.solver import effects
 ANY = "*"
 
 
-def known_keys(model: type[BaseModel]) -> list[str]:
-    """Dotted keys of a table and of all tables below it, ``*`` for what the scene names."""
-    found: list[str] = []
+def known_keys(model: type[BaseModel], location: Sequence[int | str] = ()) -> list[str]:
+    """Dotted keys of a table and of all tables below it, ``*`` for what the scene names.
+
+    Where there are several kinds of table, the keys of all of them, or only of those that
+    ``location``, as pydantic gives it, leads through.
+    """
+    found: dict[str, None] = {}
     for name, field in model.model_fields.items():
-        found.append(name)
+        found[name] = None
         if name == "effects":
-            found += [f"effects.{effect}" for effect in effects.registry()]
+            found |= {f"effects.{effect}": None for effect in effects.registry()}
             continue
-        inner, wildcard = table_in(field.annotation)
-        if inner is not None:
-            prefix = f"{name}.{ANY}" if wildcard else name
+        inner, wildcard = tables_in(field.annotation)
+        if inner:
+            below = tuple(location[1:]) if location and location[0] == name else ()
+            prefix = name
             if wildcard:
-                found.append(prefix)
-            found += [f"{prefix}.{key}" for key in known_keys(inner)]
+                prefix, below = f"{name}.{ANY}", below[1:]
+                found[prefix] = None
+            if len(inner) > 1 and below:
+                chosen = tuple(table for table in inner if kind_of(table) == below[0])
+                inner, below = chosen or inner, below[1:] if chosen else below
+            for table in inner:
+                found |= {f"{prefix}.{key}": None for key in known_keys(table, below)}
         elif _is_free(field.annotation):
-            found.append(f"{name}.{ANY}")
-    return found
+            found[f"{name}.{ANY}"] = None
+    return list(found)
 
 
-def table_in(annotation: Any) -> tuple[type[Table] | None, bool]:
-    """The table class inside an annotation and whether a list or mapping of it is meant."""
+def kind_of(table: type[BaseModel]) -> str:
+    """What the ``type`` of a table says that is one of several kinds, "" without one."""
+    field = table.model_fields.get("type")
+    choices = typing.get_args(field.annotation) if field is not None else ()
+    return str(choices[0]) if choices else ""
+
+
+def tables_in(annotation: Any) -> tuple[tuple[type[Table], ...], bool]:
+    """The table classes inside an annotation and whether a list or mapping of them is meant."""
     if isinstance(annotation, type) and issubclass(annotation, Table):
-        return annotation, False
+        return (annotation,), False
     origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
+    if origin is Annotated:
+        return tables_in(arguments[0])
     if origin in (typing.Union, types.UnionType):
+        found: tuple[type[Table], ...] = ()
+        wildcard = False
         for argument in arguments:
-            inner, wildcard = table_in(argument)
-            if inner is not None:
-                return inner, wildcard
-    elif origin in (list, dict) and arguments:
-        inner, _ = table_in(arguments[-1])
-        return inner, inner is not None
-    return None, False
+            inner, many = tables_in(argument)
+            found, wildcard = found + inner, wildcard or many
+        return found, wildcard
+    if origin in (list, dict) and arguments:
+        inner, _ = tables_in(arguments[-1])
+        return inner, bool(inner)
+    return (), False
+
+
+def with_kinds(key: str, raw: Any, model: type[BaseModel]) -> list[str]:
+    """A dotted key as pydantic's location, with the kinds of tables that ``raw`` says there are."""
+    location: list[str] = []
+    here: tuple[type[BaseModel], ...] = (model,)
+    named = choosing = False
+    for part in key.split("."):
+        if choosing and not named:
+            choosing = False
+            kind = raw.get("type", kind_of(here[0])) if isinstance(raw, dict) else ""
+            chosen = tuple(table for table in here if kind_of(table) == kind)
+            if chosen:
+                here = chosen
+                location.append(str(kind))
+        location.append(part)
+        raw = raw.get(part) if isinstance(raw, dict) else None
+        if named:
+            named = False
+            continue
+        fields = [table.model_fields[part] for table in here if part in table.model_fields]
+        here, named = tables_in(fields[0].annotation) if fields else ((), False)
+        choosing = len(here) > 1
+    return location
+
+
+def without_kinds(
+    location: Sequence[int | str], model: type[BaseModel]
+) -> tuple[list[int | str], FieldInfo | None]:
+    """A location of pydantic without the kinds of tables in it, and the field where it ends."""
+    parts: list[int | str] = []
+    here: tuple[type[BaseModel], ...] = (model,)
+    field: FieldInfo | None = None
+    named = choosing = False  # what comes next is a name that the scene chose, or a kind
+    for part in location:
+        if choosing and not named:
+            choosing = False
+            chosen = tuple(table for table in here if kind_of(table) == part)
+            if chosen:
+                here = chosen
+                continue
+        parts.append(part)
+        if named:
+            named = False
+            continue
+        field = next(
+            (table.model_fields[str(part)] for table in here if str(part) in table.model_fields),
+            None,
+        )
+        here, named = tables_in(field.annotation) if field is not None else ((), False)
+        choosing = len(here) > 1
+    return parts, field
 
 
 def _is_free(annotation: Any) -> bool:

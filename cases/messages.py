@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from catenary.cases.keys import known_keys, nearest, table_in
+from catenary.cases.keys import known_keys, nearest, without_kinds
 from catenary.cases.units import unit_of
 from catenary.solver.errors import InputError
 
@@ -50,6 +50,11 @@ def unknown_key(key: str, where: str, known: list[str]) -> str:
     return f"{shown(key)[1:-1]} {where} is unknown{hint}"
 
 
+def _or(listed: str) -> str:
+    """A list "a, b, c" as "a, b or c"."""
+    return " or ".join(listed.rsplit(", ", 1))
+
+
 # What pydantic's error types ask for, completed with the error's own limits.
 _WANTED: dict[str, Callable[[dict[str, Any]], str]] = {
     "greater_than": lambda c: f"must be greater than {c['gt']:g}",
@@ -71,6 +76,10 @@ _WANTED: dict[str, Callable[[dict[str, Any]], str]] = {
     "string_too_short": lambda c: "must not be empty",
     "string_too_long": lambda c: f"must have at most {c['max_length']} characters",
     "value_error": lambda c: str(c["error"]),
+    "union_tag_invalid": lambda c: (
+        f"must be of type {_or(c['expected_tags'].replace(chr(39), ''))}, not {c['tag']}"
+    ),
+    "union_tag_not_found": lambda c: "must have a type",
 }
 _OF_A_NUMBER = (
     "greater_than",
@@ -99,14 +108,15 @@ def input_error(
 def _sentence(
     problem: dict[str, Any], raw: dict[str, Any], model: type[BaseModel], origin: Origin
 ) -> str:
-    location = _location(problem["loc"], raw)
+    parts, field = without_kinds(problem["loc"], model)
+    location = _location(parts, raw)
     key = ".".join(location) or "the scene"
     where = origin.of(key)
     kind = problem["type"]
     if kind == "extra_forbidden":
-        return unknown_key(key, where, known_keys(model))
+        return unknown_key(key, where, known_keys(model, problem["loc"]))
     if kind == "missing":
-        meaning = _description(problem["loc"], model)
+        meaning = field.description if field is not None else ""
         return f"{key}{f' ({meaning})' if meaning else ''} is missing {where}"
     wanted = _WANTED.get(kind, lambda c: problem["msg"])(problem.get("ctx") or {})
     value = problem["input"]
@@ -117,7 +127,7 @@ def _sentence(
     return f"{key} is {shown(value)} {where}; it {wanted}{shown_unit}"
 
 
-def _location(loc: tuple[int | str, ...], raw: Any) -> list[str]:
+def _location(loc: Sequence[int | str], raw: Any) -> list[str]:
     """The part of a pydantic location that exists as written, with the missing or extra key."""
     parts: list[str] = []
     for part in loc:
@@ -133,16 +143,3 @@ def _location(loc: tuple[int | str, ...], raw: Any) -> list[str]:
         else:
             raw = None
     return parts
-
-
-def _description(loc: tuple[int | str, ...], model: type[BaseModel]) -> str:
-    """Help text of the field at a location of a missing key, "" if there is none."""
-    here: type[BaseModel] | None = model
-    text = ""
-    for part in loc:
-        if here is None or str(part) not in here.model_fields:
-            continue  # an index or a chosen name: the table is the one inside
-        field = here.model_fields[str(part)]
-        text = field.description or ""
-        here = table_in(field.annotation)[0]
-    return text

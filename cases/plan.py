@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from catenary.cases.pantograph_facts import kind_lines
 from catenary.cases.scene import Scene
 from catenary.solver import effects
 from catenary.solver.problem import Problem
@@ -48,6 +49,7 @@ class Plan:
     element_lengths : shortest and longest element of the contact wire [m]
     speed, wave_speed : of the train and of the contact wire [m/s]
     static_forces : of the pantographs [N]
+    kinds : name and description of each kind of pantograph on the train
     start, end, evaluation : stretch that the leading pantograph runs, and that is judged [m]
     dt, simulated : time step and simulated time [s]
     memory : estimate of the resident memory on one rank [B]
@@ -70,6 +72,7 @@ class Plan:
     speed: float
     wave_speed: float
     static_forces: tuple[float, ...]
+    kinds: tuple[tuple[str, str], ...]
     start: float
     end: float
     evaluation: tuple[float, float]
@@ -135,6 +138,7 @@ def make_plan(scene: Scene) -> Plan:
         speed=train.speed,
         wave_speed=problem.line.contact_wire.wave_speed,
         static_forces=tuple(place.static_force for place in train.placements),
+        kinds=tuple((name, told[0]) for name, told in kind_lines(scene, problem).items()),
         start=train.start,
         end=train.end,
         evaluation=problem.evaluation,
@@ -165,6 +169,7 @@ def plan_text(plan: Plan) -> str:
     pantographs = "1 pantograph" if plan.n_pantographs == 1 else f"{plan.n_pantographs} pantographs"
     rows = [
         ("train", f"{3.6 * plan.speed:g} km/h, {pantographs}, static force {forces} N"),
+        *(("pantograph", f"{name}, {told}") for name, told in plan.kinds),
         (
             "speed",
             f"{ratio:.2f} of the contact wire's wave speed ({3.6 * plan.wave_speed:.1f} km/h)",

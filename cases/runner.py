@@ -21,6 +21,7 @@ from petsc4py import PETSc
 
 from catenary.cases.interrupts import StopRequest
 from catenary.cases.meshing import mesh_of
+from catenary.cases.pantograph_facts import header_facts
 from catenary.cases.plan import effect_rows
 from catenary.cases.scene import Scene
 from catenary.meshgen.mesh import LineMesh
@@ -256,6 +257,7 @@ def _header(
             "wave_speed_m_per_s": line.contact_wire.wave_speed,
             "system": scene.evaluation.system,
             "edition": scene.evaluation.edition,
+            "pantographs": header_facts(scene, problem),
             "versions": _versions(),
             "config": scene.resolved(),
             "petsc_options": list(petsc_options),

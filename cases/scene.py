@@ -14,17 +14,17 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field, PrivateAttr, ValidationError
 
 from catenary.cases.catalogue import find_case
-from catenary.cases.keys import is_known, known_keys
+from catenary.cases.keys import is_known, known_keys, with_kinds
 from catenary.cases.loading import assign, parse_assignment, read_toml
 from catenary.cases.messages import COMMAND_LINE, Origin, input_error, unknown_key
 from catenary.cases.schema_line import LineTable, MeshTable
+from catenary.cases.schema_pantograph import PantographTable
 from catenary.cases.schema_run import (
     CaseTable,
     ContactTable,
     EvaluationTable,
     NumericsTable,
     OutputTable,
-    PantographTable,
     PetscTable,
     TrainTable,
 )
@@ -134,7 +134,8 @@ def load_scene(case: str | Path, overrides: Sequence[str] = (), shortened: bool 
     for text in overrides:
         key, value = parse_assignment(text)
         if not is_known(key, known):
-            raise InputError(unknown_key(key, COMMAND_LINE, known))
+            near = known_keys(Scene, with_kinds(key, raw, Scene))
+            raise InputError(unknown_key(key, COMMAND_LINE, near))
         assign(raw, key, value)
         given.append(key)
     return scene_from(raw, Origin(str(path), tuple(given)), folder=path.parent)

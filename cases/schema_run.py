@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from catenary.cases.table import Table, ascending, exactly_one
+from catenary.cases.table import Table
 
 # Statistics are taken below 20 Hz (EN 50317); its Nyquist limit is the longest step that can do so.
 MAX_DT = 1.0 / 40.0
@@ -51,61 +51,6 @@ class TrainTable(Table):
     pantographs: list[PlacementTable] = Field(
         min_length=1, max_length=16, description="pantographs in running order, leading one first"
     )
-
-
-Mass = Annotated[float, Field(gt=0, le=1000)]
-Stiffness = Annotated[float, Field(ge=0, le=1e8)]
-DampingValue = Annotated[float, Field(ge=0, le=1e6)]
-Force = Annotated[float, Field(ge=-1000, le=1000)]
-
-
-class PantographTable(Table):
-    """A pantograph as a chain of lumped masses, head first; the last spring stands on the base."""
-
-    type: Literal["lumped"] = Field("lumped", description="model of the pantograph")
-    masses_kg: list[Mass] = Field(min_length=1, max_length=20, description="masses, head first")
-    stiffnesses_N_per_m: list[Stiffness] = Field(
-        description="springs below each mass, the last one to the base; only that may be 0"
-    )
-    dampings_N_s_per_m: list[DampingValue] = Field(description="dampers below each mass")
-    static_force_N: float | None = Field(
-        None, gt=0, le=1000, description="force on the wire at rest"
-    )
-    static_force_by_speed: (
-        list[Annotated[list[float], Field(min_length=2, max_length=2)]] | None
-    ) = Field(
-        None,
-        min_length=1,
-        max_length=1000,
-        description="pairs of speed [km/h] and force [N], linear in between",
-    )
-    nominal_height_m: float | None = Field(
-        None, gt=0, le=20, description="head height at which the static force holds"
-    )
-
-    @model_validator(mode="after")
-    def _consistent(self) -> PantographTable:
-        n = len(self.masses_kg)
-        for name in ("stiffnesses_N_per_m", "dampings_N_s_per_m"):
-            if len(getattr(self, name)) != n:
-                raise ValueError(
-                    f"must give one value per mass, but {name} has {len(getattr(self, name))} "
-                    f"and masses_kg has {n}"
-                )
-        if any(k == 0 for k in self.stiffnesses_N_per_m[:-1]):
-            raise ValueError("must have springs between its masses: only the last of "
-                             "stiffnesses_N_per_m may be 0")  # fmt: skip
-        exactly_one(self, "static_force_N", "static_force_by_speed")
-        if self.static_force_by_speed is not None:
-            ascending([pair[0] for pair in self.static_force_by_speed],
-                      "the speeds of static_force_by_speed")  # fmt: skip
-            for _, force in self.static_force_by_speed:
-                if not 0 < force <= 1000:
-                    raise ValueError(
-                        "must have forces between 0 and 1000 N in static_force_by_speed, "
-                        f"but one is {force:g}"
-                    )
-        return self
 
 
 class ContactTable(Table):

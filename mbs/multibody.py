@@ -153,7 +153,7 @@ def stand(data: MultibodyData) -> Standing:
 def reduced(data: MultibodyData) -> ReducedMechanism:
     """The mechanism below the head, as far around its working height as it reaches."""
     standing = stand(data)
-    frame = _without_head(data, standing.system)
+    frame = without_head(data, standing.system)
     heights = standing.working_height + np.arange(-REACH, REACH + 0.5 * SPACING, SPACING)
     start = _part(standing.motion, frame)
     frame = frame.with_forces(*(f for f in data.wind if f.body != data.head))
@@ -190,7 +190,7 @@ def describe_assembly(missed: tuple[Miss, ...]) -> str:
     return f"joints missed before assembly by: {listed}"
 
 
-def _without_head(data: MultibodyData, system: System) -> System:
+def without_head(data: MultibodyData, system: System) -> System:
     """The mechanism that raises the arm: nothing that the head is, or hangs on."""
     bodies = tuple(body for body in system.bodies if body.name != data.head)
     joints = tuple(joint for joint in system.joints if data.head not in _joined(joint))
@@ -297,7 +297,7 @@ def _judge_positions(data: MultibodyData) -> tuple[Miss, ...]:
 
 def _judge_raising(data: MultibodyData, motion: Motion) -> None:
     """Raise ``InputError`` unless the mechanism has one way to move that forces act on: raising."""
-    frame = _without_head(data, data.system)
+    frame = without_head(data, data.system)
     there = _part(motion, frame)
     height = float(there.position[there.numbers[data.arm], 2])
     holder = PrescribedPoint(HOLDER, data.arm, constant(height))

@@ -191,6 +191,13 @@ def _facts(results: Results) -> list[tuple[str, str]]:
             f"{results.line('support_x')[-1] - results.line('support_x')[0]:.0f} m, "
             f"{results.line('dropper_x').size} droppers, {results.line('arm_x').size} steady arms",
         ),
+        *(
+            (name, f"{told['kind']}, {told['description']}")
+            for name, told in zip(
+                results.pantograph_names(), results.pantograph_facts(), strict=True
+            )
+            if told
+        ),
         ("mesh", f"{results.line('node_points').shape[0]} nodes, {n_cells} wire elements"),
         ("unknowns", f"{about['n_dofs']}"),
         ("ranks", f"{about['n_ranks']}"),

@@ -23,6 +23,7 @@ _JSON_ATTRIBUTES = (
     "effects_off",
     "phase_wall_s",
     "inner_iterations",
+    "pantographs",
 )
 
 
@@ -133,6 +134,12 @@ class Results:
     def n_pantographs(self) -> int:
         """Number of pantographs."""
         return int(self._file["channels/contact_force"].shape[1])
+
+    def pantograph_facts(self) -> list[dict[str, Any]]:
+        """What is told of each pantograph, by their order: ``kind``, ``model``, ``description``,
+        ``static_force_N``, ``actuator_force_N``; empty tables in files without."""
+        told: list[dict[str, Any]] = self.attributes.get("pantographs", [])
+        return told or [{} for _ in range(self.n_pantographs)]
 
     def pantograph_names(self) -> list[str]:
         """How the pantographs are called, by their order on the train."""

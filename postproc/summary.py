@@ -6,6 +6,7 @@ Keys end in the unit that a reader expects (mm, km/h); what a run does not give 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,10 @@ def summarise(
         "phase_wall_s": attributes.get("phase_wall_s", {}),
         "inner_iterations": attributes.get("inner_iterations", {}),
         "evaluation_m": [start, end],
-        "pantographs": [_pantograph(p) for p in statistics.pantographs],
+        "pantographs": [
+            _pantograph(p, told)
+            for p, told in zip(statistics.pantographs, results.pantograph_facts(), strict=True)
+        ],
         "supports": _supports(statistics),
         "droppers": {
             "n_slackened": statistics.droppers.n_slackened,
@@ -69,9 +73,13 @@ def real_time_factor(results: Results) -> float | None:
     return results.attributes["marched_s"] / wall if wall else None
 
 
-def _pantograph(p: PantographStatistics) -> dict[str, Any]:
+def _pantograph(p: PantographStatistics, told: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "name": p.name,
+        "kind": told.get("kind"),
+        "model": told.get("model"),
+        "static_force_N": told.get("static_force_N"),
+        "actuator_force_N": told.get("actuator_force_N"),
         "mean_N": p.mean,
         "std_N": p.std,
         "std_0_5_N": p.std_0_5,

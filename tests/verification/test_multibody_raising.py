@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import paper_pantograph as ambrosio
 from measuring import check, orders, print_table
 
-from catenary.mbs import ambrosio
 from catenary.mbs.constraint_handling import Baumgarte
 from catenary.mbs.forces import PointForce
 from catenary.mbs.integrators import integrate

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import paper_pantograph as ambrosio
 import pytest
 from measuring import check
 from scipy.integrate import solve_ivp
 
-from catenary.mbs import ambrosio
 from catenary.mbs.bodies import SPACE, Body
 from catenary.mbs.constraint_handling import Baumgarte
 from catenary.mbs.forces import Gravity, SpringDamper

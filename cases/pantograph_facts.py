@@ -1,0 +1,52 @@
+"""What is told of the train's pantographs: model, static force, actuator force, assembly."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from catenary.cases.scene import Scene
+from catenary.mbs.build import PantographData
+from catenary.mbs.multibody import MultibodyData, describe, describe_assembly, stand
+from catenary.solver.problem import Problem
+
+
+def model_of(data: PantographData) -> str:
+    """The model's name, as ``type`` has it in a scene."""
+    return "multibody" if isinstance(data, MultibodyData) else "lumped"
+
+
+def description_of(data: PantographData, static_force: float) -> str:
+    """A line about a pantograph."""
+    if isinstance(data, MultibodyData):
+        return describe(data)
+    masses = ", ".join(f"{mass:g}" for mass in data.masses)
+    noun = "mass" if len(data.masses) == 1 else "masses"
+    return f"lumped: {len(data.masses)} {noun} of {masses} kg; {static_force:.1f} N"
+
+
+def header_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
+    """What a result file says of each pantograph, in running order. Not collective."""
+    return [
+        {
+            "kind": place.name,
+            "model": model_of(placement.data),
+            "description": description_of(placement.data, placement.static_force),
+            "static_force_N": placement.static_force,
+            "actuator_force_N": _actuator_force(placement.data),
+        }
+        for place, placement in zip(scene.train.pantographs, problem.train.placements, strict=True)
+    ]
+
+
+def kind_lines(scene: Scene, problem: Problem) -> dict[str, list[str]]:
+    """Lines about each kind of pantograph on the train, by its name. Not collective."""
+    lines: dict[str, list[str]] = {}
+    for place, placement in zip(scene.train.pantographs, problem.train.placements, strict=True):
+        lines[place.name] = [description_of(placement.data, placement.static_force)]
+        if isinstance(placement.data, MultibodyData):
+            lines[place.name].append(describe_assembly(stand(placement.data).missed))
+    return lines
+
+
+def _actuator_force(data: PantographData) -> float | None:
+    return stand(data).actuator_force if isinstance(data, MultibodyData) else None

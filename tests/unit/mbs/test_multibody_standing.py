@@ -1,0 +1,238 @@
+"""Multibody pantographs at their working height: a telescope done by hand, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from measuring import check
+
+from catenary.mbs.bodies import SPACE, Body
+from catenary.mbs.build import Operation, make_pantograph, raising_data
+from catenary.mbs.forces import Actuator, Gravity, PointForce, SpringDamper
+from catenary.mbs.joints import Prismatic, Revolute
+from catenary.mbs.multibody import MultibodyData, describe, reduced, stand
+from catenary.mbs.raising import RaisingPantograph
+from catenary.mbs.system import System
+from catenary.solver.errors import InputError, RunBroken
+
+G = 9.81
+UP, ACROSS = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+MAST, HEAD, FORCE, STIFFNESS, FREE = 15.0, 7.2, 120.0, 4200.0, 0.12
+
+
+def slide(name: str, below: str, above: str) -> Prismatic:
+    return Prismatic(name, below, above, axis_i=UP, axis_j=UP, normal_i=ACROSS, normal_j=ACROSS)
+
+
+SYSTEM = System(
+    (
+        Body("mast", MAST, (1.0, 1.0, 1.0), (0.0, 0.0, 1.0)),
+        Body("head", HEAD, (1.0, 1.0, 1.0), (0.0, 0.0, 1.1)),
+    ),
+    (slide("guide", SPACE, "mast"), slide("slide", "mast", "head")),
+    (
+        Gravity((MAST, HEAD), G),
+        Actuator("jack", SPACE, "mast", force=300.0),
+        SpringDamper("brake", SPACE, "mast", damping=90.0),
+        SpringDamper("spring", "mast", "head", stiffness=STIFFNESS, free_length=FREE, damping=10.0),
+    ),
+)
+DATA = MultibodyData("telescope", SYSTEM, "head", "mast", None, "jack", FORCE)
+
+
+def test_telescope_stands_as_its_weights_and_springs_say() -> None:
+    standing = stand(DATA)
+    weight = (MAST + HEAD) * G
+    # Calibrated to 1e-9 of the static force; the rest is solved to 1e-9 of the largest force.
+    check("jack [N]", standing.actuator_force, FORCE + weight, within=1e-6)
+    check("static force [N]", standing.static_force, FORCE, within=1e-6)
+    check("with its own 300 N [N]", standing.force_before, 300.0 - weight, within=1e-6)
+    check("working height [m]", standing.working_height, 1.0, within=1e-12)
+    assert standing.n_freedoms == 2
+    head = standing.head
+    # Differences of forces of some 100 N over 20 mm; round-off 1e-12 of them.
+    check("head [kg]", head.mass, HEAD, within=1e-9)
+    check("spring [N/m]", head.stiffness, STIFFNESS, within=1e-6)
+    check("damper [N s/m]", head.damping, 10.0, within=1e-9)
+    check("weight [N]", head.weight, HEAD * G, within=1e-9)
+    check("above the mast [m]", head.offset, FREE - HEAD * G / STIFFNESS, within=1e-9)
+    assert "2 bodies, 2 joints, 1 of 2 degrees of freedom is the raising" in describe(DATA)
+
+
+def test_telescope_is_reduced_to_its_mast() -> None:
+    tables = reduced(DATA)
+    check("ends [m]", (tables.heights[0], tables.heights[-1]), (0.4, 1.6), within=1e-9)
+    check("masses [kg]", tables.masses, MAST, within=1e-9)
+    check("lifts [N]", tables.lifts, FORCE + HEAD * G, within=1e-6)
+    check("dampings [N s/m]", tables.dampings, 90.0, within=1e-9)
+
+
+def test_vehicle_stands_where_the_head_meets_the_wire_at_the_working_height() -> None:
+    height = 5.3
+    data = raising_data(DATA, FORCE, height)
+    # Pressed by F the head is F / k lower above the mast, which is 1 m above the base.
+    arm = 1.0 + FREE - (HEAD * G + FORCE) / STIFFNESS
+    check("base [m]", data.base_height, height - arm, within=1e-9)
+    running = make_pantograph(DATA, Operation(FORCE, height, 0.0, 1e-3, 0.25, 0.5))
+    assert isinstance(running, RaisingPantograph)
+    check("static force there [N]", running.static_force(height), FORCE, within=1e-6)
+
+
+def test_wind_adds_to_the_force_under_way_and_not_to_the_static_one() -> None:
+    """Half on the head, half on the mast: both raise the wire's force."""
+    wind = (
+        PointForce("on head", "head", (3.0, 0.0, 8.0)),
+        PointForce("on mast", "mast", (0.0, 0.0, 12.0)),
+    )
+    data = replace(DATA, wind=wind)
+    assert stand(data).actuator_force == pytest.approx(stand(DATA).actuator_force, rel=1e-12)
+    running = make_pantograph(data, Operation(FORCE, 5.0, 0.0, 1e-3, 0.25, 0.5))
+    assert isinstance(running, RaisingPantograph)
+    check("under way [N]", running.static_force(5.0), FORCE + 20.0, within=1e-6)
+
+
+def test_without_calibration_the_force_follows_from_the_actuator() -> None:
+    data = replace(DATA, actuator=None, static_force=None)
+    assert stand(data).actuator_force is None
+    check("static force [N]", stand(data).static_force, 300.0 - (MAST + HEAD) * G, within=1e-6)
+    weak = replace(data, system=SYSTEM.with_force_changed("jack", force=100.0))
+    with pytest.raises(InputError, match="static force is -117.8 N .* cannot raise it"):
+        stand(weak)
+
+
+def test_what_is_set_up_is_set_up_once() -> None:
+    again = replace(DATA, system=replace(SYSTEM, bodies=tuple(SYSTEM.bodies)))
+    assert again == DATA and again is not DATA
+    assert stand(again) is stand(DATA)
+    assert reduced(again) is reduced(DATA)
+
+
+def test_leaving_the_tables_ends_the_run_with_heights_and_name() -> None:
+    running = make_pantograph(DATA, Operation(FORCE, 5.0, 0.0, 1e-3, 0.25, 0.5))
+    running.place(5.0)
+    with pytest.raises(RunBroken, match="'telescope' is at 1.6.* between 0.4 m and 1.6 m only"):
+        for number in range(2000):  # free of the wire it rises with 120 N on 22 kg
+            running.predict(1e-3 * (number + 1))
+            running.advance(np.zeros(1))
+
+
+def without(system: System, *names: str) -> System:
+    return replace(
+        system,
+        joints=tuple(joint for joint in system.joints if joint.name not in names),
+        forces=tuple(force for force in system.forces if force.name not in names),
+    )
+
+
+ROD = Body("rod", 5.0, (0.1, 0.1, 0.1), (0.5, 0.0, 1.0))
+
+REFUSED: dict[str, tuple[dict[str, Any], str]] = {
+    "loop": (
+        {
+            "system": replace(
+                SYSTEM, joints=(replace(SYSTEM.joints[0], at_i=(0.07, 0, 0)), SYSTEM.joints[1])
+            )
+        },
+        "joint 'guide' misses by 70 mm .* where 50 mm",
+    ),
+    "joint twice": (
+        {"system": SYSTEM.with_joints(slide("again", SPACE, "mast"))},
+        r"joints again \(5\) repeat",
+    ),
+    "held fast": (
+        {
+            "system": SYSTEM.with_joints(
+                Revolute("bolt", SPACE, "mast", (0.0, 0.0, 1.0), axis_i=UP, axis_j=UP)
+            )
+        },
+        r"joints bolt \(4\) repeat",
+    ),
+    "no way up": (
+        {
+            "system": replace(
+                SYSTEM,
+                joints=(
+                    replace(
+                        SYSTEM.joints[0],
+                        axis_i=ACROSS,
+                        axis_j=ACROSS,
+                        normal_i=UP,
+                        normal_j=UP,
+                        at_i=(0.0, 0.0, 1.0),
+                    ),
+                    SYSTEM.joints[1],
+                ),
+            )
+        },
+        "leave no way to raise the arm 'mast'",
+    ),
+    "two ways": (
+        {
+            "system": replace(
+                SYSTEM.with_joints(Revolute("pin", "mast", "rod", (0, 0, 0), (-0.5, 0, 0))),
+                bodies=(*SYSTEM.bodies, ROD),
+                forces=(Gravity((MAST, HEAD, ROD.mass), G), *SYSTEM.forces[1:]),
+            )
+        },
+        "more than one way to move: with the arm 'mast' held",
+    ),
+    "no spring": ({"system": without(SYSTEM, "spring")}, "'head' stands on no spring"),
+    "no guide": ({"system": without(SYSTEM, "slide")}, "'head' is guided by no joint"),
+    "head on the base": (
+        {"system": SYSTEM.with_forces(SpringDamper("stay", SPACE, "head", stiffness=1.0))},
+        "'stay' acts between the head 'head' and space",
+    ),
+    "head joined to the base": (
+        {"system": SYSTEM.with_joints(slide("stay", SPACE, "head"))},
+        "'stay' ties the head 'head' to space",
+    ),
+    "actuator below the head": (
+        {"system": SYSTEM.with_forces(Actuator("push", "mast", "head", force=1.0))},
+        "'push' acts between head and arm and must be a spring",
+    ),
+    "useless actuator": (
+        {
+            "system": SYSTEM.with_forces(
+                Actuator("side", SPACE, "mast", (-1.0, 0.0, 1.0), force=1.0)
+            ),
+            "actuator": "side",
+        },
+        "'side' does not act on what",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_is_no_pantograph_is_refused(what: str) -> None:
+    changes, sentence = REFUSED[what]
+    with pytest.raises(InputError, match=sentence):
+        stand(replace(DATA, **changes))
+
+
+def test_working_height_out_of_reach_is_refused() -> None:
+    """A rod of 1 m at 45 degrees does not reach 2 m."""
+    rod = Body("rod", 5.0, (0.1, 0.1, 0.1), (0.5, 0.0, 0.5), (0.0, -np.sin(np.pi / 8), 0.0))
+    length = np.sqrt(0.5)
+    system = System(
+        (rod, replace(SYSTEM.bodies[1], position=(0.5, 0.0, 0.6))),
+        (
+            Revolute("hinge", SPACE, "rod", at_j=(-length, 0.0, 0.0)),
+            replace(SYSTEM.joints[1], i="rod", axis_i=(1.0, 0.0, 1.0), normal_i=(1.0, 0.0, -1.0)),
+        ),
+        (
+            Gravity((5.0, HEAD), G),
+            Actuator("jack", SPACE, "rod", (0.5, 0.0, -1.0), force=300.0),
+            replace(SYSTEM.forces[3], i="rod"),
+        ),
+    )
+    data = MultibodyData("rod", system, "head", "rod", 2.0, "jack", FORCE)
+    with pytest.raises(InputError, match="'rod' does not reach its working height of 2 m"):
+        stand(data)
+    # As far as it goes: the hinge is 0.707 m away, and near the top it locks.
+    standing = replace(data, working_height=0.5)
+    heights = reduced(standing).heights
+    print(heights[[0, -1]])
+    assert 0.5 < heights[-1] < length
