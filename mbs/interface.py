@@ -33,8 +33,9 @@ class Pantograph(Protocol):
     def strip_offsets(self) -> tuple[float, ...]:
         """Places of the strips ahead of the pantograph's own place along the track [m], (s,)."""
 
-    def place(self, head_height: float) -> None:
-        """Put the pantograph at rest with its head at this height [m], without contact."""
+    def place(self, head_height: float, velocity: float = 0.0) -> None:
+        """Put the pantograph without contact to where its head is at this height [m], all of it
+        moving upward with ``velocity`` [m/s]."""
 
     def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Heights [m] and velocities [m/s] of the strips at ``time`` [s], the end of the coming

@@ -10,7 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
+from catenary.mbs import head_kernels
+from catenary.mbs.base_motion import BaseMotion
+from catenary.mbs.head_steps import SteppedHead, raised
 from catenary.mbs.interface import HeadState
+from catenary.mbs.lateral import LateralPath
+from catenary.mbs.strips import ONE_STRIP, HeadParts, Strips, Turning, head_parts
 
 
 @dataclass(frozen=True)
@@ -18,12 +23,15 @@ class LumpedData:
     """A chain of masses, head first.
 
     ``masses`` [kg], shape (n,); ``stiffnesses`` [N/m] and ``dampings`` [N s/m], shape (n,): entry
-    i joins mass i to mass i + 1, the last entry joins the last mass to the base.
+    i joins mass i to mass i + 1, the last entry joins the last mass to the base. The first mass is
+    the whole head, ``strips`` included, which may turn about the track as ``roll`` says.
     """
 
     masses: tuple[float, ...]
     stiffnesses: tuple[float, ...]
     dampings: tuple[float, ...]
+    strips: Strips = ONE_STRIP
+    roll: Turning | None = None
 
     @property
     def n_masses(self) -> int:
@@ -31,25 +39,27 @@ class LumpedData:
 
     @property
     def strip_offsets(self) -> tuple[float, ...]:
-        """One strip, in the pantograph's own place [m]."""
-        return (0.0,)
+        """Places of the strips ahead of the pantograph's own place [m]."""
+        return self.strips.offsets
 
     def chain(self, values: tuple[float, ...]) -> np.ndarray:
         """Matrix of springs (or dampers) between neighbours, the last to ground, shape (n, n)."""
-        matrix = np.diag(np.asarray(values, dtype=float))
-        for i, value in enumerate(values[:-1]):
-            matrix[i + 1, i + 1] += value
-            matrix[i, i + 1] -= value
-            matrix[i + 1, i] -= value
-        return matrix
+        n = len(values)
+        return _chain(np.zeros((1, 1)), values)[:n, :n]
+
+    def head(self, rolls: bool) -> HeadParts:
+        """The head on the second mass, or on the base if there is none."""
+        values = self.masses[0], self.stiffnesses[0], self.dampings[0]
+        return head_parts(*values, self.strips, self.roll if rolls else None)
 
 
-class LumpedPantograph:
+class LumpedPantograph(SteppedHead):
     """A lumped-mass pantograph advanced by Newmark's method, implicit in its contact force.
 
-    Coordinates are the masses' heights with the springs relaxed when all are equal. Weights are
-    balanced by the lifting mechanism, whose net lift on the last mass is ``static_force`` at the
-    nominal head height, raised smoothly from zero over ``raise_time``.
+    Coordinates are the masses' heights with the springs relaxed when all are equal, and angles of
+    a head that turns; see `strips`. Weights are balanced by the lifting mechanism, whose net lift
+    on the last mass is ``static_force`` at the nominal head height, raised smoothly from zero over
+    ``raise_time``.
 
     Parameters
     ----------
@@ -58,6 +68,8 @@ class LumpedPantograph:
     nominal_height : head height at which the contact force at rest is ``static_force`` [m]
     raise_time : time over which the lift grows from zero [s]
     dt, beta, gamma : Newmark step [s] and parameters, those of the line
+    lateral : where the wire crosses the strips; without it the head does not roll
+    base : how the vehicle moves; without it the base stays
     """
 
     def __init__(
@@ -69,103 +81,93 @@ class LumpedPantograph:
         dt: float,
         beta: float = 0.25,
         gamma: float = 0.5,
+        lateral: LateralPath | None = None,
+        base: BaseMotion | None = None,
     ) -> None:
-        self.strip_offsets = data.strip_offsets
+        head = data.head(rolls=lateral is not None)
+        n = head.n + data.n_masses - 1
+        super().__init__(head, n, dt, beta, gamma, lateral)
         self._lift_full = static_force
         self._raise_time = raise_time
-        n = data.n_masses
-        self._mass = np.diag(np.asarray(data.masses, dtype=float))
-        self._stiffness = data.chain(data.stiffnesses)
-        damping = data.chain(data.dampings)
+        self._base = base
+        # The lift acts on the last mass, which is the head itself if there is no other.
+        self._carrier = n - 1 if data.n_masses > 1 else int(np.flatnonzero(head.level)[-1])
+        self._masses = np.concatenate([head.masses, data.masses[1:]])
+        springs = _chain(head.stiffness, data.stiffnesses[1:])
+        dampers = _chain(head.damping, data.dampings[1:])
+        self._stiffness, self._damping = springs[:n, :n], dampers[:n, :n]
+        self._base_stiffness, self._base_damping = data.stiffnesses[-1], data.dampings[-1]
         # The base spring carries nothing when the head is at its nominal height under the static
         # force, which compresses every spring between head and last mass.
         compression = sum(static_force / k for k in data.stiffnesses[:-1])
+        compression += data.strips.compression(static_force)
         self._base_height = nominal_height + compression
-        self._base_force = data.stiffnesses[-1] * self._base_height
-        # A step is linear: new state = step @ state + lift * by_lift + by_base - force * by_force,
-        # with the state (positions, velocities, accelerations).
+        # A step is linear: new state = step @ state + drive * by_drive - by_force @ force, with
+        # the state (positions, velocities, accelerations).
         one, none = np.eye(n), np.zeros((n, n))
-        predict_position = np.hstack([one, dt * one, dt**2 * (0.5 - beta) * one])
-        predict_velocity = np.hstack([none, one, dt * (1.0 - gamma) * one])
-        inverse = linalg.inv(self._mass + gamma * dt * damping + beta * dt**2 * self._stiffness)
-        free = -inverse @ (self._stiffness @ predict_position + damping @ predict_velocity)
+        _, ahead, faster, by_place, by_speed = self._newmark
+        predict_position = np.hstack([one, dt * one, ahead * one])
+        predict_velocity = np.hstack([none, one, faster * one])
+        inverse = linalg.inv(
+            np.diag(self._masses) + by_speed * self._damping + by_place * self._stiffness
+        )
+        free = -inverse @ (self._stiffness @ predict_position + self._damping @ predict_velocity)
         self._step = np.vstack(
-            [
-                predict_position + beta * dt**2 * free,
-                predict_velocity + gamma * dt * free,
-                free,
-            ]
+            [predict_position + by_place * free, predict_velocity + by_speed * free, free]
         )
-        unit = np.vstack([beta * dt**2 * inverse, gamma * dt * inverse, inverse])
-        self._by_force = unit[:, 0].copy()
-        self._by_lift = unit[:, -1].copy()
-        self._by_base = self._base_force * self._by_lift
-        self._n = n
-        self._state = np.zeros(3 * n)
-        self._free = np.zeros(3 * n)
-        # The head's share of the step, which shows what ``predict`` finds.
-        self._head = HeadState(
-            self._free[:1],
-            self._free[n : n + 1],
-            self._by_force[:1].reshape(1, 1),
-            self._by_force[n : n + 1].reshape(1, 1),
-        )
-        self._extrapolation = np.vstack([predict_position[:1], predict_velocity[:1]])
+        unit = np.vstack([by_place * inverse, by_speed * inverse, inverse])
+        self._by_drive = np.ascontiguousarray(unit[:, self._carrier])
+        self._inverse = inverse
 
     def lift(self, time: float) -> float:
         """Net lift on the last mass at ``time`` [N]: a half cosine up to the static force."""
-        if time >= self._raise_time:
-            return self._lift_full
-        return self._lift_full * 0.5 * (1.0 - float(np.cos(np.pi * time / self._raise_time)))
-
-    @property
-    def position(self) -> np.ndarray:
-        """Heights of the masses, head first, shape (n,) [m]."""
-        return self._state[: self._n]
-
-    @property
-    def velocity(self) -> np.ndarray:
-        """Velocities of the masses, upward, shape (n,) [m/s]."""
-        return self._state[self._n : 2 * self._n]
-
-    def place(self, head_height: float) -> None:
-        """Put all masses at rest at ``head_height`` [m], springs relaxed, no contact."""
-        n = self._n
-        self._state[:n] = head_height
-        self._state[n : 2 * n] = 0.0
-        force = -self._stiffness @ self.position
-        force[-1] += self.lift(0.0) + self._base_force
-        # A start from any other acceleration than what these forces cause loses an order in dt.
-        self._state[2 * n :] = linalg.solve(self._mass, force)
-
-    def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Height and velocity of the head by Newmark's predictor (paper eq. 2.5), (1,) each."""
-        height, velocity = self._extrapolation @ self._state
-        return np.array([height]), np.array([velocity])
+        return self._lift_full * raised(time, self._raise_time)
 
     def predict(self, time: float) -> HeadState:
-        """Head at ``time`` [s] as an affine function of the contact force in the coming step."""
-        np.matmul(self._step, self._state, out=self._free)
-        self._free += self.lift(time) * self._by_lift + self._by_base
+        """Strips at ``time`` [s] as affine functions of the contact forces in the coming step."""
+        self._aim(time)
+        head_kernels.linear_step(
+            self._step,
+            self._drive(time),
+            self._by_drive,
+            self._inverse,
+            self._newmark[3],
+            self._newmark[4],
+            self._touch,
+            self._state,
+            self._free,
+            self._by_force,
+            self._out,
+        )
         return self._head
-
-    def advance(self, contact_force: np.ndarray) -> None:
-        """Take the step predicted last with this contact force (1,) [N]."""
-        np.multiply(self._by_force, -contact_force[0], out=self._state)
-        self._state += self._free
-
-    def state(self) -> np.ndarray:
-        """Positions, velocities and accelerations, shape (3 n,)."""
-        return self._state.copy()
-
-    def restore(self, state: np.ndarray) -> None:
-        """Continue from what ``state`` returned."""
-        self._state = np.array(state, dtype=float)
 
     def energy(self) -> float:
         """Kinetic energy, and elastic energy of all springs, the base spring included [J]."""
-        stretch = self.position - self._base_height
+        stretch = self.position - self._base_height * self._level
         return float(
-            0.5 * self.velocity @ self._mass @ self.velocity
-            + 0.5 * stretch @ self._stiffness @ stretch
+            0.5 * self._masses @ self.velocity**2 + 0.5 * stretch @ self._stiffness @ stretch
         )
+
+    def _drive(self, time: float) -> float:
+        """Force on the last mass that its own motion has no part in [N]."""
+        force = self.lift(time) + self._base_stiffness * self._base_height
+        if self._base is not None:
+            base = self._base.vertical(time)
+            force += self._base_stiffness * base.place + self._base_damping * base.velocity
+        return force
+
+    def _acceleration(self, time: float) -> np.ndarray:
+        force = -self._stiffness @ self.position - self._damping @ self.velocity
+        force[self._carrier] += self._drive(time)
+        return np.asarray(force / self._masses)
+
+
+def _chain(head: np.ndarray, below: tuple[float, ...]) -> np.ndarray:
+    """A head's matrix with springs (or dampers) ``below`` its carrier, the last one to the base."""
+    n = len(head) + len(below)
+    matrix = np.zeros((n, n))
+    matrix[: len(head), : len(head)] = head
+    for upper, value in enumerate(below, start=len(head) - 1):
+        pair = slice(upper, upper + 2)
+        matrix[pair, pair] += value * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    return matrix

@@ -31,7 +31,8 @@ class ReducedMechanism:
 
     ``heights`` [m], growing; ``masses`` [kg], equivalent mass at the point; ``lifts`` [N], upward
     force on the point at rest; ``dampings`` [N s/m]; all of shape (n,), n >= 4. ``name`` is the
-    pantograph's, for messages.
+    pantograph's, for messages. ``carried`` [kg], shape (n,): the sum of m dz/dh, force on the point
+    per upward acceleration of the base; None if the base is at rest.
     """
 
     heights: np.ndarray
@@ -39,6 +40,7 @@ class ReducedMechanism:
     lifts: np.ndarray
     dampings: np.ndarray
     name: str = ""
+    carried: np.ndarray | None = None
     _table: CubicSpline = field(init=False, repr=False, compare=False)
     _slopes: CubicSpline = field(init=False, repr=False, compare=False)
 
@@ -59,13 +61,29 @@ class ReducedMechanism:
             raise self.left(height)
         return self._table(height), self._slopes(height)
 
-    def left(self, height: float) -> RunBroken:
-        """The error of a mechanism that has left its tables at a height [m]."""
+    def coefficients(self, carried: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Heights (n,) and, from each to the next, coefficients of the splines (n - 1, 4, 4).
+
+        The second index stands for mass, lift, damping and carried mass (zero unless asked for),
+        the third for powers, the highest first.
+        """
+        last = np.zeros_like(self.masses)
+        if carried:
+            if self.carried is None:
+                raise ValueError("nothing is known of what a moving base carries along")
+            last = self.carried
+        columns = np.stack([self.masses, self.lifts, self.dampings, last], axis=1)
+        spline = CubicSpline(self.heights, columns)
+        return spline.x, np.ascontiguousarray(spline.c.transpose(1, 2, 0))
+
+    def left(self, height: float, time: float | None = None) -> RunBroken:
+        """The error of a mechanism that has left its tables at a height [m] and a time [s]."""
         who = f"of pantograph {self.name!r} " if self.name else ""
+        begin = "The" if time is None else f"At {time:.4g} s the"
         return RunBroken(
-            f"The arm {who}is at {height:.4g} m above its base, but its mechanism moves between "
-            f"{self.heights[0]:.4g} m and {self.heights[-1]:.4g} m only: it was thrown off the "
-            "wire, or the line's heights are beyond its reach."
+            f"{begin} arm {who}is at {height:.4g} m above its base, but its mechanism moves "
+            f"between {self.heights[0]:.4g} m and {self.heights[-1]:.4g} m only: it was thrown "
+            "off the wire, or the line's heights are beyond its reach."
         )
 
     def acceleration(self, height: float, speed: float, push: float = 0.0) -> float:
@@ -111,7 +129,7 @@ def reduce_mechanism(
     # Heights are visited from the one that is nearest to the start, each from its neighbour.
     motion = system.assemble(system.start() if start is None else start).motion
     first = int(np.argmin(np.abs(table - point(motion, body, at).value[2])))
-    columns = np.full((len(table), 3), np.nan)
+    columns = np.full((len(table), 4), np.nan)
     motion, columns[first] = _at_height(system, body, at, motion, table[first])
     for way in (range(first + 1, len(table)), range(first - 1, -1, -1)):
         there = motion
@@ -131,14 +149,15 @@ def reduce_mechanism(
             f"The mechanism moves by less than {4 * np.diff(table).min():g} m from the height of "
             f"{table[first]:g} m before it locks or comes apart."
         )
-    masses, lifts, dampings = columns[reached].T
-    return ReducedMechanism(table[reached], masses, lifts, dampings, name)
+    masses, lifts, dampings, carried = columns[reached].T
+    return ReducedMechanism(table[reached], masses, lifts, dampings, name, carried)
 
 
 def _at_height(
     system: System, body: str, at: Vector, near: Motion, height: float
 ) -> tuple[Motion, np.ndarray]:
-    """The system at rest with a point at a height, and mass, lift and damping there, shape (3,)."""
+    """The system at rest with a point at a height, and mass, lift, damping and carried mass there,
+    shape (4,)."""
     holder = PrescribedPoint("height", body, constant(float(height)), at)
     motion = equilibrium(system.with_joints(holder), near).motion
     rows = holder.rows(motion, 0.0)
@@ -149,4 +168,6 @@ def _at_height(
     way = root * linalg.lstsq(jacobian * root, unit_speed, cond=1e-8)[0]
     lift = way @ system.generalised_forces(motion, 0.0)
     damping = lift - way @ system.generalised_forces(motion.with_velocities(way), 0.0)
-    return motion, np.array([system.mass @ way**2, lift, damping])
+    # Where the third of the six numbers of a body is its velocity upward.
+    carried = system.mass[2::6] @ way[2::6]
+    return motion, np.array([system.mass @ way**2, lift, damping, carried])

@@ -1,0 +1,163 @@
+"""Collector strips and the head that carries them: masses on springs above what raises them.
+
+Coordinates of a head, in this order: the heights of strips on springs of their own, the head's
+height, its roll about the track, its pitch across it. A strip touches the wire at a height
+z + l phi + p theta: l [m] is the lateral place of the wire on it, p [m] the strip's place ahead of
+the head's centre, phi and theta roll and pitch [rad], which lift what is left of and ahead of the
+centre. Angles are small: 0.1 rad would be an error of 0.5 %.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Turning:
+    """A head that turns: ``inertia`` [kg m2] about its centre, ``stiffness`` [N m/rad] and
+    ``damping`` [N m s/rad] between it and what carries it."""
+
+    inertia: float
+    stiffness: float
+    damping: float
+
+
+@dataclass(frozen=True)
+class Suspension:
+    """What a strip stands on: ``mass`` [kg] of the strip, ``stiffness`` [N/m] and ``damping``
+    [N s/m] between it and the head."""
+
+    mass: float
+    stiffness: float
+    damping: float
+
+
+@dataclass(frozen=True)
+class Strips:
+    """One or two collector strips.
+
+    Attributes
+    ----------
+    number : 1 or 2
+    spacing : between two strips along the track [m]
+    length : of a strip across the track [m], None if it is not known
+    suspension : of each strip, whose mass is part of the head's; None if it is fixed to the head
+    pitch : how the head turns across the track, None if it does not
+    """
+
+    number: int = 1
+    spacing: float = 0.0
+    length: float | None = None
+    suspension: Suspension | None = None
+    pitch: Turning | None = None
+
+    @property
+    def offsets(self) -> tuple[float, ...]:
+        """Places ahead of the head's centre [m], the leading strip first."""
+        if self.number == 1:
+            return (0.0,)
+        return (0.5 * self.spacing, -0.5 * self.spacing)
+
+    def compression(self, force: float) -> float:
+        """How far a force shared by all strips presses them into the head [m]."""
+        if self.suspension is None:
+            return 0.0
+        return force / (self.number * self.suspension.stiffness)
+
+
+ONE_STRIP = Strips()
+
+
+@dataclass(frozen=True)
+class HeadParts:
+    """A head as matrices over its n coordinates, and one more for the height of its carrier.
+
+    Attributes
+    ----------
+    masses : (n,) [kg] or [kg m2]
+    stiffness, damping : (n + 1, n + 1)
+    touch : (s, n) by how much each coordinate raises each strip, the lateral place left out
+    level : (n,) 1 for heights, 0 for angles
+    roll : number of the roll's coordinate, -1 without it
+    offsets : (s,) places of the strips ahead of the head's centre [m]
+    """
+
+    masses: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    touch: np.ndarray
+    level: np.ndarray
+    roll: int
+    offsets: tuple[float, ...] = field(default=(0.0,))
+
+    @cached_property
+    def n(self) -> int:
+        """Number of coordinates."""
+        return int(self.masses.size)
+
+
+def head_parts(
+    mass: float,
+    stiffness: float,
+    damping: float,
+    strips: Strips = ONE_STRIP,
+    roll: Turning | None = None,
+) -> HeadParts:
+    """A head of a whole ``mass`` [kg], its strips included, on a spring [N/m] and damper [N s/m].
+
+    Raises
+    ------
+    ValueError
+        The strips weigh as much as the whole head or more.
+    """
+    sprung = strips.suspension
+    n_own = strips.number if sprung is not None else 0
+    own_mass = n_own * sprung.mass if sprung is not None else 0.0
+    if own_mass >= mass:
+        raise ValueError(f"strips of {own_mass:g} kg are part of a head of {mass:g} kg")
+    turns = [turning for turning in (roll, strips.pitch) if turning is not None]
+    head, n = n_own, n_own + 1 + len(turns)
+    pitch = n - 1 if strips.pitch is not None else -1
+    masses = np.zeros(n)
+    springs, dampers = np.zeros((n + 1, n + 1)), np.zeros((n + 1, n + 1))
+    masses[head] = mass - own_mass
+    _join(springs, _difference(n, head, n), stiffness)
+    _join(dampers, _difference(n, head, n), damping)
+    for number, turning in enumerate(turns, start=head + 1):
+        masses[number] = turning.inertia
+        springs[number, number] += turning.stiffness
+        dampers[number, number] += turning.damping
+    touch = np.zeros((strips.number, n))
+    for i, ahead in enumerate(strips.offsets):
+        place = np.zeros(n + 1)
+        place[head] = 1.0
+        if pitch >= 0:
+            place[pitch] = ahead
+        if sprung is None:
+            touch[i] = place[:n]
+            continue
+        masses[i] = sprung.mass
+        touch[i, i] = 1.0
+        stretch = -place
+        stretch[i] = 1.0
+        _join(springs, stretch, sprung.stiffness)
+        _join(dampers, stretch, sprung.damping)
+    level = np.zeros(n)
+    level[: head + 1] = 1.0
+    number = head + 1 if roll is not None else -1
+    return HeadParts(masses, springs, dampers, touch, level, number, strips.offsets)
+
+
+def _difference(n: int, upper: int, lower: int) -> np.ndarray:
+    """Stretch of a spring between two of n + 1 coordinates."""
+    stretch = np.zeros(n + 1)
+    stretch[upper], stretch[lower] = 1.0, -1.0
+    return stretch
+
+
+def _join(matrix: np.ndarray, stretch: np.ndarray, value: float) -> None:
+    """Add a spring (or damper) whose stretch is ``stretch`` @ coordinates."""
+    matrix += value * np.outer(stretch, stretch)
