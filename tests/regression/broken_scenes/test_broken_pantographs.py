@@ -1,0 +1,195 @@
+"""Pantographs that cannot be: one sentence, exit code 2, nothing written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from catenary.cases.cli import app
+
+SOUND = Path(__file__).with_name("sound.toml")
+TELESCOPE = Path(__file__).parents[2] / "support" / "telescope.toml"
+KIND = "pantographs.telescope"
+
+# Assignments on the sound scene with a telescope, and what the sentence must hold.
+ASSIGNMENTS = {
+    "unknown type": ([f"{KIND}.type=multibdy"], "must be of type lumped or multibody"),
+    "key of the other type": ([f"{KIND}.masses_kg=[3]"], f"{KIND}.masses_kg on"),
+    "misspelt key": ([f"{KIND}.working_hight_m=1"], f"did you mean {KIND}.working_height_m?"),
+    "misspelt key of a body": (
+        [f"{KIND}.bodies.head.mass=7"],
+        f"did you mean {KIND}.bodies.head.mass_kg?",
+    ),
+    "key of another joint": (
+        [f"{KIND}.joints.guide.axes_i=[0,0,1]"],
+        f"did you mean {KIND}.joints.guide.axis_i?",
+    ),
+    "unknown joint": (
+        [f"{KIND}.joints.guide.type=hinge"],
+        "must be of type fixed, revolute, spherical",
+    ),
+    "joint without type": ([f"{KIND}.joints.guide.type="], "must have a type"),
+    "weightless body": ([f"{KIND}.bodies.mast.mass_kg=0"], "greater than 0 [kg]"),
+    "negative inertia": (
+        [f"{KIND}.bodies.mast.inertia_kg_m2=[1, -1, 1]"],
+        f"{KIND}.bodies.mast.inertia_kg_m2.1 is -1",
+    ),
+    "two moments of inertia": ([f"{KIND}.bodies.mast.inertia_kg_m2=[1, 1]"], "at least 3 entries"),
+    "turn beyond one": ([f"{KIND}.bodies.mast.turn=[1, 1, 0]"], "must be at most 1 long"),
+    "axis of no length": ([f"{KIND}.joints.guide.axis_i=[0,0,0]"], "must not have zero length"),
+    "unknown head": (
+        [f"{KIND}.head=hed"],
+        'is "hed" on the command line (--set); did you mean head',
+    ),
+    "unknown arm": ([f"{KIND}.arm=boom"], "it must be one of mast, head"),
+    "unknown actuator": ([f"{KIND}.actuator=jak"], "did you mean jack?"),
+    "unknown body of a joint": (
+        [f"{KIND}.joints.slide.i=must"],
+        f'{KIND}.joints.slide.i is "must" on the command line (--set); did you mean mast?',
+    ),
+    "unknown body of a force": ([f"{KIND}.forces.brake.j=nothing"], "one of mast, head, space"),
+    "head is arm": ([f"{KIND}.head=mast"], "as the arm is"),
+    "joint of one body": ([f"{KIND}.joints.slide.i=head"], 'has "head" on both sides'),
+    "no static force": ([f"{KIND}.static_force_N="], "exactly one of static_force_N"),
+    "static force twice": (
+        [f"{KIND}.static_force_by_speed=[[100, 90], [300, 120]]"],
+        "static_force_N and static_force_by_speed are given",
+    ),
+    "static force without calibration": (
+        [f"{KIND}.calibrate=false"],
+        "must not have static_force_N with calibrate = false",
+    ),
+    "speed outside the forces": (
+        [f"{KIND}.static_force_N=", f"{KIND}.static_force_by_speed=[[275, 143], [320, 169]]"],
+        "only holds forces for 275 to 320 km/h",
+    ),
+    "nothing to calibrate": ([f"{KIND}.actuator="], "needs actuator"),
+    "a spring to calibrate": ([f"{KIND}.actuator=brake"], "a spring_damper, no actuator"),
+    "a table to calibrate": (
+        [f"{KIND}.forces.jack.force_N=", f"{KIND}.forces.jack.force_by_length=[[0, 9], [1, 8]]"],
+        "write calibrate = false",
+    ),
+    "two forces of an actuator": (
+        [f"{KIND}.forces.jack.force_by_length=[[0, 9], [1, 8]]"],
+        "force_N and force_by_length are given",
+    ),
+    "table that goes back": (
+        [f"{KIND}.forces.spring.pull_by_extension=[[1, 9], [0, 8]]"],
+        "ascending order, but 0 follows 1",
+    ),
+    "stop without a limit": (
+        [f"{KIND}.forces.stop={{type='bump_stop', j='mast', stiffness_N_per_m=1e4}}"],
+        "must have shortest_m, longest_m or both",
+    ),
+    "correction of nothing": (
+        [f"{KIND}.corrections=[{{key='bodies.mast.weight', published=1, reason='so'}}]"],
+        "bodies.mast.weight is none",
+    ),
+    "published without corrections": ([f"{KIND}.as_published=true"], "must list corrections"),
+    "published beyond what is allowed": (
+        [
+            f"{KIND}.as_published=true",
+            f"{KIND}.corrections=[{{key='bodies.mast.mass_kg', published=-1, reason='misprint'}}]",
+        ],
+        "the published bodies.mast.mass_kg is not allowed",
+    ),
+    "loop that does not close": (
+        [f"{KIND}.joints.guide.at_i_m=[0.07, 0, 0]"],
+        "cannot be built: its loops do not close: joint 'guide' misses by 70 mm",
+    ),
+    "joint twice": (
+        [f"{KIND}.joints.again={{type='prismatic', j='mast'}}"],
+        "its joints again (5) repeat",
+    ),
+    "held fast": (
+        [
+            f"{KIND}.joints.guide.axis_i=[1, 0, 0]",
+            f"{KIND}.joints.guide.axis_j=[1, 0, 0]",
+            f"{KIND}.joints.guide.normal_i=[0, 0, 1]",
+            f"{KIND}.joints.guide.normal_j=[0, 0, 1]",
+            f"{KIND}.joints.guide.at_i_m=[0, 0, 1]",
+        ],
+        "leave no way to raise the arm 'mast'",
+    ),
+    "more than one way up": (
+        [
+            f"{KIND}.bodies.rod={{mass_kg=5, inertia_kg_m2=[1,1,1], position_m=[0.5, 0, 1]}}",
+            f"{KIND}.joints.pin={{type='revolute', i='mast', j='rod', at_j_m=[-0.5, 0, 0]}}",
+        ],
+        "more than one way to move",
+    ),
+    "actuator without effect": (
+        [
+            f"{KIND}.forces.side={{type='actuator', j='mast', at_i_m=[-1, 0, 1], force_N=1}}",
+            f"{KIND}.actuator=side",
+        ],
+        "'side' does not act on",
+    ),
+    "head without spring": (
+        [f"{KIND}.forces.spring.stiffness_N_per_m=0"],
+        "'head' stands on no spring",
+    ),
+    "head on a table": (
+        [
+            f"{KIND}.forces.spring.stiffness_N_per_m=",
+            f"{KIND}.forces.spring.pull_by_extension=[[-1, -4200], [1, 4200]]",
+        ],
+        "must be a spring with a constant stiffness",
+    ),
+    "head without guide": (
+        [f"{KIND}.joints.slide.type=spherical", f"{KIND}.joints.slide.i=space"],
+        "ties the head 'head' to space",
+    ),
+    "out of reach": (
+        [
+            f"{KIND}.working_height_m=3",
+            f"{KIND}.joints.lock={{type='prescribed_point', body='mast', coordinate_m=1}}",
+        ],
+        "leave no way to raise",
+    ),
+    "too weak": (
+        [f"{KIND}.calibrate=false", f"{KIND}.static_force_N=", f"{KIND}.forces.jack.force_N=100"],
+        "its actuators cannot raise it",
+    ),
+}
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    """The sound scene with the telescope on its train."""
+    text = SOUND.read_text(encoding="utf-8") + TELESCOPE.read_text(encoding="utf-8")
+    path = tmp_path / "case.toml"
+    path.write_text(text.replace('name = "reference"', 'name = "telescope"'), encoding="utf-8")
+    return path
+
+
+def test_the_scene_with_a_telescope_is_sound(scene: Path) -> None:
+    result = CliRunner().invoke(app, ["check", str(scene)])
+    assert result.exit_code == 0, result.output
+    assert "1 of 2 degrees of freedom is the raising" in result.stdout
+    assert "guide 0.0 mm, slide 0.0 mm" in result.stdout
+
+
+@pytest.mark.parametrize("name", ASSIGNMENTS)
+def test_a_broken_pantograph_ends_in_one_sentence_and_code_2(name: str, scene: Path) -> None:
+    assignments, expected = ASSIGNMENTS[name]
+    words = [word for text in assignments for word in ("--set", text)]
+    result = CliRunner().invoke(app, ["check", str(scene), *words])
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    sentence = result.stderr.strip()
+    assert sentence.startswith("catenary: ")
+    assert "\n" not in sentence
+    assert expected in sentence, sentence
+    assert list(scene.parent.iterdir()) == [scene]
+
+
+def test_paper_as_published_names_the_joint_that_does_not_close() -> None:
+    """0.200 - 0.020 m along and 5 mm across: 182 mm."""
+    words = ["check", "ambrosio2012", "--set", "pantographs.seven_body.as_published=true"]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 2, result.output
+    assert "joint 'joint_1' misses by 182 mm" in result.stderr
+    assert result.stderr.count("\n") == 1

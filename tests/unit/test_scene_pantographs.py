@@ -1,0 +1,225 @@
+"""Pantographs in scenes: what tables become, which numbers are published, what is told of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from measuring import check
+from paper_pantograph import corrections, data, number_at, table
+
+from catenary.cases.checks_pantograph import check_pantographs
+from catenary.cases.convert_pantograph import multibody_of, static_force
+from catenary.cases.loading import read_toml
+from catenary.cases.pantograph_facts import header_facts, kind_lines
+from catenary.cases.scene import Scene, load_scene
+from catenary.cases.schema_pantograph import MultibodyTable
+from catenary.mbs.bodies import SPACE, Body
+from catenary.mbs.build import PantographData
+from catenary.mbs.forces import Actuator, BumpStop, Gravity, PointForce, SpringDamper, Table
+from catenary.mbs.joints import (
+    Fixed,
+    PointOnCurve,
+    PointOnLine,
+    PrescribedAngle,
+    PrescribedPoint,
+    Prismatic,
+    Revolute,
+    RevolutePrismatic,
+    Spherical,
+    constant,
+)
+from catenary.mbs.lumped import LumpedData
+from catenary.mbs.multibody import MultibodyData, stand
+
+TELESCOPE = Path(__file__).parents[1] / "support" / "telescope.toml"
+A, B, ORIGIN = (0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.0, 0.0, 0.0)
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+ENDS = {"i": "mast", "j": "head", "at_i_m": list(A), "at_j_m": list(B)}
+
+JOINTS: dict[str, tuple[dict[str, Any], Any]] = {
+    "fixed": (ENDS | {"turn": [0.6, 0, 0]}, Fixed("x", "head", "mast", A, B, (0.8, 0.6, 0, 0))),
+    "revolute": (ENDS | {"axis_j": list(X)}, Revolute("x", "mast", "head", A, B, Y, X)),
+    "spherical": (ENDS, Spherical("x", "mast", "head", A, B)),
+    "prismatic": (
+        ENDS | {"axis_i": list(Y), "normal_j": list(Y)},
+        Prismatic("x", "mast", "head", A, B, Y, Z, X, Y),
+    ),
+    "revolute_prismatic": (
+        {"j": "head", "slide_axis_j": list(Y)},
+        RevolutePrismatic("x", SPACE, "head", ORIGIN, ORIGIN, X, X, Y),
+    ),
+    "point_on_line": (ENDS | {"axis_i": list(Z)}, PointOnLine("x", "mast", "head", A, B, Z)),
+    "point_on_curve": (
+        {"body": "mast", "at_m": list(A), "curve_m": [[0, 1, 2], [1, 2, 5], [2, 2, 6]]},
+        PointOnCurve("x", "mast", (0, 1, 2), (1, 2, 2), (2, 5, 6), A),
+    ),
+    "prescribed_point": (
+        {"body": "mast", "at_m": list(A), "along": list(X), "coordinate_m": 0.7},
+        PrescribedPoint("x", "mast", constant(0.7), A, X),
+    ),
+    "prescribed_angle": (
+        {"j": "mast", "axis_i": list(X), "normal_i": list(Y), "normal_j": list(Z), "angle_deg": 90},
+        PrescribedAngle("x", SPACE, "mast", constant(np.pi / 2), X, Y, Z),
+    ),
+}
+FORCES: dict[str, tuple[str, dict[str, Any], Any]] = {
+    "linear spring": (
+        "spring_damper",
+        ENDS | {"stiffness_N_per_m": 5.0, "free_length_m": 0.2, "damping_N_s_per_m": 3.0},
+        SpringDamper("x", "mast", "head", A, B, 5.0, 0.2, 3.0),
+    ),
+    "spring from a table": (
+        "spring_damper",
+        ENDS | {"pull_by_extension": [[-1, -9], [0, 0], [1, 4]]},
+        SpringDamper("x", "mast", "head", A, B, Table((-1, 0, 1), (-9, 0, 4))),
+    ),
+    "constant actuator": (
+        "actuator",
+        ENDS | {"force_N": 7},
+        Actuator("x", "mast", "head", A, B, 7),
+    ),
+    "actuator from a table": (
+        "actuator",
+        ENDS | {"force_by_length": [[0.5, 100], [1, 80]]},
+        SpringDamper("x", "mast", "head", A, B, Table((0.5, 1), (-100, -80))),
+    ),
+    "stop": (
+        "bump_stop",
+        ENDS | {"longest_m": 0.9, "stiffness_N_per_m": 1e4},
+        BumpStop("x", "mast", "head", A, B, 0.0, 0.9, 1e4),
+    ),
+    "point force": (
+        "point_force",
+        {"body": "mast", "at_m": list(B), "force_N": [1, 2, 3]},
+        PointForce("x", "mast", (1, 2, 3), B),
+    ),
+}
+
+
+def telescope(**changes: Any) -> dict[str, Any]:
+    """The raw table of the telescope; a change of None takes a key away."""
+    raw = dict(read_toml(TELESCOPE)["pantographs"]["telescope"]) | changes
+    return {key: value for key, value in raw.items() if value is not None}
+
+
+def converted(raw: dict[str, Any], speed: float = 250.0) -> MultibodyData:
+    return multibody_of("telescope", MultibodyTable.model_validate(raw), speed)
+
+
+def of_the_train(scene: Scene) -> PantographData:
+    return scene.to_problem().train.placements[0].data
+
+
+@pytest.mark.parametrize("kind", JOINTS)
+def test_each_joint_reaches_the_mechanism(kind: str) -> None:
+    keys, expected = JOINTS[kind]
+    found = converted(telescope(joints={"x": keys | {"type": kind}}))
+    assert found.system.joints == (expected,)
+
+
+@pytest.mark.parametrize("what", FORCES)
+def test_each_force_reaches_the_mechanism(what: str) -> None:
+    kind, keys, expected = FORCES[what]
+    raw = telescope(forces={"x": keys | {"type": kind}}, actuator="x", gravity=False)
+    assert converted(raw).system.forces == (expected,)
+
+
+def test_bodies_and_their_weight_reach_the_mechanism() -> None:
+    found = converted(telescope())
+    assert found.system.bodies == (
+        Body("mast", 15.0, (1, 1, 1), (0, 0, 1.0), ORIGIN),
+        Body("head", 7.2, (1, 1, 1), (0, 0, 1.1), ORIGIN),
+    )
+    assert found.system.forces[0] == Gravity((15.0, 7.2), 9.81)
+    assert not any(
+        isinstance(f, Gravity) for f in converted(telescope(gravity=False)).system.forces
+    )
+
+
+def test_actuator_from_a_table_pushes_as_much_as_it_says() -> None:
+    """0.75 m is half way between 100 N at 0.5 m and 80 N at 1 m."""
+    jack = {"type": "actuator", "j": "mast", "force_by_length": [[0.5, 100.0], [1.0, 80.0]]}
+    forces = telescope()["forces"] | {"jack": jack}
+    system = converted(telescope(forces=forces, calibrate=False, static_force_N=None)).system
+    start = system.start()
+    low = start.moved(np.array([0, 0, -0.25, *[0.0] * 9]))
+    push = system.force("jack").generalised(low, 0.0)
+    check("push on the mast [N]", push[2], 90.0, within=1e-12)
+
+
+def test_wind_grows_with_the_square_of_the_speed_and_is_kept_apart() -> None:
+    wind = {"type": "aerodynamic_force", "body": "head", "coefficient_N_s2_per_m2": [0, 0, 0.01]}
+    forces = telescope()["forces"] | {"lift": wind}
+    slow, fast = (converted(telescope(forces=forces), speed) for speed in (180.0, 360.0))
+    check("lift [N]", slow.wind[0].force, (0, 0, 25.0), within=1e-12)
+    check("lift [N]", fast.wind[0].force, (0, 0, 100.0), within=1e-12)
+    assert slow.system == fast.system == converted(telescope()).system
+
+
+def test_without_calibration_the_static_force_is_that_of_the_mechanism() -> None:
+    raw = telescope(calibrate=False, static_force_N=None)
+    force = static_force("telescope", MultibodyTable.model_validate(raw), 250.0)
+    check("static force [N]", force, 300.0 - 22.2 * 9.81, within=1e-6)
+
+
+def test_paper_s_published_numbers_stand_beside_the_corrected_ones() -> None:
+    published, corrected = data(as_published=True).system, data().system
+    assert set(corrections()) == {
+        "joints.joint_1.at_i_m.0",
+        "forces.raising_spring.at_i_m.0",
+        "forces.actuator.force_N",
+    }
+    for key, correction in corrections().items():
+        assert correction.reason
+        assert correction.published != number_at(key)
+    changed = [a.name for a, b in zip(published.joints, corrected.joints, strict=True) if a != b]
+    changed += [a.name for a, b in zip(published.forces, corrected.forces, strict=True) if a != b]
+    assert changed == ["joint_1", "raising_spring", "actuator"]
+    # Table 3 and Table 4 of the paper.
+    joints = {joint.name: joint for joint in published.joints}
+    assert joints["joint_1"].at_i == (0.020, 0.0, 0.132)
+    assert published.force("raising_spring").at_i == (0.259, 0.0, 0.0)
+    assert published.force("actuator").force == 920.0
+
+
+def test_scene_of_the_paper_has_seven_bodies_and_its_equivalent() -> None:
+    scene = load_scene("ambrosio2012")
+    seven = of_the_train(scene)
+    assert isinstance(seven, MultibodyData)
+    assert len(seven.system.bodies) == 7
+    lumped = of_the_train(load_scene("ambrosio2012", ["train.pantographs.0.name=lumped"]))
+    assert isinstance(lumped, LumpedData)
+    # The case's lumped equivalent is rounded to three figures.
+    head = stand(seven).head
+    check("head [kg]", lumped.masses[0], head.mass, within=0.005 * head.mass)
+    check("head [N/m]", lumped.stiffnesses[0], head.stiffness, within=0.005 * head.stiffness)
+    check("head [N s/m]", lumped.dampings[0], head.damping, within=0.005 * head.damping)
+
+
+def test_what_is_told_of_a_pantograph() -> None:
+    scene = load_scene("ambrosio2012")
+    (told,) = header_facts(scene, scene.to_problem())
+    assert (told["kind"], told["model"]) == ("seven_body", "multibody")
+    assert told["static_force_N"] == 150.0
+    # 9.89 kN by virtual work, within 1 %.
+    check("actuator [N]", told["actuator_force_N"], 9890.0, within=98.9)
+    what, assembly = kind_lines(scene, scene.to_problem())["seven_body"]
+    assert "7 bodies, 9 joints, 1 of 5 degrees of freedom is the raising" in what
+    assert "joint_6 13.8 mm" in assembly
+    plain = load_scene("en50318_2002")
+    (told,) = header_facts(plain, plain.to_problem())
+    assert (told["model"], told["actuator_force_N"]) == ("lumped", None)
+    assert "2 masses of 7.2, 15 kg" in told["description"]
+
+
+def test_kinds_that_are_not_on_the_train_are_not_assembled() -> None:
+    """So that a case may hold a mechanism that cannot be built beside one that can."""
+    scene = load_scene(
+        "ambrosio2012",
+        ["train.pantographs.0.name=lumped", "pantographs.seven_body.as_published=true"],
+    )
+    check_pantographs(scene)
+    assert table().as_published is False
