@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
+from catenary.cases.checks_contact import check_contact
 from catenary.cases.checks_pantograph import check_pantographs
 from catenary.cases.keys import is_known, known_keys
-from catenary.cases.messages import shown, unknown_key
-from catenary.cases.units import unit_of
+from catenary.cases.messages import refuse, shown, unknown_key
 from catenary.meshgen.line import Line
 from catenary.solver import effects
 from catenary.solver.errors import InputError
@@ -30,7 +30,6 @@ MIN_SEPARATION = 1.0
 _TINY = 1e-6
 # Effects that are off by default and need a value in the scene: the key that holds it.
 _DATA_OF = {
-    "contact_damping": "contact.damping_N_s_per_m",
     "residual_dropper_stiffness": "line.dropper.residual_stiffness_ratio",
 }
 
@@ -41,6 +40,7 @@ def check(scene: Scene) -> None:
     _effect_names(scene)
     _effect_requirements(scene)
     _effect_data(scene)
+    check_contact(scene)
     _pantograph_names(scene)
     _separations(scene)
     check_pantographs(scene)
@@ -56,10 +56,7 @@ def check(scene: Scene) -> None:
 
 
 def _refuse(scene: Scene, key: str, value: object, why: str) -> NoReturn:
-    unit = unit_of(key)
-    number = f"{value:g}" if isinstance(value, float) else shown(value)
-    in_unit = f" {unit}" if unit else ""
-    raise InputError(f"{key} is {number}{in_unit} {scene.origin.of(key)}; {why}")
+    refuse(scene.origin, key, value, why)
 
 
 def _test_keys(scene: Scene) -> None:
@@ -97,7 +94,6 @@ def _effect_requirements(scene: Scene) -> None:
 
 def _effect_data(scene: Scene) -> None:
     values = {
-        "contact_damping": scene.contact.damping_N_s_per_m,
         "residual_dropper_stiffness": scene.line.dropper.residual_stiffness_ratio,
     }
     switches = scene.switches()

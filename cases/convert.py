@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from catenary.cases.convert_contact import contact_law_of
 from catenary.cases.convert_pantograph import pantograph_of, static_force
 from catenary.cases.schema_line import LineTable, WireTable
 from catenary.cases.units import length_from_mm, speed_from_km_h
 from catenary.meshgen.line import DropperKind, Line, SteadyArm, Wire
 from catenary.solver.errors import InputError
-from catenary.solver.contact_laws import LinearLaw
 from catenary.solver.problem import Damping, Numerics, Placement, Problem, Train
 
 if TYPE_CHECKING:
@@ -72,13 +72,13 @@ def line_of(scene: Scene) -> Line:
 
 def problem_of(scene: Scene) -> Problem:
     """The problem of a scene."""
-    numerics = scene.numerics
+    numerics, train = scene.numerics, _train(scene)
     ratio = scene.line.dropper.residual_stiffness_ratio
     return Problem(
         line=line_of(scene),
         damping=_damping(scene.line),
-        contact=LinearLaw(scene.contact.stiffness_N_per_m, scene.contact.damping_N_s_per_m),
-        train=_train(scene),
+        contact=contact_law_of(scene.contact, train.placements[0].static_force),
+        train=train,
         numerics=Numerics(
             dt=numerics.dt_s,
             scheme=numerics.scheme,
@@ -87,6 +87,8 @@ def problem_of(scene: Scene) -> Problem:
             eps_d=numerics.eps_d_m,
             eps_v=numerics.eps_v_m_per_s,
             max_iterations=numerics.max_iterations,
+            coupling=numerics.coupling or "implicit",
+            eps_force=numerics.eps_force_N,
         ),
         evaluation=(scene.evaluation.from_m, scene.evaluation.to_m),
         residual_stiffness_ratio=ratio,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
 from pydantic import BaseModel, ValidationError
 
@@ -41,6 +41,14 @@ def shown(value: Any) -> str:
         text = "a number of thousands of digits"
     text = "".join(c if c.isprintable() else "?" for c in text)
     return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
+
+
+def refuse(origin: Origin, key: str, value: object, why: str) -> NoReturn:
+    """Raise the ``InputError`` that says what a key is, where it was written, and why it cannot."""
+    unit = unit_of(key)
+    number = f"{value:g}" if isinstance(value, float) else shown(value)
+    in_unit = f" {unit}" if unit else ""
+    raise InputError(f"{key} is {number}{in_unit} {origin.of(key)}; {why}")
 
 
 def unknown_key(key: str, where: str, known: list[str]) -> str:

@@ -17,11 +17,11 @@ from catenary.cases.catalogue import find_case
 from catenary.cases.keys import is_known, known_keys, with_kinds
 from catenary.cases.loading import assign, parse_assignment, read_toml
 from catenary.cases.messages import COMMAND_LINE, Origin, input_error, unknown_key
+from catenary.cases.schema_contact import ContactTable
 from catenary.cases.schema_line import LineTable, MeshTable
 from catenary.cases.schema_pantograph import PantographTable
 from catenary.cases.schema_run import (
     CaseTable,
-    ContactTable,
     EvaluationTable,
     NumericsTable,
     OutputTable,
@@ -47,7 +47,9 @@ class Scene(Table):
         min_length=1, description="the kinds of pantograph, by name"
     )
     train: TrainTable = Field(description="the train and its pantographs")
-    contact: ContactTable = Field(default_factory=ContactTable, description="penalty contact")
+    contact: ContactTable = Field(
+        default_factory=ContactTable, description="contact between head and wire"
+    )
     numerics: NumericsTable = Field(default_factory=NumericsTable, description="time stepping")
     evaluation: EvaluationTable = Field(description="the stretch whose statistics are judged")
     output: OutputTable = Field(default_factory=OutputTable, description="what is written")

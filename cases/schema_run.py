@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from catenary.cases.table import Table
+from catenary.cases.table import TAKE_AWAY, Table
 
 # Statistics are taken below 20 Hz (EN 50317); its Nyquist limit is the longest step that can do so.
 MAX_DT = 1.0 / 40.0
@@ -53,21 +53,17 @@ class TrainTable(Table):
     )
 
 
-class ContactTable(Table):
-    """Penalty contact between head and wire."""
-
-    stiffness_N_per_m: float = Field(5e4, gt=0, le=1e9, description="penalty stiffness")
-    damping_N_s_per_m: float = Field(
-        0.0, ge=0, le=1e6, description="damping, acts with effects.contact_damping"
-    )
-
-
 class NumericsTable(Table):
     """Time stepping."""
 
     dt_s: float = Field(1e-3, ge=1e-6, description="time step")
     scheme: Literal["one_solve", "fixed_point"] = Field(
         "one_solve", description="one solve a step, or the paper's fixed-point correction"
+    )
+    coupling: Literal["implicit", "iterated", "explicit"] | None = Field(
+        None,
+        description="one_solve: contact forces implicit through both sides (if absent), exchanged "
+        "until they agree, or from the extrapolated motion of both sides",
     )
     newmark_beta: float = Field(0.25, gt=0, le=1, description="Newmark's beta")
     newmark_gamma: float = Field(0.5, ge=0.5, le=2, description="Newmark's gamma")
@@ -77,8 +73,14 @@ class NumericsTable(Table):
     eps_v_m_per_s: float = Field(
         1e-3, gt=0, le=1, description="fixed_point: change of velocity that ends a step"
     )
+    eps_force_N: float = Field(
+        1e-6, gt=0, le=10, description="coupling iterated: change of force that ends a step"
+    )
     max_iterations: int = Field(
-        50, ge=1, le=10000, description="fixed_point: most corrections a step"
+        50,
+        ge=1,
+        le=10000,
+        description="most corrections (fixed_point) or exchanges (coupling iterated) a step",
     )
 
     @field_validator("dt_s")
@@ -90,6 +92,11 @@ class NumericsTable(Table):
 
     @model_validator(mode="after")
     def _stable(self) -> NumericsTable:
+        if self.coupling is not None and self.scheme != "one_solve":
+            raise ValueError(
+                f"must not give coupling, which belongs to scheme one_solve, with {self.scheme}"
+                + TAKE_AWAY
+            )
         if 2 * self.newmark_beta < self.newmark_gamma:
             raise ValueError(
                 "must have 2 newmark_beta >= newmark_gamma to be stable for every step, but "
