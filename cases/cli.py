@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from catenary.cases.runner import RunOutcome
     from catenary.cases.scene import Scene
 
-app = typer.Typer(
+T = TypeVar("T")
+
+app: typer.Typer = typer.Typer(
     name="catenary",
     help="Finite elements for railway overhead lines coupled with pantographs.",
     no_args_is_help=True,
@@ -85,11 +87,20 @@ def run(
     shortened: Shortened = False,
     force: Force = False,
     strict: Strict = False,
+    study: Annotated[
+        bool, typer.Option("--study", help="Run the case's study: variants, figures, verdicts.")
+    ] = False,
     verbose: Verbose = False,
 ) -> int:
     """Collective."""
     from catenary.cases.petsc_options import split_extras
     from catenary.cases.scene import load_scene
+
+    if study:
+        if strict:
+            raise InputError("a study is not judged as a whole: give --study without --strict")
+        words = (extras or [], assignments or [])
+        return cli_studies.run_study(case, out, *words, shortened, force, verbose)
 
     def read() -> tuple[Scene, list[str]]:
         more, options = split_extras(extras or [])
@@ -97,7 +108,7 @@ def run(
             raise InputError(f"-o {out} is a file; name a folder for the results")
         return load_scene(case, [*(assignments or []), *more], shortened), options
 
-    comm, scene, arguments = _begin(read, verbose)
+    comm, scene, arguments = begin(read, verbose, lambda scene: scene)
     from catenary.cases.runner import run_case
 
     tell = _teller(out)
@@ -134,27 +145,31 @@ def restart(
             config = results.attributes["config"]
         return scene_from(config, Origin(str(results.path))), options
 
-    comm, scene, arguments = _begin(read, verbose)
+    comm, scene, arguments = begin(read, verbose, lambda scene: scene)
     from catenary.cases.runner import restart_case
 
     result = restart_case(scene, folder, comm, petsc_options=arguments, tell=_teller(folder))
     return _end(result, folder, strict)
 
 
-def _begin(
-    read: Callable[[], tuple[Scene, list[str]]], verbose: bool
-) -> tuple[Any, Scene, list[str]]:
-    """Communicator, scene and the options with which PETSc now runs. Collective."""
+def begin(
+    read: Callable[[], tuple[T, list[str]]], verbose: bool, scene_of: Callable[[T], Scene]
+) -> tuple[Any, T, list[str]]:
+    """Communicator, what ``read`` gives on rank 0, the options with which PETSc now runs.
+
+    Collective. ``read`` also gives the command line's options for PETSc, ``scene_of`` the scene
+    whose ``[petsc]`` table stands before them.
+    """
     from catenary.cases.petsc_options import as_arguments, start_petsc
     from catenary.solver.parallel import abort_on_unforeseen_error, on_root, set_up_logging
 
     comm = console.world()
     abort_on_unforeseen_error(comm)
     set_up_logging(comm, verbose)
-    scene, options = on_root(comm, read)
-    arguments = as_arguments(scene.petsc, options)
+    what, options = on_root(comm, read)
+    arguments = as_arguments(scene_of(what).petsc, options)
     start_petsc(arguments)
-    return comm, scene, arguments
+    return comm, what, arguments
 
 
 def _teller(folder: Path) -> Callable[[str], None]:
@@ -340,6 +355,10 @@ def compare(
     from catenary.postproc.compare import compare as compare_runs
 
     console.say(compare_runs(first, second).rstrip())
+
+
+# The verbs of other files, which take what is above.
+from catenary.cases import cli_studies  # noqa: E402
 
 
 def main() -> None:

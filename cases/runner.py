@@ -29,7 +29,7 @@ from catenary.postproc.fields import FieldRecorder
 from catenary.postproc.header import Header, line_datasets, static_datasets
 from catenary.postproc.progress import Progress
 from catenary.postproc.recorder import Recorder
-from catenary.postproc.report import write_report
+from catenary.postproc.report import write_report, write_summary
 from catenary.postproc.results import Results
 from catenary.solver.equilibrium import (
     Elasticity,
@@ -99,6 +99,7 @@ def run_case(
     force: bool = False,
     petsc_options: Sequence[str] = (),
     tell: Callable[[str], None] = lambda outcome: None,
+    only_summary: bool = False,
 ) -> RunOutcome:
     """Simulate a scene and write results, fields and report into ``out_dir``. Collective.
 
@@ -109,6 +110,7 @@ def run_case(
     petsc_options : the options that PETSc was started with, for the record
     tell : called with the outcome on all ranks when the result file is closed, before the report
         is drawn: an MPI launcher that is interrupted leaves its processes a second
+    only_summary : of the report write ``summary.json`` alone, which costs no time
 
     Raises
     ------
@@ -122,7 +124,18 @@ def run_case(
     phases = Phases()
     problem = scene.to_problem()
     at_rest = _at_rest(scene, problem, comm, phases)
-    return _march(scene, problem, at_rest, out_dir, comm, phases, petsc_options, tell, resume=False)
+    return _march(
+        scene,
+        problem,
+        at_rest,
+        out_dir,
+        comm,
+        phases,
+        petsc_options,
+        tell,
+        resume=False,
+        only_summary=only_summary,
+    )
 
 
 def restart_case(
@@ -190,6 +203,7 @@ def _march(
     petsc_options: Sequence[str],
     tell: Callable[[str], None],
     resume: bool,
+    only_summary: bool = False,
 ) -> RunOutcome:
     with phases("distribute"):
         march = March(comm, problem, at_rest.model, at_rest.form, at_rest.lift)
@@ -224,14 +238,17 @@ def _march(
     recorder.close(_performance(outcome, phases, comm.size))
     tell(outcome.outcome)
     with phases("report"):
-        result = on_root(comm, lambda: _report(out_dir, outcome))
+        result = on_root(comm, lambda: _report(out_dir, outcome, only_summary))
     logger.debug("phases [s]: %s", {name: round(wall, 3) for name, wall in phases.wall.items()})
     return result
 
 
-def _report(out_dir: Path, outcome: Outcome) -> RunOutcome:
+def _report(out_dir: Path, outcome: Outcome, only_summary: bool) -> RunOutcome:
     try:
-        report = write_report(out_dir / RESULT, out_dir)
+        if only_summary:
+            accepted = write_summary(out_dir / RESULT, out_dir)
+        else:
+            accepted = write_report(out_dir / RESULT, out_dir).verdict
         summary = json.loads((out_dir / "summary.json").read_text(encoding="utf-8"))
     except OSError as error:
         if outcome.outcome != "done":  # that has been told, and this adds nothing
@@ -240,7 +257,7 @@ def _report(out_dir: Path, outcome: Outcome) -> RunOutcome:
             f"writing the report into {out_dir} failed ({error.strerror or error}); the results "
             f"are complete: `catenary report {out_dir}` writes it again"
         ) from error
-    return RunOutcome(outcome.outcome, report.verdict, summary)
+    return RunOutcome(outcome.outcome, accepted, summary)
 
 
 def _header(

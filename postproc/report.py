@@ -88,6 +88,23 @@ def write_report(result_path: Path | str, out_dir: Path | str) -> Report:
     return Report([out / name for name in content], criteria, verdict)
 
 
+def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
+    """Write ``summary.json`` of a run alone; returns the verdict as ``Report``. Not collective.
+
+    Raises
+    ------
+    InputError
+        If ``result_path`` is no result file.
+    """
+    with Results(result_path) as results:
+        statistics = stats.evaluate(results)
+        criteria = judge(results, statistics)
+        text = as_json(summarise(results, statistics, criteria))
+        verdict = standards.verdict(criteria) if results.complete else None
+    write_whole(Path(out_dir) / "summary.json", text)
+    return verdict
+
+
 def judge(results: Results, statistics: RunStatistics) -> list[Criterion]:
     """The criteria of the edition and system that the result file names. Not collective."""
     about = results.attributes

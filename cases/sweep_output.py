@@ -1,0 +1,179 @@
+"""What a sweep leaves: a table as CSV, JSON and text, and statistics drawn over what was varied."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from catenary.cases.jobs import LINE_COLUMNS, PANTOGRAPH_COLUMNS, Ended
+from catenary.cases.units import unit_of
+from catenary.postproc import plots
+from catenary.postproc.storage import plain, write_whole
+
+TABLE, RECORD, PICTURE = "sweep.csv", "sweep.json", "sweep.png"
+PLOTTED = ("mean_N", "std_N", "max_N", "min_N", "max_uplift_mm")
+_MOST_LABELS = 10  # curves that a legend can name
+
+
+def rows(ended: Sequence[Ended]) -> list[dict[str, Any]]:
+    """One row per variant and pantograph; a variant that broke has one without figures.
+
+    Columns: ``variant``, the varied keys, ``outcome``, ``pantograph``, ``STATISTICS``, ``passed``
+    (the standard's verdict), ``wall_s``.
+    """
+    keys = varied_keys(ended)
+    table = []
+    for one in ended:
+        head = {"variant": one.variant.name}
+        head |= {key: one.variant.varied.get(key, "") for key in keys}
+        head["outcome"] = one.outcome
+        tail: dict[str, Any] = {"passed": one.summary.get("passed"), "wall_s": one.wall}
+        for pantograph in one.summary.get("pantographs", [{}]):
+            row: dict[str, Any] = {**head, "pantograph": pantograph.get("name", "")}
+            row |= {name: pantograph.get(name) for name in PANTOGRAPH_COLUMNS}
+            row |= _of_line(one.summary)
+            table.append(row | tail)
+    return table
+
+
+def _of_line(summary: dict[str, Any]) -> dict[str, Any]:
+    droppers = summary.get("droppers", {})
+    values = (
+        summary.get("supports", {}).get("max_uplift_mm"),
+        droppers.get("n_slackened"),
+        droppers.get("max_force_N"),
+        droppers.get("min_force_N"),
+    )
+    return dict(zip(LINE_COLUMNS, values, strict=True))
+
+
+def varied_keys(ended: Sequence[Ended]) -> list[str]:
+    """Keys that any of the variants varies, in the order of their first appearance."""
+    return list(dict.fromkeys(key for one in ended for key in one.variant.varied))
+
+
+def as_csv(table: Sequence[dict[str, Any]]) -> str:
+    """The rows as CSV text; what is unknown is empty. ``table`` has at least one row."""
+    stream = io.StringIO()
+    writer = csv.DictWriter(stream, list(table[0]), lineterminator="\n")
+    writer.writeheader()
+    for row in table:
+        writer.writerow({key: _cell(value) for key, value in row.items()})
+    return stream.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    if value is None:
+        return ""
+    return f"{value:.6g}" if isinstance(value, float) else value
+
+
+def as_text(ended: Sequence[Ended]) -> str:
+    """The table for a terminal: the figures that one wants to see at once."""
+    width = max(len(one.variant.name) for one in ended)
+    lines = [
+        f"{'variant':{width}}  {'pantograph':12}{'mean':>8}{'std':>8}{'max':>8}{'min':>8}  [N]"
+        f"{'loss [%]':>10}{'uplift [mm]':>13}{'slackened':>11}"
+    ]
+    for row in rows(ended):
+        if row["outcome"] != "done":
+            lines.append(f"{row['variant']:{width}}  BROKE: {row['outcome']}")
+            continue
+        forces = "".join(
+            f"{_short(row[name]):>8}" for name in ("mean_N", "std_N", "max_N", "min_N")
+        )
+        lines.append(
+            f"{row['variant']:{width}}  {row['pantograph']:12}{forces}     "
+            f"{_short(row['loss_percent'], 3):>10}{_short(row['max_uplift_mm']):>13}"
+            f"{_short(row['n_slackened'], 0):>11}"
+        )
+    return "\n".join(lines)
+
+
+def _short(value: float | None, digits: int = 1) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def write(out_dir: Path, case: str, ended: Sequence[Ended], plotted: Sequence[str]) -> list[Path]:
+    """Write table, record and picture of a sweep; returns the files. Not collective.
+
+    The picture is left out if fewer than two variants are done.
+    """
+    table = rows(ended)
+    record = {
+        "case": case,
+        "varied": varied_keys(ended),
+        "wall_s": sum(one.wall for one in ended),
+        "variants": [
+            {"name": one.variant.name, "assignments": one.variant.assignments} for one in ended
+        ],
+        "rows": table,
+    }
+    content: dict[str, bytes | str] = {
+        TABLE: as_csv(table),
+        RECORD: json.dumps(plain(record), indent=1, ensure_ascii=False) + "\n",
+    }
+    if sum(one.done for one in ended) > 1:
+        content[PICTURE] = plots.png(draw(table, varied_keys(ended), plotted))
+    for name, data in content.items():
+        write_whole(out_dir / name, data)
+    return [out_dir / name for name in content]
+
+
+def draw(table: Sequence[dict[str, Any]], keys: Sequence[str], plotted: Sequence[str]) -> Figure:
+    """Statistics over the first varied key with numbers, a curve for each value of the others.
+
+    Parameters
+    ----------
+    table : what ``rows`` gives, at least one row done
+    keys : varied keys; without any the variants' names stand on the axis
+    plotted : names out of ``STATISTICS``
+    """
+    done = [row for row in table if row["outcome"] == "done"]
+    key = next((k for k in keys if all(_is_number(row[k]) for row in done)), None)
+    axis = key or (keys[0] if keys else "variant")
+    others = [k for k in keys if k != axis]
+    curves: dict[str, list[dict[str, Any]]] = {}
+    for row in done:
+        label = ", ".join([*(f"{k.rsplit('.', 1)[-1]} {row[k]}" for k in others)])
+        label = ", ".join(part for part in (row["pantograph"], label) if part)
+        curves.setdefault(label, []).append(row)
+    places = list(dict.fromkeys(row[axis] for row in done))
+    figure = plots.new_figure(0.6 + 2.0 * len(plotted))
+    panels = figure.subplots(len(plotted), 1, sharex=True, squeeze=False)[:, 0]
+    for name, axes in zip(plotted, panels, strict=True):
+        for number, (label, own) in enumerate(curves.items()):
+            x = [float(row[axis]) if key else places.index(row[axis]) for row in own]
+            y = [np.nan if row[name] is None else float(row[name]) for row in own]
+            order = np.argsort(x, kind="stable")
+            axes.plot(
+                np.array(x)[order],
+                np.array(y)[order],
+                "o-",
+                ms=4,
+                linewidth=1.3,
+                color=plots.colour(number),
+                label=label,
+            )
+        plots.tidy(axes, "", name)
+    if len(curves) <= _MOST_LABELS:
+        plots.legend_above(panels[0], columns=min(len(curves), 3))
+    if key is None:
+        panels[-1].set_xticks(range(len(places)), places, rotation=30, ha="right")
+    unit = unit_of(axis)
+    panels[-1].set_xlabel(f"{axis} [{unit}]" if unit else axis)
+    return figure
+
+
+def _is_number(text: Any) -> bool:
+    try:
+        return bool(np.isfinite(float(text)))
+    except (TypeError, ValueError):
+        return False

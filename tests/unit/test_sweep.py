@@ -1,0 +1,251 @@
+"""A sweep: what it writes, that it goes on where it was, variants that break, bad input."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from matplotlib.figure import Figure
+from measuring import COMM
+from typer.testing import CliRunner
+
+from catenary.cases.cli import app
+from catenary.cases.jobs import STATISTICS, Ended, Job, make_jobs
+from catenary.cases.runner import run_case
+from catenary.cases.sweep import run_jobs
+from catenary.cases.sweep_output import as_text, draw, rows
+from catenary.cases.variants import Variant, parse_vary, product
+from catenary.postproc.results import Results
+from catenary.solver.errors import InputError
+
+CASE = "en50318_2002"
+# Six spans with one element a gap, run through in 460 steps.
+TINY = (
+    "line.n_spans=6",
+    "mesh.elements_per_gap=1",
+    "train.start_m=65",
+    "train.end_m=257",
+    "train.raise_time_s=0.2",
+    "numerics.dt_s=0.005",
+    "evaluation.from_m=120",
+    "evaluation.to_m=240",
+    "output.field_every_s=0",
+    "output.energy_every_s=0",
+)
+VARIED = "train.speed_km_h=250,300"
+# A wire that is to rise towards mid-span pushes on its droppers: found at the equilibrium.
+SLACK = "line.dropper.pre_sag_mid_mm=-100"
+
+
+def tiny(*variants: Variant) -> list[Job]:
+    return make_jobs(CASE, variants or product([parse_vary(VARIED)], {}), TINY)
+
+
+def invoke(*words: str) -> Any:
+    return CliRunner().invoke(app, list(words))
+
+
+@pytest.fixture(autouse=True)
+def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command line installs an exception hook; it goes with the test."""
+    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The folder of a sweep of two speeds and what the command line said."""
+    out = tmp_path_factory.mktemp("swept") / "out"
+    hook = sys.excepthook
+    done = invoke("sweep", CASE, "-o", str(out), "--vary", VARIED, "--set", *TINY)
+    sys.excepthook = hook
+    assert done.exit_code == 0, done.output
+    return out, done.stdout
+
+
+def test_each_variant_has_its_run_and_a_row(swept: tuple[Path, str]) -> None:
+    out, said = swept
+    with (out / "sweep.csv").open() as file:
+        table = list(csv.DictReader(file))
+    names = ["speed_km_h_250", "speed_km_h_300"]
+    assert [row["variant"] for row in table] == names
+    assert [row["train.speed_km_h"] for row in table] == ["250", "300"]
+    for row in table:
+        summary = json.loads((out / row["variant"] / "summary.json").read_text())
+        assert float(row["std_N"]) == pytest.approx(summary["pantographs"][0]["std_N"], rel=1e-5)
+        assert summary["speed_km_h"] == pytest.approx(float(row["train.speed_km_h"]))
+        assert not (out / row["variant"] / "report.html").exists()
+        assert f"{summary['pantographs'][0]['std_N']:.1f}" in said
+        with Results(out / row["variant"]) as results:
+            assert results.complete
+    assert table[0]["std_N"] != table[1]["std_N"]
+    record = json.loads((out / "sweep.json").read_text())
+    assert [row["variant"] for row in record["rows"]] == names
+    assert (out / "sweep.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_variant_is_the_run_of_the_same_scene(swept: tuple[Path, str], tmp_path: Path) -> None:
+    job = tiny()[1]
+    run_case(job.scene, tmp_path / "alone", COMM, only_summary=True)
+    with Results(tmp_path / "alone") as alone, Results(swept[0] / job.variant.name) as one:
+        assert (alone.channel("contact_force") == one.channel("contact_force")).all()
+
+
+def test_what_is_done_is_not_run_again(swept: tuple[Path, str]) -> None:
+    out, _ = swept
+    first, second = out / "speed_km_h_250", out / "speed_km_h_300"
+    before = (first / "run.h5").stat().st_mtime_ns
+    figures = (out / "sweep.csv").read_text().splitlines()[2].split(",")[4:-1]
+    (second / "variant.json").unlink()  # as a kill leaves it
+    again = invoke("sweep", CASE, "-o", str(out), "--vary", VARIED, "--set", *TINY)
+    assert again.exit_code == 0, again.output
+    assert "[1/2] speed_km_h_250: done already" in again.stdout
+    assert "[2/2] speed_km_h_300\n" in again.stdout
+    assert (first / "run.h5").stat().st_mtime_ns == before
+    assert (out / "sweep.csv").read_text().splitlines()[2].split(",")[4:-1] == figures
+
+
+def test_further_values_join_a_sweep_and_other_ones_are_refused(swept: tuple[Path, str]) -> None:
+    out, _ = swept
+    other = invoke(
+        "sweep", CASE, "-o", str(out), "--vary", "train.speed_km_h=275", "--set", *TINY
+    )  # fmt: skip
+    assert other.exit_code == 2
+    assert "a sweep with other variants (speed_km_h_250)" in other.stderr
+    assert not (out / "speed_km_h_275").exists()
+
+
+def test_another_configuration_is_not_overwritten_without_force(tmp_path: Path) -> None:
+    variant = Variant("one", ())
+    run_jobs(tiny(variant), tmp_path, COMM)
+    before = (tmp_path / "one" / "summary.json").read_text()
+    changed = make_jobs(CASE, [variant], [*TINY, "contact.stiffness_N_per_m=2e4"])
+    with pytest.raises(InputError, match="another configuration"):
+        run_jobs(changed, tmp_path, COMM)
+    assert (tmp_path / "one" / "summary.json").read_text() == before
+    (ended,) = run_jobs(changed, tmp_path, COMM, force=True)
+    assert ended.done and not ended.skipped
+    assert (tmp_path / "one" / "summary.json").read_text() != before
+
+
+def test_a_run_of_its_own_is_not_overwritten(tmp_path: Path) -> None:
+    (other,) = make_jobs(CASE, [Variant("one", ())], [*TINY, "numerics.dt_s=0.01"])
+    run_case(other.scene, tmp_path / "one", COMM, only_summary=True)
+    with pytest.raises(InputError, match="the results of another run"):
+        run_jobs(tiny(Variant("one", ())), tmp_path, COMM)
+
+
+def test_a_variant_that_breaks_does_not_stop_the_others(tmp_path: Path) -> None:
+    named = tmp_path / "variants.toml"
+    named.write_text(f'slack = ["{SLACK}"]\nsound = []\n')
+    out = tmp_path / "out"
+    done = invoke(
+        "sweep", CASE, "-o", str(out), "--variants", str(named),
+        "--set", *TINY,
+    )  # fmt: skip
+    assert done.exit_code == 1, done.output
+    assert "1 of 2 variants broke: slack (the dropper in span" in done.stderr
+    assert "would be slack at rest" in done.stderr
+    with (out / "sweep.csv").open() as file:
+        slack, sound = csv.DictReader(file)
+    assert "would be slack at rest" in slack["outcome"] and slack["std_N"] == ""
+    assert sound["outcome"] == "done" and float(sound["std_N"]) > 0
+
+
+def test_measures_are_taken_and_results_dropped_on_request(tmp_path: Path) -> None:
+    (job,) = tiny(Variant("one", ()))
+    slim = Job(job.variant, job.scene, keep_results=False)
+
+    def measure(results: Results) -> dict[str, Any]:
+        return {"n_steps": results.n_steps}
+
+    (first,) = run_jobs([slim], tmp_path, COMM, measure=measure)
+    assert first.measured == {"n_steps": first.summary["n_steps"]}
+    assert not (tmp_path / "one" / "run.h5").exists()
+    (second,) = run_jobs([slim], tmp_path, COMM, measure=measure)
+    assert second.skipped and second.measured == first.measured
+    (third,) = run_jobs([job], tmp_path, COMM, measure=measure)  # now the file is wanted
+    assert not third.skipped and (tmp_path / "one" / "run.h5").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ([], "there is nothing to vary"),
+        (["--vary", "train.sped_km_h=1,2"], "did you mean train.speed_km_h?"),
+        (["--vary", "train.speed_km_h=250,-3"], "variant speed_km_h_-3: train.speed_km_h is -3"),
+        (["--vary", "train.speed_km_h"], "must have the form"),
+        (["--vary", "train.speed_km_h=1", "--plot", "sdt_N"], "did you mean std_N?"),
+        (["--variants", "nowhere.toml"], "nowhere.toml cannot be read"),
+        (["--vary", "train.speed_km_h=250", "fast"], "neither key=value nor"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_writes_nothing(
+    words: list[str], sentence: str, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    done = invoke("sweep", CASE, "-o", str(out), *words)
+    assert done.exit_code == 2
+    assert sentence in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not out.exists()
+
+
+def test_results_in_place_of_a_file_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("mine")
+    done = invoke("sweep", CASE, "-o", str(tmp_path / "out"), "--vary", VARIED)
+    assert done.exit_code == 2
+    assert "is a file" in done.stderr
+
+
+def fake(name: str, varied: dict[str, str], *sigmas: float | None) -> Ended:
+    """A variant that is done with one pantograph for each standard deviation."""
+    people = ["leading", "trailing"]
+    pantographs = [
+        {**dict.fromkeys(STATISTICS, 1.0), "name": people[i], "std_N": sigma, "loss_percent": 0.0}
+        for i, sigma in enumerate(sigmas)
+    ]
+    summary = {"pantographs": pantographs, "supports": {"max_uplift_mm": 5.0}, "passed": True}
+    return Ended(Variant(name, (), varied), "done", summary)
+
+
+def test_rows_have_one_line_per_pantograph_and_one_per_broken_variant() -> None:
+    ended = [fake("a", {"k": "1"}, 10.0, None), Ended(Variant("b", (), {"k": "2"}), "it broke")]
+    table = rows(ended)
+    assert [(row["variant"], row["k"], row["pantograph"]) for row in table] == [
+        ("a", "1", "leading"), ("a", "1", "trailing"), ("b", "2", ""),
+    ]  # fmt: skip
+    assert [row["std_N"] for row in table] == [10.0, None, None]
+    assert "BROKE: it broke" in as_text(ended)
+
+
+def curves_of(figure: Figure) -> dict[str, list[tuple[float, float]]]:
+    """Points of the curves in a figure's first panel, by label."""
+    return {
+        str(line.get_label()): [(float(x), float(y)) for x, y in line.get_xydata()]
+        for line in figure.axes[0].get_lines()
+    }
+
+
+def test_statistics_are_drawn_over_the_key_with_numbers() -> None:
+    ended = [
+        fake(f"{law}{speed}", {"contact.law": law, "train.speed_km_h": speed}, 1.0 * int(speed))
+        for law in ("hard", "soft")
+        for speed in ("300", "200")
+    ]
+    figure = draw(rows(ended), ["contact.law", "train.speed_km_h"], ["std_N", "max_uplift_mm"])
+    assert curves_of(figure) == {
+        "leading, law hard": [(200.0, 200.0), (300.0, 300.0)],
+        "leading, law soft": [(200.0, 200.0), (300.0, 300.0)],
+    }
+    assert figure.axes[1].get_xlabel() == "train.speed_km_h [km/h]"
+
+
+def test_words_stand_on_the_axis_where_no_key_has_numbers() -> None:
+    ended = [fake("a", {"contact.law": "hard"}, 3.0), fake("b", {"contact.law": "soft"}, 4.0)]
+    figure = draw(rows(ended), ["contact.law"], ["std_N"])
+    assert curves_of(figure) == {"leading": [(0.0, 3.0), (1.0, 4.0)]}
+    assert [label.get_text() for label in figure.axes[0].get_xticklabels()] == ["hard", "soft"]

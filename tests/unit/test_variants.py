@@ -1,0 +1,129 @@
+"""Variants: how keys are varied, products, names of folders, files of named variants."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from catenary.cases.variants import (
+    Variant,
+    check_keys,
+    parse_vary,
+    product,
+    read_named,
+    slug,
+)
+from catenary.solver.errors import InputError
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("a.b=1,2,3", ("1", "2", "3")),
+        ("a.b= 1 , 2 ", ("1", "2")),
+        ("a.b=[1,2],[3]", ("[1,2]", "[3]")),
+        ('a.b="x,y",z', ('"x,y"', "z")),
+        ('a.b=[{n="l"},{n="l",d=2}],[]', ('[{n="l"},{n="l",d=2}]', "[]")),
+        ("a.b=1", ("1",)),
+    ],
+)
+def test_values_are_cut_at_outer_commas(text: str, values: tuple[str, ...]) -> None:
+    assert parse_vary(text) == ("a.b", values)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("a.b", "must have the form"),
+        ("a.b=", "must have the form"),
+        ("=1,2", "must have the form"),
+        ("a.b=1,,2", "must have the form"),
+        ("a.b=1,2,1", "names 1 twice"),
+        ("petsc.ksp_type=cg,gmres", "when the program starts"),
+    ],
+)
+def test_what_is_no_variation_is_told(text: str, sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
+        parse_vary(text)
+
+
+def test_a_product_has_every_combination_once_and_the_last_key_is_fastest() -> None:
+    variants = product([parse_vary("a.x=1,2"), parse_vary("b.y=3,4,5")], {})
+    assert [v.name for v in variants] == [
+        "x_1__y_3", "x_1__y_4", "x_1__y_5", "x_2__y_3", "x_2__y_4", "x_2__y_5",
+    ]  # fmt: skip
+    assert variants[3].assignments == ("a.x=2", "b.y=3")
+    assert variants[3].varied == {"a.x": "2", "b.y": "3"}
+
+
+def test_named_variants_come_before_the_varied_keys_that_win() -> None:
+    variants = product([parse_vary("a.x=1,2")], {"soft": ["c.k=1"], "hard": ["c.k=9", "c.d=0"]})
+    assert [v.name for v in variants] == ["soft__x_1", "soft__x_2", "hard__x_1", "hard__x_2"]
+    assert variants[2].assignments == ("c.k=9", "c.d=0", "a.x=1")
+    assert variants[2].varied == {"variant": "hard", "a.x": "1"}
+    assert product([], {"only": ["c.k=1"]}) == [Variant("only", ("c.k=1",), {})]
+
+
+def test_keys_that_share_their_last_part_are_told_apart() -> None:
+    (variant,) = product([parse_vary("one.t=1"), parse_vary("two.t=1")], {})
+    assert variant.name == "one.t_1__two.t_1"
+
+
+def test_values_that_make_the_same_folder_get_two() -> None:
+    names = [v.name for v in product([parse_vary('a.x="b/c","b c","B-C"')], {})]
+    assert len({name.lower() for name in names}) == 3
+
+
+@pytest.mark.parametrize(
+    ("texts", "sentence"),
+    [
+        (["a.x=1,2", "a.x=3"], "given twice"),
+        ([f"a.x{i}=" + ",".join(str(j) for j in range(10)) for i in range(5)], "100000 runs"),
+    ],
+)
+def test_impossible_products_are_told(texts: list[str], sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
+        product([parse_vary(text) for text in texts], {})
+
+
+@given(st.text(max_size=300))
+def test_every_text_makes_a_folder_name(text: str) -> None:
+    name = slug(text)
+    assert 0 < len(name) <= 100
+    assert set(name) <= set("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-")
+    assert name not in (".", "..")
+
+
+def test_long_names_that_differ_at_their_end_stay_apart() -> None:
+    assert slug("x" * 200 + "a") != slug("x" * 200 + "b")
+
+
+def test_named_variants_are_read_from_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "variants.toml"
+    path.write_text('soft = ["contact.stiffness_N_per_m=1e4"]\nbase = []\n')
+    assert read_named(path) == {"soft": ["contact.stiffness_N_per_m=1e4"], "base": []}
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "names no variant"),
+        ("soft = 3\n", "soft in .* must be a list of assignments"),
+        ("soft = [3]\n", "soft in .* must be a list of assignments"),
+        ("[soft]\nx = 1\n", "soft in .* must be a list of assignments"),
+        ("soft = [\n", "not valid TOML"),
+    ],
+)
+def test_other_files_are_told(text: str, sentence: str, tmp_path: Path) -> None:
+    path = tmp_path / "variants.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=sentence):
+        read_named(path)
+
+
+def test_an_unknown_key_brings_the_nearest_one() -> None:
+    with pytest.raises(InputError, match=r"did you mean train\.speed_km_h"):
+        check_keys([Variant("v", ("train.sped_km_h=300",))], "on the command line (--vary)")
