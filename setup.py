@@ -8,7 +8,13 @@ setup(
     packages=[f"catenary.{part}" for part in PARTS],
     package_dir={f"catenary.{part}": part for part in PARTS},
     package_data={
-        "catenary.cases": ["*/case.toml", "*/README.md", "*/reference/*.csv"],
+        "catenary.cases": [
+            "*/case.toml",
+            "*/README.md",
+            "*/reference/*.csv",
+            "*/study.toml",
+            "*/*.py",
+        ],
         "catenary.postproc": ["templates/*"],
     },
 )

@@ -54,6 +54,8 @@ def data_files() -> set[str]:
         "cases/*/case.toml",
         "cases/*/README.md",
         "cases/*/reference/*.csv",
+        "cases/*/study.toml",
+        "cases/*/*.py",
         "postproc/templates/*",
     )
     return {

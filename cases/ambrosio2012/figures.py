@@ -1,0 +1,257 @@
+"""The paper's figures 8 to 14 from our runs, each with the numbers that it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from catenary.cases.ambrosio2012.measures import mid_span
+from catenary.cases.ambrosio2012.statements import AVERAGE, LIGHT, SINGLE, Force, Run, Runs
+from catenary.postproc import filters, plots
+from catenary.postproc.results import Results
+from catenary.postproc.statistics import histogram
+from catenary.postproc.study_report import StudyFigure
+
+# damping -> train -> folder of its result file
+Folders = Mapping[str, Mapping[str, Path]]
+Columns = dict[str, Any]
+
+_PANELS = {LIGHT: "(a) alpha = 0.00275 s", AVERAGE: "(b) alpha = 0.0275 s"}
+_SHOWN_PAIRS = ("31m", "200m")  # figures 11 and 12 show two separations; the text names these
+_STATISTICS: tuple[tuple[str, Callable[[Force], float]], ...] = (
+    ("maximum", lambda f: f.maximum),
+    ("minimum", lambda f: f.minimum),
+    ("mean", lambda f: f.mean),
+    ("deviation", lambda f: f.std),
+    ("mean + 3 sigma", lambda f: f.mean + 3 * f.std),
+    ("mean - 3 sigma", lambda f: f.mean - 3 * f.std),
+)
+_BIN = 20.0  # [N]
+
+
+def draw(folders: Folders, runs: Runs) -> list[StudyFigure]:
+    """Figures 8 to 14 of what is there; one whose runs are all missing is left out.
+
+    Parameters
+    ----------
+    folders : result files of the runs that are done
+    runs : their statistics
+    """
+    figures = []
+    if any(folders.values()):
+        figures = [_forces(folders), _overview(runs), _histograms(folders)]
+        shown = {
+            damping: {t: f for t, f in trains.items() if t in _SHOWN_PAIRS}
+            for damping, trains in folders.items()
+        }
+        if any(shown.values()):
+            figures += [_uplift(shown), _droppers(shown)]
+        figures += [_by_separation(13, LIGHT, runs), _by_separation(14, AVERAGE, runs)]
+    return figures
+
+
+def _places(n: int) -> tuple[str, ...]:
+    return ("single",) if n == 1 else ("leading", "trailing")
+
+
+def _label(train: str, place: str) -> str:
+    return train if train == SINGLE else f"{train} {place}"
+
+
+def _filtered(results: Results) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Place, position [m] and 20 Hz force [N] of each pantograph within the stretch."""
+    position, force = results.channel("contact_position"), results.channel("contact_force")
+    start, end = results.evaluation
+    filtered = filters.low_pass(force, results.dt)
+    found = []
+    for p, place in enumerate(_places(results.n_pantographs)):
+        within = (position[:, p] >= start) & (position[:, p] <= end)
+        found.append((place, position[within, p], filtered[within, p]))
+    return found
+
+
+def _forces(folders: Folders) -> StudyFigure:
+    trains = list(dict.fromkeys(train for own in folders.values() for train in own))
+    figure = plots.new_figure(0.6 + 1.55 * len(trains))
+    grid = figure.subplots(len(trains), 2, sharey=True, squeeze=False)
+    columns: Columns = {}
+    for column, (damping, own) in enumerate(folders.items()):
+        for row, train in enumerate(trains):
+            axes = grid[row, column]
+            if train in own:
+                _force_panel(axes, own[train], train, damping, columns)
+            title = f"{_PANELS[damping]}: {train}" if row == 0 else train
+            plots.tidy(axes, "", "force [N]" if column == 0 else "", title)
+        grid[-1, column].set_xlabel("position of the pantograph [m]")
+    plots.legend_above(grid[min(1, len(trains) - 1), 1], columns=2)
+    return StudyFigure("figure_08", "Figure 8: contact force of each pantograph, 20 Hz low-pass.",
+                       figure, columns)  # fmt: skip
+
+
+def _force_panel(axes: Axes, folder: Path, train: str, damping: str, columns: Columns) -> None:
+    with Results(folder) as results:
+        for number, (place, position, force) in enumerate(_filtered(results)):
+            colour = plots.colour(number)
+            axes.plot(position, force, color=colour, linewidth=0.8, label=place)
+            name = f"{damping} {_label(train, place)}"
+            columns[f"{name} position [m]"] = position
+            columns[f"{name} force [N]"] = force
+
+
+def _overview(runs: Runs) -> StudyFigure:
+    """Figure 9: statistics of all pantographs, a panel for each damping."""
+    figure = plots.new_figure(6.4)
+    panels = figure.subplots(2, 1)
+    columns: Columns = {"damping": [], "pantograph": []}
+    columns |= {f"{name} [N]": [] for name, _ in _STATISTICS}
+    for axes, (damping, trains) in zip(panels, runs.items(), strict=True):
+        forces = _labelled(trains)
+        for number, (name, value) in enumerate(_STATISTICS):
+            at = np.arange(len(forces)) + 0.13 * (number - 2.5)
+            values = [value(force) for force in forces.values()]
+            axes.bar(at, values, 0.12, color=plots.colour(number), label=name)
+            columns[f"{name} [N]"] += values
+        columns["damping"] += [damping] * len(forces)
+        columns["pantograph"] += list(forces)
+        axes.axhline(0.0, color=plots.GREY, linewidth=0.8)
+        axes.set_xticks(range(len(forces)), [label.replace(" ", "\n") for label in forces])
+        plots.tidy(axes, "", "contact force [N]", _PANELS[damping])
+        axes.grid(False, axis="x")
+    plots.legend_above(panels[0], columns=6)
+    return StudyFigure(
+        "figure_09", "Figure 9: statistics of the contact force.", figure, columns
+    )  # fmt: skip
+
+
+def _labelled(trains: Mapping[str, Run | None]) -> dict[str, Force]:
+    """Forces of all pantographs of a damping by "train place"."""
+    return {
+        _label(train, place): force
+        for train, run in trains.items()
+        if run is not None
+        for place, force in zip(_places(len(run.forces)), run.forces, strict=True)
+    }
+
+
+def _histograms(folders: Folders) -> StudyFigure:
+    """Figure 10: share of time in bins of the contact force, a panel for each damping."""
+    figure = plots.new_figure(6.4)
+    panels = figure.subplots(2, 1, sharex=True, sharey=True)
+    columns: Columns = {}
+    for axes, (damping, trains) in zip(panels, folders.items(), strict=True):
+        for number, (train, folder) in enumerate(trains.items()):
+            with Results(folder) as results:
+                records = _filtered(results)
+            for place, _, force in records:
+                edges, percent = histogram(force, _BIN)
+                middle = 0.5 * (edges[1:] + edges[:-1])
+                name = _label(train, place)
+                style = "--" if place == "trailing" else "-"
+                axes.plot(middle, percent, style, marker="o", ms=2.5, linewidth=1.1,
+                          color=plots.colour(number), label=name)  # fmt: skip
+                columns[f"{damping} {name} force [N]"] = middle
+                columns[f"{damping} {name} share [%]"] = percent
+        plots.tidy(axes, "", "share of time [%]", _PANELS[damping])
+    panels[-1].set_xlabel(f"contact force, 20 Hz, bins of {_BIN:g} N [N]")
+    plots.legend_above(panels[0], columns=4)
+    return StudyFigure("figure_10", "Figure 10: histograms of the contact force.", figure, columns)
+
+
+def _uplift(shown: Folders) -> StudyFigure:
+    """Figure 11: uplift at the arm nearest to the middle of the stretch."""
+
+    def record(results: Results) -> tuple[float, np.ndarray]:
+        x = results.line("arm_x")
+        arm = int(np.argmin(np.abs(x - np.mean(results.evaluation))))
+        return float(x[arm]), 1e3 * results.channel("arm_uplift")[:, arm]
+
+    return _passages(
+        shown, record, "figure_11", "uplift [mm]",
+        "Figure 11: uplift at the steady arm in the middle of the stretch.",
+    )  # fmt: skip
+
+
+def _droppers(shown: Folders) -> StudyFigure:
+    """Figure 12: force of a dropper next to the middle of the span in the stretch's middle."""
+
+    def record(results: Results) -> tuple[float, np.ndarray]:
+        x, span = results.line("dropper_x"), results.line("dropper_span")
+        chosen = np.flatnonzero(mid_span(results) & (span == results.reference_span))
+        return float(x[chosen[0]]), results.channel("dropper_force")[:, chosen[0]]
+
+    return _passages(
+        shown, record, "figure_12", "dropper force [N]",
+        "Figure 12: force of a mid-span dropper in the middle of the stretch; 0 is slack.",
+    )  # fmt: skip
+
+
+def _passages(
+    shown: Folders,
+    record: Callable[[Results], tuple[float, np.ndarray]],
+    name: str,
+    what: str,
+    caption: str,
+) -> StudyFigure:
+    """A record at one place of the line over the time since the leading head passed it."""
+    figure = plots.new_figure(5.6)
+    panels = figure.subplots(2, 1, sharex=True, sharey=True)
+    columns: Columns = {}
+    for axes, (damping, trains) in zip(panels, shown.items(), strict=True):
+        for number, (train, folder) in enumerate(trains.items()):
+            with Results(folder) as results:
+                x, values = record(results)
+                position = results.channel("contact_position")
+                speed = results.attributes["speed_m_per_s"]
+            since = (position.max(axis=1) - x) / speed
+            behind = float(position[0].max() - position[0].min()) / speed
+            colour = plots.colour(number)
+            axes.plot(since, values, color=colour, linewidth=1.1, label=train)
+            axes.axvline(behind, color=colour, linestyle="--", linewidth=0.9)
+            columns[f"{damping} {train} time since the leading head [s]"] = since
+            columns[f"{damping} {train} {what}"] = values
+        axes.axvline(0.0, color=plots.GREY, linestyle="--", linewidth=0.9)
+        axes.axhline(0.0, color=plots.GREY, linewidth=0.6)
+        axes.set_xlim(-2.0, 5.0)
+        plots.tidy(axes, "", what, _PANELS[damping])
+    panels[-1].set_xlabel("time since the leading head has passed [s]; dashed: heads pass")
+    plots.legend_above(panels[0], columns=2)
+    return StudyFigure(name, caption, figure, columns)
+
+
+def _by_separation(number: int, damping: str, runs: Runs) -> StudyFigure:
+    """Figures 13 and 14: statistics over the separation beside the single pantograph's."""
+    figure = plots.new_figure(3.6)
+    panels = figure.subplots(1, 2, sharey=True)
+    trains = runs[damping]
+    columns: Columns = {"pantograph": [], "train": []}
+    columns |= {f"{name} [N]": [] for name, _ in _STATISTICS}
+    for panel, place in enumerate(("leading", "trailing")):
+        axes = panels[panel]
+        shown = {
+            train: run.forces[min(panel, len(run.forces) - 1)]
+            for train, run in trains.items()
+            if run is not None
+        }
+        for index, (name, value) in enumerate(_STATISTICS):
+            values = [value(force) for force in shown.values()]
+            axes.plot(range(len(shown)), values, "o-", ms=4, linewidth=1.1,
+                      color=plots.colour(index), label=name)  # fmt: skip
+            columns[f"{name} [N]"] += values
+        columns["pantograph"] += [place] * len(shown)
+        columns["train"] += list(shown)
+        axes.axhline(0.0, color=plots.GREY, linewidth=0.8)
+        axes.set_xticks(range(len(shown)), list(shown))
+        title = f"({'ab'[panel]}) {place}"
+        plots.tidy(axes, "separation", "contact force [N]" if panel == 0 else "", title)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=6,
+                  frameon=False, fontsize="small")  # fmt: skip
+    return StudyFigure(
+        f"figure_{number}",
+        f"Figure {number}: statistics of the contact force over the separation, {damping} damping.",
+        figure,
+        columns,
+    )

@@ -1,0 +1,81 @@
+"""What the study takes from a result file beside the summary, as plain numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from catenary.postproc.results import Results
+
+# A pantograph moves the wire before it arrives: what a dropper does from here on, three dropper
+# spacings ahead of the head, counts as that pantograph's passage [m].
+AHEAD = 20.0
+# An uplift has begun when it has reached this share of its largest value.
+BEGUN = 0.05
+MID_SPAN = 2  # droppers nearest to mid-span that stand for it, as an even number of them has two
+
+
+def measure(results: Results) -> dict[str, Any]:
+    """Slack droppers by passage, where the uplift of the arms begins, wave and train speed."""
+    return {
+        "slack": slack_droppers(results),
+        "onset_m": uplift_onset(results),
+        "wave_speed_m_per_s": results.attributes["wave_speed_m_per_s"],
+        "train_speed_m_per_s": results.attributes["speed_m_per_s"],
+        "span_m": float(np.diff(results.line("support_x"))[results.reference_span]),
+    }
+
+
+def slack_droppers(results: Results) -> dict[str, dict[str, int]]:
+    """Counts of evaluated droppers that were slack: ``leading`` before the last pantograph's
+    passage, ``trailing`` in or after it, ``any`` time, out of ``of``; of those next to mid-span
+    (``mid``) and of all (``all``). With one pantograph its passage is the leading one."""
+    x = results.line("dropper_x")
+    start, end = results.evaluation
+    evaluated = (x >= start) & (x <= end)
+    position, force = results.channel("contact_position"), results.channel("dropper_force")
+    slack = force <= 0.0
+    last = position.min(axis=1)
+    after = last[:, None] >= x[None, :] - AHEAD if position.shape[1] > 1 else np.zeros_like(slack)
+    leading = (slack & ~after).any(axis=0)
+    trailing = (slack & after).any(axis=0)
+    groups = {"mid": evaluated & mid_span(results), "all": evaluated}
+    return {
+        name: {
+            "leading": int((leading & chosen).sum()),
+            "trailing": int((trailing & chosen).sum()),
+            "any": int(((leading | trailing) & chosen).sum()),
+            "of": int(chosen.sum()),
+        }
+        for name, chosen in groups.items()
+    }
+
+
+def mid_span(results: Results) -> np.ndarray:
+    """Whether a dropper is one of the two nearest to the middle of its span, (n_droppers,)."""
+    x, span = results.line("dropper_x"), results.line("dropper_span")
+    masts = results.line("support_x")
+    away = np.abs(x - 0.5 * (masts[span] + masts[span + 1]))
+    near = np.zeros(x.size, dtype=bool)
+    for number in np.unique(span):
+        inside = np.flatnonzero(span == number)
+        near[inside[np.argsort(away[inside], kind="stable")[:MID_SPAN]]] = True
+    return near
+
+
+def uplift_onset(results: Results) -> float | None:
+    """How far before an evaluated arm the leading head is when its uplift has begun [m].
+
+    The smallest value of all arms; negative if an arm moves only after the head has passed. None
+    without arms in the stretch.
+    """
+    x = results.line("arm_x")
+    start, end = results.evaluation
+    lead = results.channel("contact_position").max(axis=1)
+    uplift = results.channel("arm_uplift")
+    ahead = []
+    for arm in np.flatnonzero((x >= start) & (x <= end)):
+        begun = np.flatnonzero(uplift[:, arm] >= BEGUN * uplift[:, arm].max())
+        ahead.append(float(x[arm] - lead[begun[0]]))
+    return min(ahead) if ahead else None

@@ -1,0 +1,106 @@
+"""The paper's study: two pantographs at several separations, with light and average damping.
+
+``study.toml`` lists the runs, ``statements.py`` judges them, ``figures.py`` redraws the paper's
+figures 8 to 14, ``ranking.py`` says which open input moves what.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from string import Template
+from typing import TYPE_CHECKING, Any
+
+from catenary.cases.loading import read_toml
+from catenary.cases.scene import Scene
+from catenary.cases.study import StudyRun, StudyVariant
+from catenary.cases.variants import Variant, check_keys, slug
+from catenary.solver.errors import InputError
+
+if TYPE_CHECKING:
+    from catenary.postproc.results import Results
+    from catenary.postproc.study_report import Study
+
+TABLE = Path(__file__).with_name("study.toml")
+VARIED = "vary"
+
+
+def run_name(reading: str, damping: str, train: str) -> str:
+    """Name of the run of a train under a reading."""
+    return slug(f"{reading}__{damping}__{train}")
+
+
+def variations(table: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Assignments of all variations by "group: title"."""
+    return {
+        f"{group}: {title}": assignments
+        for group, entries in table["variations"].items()
+        for title, assignments in entries.items()
+    }
+
+
+def read_table(shortened: bool = False) -> dict[str, Any]:
+    """``study.toml``, reduced to its short form on request."""
+    table = read_toml(TABLE)
+    if shortened:
+        short = table["short"]
+        for name in ("trains", "readings"):
+            table[name] = [one for one in table[name] if one["name"] in short[name]]
+        kept: dict[str, dict[str, list[str]]] = {}
+        for name in short["variations"]:
+            group, title = name.split(": ")
+            kept.setdefault(group, {})[title] = table["variations"][group][title]
+        table["variations"] = kept
+    return table
+
+
+def variants(scene: Scene, shortened: bool) -> list[StudyVariant]:
+    """All runs; only those of the first reading, which the figures show, keep their results."""
+    table = read_table(shortened)
+    planned = []
+    for number, reading in enumerate(table["readings"]):
+        for damping, alpha in table["dampings"].items():
+            for train in table["trains"]:
+                name = run_name(reading["name"], damping, train["name"])
+                assignments = (*table["always"], *alpha, *reading["set"], *train["set"])
+                keys = {"reading": reading["name"], "damping": damping, "train": train["name"]}
+                planned.append(StudyVariant(Variant(name, assignments, keys), number == 0))
+    for title, changes in variations(table).items():
+        for damping, alpha in table["dampings"].items():
+            name = run_name(VARIED, damping, title)
+            keys = {"reading": title, "damping": damping, "train": "single"}
+            planned.append(
+                StudyVariant(Variant(name, (*table["always"], *alpha, *changes), keys), False)
+            )
+    kind = scene.train.pantographs[0].name
+    filled = [_with_kind(one, kind) for one in planned]
+    check_keys([one.variant for one in filled], f"in {TABLE}")
+    _refuse_same_names(filled)
+    return filled
+
+
+def _with_kind(one: StudyVariant, kind: str) -> StudyVariant:
+    given = one.variant
+    assignments = tuple(Template(text).safe_substitute(kind=kind) for text in given.assignments)
+    return StudyVariant(Variant(given.name, assignments, given.varied), one.keep_results)
+
+
+def _refuse_same_names(planned: list[StudyVariant]) -> None:
+    names = [one.variant.name for one in planned]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"{TABLE} makes two runs that are both named {name}")
+
+
+def measure(results: Results) -> dict[str, Any]:
+    """Beside the summary: slack droppers by passage, onset of the uplift, wave and train speed."""
+    from catenary.cases.ambrosio2012.measures import measure as take
+
+    return take(results)
+
+
+def conclude(runs: Mapping[str, StudyRun]) -> Study:
+    """Verdicts, ranking and figures of the runs that are done."""
+    from catenary.cases.ambrosio2012.conclusion import conclude as draw_up
+
+    return draw_up(runs, read_table())

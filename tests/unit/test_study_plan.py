@@ -1,0 +1,139 @@
+"""Studies: which case has one, what a study.py must hold, which runs the paper's study makes."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from typer.testing import CliRunner
+
+from catenary.cases.ambrosio2012.study import read_table
+from catenary.cases.catalogue import shipped
+from catenary.cases.cli import app
+from catenary.cases.study import find_study, make_plan
+from catenary.postproc.study_report import (
+    NOT_REPRODUCED,
+    REPRODUCED,
+    Finding,
+    Reading,
+    Study,
+    StudyFigure,
+    columns_csv,
+    verdict_text,
+    write_study,
+)
+from catenary.solver.errors import InputError
+
+
+@pytest.fixture(autouse=True)
+def own_hook(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command line installs an exception hook; it goes with the test."""
+    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
+
+
+def invoke(*words: str) -> Any:
+    return CliRunner().invoke(app, list(words))
+
+
+def own_case(folder: Path, study: str) -> Path:
+    """A folder with a shipped case and a study of its own."""
+    shutil.copy(shipped()["en50318_2002"], folder / "case.toml")
+    (folder / "study.py").write_text(study)
+    return folder
+
+
+def test_a_case_without_a_study_says_so(tmp_path: Path) -> None:
+    done = invoke("run", "en50318_2002", "--study", "-o", str(tmp_path / "out"))
+    assert done.exit_code == 2
+    assert "en50318_2002 has no study: there is no study.py beside its case.toml" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_study_is_not_strict(tmp_path: Path) -> None:
+    done = invoke("run", "ambrosio2012", "--study", "--strict", "-o", str(tmp_path / "out"))
+    assert done.exit_code == 2
+    assert "give --study without --strict" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("study", "sentence"),
+    [
+        ("x = 1\n", "has no function variants"),
+        ("def variants(scene, shortened): ...\n", "has no function measure"),
+        ("def variants(\n", "cannot be loaded: SyntaxError"),
+        ("import no_such_module\n", "cannot be loaded: ModuleNotFoundError"),
+    ],
+)
+def test_a_study_that_cannot_be_used_is_told(study: str, sentence: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=sentence):
+        make_plan(str(own_case(tmp_path, study)))
+
+
+def test_the_papers_study_holds_every_train_under_both_dampings_and_every_variation() -> None:
+    table = read_table()
+    plan = make_plan("ambrosio2012")
+    variations = sum(len(group) for group in table["variations"].values())
+    assert len(plan.jobs) == 2 * (len(table["readings"]) * len(table["trains"]) + variations)
+    assert plan.path == find_study("ambrosio2012")
+    first = [job for job in plan.jobs if job.keep_results]
+    assert {job.scene.line.damping.alpha_s for job in first} == {0.00275, 0.0275}
+    assert sorted(max(p.behind_m for p in job.scene.train.pantographs) for job in first) == sorted(
+        2 * [0.0, 31.0, 85.0, 100.0, 200.0, 400.0]
+    )
+
+
+def test_all_trains_start_and_are_judged_at_the_same_place_of_a_span() -> None:
+    # The trailing pantograph starts at 110 m; the stretch lies a whole number of spans of 54 m on.
+    for job in make_plan("ambrosio2012").jobs:
+        if job.keep_results:
+            scene = job.scene
+            behind = max(one.behind_m for one in scene.train.pantographs)
+            assert scene.train.start_m - behind == 110.0
+            assert scene.evaluation.to_m - scene.evaluation.from_m == 400.0
+            assert (scene.evaluation.from_m - 400.0) % 54.0 == 0.0
+
+
+def test_the_kind_of_pantograph_is_the_cases_own() -> None:
+    plan = make_plan("ambrosio2012", ["train.pantographs.0.name=lumped"])
+    names = {one.name for job in plan.jobs for one in job.scene.train.pantographs}
+    assert names == {"lumped"}
+
+
+def study() -> Study:
+    def finding(verdict: str) -> Finding:
+        return Finding(1, "A < B.", "as it says", verdict, "1 & 2", "because")
+
+    figure = StudyFigure("figure_1", "Caption.", Figure(), {"x": np.array([0.5]), "y": [1, 2]})
+    readings = [
+        Reading("case", "the case", [], [finding(NOT_REPRODUCED)]),
+        Reading("other", "another", ["a.b=1"], [finding(REPRODUCED)]),
+    ]
+    return Study("Title", "Lead.", readings, figures=[figure])
+
+
+def test_the_report_shows_every_verdict_and_escapes_what_it_is_given(tmp_path: Path) -> None:
+    files = write_study(study(), tmp_path, [{"variant": "v"}], {"runs": 1})
+    assert {path.name for path in files} == {
+        "study.html", "study.json", "figure_1.png", "figure_1.csv",
+    }  # fmt: skip
+    html = (tmp_path / "study.html").read_text()
+    for text in ("A &lt; B.", "1 &amp; 2", "because", "not reproduced", "a.b=1", "Caption."):
+        assert text in html
+    assert "data:image/png;base64," in html
+
+
+def test_verdicts_stand_in_one_line_each() -> None:
+    head, line = verdict_text(study()).splitlines()
+    assert head.split() == ["case", "other", "statement"]
+    assert line.split("  ")[0].strip() == "1. not reproduced"
+    assert line.endswith("A < B.")
+
+
+def test_columns_of_different_lengths_end_in_empty_cells() -> None:
+    assert columns_csv({"a": [1, 2], "b": np.array([0.25])}) == "a,b\n1,0.25\n2,\n"
