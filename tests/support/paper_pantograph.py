@@ -10,6 +10,8 @@ from catenary.cases.schema_pantograph import CorrectionTable, MultibodyTable
 from catenary.mbs.multibody import MultibodyData, without_head
 from catenary.mbs.system import System
 
+BASE, LOWER_ARM, UPPER_ARM = "base", "lower_arm", "upper_arm"
+LOWER_LINK, UPPER_LINK = "lower_link", "upper_link"
 STABILISATION_ARM, HEAD, ACTUATOR = "stabilisation_arm", "head", "actuator"
 SPEED = 300.0  # [km/h]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import paper_pantograph as ambrosio
 
-from catenary.mbs import ambrosio
 from catenary.mbs.bodies import Motion
 from catenary.mbs.forces import PointForce
 from catenary.mbs.joints import PrescribedPoint, constant
