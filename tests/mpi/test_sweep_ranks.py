@@ -1,0 +1,71 @@
+"""A sweep on all ranks: the same figures as on one, every rank knows how each variant ended.
+
+Run by ``mpirun -n N python -m mpi4py -m pytest tests/mpi``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from mpi4py import MPI
+
+from catenary.cases.jobs import make_jobs
+from catenary.cases.sweep import run_jobs
+from catenary.cases.variants import Variant
+from catenary.solver.errors import InputError
+
+COMM = MPI.COMM_WORLD
+CASE = "en50318_2002"
+TINY = (
+    "line.n_spans=6",
+    "mesh.elements_per_gap=1",
+    "train.start_m=65",
+    "train.end_m=257",
+    "train.raise_time_s=0.2",
+    "numerics.dt_s=0.005",
+    "evaluation.from_m=120",
+    "evaluation.to_m=240",
+    "output.field_every_s=0",
+    "output.energy_every_s=0",
+)
+# Pushes on its droppers at rest, which is found on rank 0 alone.
+VARIANTS = (
+    Variant("slack", ("line.dropper.pre_sag_mid_mm=-100",)),
+    Variant("sound", ()),
+)
+# Round-off of the parallel solve, as in test_same_answers.py.
+TOLERANCE = 1e-9
+
+
+@pytest.fixture
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The folder of rank 0, on all ranks."""
+    path = tmp_path_factory.mktemp("sweep") if COMM.rank == 0 else None
+    yield COMM.bcast(path, root=0)
+    COMM.barrier()
+
+
+def test_a_sweep_goes_past_a_broken_variant_on_all_ranks(folder: Path) -> None:
+    jobs = make_jobs(CASE, VARIANTS, TINY)
+    slack, sound = run_jobs(jobs, folder, COMM)
+    assert "would be slack at rest" in slack.outcome
+    assert sound.done
+    outcomes = COMM.allgather([slack.outcome, sound.outcome])
+    assert outcomes == [outcomes[0]] * COMM.size
+    again = run_jobs(jobs[1:], folder, COMM)
+    assert again[0].skipped and again[0].summary == sound.summary
+    if COMM.rank == 0:
+        (alone,) = run_jobs(jobs[1:], folder / "alone", MPI.COMM_SELF)
+        here, there = (one.summary["pantographs"][0]["std_N"] for one in (sound, alone))
+        print(f"standard deviation: {here:.12g} N on {COMM.size} ranks, {there:.12g} N on one")
+        assert abs(here - there) <= TOLERANCE * there
+
+
+def test_a_refusal_reaches_all_ranks(folder: Path) -> None:
+    jobs = make_jobs(CASE, VARIANTS[1:], TINY)
+    run_jobs(jobs, folder, COMM)
+    other = make_jobs(CASE, VARIANTS[1:], [*TINY, "contact.stiffness_N_per_m=2e4"])
+    with pytest.raises(InputError, match="another configuration"):
+        run_jobs(other, folder, COMM)
