@@ -33,6 +33,7 @@ def header_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
             "description": description_of(placement.data, placement.static_force),
             "static_force_N": placement.static_force,
             "actuator_force_N": _actuator_force(placement.data),
+            "touching_mass_kg": _touching_mass(placement.data),
         }
         for place, placement in zip(scene.train.pantographs, problem.train.placements, strict=True)
     ]
@@ -50,3 +51,12 @@ def kind_lines(scene: Scene, problem: Problem) -> dict[str, list[str]]:
 
 def _actuator_force(data: PantographData) -> float | None:
     return stand(data).actuator_force if isinstance(data, MultibodyData) else None
+
+
+def _touching_mass(data: PantographData) -> float:
+    """Mass that one contact meets first [kg]: a strip on its suspension, or its share of the
+    head."""
+    if data.strips.suspension is not None:
+        return data.strips.suspension.mass
+    head = stand(data).head.mass if isinstance(data, MultibodyData) else data.masses[0]
+    return head / data.strips.number

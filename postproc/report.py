@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 
 from catenary.postproc import export, plots, standards
 from catenary.postproc import statistics as stats
+from catenary.postproc.remarks import remarks
 from catenary.postproc.results import Results
 from catenary.postproc.standards import KMH, Criterion
 from catenary.postproc.statistics import RunStatistics
@@ -183,6 +184,7 @@ def _html(
         droppers=export.dropper_table(results),
         reference_span=results.reference_span + 1,
         elasticity=1e3 * results.static("elasticity"),
+        remarks=remarks(results),
         facts=_facts(results),
         phases=about.get("phase_wall_s", {}),
         config=json.dumps(about["config"], indent=2, ensure_ascii=False),

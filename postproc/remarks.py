@@ -1,0 +1,78 @@
+"""Remarks of the report: what a run's own settings decide, and a reader should know."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from catenary.postproc.results import Results
+
+# Statistics are taken below 20 Hz; a resonance below twice that still shows in them.
+_FELT_HZ = 40.0
+# Phase of the contact's own motion in a step beyond which its hops are not resolved [rad].
+_RESOLVED = 0.5
+
+
+class _Contact(NamedTuple):
+    """A head on its contact: mass [kg], stiffness [N/m], step [s]."""
+
+    mass: float
+    stiffness: float
+    dt: float
+
+    @property
+    def omega(self) -> float:
+        return math.sqrt(self.stiffness / self.mass)
+
+    @property
+    def frequency(self) -> float:
+        return self.omega / (2.0 * math.pi)
+
+
+def remarks(results: Results) -> list[str]:
+    """Sentences about contact settings that shape the results, none if none do. Not collective."""
+    config = results.attributes["config"]
+    contact = config.get("contact", {})
+    if contact.get("law") == "kinematic":
+        return ["The contact is kinematic: head and wire do not part, so that loss cannot occur."]
+    found: dict[str, None] = {}
+    for facts in results.attributes.get("pantographs", []):
+        if facts.get("touching_mass_kg"):
+            head = _Contact(
+                facts["touching_mass_kg"],
+                _stiffness(contact, facts["static_force_N"]),
+                config["numerics"]["dt_s"],
+            )
+            found |= dict.fromkeys(_about(head))
+    return list(found)
+
+
+def _stiffness(contact: dict[str, Any], static_force: float) -> float:
+    """Stiffness of the contact, of Hertz's spring its tangent at the static force [N/m]."""
+    # Files written before there were laws hold the linear one.
+    if contact.get("law", "linear") == "linear":
+        return float(contact["stiffness_N_per_m"])
+    hertz = contact.get("hertz_stiffness_N_per_m1_5")
+    if hertz is None:
+        return 1.5 * float(contact["stiffness_N_per_m"])
+    return float(1.5 * hertz ** (2 / 3) * static_force ** (1 / 3))
+
+
+def _about(head: _Contact) -> list[str]:
+    said = (
+        f"A head of {head.mass:.3g} kg on a contact of {head.stiffness:.3g} N/m swings at "
+        f"{head.frequency:.3g} Hz"
+    )
+    result = []
+    if head.frequency < _FELT_HZ:
+        result.append(
+            f"{said}, which the forces below 20 Hz feel: contact.stiffness_N_per_m is part of the "
+            "result. Figures of other contact stiffnesses cannot be compared with these."
+        )
+    if head.omega * head.dt > _RESOLVED:
+        result.append(
+            f"{said}, of which a step of {1e3 * head.dt:g} ms does not resolve the hops: forces "
+            "below 20 Hz hold, but the loss of contact counts steps, not losses. Take a smaller "
+            "numerics.dt_s, or a contact that damps."
+        )
+    return result

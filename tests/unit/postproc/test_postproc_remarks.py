@@ -1,0 +1,62 @@
+"""Remarks about contact settings that shape the results."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from catenary.postproc.remarks import remarks
+
+
+class Told:
+    """What remarks read of a result file."""
+
+    def __init__(self, mass: float, dt: float, **contact: Any) -> None:
+        self.attributes = {
+            "config": {"contact": contact, "numerics": {"dt_s": dt}},
+            "pantographs": [{"touching_mass_kg": mass, "static_force_N": 120.0}] * 2,
+        }
+
+
+def said(mass: float, dt: float, **contact: Any) -> list[str]:
+    return remarks(Told(mass, dt, **contact))  # type: ignore[arg-type]
+
+
+def test_a_resonance_that_the_filter_lets_pass_is_told_once() -> None:
+    """sqrt(5e4 / 7.2) / 2 pi = 13.3 Hz."""
+    (sentence,) = said(7.2, 1e-3, law="linear", stiffness_N_per_m=5e4)
+    assert "7.2 kg" in sentence and "13.3 Hz" in sentence and "below 20 Hz feel" in sentence
+
+
+def test_a_contact_between_both_limits_needs_no_remark() -> None:
+    """59 Hz, and 0.37 rad a step."""
+    assert said(7.2, 1e-3, law="linear", stiffness_N_per_m=1e6) == []
+
+
+def test_hops_that_a_step_does_not_resolve_are_told() -> None:
+    """188 Hz and 1.2 rad in a step of 1 ms, 0.12 rad in 0.1 ms."""
+    (sentence,) = said(7.2, 1e-3, law="linear", stiffness_N_per_m=1e7)
+    assert "does not resolve the hops" in sentence
+    assert said(7.2, 1e-4, law="linear", stiffness_N_per_m=1e7) == []
+
+
+def test_hertz_s_spring_counts_with_its_tangent() -> None:
+    """Secant 5e4 at 120 N: tangent 7.5e4, sqrt(7.5e4 / 7.2) / 2 pi = 16.2 Hz, given either way."""
+    stiffness = 120.0 / (120.0 / 5e4) ** 1.5
+    one = said(7.2, 1e-3, law="hertz", stiffness_N_per_m=5e4)
+    other = said(7.2, 1e-3, law="hertz", hertz_stiffness_N_per_m1_5=stiffness)
+    assert one == other
+    assert "16.2 Hz" in one[0]
+
+
+def test_kinematic_contact_says_that_nothing_can_be_lost() -> None:
+    (sentence,) = said(7.2, 1e-3, law="kinematic")
+    assert "loss cannot occur" in sentence
+
+
+@pytest.mark.parametrize("facts", [[], [{"static_force_N": 120.0}]])
+def test_older_files_without_masses_have_no_remarks(facts: list[dict[str, Any]]) -> None:
+    told = Told(7.2, 1e-3, law="linear", stiffness_N_per_m=5e4)
+    told.attributes["pantographs"] = facts
+    assert remarks(told) == []  # type: ignore[arg-type]
