@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 from catenary.mbs import head_kernels
 from catenary.mbs.base_motion import BaseMotion
+from catenary.mbs.head_turning import PITCH, ROLL, head_turning
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lateral import LateralPath
 from catenary.mbs.lumped import LumpedData, LumpedPantograph
 from catenary.mbs.multibody import MultibodyData, head_weight_under_way, reduced, stand
 from catenary.mbs.raising import RaisingData, RaisingPantograph
+from catenary.mbs.strips import Turning
 
 # What a pantograph can be described by.
 PantographData = LumpedData | MultibodyData
@@ -52,7 +55,11 @@ def raising_data(data: MultibodyData, static_force: float, nominal_height: float
     """
     standing = stand(data)
     head = standing.head
-    arm = nominal_height + static_force / head.stiffness - head.offset
+    strips = data.strips
+    if strips.number > 1:
+        strips = replace(strips, pitch=head_turning(data, PITCH))
+    pressed = static_force / head.stiffness + strips.compression(static_force)
+    arm = nominal_height + pressed - head.offset
     return RaisingData(
         frame=reduced(data),
         head_mass=head.mass,
@@ -61,4 +68,13 @@ def raising_data(data: MultibodyData, static_force: float, nominal_height: float
         head_weight=head_weight_under_way(data),
         head_offset=head.offset,
         base_height=arm - standing.working_height,
+        strips=strips,
+        roll=roll_of(data),
     )
+
+
+def roll_of(data: PantographData) -> Turning | None:
+    """How the head of a pantograph rolls, None if it cannot. Not collective."""
+    if isinstance(data, MultibodyData):
+        return head_turning(data, ROLL)
+    return data.roll

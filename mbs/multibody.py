@@ -19,6 +19,7 @@ from catenary.mbs.forces import Force, Gravity, PointForce, SpringDamper
 from catenary.mbs.joints import Joint, PrescribedPoint, constant
 from catenary.mbs.reduction import ReducedMechanism, reduce_mechanism
 from catenary.mbs.statics import calibrate_actuator, equilibrium, held_force, unheld_force
+from catenary.mbs.strips import ONE_STRIP, Strips
 from catenary.mbs.system import Miss, System
 from catenary.solver.errors import InputError, RunBroken
 
@@ -27,6 +28,8 @@ logger = logging.getLogger("catenary.multibody")
 # Heights over which a mechanism is reduced, to either side of its working height, and how far
 # they are apart [m]: transition spans rise by half a metre.
 REACH, SPACING = 0.6, 0.02
+# Between those heights, to how much the lift is right [N].
+LIFT_TOLERANCE = 0.2
 # Part of the head's travel over which its spring is measured [m].
 TRAVEL = 0.01
 # Forces on further motions of the mechanism that show that it has no hold, over its weight. A link
@@ -44,7 +47,7 @@ class MultibodyData:
     given positions; ``head``, ``arm`` names of bodies; ``working_height`` [m] of the arm's centre
     of mass, None for where the joints close; ``actuator`` is the force to be calibrated to
     ``static_force`` [N], both None if forces hold as they are; ``wind`` are forces that act under
-    way, not at standstill, where the static force is measured.
+    way, not at standstill, where the static force is measured; ``strips`` are parts of the head.
     """
 
     name: str
@@ -56,11 +59,12 @@ class MultibodyData:
     static_force: float | None = None
     assembly_tolerance: float = 0.05
     wind: tuple[PointForce, ...] = ()
+    strips: Strips = ONE_STRIP
 
     @property
     def strip_offsets(self) -> tuple[float, ...]:
-        """One strip, in the pantograph's own place."""
-        return (0.0,)
+        """Places of the strips ahead of the pantograph's own place [m]."""
+        return self.strips.offsets
 
 
 class Head(NamedTuple):
@@ -158,7 +162,13 @@ def reduced(data: MultibodyData) -> ReducedMechanism:
     start = _part(standing.motion, frame)
     frame = frame.with_forces(*(f for f in data.wind if f.body != data.head))
     return reduce_mechanism(
-        frame, data.arm, heights, start=start, as_far_as_it_goes=True, name=data.name
+        frame,
+        data.arm,
+        heights,
+        start=start,
+        as_far_as_it_goes=True,
+        tolerance=LIFT_TOLERANCE,
+        name=data.name,
     )
 
 

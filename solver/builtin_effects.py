@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from catenary.mbs.build import roll_of
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.contact_laws import KinematicLaw
 from catenary.solver.effects import Effect, register
@@ -206,6 +207,28 @@ register(
         "paper section 5",
         default=True,
         applies=lambda p: len(p.train.placements) > 1,
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "head_roll",
+        "roll of the pan heads under a wire that moves along their strips",
+        "a roll of each head, on which the contact force acts with the stagger as its lever",
+        "rigid head on two springs beside each other",
+        default=False,
+        applies=lambda p: any(roll_of(place.data) is not None for place in p.train.placements),
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "vehicle_motion",
+        "motion of the vehicle under its pantographs",
+        "height and lateral place of the pantographs' bases as functions of time and place",
+        "given motion, or spectra of track irregularities (FRA; ORE B176)",
+        default=False,
+        applies=lambda p: p.train.vehicle is not None,
         build=lambda builder: builder.count_term(),
     )
 )

@@ -256,6 +256,7 @@ class March:
             owned_droppers=self._interaction.droppers.numbers,
             node_points=points,
             owned_nodes=owned_nodes,
+            n_strips=self._pantographs.n_strips,
         )
 
     def _dropper_law(self) -> Callable[[], np.ndarray]:
@@ -339,6 +340,7 @@ class March:
             node_uplift=lambda: line.displacement[self._node_rows],
             energies=self._energies,
             checkpoint=lambda: self._checkpoint(step),
+            strip_force=pantographs.strip_force,
         )
         try:
             for observer in observers:

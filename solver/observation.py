@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,6 +16,7 @@ class Stage:
     Attributes
     ----------
     n_pantographs : number of pantographs
+    n_strips : of each pantograph in running order
     dt, start_time : time step and time of the initial state [s]
     n_steps : steps planned
     arm_x, dropper_x : positions of steady arms and droppers [m]
@@ -35,6 +36,7 @@ class Stage:
     owned_droppers: np.ndarray
     node_points: np.ndarray
     owned_nodes: np.ndarray
+    n_strips: tuple[int, ...] = ()
 
 
 @dataclass
@@ -51,6 +53,8 @@ class StepView:
     node_uplift : () -> (n owned nodes,) vertical displacement [m]; not collective
     energies : () -> (kinetic, elastic) of the line relative to equilibrium [J]; collective
     checkpoint : () -> dict of arrays on rank 0 with which to continue, None elsewhere; collective
+    strip_force : (number of all strips,) share of each strip in the contact force, pantograph by
+        pantograph, the leading strip first [N], rank 0 only
     """
 
     step: int
@@ -64,6 +68,7 @@ class StepView:
     node_uplift: Callable[[], np.ndarray]
     energies: Callable[[], tuple[float, float]]
     checkpoint: Callable[[], dict[str, Any] | None]
+    strip_force: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 class Observer(Protocol):

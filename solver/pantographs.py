@@ -8,8 +8,10 @@ from collections.abc import Callable
 import numpy as np
 from scipy import integrate
 
-from catenary.mbs.build import Operation, make_pantograph
+from catenary.mbs.base_motion import BaseMotion
+from catenary.mbs.build import Operation, make_pantograph, roll_of
 from catenary.mbs.interface import Pantograph
+from catenary.mbs.lateral import LateralPath
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.contact import ContactWire, Touches
 from catenary.solver.equilibrium import Elasticity, Equilibrium
@@ -67,6 +69,11 @@ class Pantographs:
         return int(self._start.size)
 
     @property
+    def n_strips(self) -> tuple[int, ...]:
+        """Number of strips of each pantograph."""
+        return tuple(strips.stop - strips.start for strips in self._strips)
+
+    @property
     def n_contacts(self) -> int:
         """Number of strips that may touch the wire."""
         return int(self._contact_start.size)
@@ -117,6 +124,7 @@ class Pantographs:
         self, problem: Problem, placement: Placement, nominal_height: float, wire_height: float
     ) -> Pantograph:
         numerics = problem.numerics
+        base = _base_of(problem, placement)
         operation = Operation(
             placement.static_force,
             nominal_height,
@@ -124,10 +132,37 @@ class Pantographs:
             numerics.dt,
             numerics.beta,
             numerics.gamma,
+            _lateral_path(problem, placement, base),
+            base,
         )
         model = make_pantograph(placement.data, operation)
         model.place(wire_height)
         return model
+
+
+def _base_of(problem: Problem, placement: Placement) -> BaseMotion | None:
+    """How the vehicle moves the base of a pantograph, None if it is not simulated."""
+    train = problem.train
+    if "vehicle_motion" not in problem.effects or train.vehicle is None:
+        return None
+    return BaseMotion(train.vehicle, train.start - placement.behind, train.speed)
+
+
+def _lateral_path(
+    problem: Problem, placement: Placement, base: BaseMotion | None
+) -> LateralPath | None:
+    """Where the wire crosses the strips of a pantograph, None if its head does not roll."""
+    if "head_roll" not in problem.effects or roll_of(placement.data) is None:
+        return None
+    line, train = problem.line, problem.train
+    return LateralPath(
+        line.support_positions,
+        line.stagger,
+        train.start - placement.behind,
+        placement.data.strip_offsets,
+        train.speed,
+        base,
+    )
 
 
 def nominal_height_rule(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from catenary.mbs.base_motion import VehicleMotion
 from catenary.mbs.build import PantographData
 from catenary.meshgen.line import Line
 from catenary.solver.contact_laws import ContactLaw
@@ -42,13 +43,15 @@ class Placement:
 @dataclass(frozen=True)
 class Train:
     """``speed`` [m/s]; ``start`` and ``end`` [m] of the leading pantograph; ``raise_time`` [s] in
-    which the static force grows from zero to its value."""
+    which the static force grows from zero to its value; ``vehicle`` is how the pantographs' bases
+    move, with the effect ``vehicle_motion``."""
 
     speed: float
     start: float
     end: float
     raise_time: float
     placements: tuple[Placement, ...]
+    vehicle: VehicleMotion | None = None
 
 
 @dataclass(frozen=True)

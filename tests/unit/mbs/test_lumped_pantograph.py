@@ -7,11 +7,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from catenary.mbs import head_kernels
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lumped import LumpedData, LumpedPantograph
 
 DT = 1e-3
 EPS = np.finfo(float).eps
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled() -> None:
+    """Compiling takes longer than any example may."""
+    head_kernels.warm_up()
+
 
 chains = st.integers(1, 4).flatmap(
     lambda n: st.builds(

@@ -7,8 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_lines import BARE, ac_simple_line, mesh_of, problem_of, train
+from small_lines import BARE, EN_PANTOGRAPH, ac_simple_line, mesh_of, problem_of, train
 
+from catenary.mbs.base_motion import Harmonic, VehicleMotion
+from catenary.mbs.build import Operation, make_pantograph
+from catenary.mbs.lateral import LateralPath
+from catenary.mbs.strips import Turning
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver import effects
@@ -33,12 +37,15 @@ def full_line() -> Line:
 
 def full_problem(names: frozenset[str]) -> Problem:
     line = full_line()
+    rolling = replace(EN_PANTOGRAPH, roll=Turning(2.0, 470.0, 1.0))
+    speed = 1.1 * line.contact_wire.wave_speed
+    ours = train(speed, 60.0, 160.0, data=rolling, behind=(0.0, 31.0))
     return problem_of(
         line,
         names,
         damping=Damping(1e-4, 0.0125),
         contact=LinearLaw(5e4, 50.0),
-        train=train(1.1 * line.contact_wire.wave_speed, 60.0, 160.0, behind=(0.0, 31.0)),
+        train=replace(ours, vehicle=VehicleMotion((Harmonic(0.01, 1.0),))),
         residual_stiffness_ratio=0.01,
     )
 
@@ -109,6 +116,8 @@ BLOCKS = {
     "contact_loss": ({}, 1),
     "contact_damping": ({}, 1),
     "several_pantographs": ({}, 1),
+    "head_roll": ({}, 1),
+    "vehicle_motion": ({}, 1),
     "supercritical_speed": ({}, 1),
 }
 
@@ -173,6 +182,8 @@ def test_a_scene_without_an_effect_has_no_trace_of_it(name: str, mesh: LineMesh)
             "several_pantographs",
             lambda p: replace(p, train=replace(p.train, placements=p.train.placements[:1])),
         ),
+        ("head_roll", lambda p: replace(p, train=train(70.0, 60.0, 160.0))),
+        ("vehicle_motion", lambda p: replace(p, train=replace(p.train, vehicle=None))),
         ("supercritical_speed", lambda p: replace(p, train=replace(p.train, speed=70.0))),
     ],
 )
@@ -289,3 +300,12 @@ def test_damping_may_differ_from_component_to_component(mesh: LineMesh) -> None:
     off = build(replace(on, effects=BARE), mesh, lengths)
     assert off.damping_of("droppers") == (0.0, 0.0)
     assert off.damping_is_proportional
+
+
+def test_a_head_has_a_roll_only_if_asked() -> None:
+    """As `Pantographs` asks: with where the wire crosses the strips, or without."""
+    data = replace(EN_PANTOGRAPH, roll=Turning(2.0, 470.0, 1.0))
+    operation = Operation(120.0, 5.5, 0.5, 1e-3, 0.25, 0.5)
+    path = LateralPath(np.array([0.0, 100.0]), (0.2, 0.2), 0.0, (0.0,), 70.0)
+    assert make_pantograph(data, operation).state().size == 6
+    assert make_pantograph(data, operation._replace(lateral=path)).state().size == 9
