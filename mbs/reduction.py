@@ -8,6 +8,8 @@ of m, F and c over h hold all of it, so that a step costs a few interpolations.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg
@@ -20,6 +22,8 @@ from catenary.mbs.statics import equilibrium
 from catenary.mbs.system import System
 from catenary.solver.errors import InputError, RunBroken
 
+# Closer than this no heights are put in [m]: a stop of 1e5 N/m is then off by some 5 N over 1 mm.
+FINEST = 5e-4
 # A mechanism whose equivalent mass is so many times that at the start nearly locks: tables would
 # not follow it.
 LOCKING = 4.0
@@ -103,6 +107,7 @@ def reduce_mechanism(
     at: Vector = ORIGIN,
     start: Motion | None = None,
     as_far_as_it_goes: bool = False,
+    tolerance: float | None = None,
     name: str = "",
 ) -> ReducedMechanism:
     """Tables of a mechanism for heights of the point ``at`` of a body.
@@ -116,6 +121,8 @@ def reduce_mechanism(
     start : a motion near by to assemble from, that of the system's data if None
     as_far_as_it_goes : leave out the heights beyond the first one, above and below the start,
         that the mechanism does not reach or where it nearly locks
+    tolerance : of the lift between heights [N]; where it is missed further ones are put in, down
+        to half a millimetre; None for the given heights alone
     name : of the pantograph, for messages
 
     Raises
@@ -129,35 +136,65 @@ def reduce_mechanism(
     # Heights are visited from the one that is nearest to the start, each from its neighbour.
     motion = system.assemble(system.start() if start is None else start).motion
     first = int(np.argmin(np.abs(table - point(motion, body, at).value[2])))
-    columns = np.full((len(table), 4), np.nan)
-    motion, columns[first] = _at_height(system, body, at, motion, table[first])
-    for way in (range(first + 1, len(table)), range(first - 1, -1, -1)):
-        there = motion
-        for k in way:
+    places = [_at_height(system, body, at, motion, table[first])]
+    for way in (table[first + 1 :], table[:first][::-1]):
+        there = places[0]
+        for height in way:
             try:
-                there, columns[k] = _at_height(system, body, at, there, table[k])
+                there = _at_height(system, body, at, there.motion, height)
             except (InputError, RunBroken):
                 if not as_far_as_it_goes:
                     raise
                 break
-            if as_far_as_it_goes and columns[k, 0] > LOCKING * columns[first, 0]:
-                columns[k] = np.nan
+            if as_far_as_it_goes and there.columns[0] > LOCKING * places[0].columns[0]:
                 break
-    reached = ~np.isnan(columns[:, 0])
-    if reached.sum() < 4:
+            places.append(there)
+    if len(places) < 4:
         raise InputError(
             f"The mechanism moves by less than {4 * np.diff(table).min():g} m from the height of "
             f"{table[first]:g} m before it locks or comes apart."
         )
-    masses, lifts, dampings, carried = columns[reached].T
-    return ReducedMechanism(table[reached], masses, lifts, dampings, name, carried)
+    places.sort(key=lambda place: place.height)
+    if tolerance is not None:
+        places = _refined(system, body, at, places, tolerance)
+    reached = np.array([place.height for place in places])
+    masses, lifts, dampings, carried = np.array([place.columns for place in places]).T
+    return ReducedMechanism(reached, masses, lifts, dampings, name, carried)
 
 
-def _at_height(
-    system: System, body: str, at: Vector, near: Motion, height: float
-) -> tuple[Motion, np.ndarray]:
-    """The system at rest with a point at a height, and mass, lift, damping and carried mass there,
-    shape (4,)."""
+class _Place(NamedTuple):
+    """A mechanism at rest at a ``height``: ``columns`` (4,) of its tables there."""
+
+    height: float
+    motion: Motion
+    columns: np.ndarray
+
+
+def _refined(
+    system: System, body: str, at: Vector, places: list[_Place], tolerance: float
+) -> list[_Place]:
+    """The same with further heights in between where splines miss the lift, such as at stops."""
+    doubtful = list(pairwise(places))
+    while doubtful:
+        lift = CubicSpline([p.height for p in places], [p.columns[1] for p in places])
+        missed = set()
+        for low, high in doubtful:
+            if high.height - low.height > 2.0 * FINEST:
+                middle = 0.5 * (low.height + high.height)
+                there = _at_height(system, body, at, low.motion, middle)
+                if abs(lift(middle) - there.columns[1]) > tolerance:
+                    missed.add(middle)
+                    places.append(there)
+        places.sort(key=lambda place: place.height)
+        # A new height changes the spline next to it and, by a quarter, one interval on.
+        new = [k for k, place in enumerate(places) if place.height in missed]
+        near = {i for k in new for i in range(max(k - 2, 0), min(k + 2, len(places) - 1))}
+        doubtful = [(places[i], places[i + 1]) for i in sorted(near)]
+    return places
+
+
+def _at_height(system: System, body: str, at: Vector, near: Motion, height: float) -> _Place:
+    """The system at rest with a point at a height: mass, lift, damping and carried mass there."""
     holder = PrescribedPoint("height", body, constant(float(height)), at)
     motion = equilibrium(system.with_joints(holder), near).motion
     rows = holder.rows(motion, 0.0)
@@ -170,4 +207,5 @@ def _at_height(
     damping = lift - way @ system.generalised_forces(motion.with_velocities(way), 0.0)
     # Where the third of the six numbers of a body is its velocity upward.
     carried = system.mass[2::6] @ way[2::6]
-    return motion, np.array([system.mass @ way**2, lift, damping, carried])
+    columns = np.array([system.mass @ way**2, lift, damping, carried])
+    return _Place(float(height), motion, columns)
