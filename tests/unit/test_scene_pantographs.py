@@ -12,8 +12,10 @@ from paper_pantograph import corrections, data, number_at, table
 
 from catenary.cases.checks_pantograph import check_pantographs
 from catenary.cases.convert_pantograph import multibody_of, static_force
+from catenary.cases.keys import is_known, known_keys
 from catenary.cases.loading import read_toml
 from catenary.cases.pantograph_facts import header_facts, kind_lines
+from catenary.cases.printing import key_table
 from catenary.cases.scene import Scene, load_scene
 from catenary.cases.schema_pantograph import MultibodyTable
 from catenary.mbs.bodies import SPACE, Body
@@ -223,3 +225,24 @@ def test_kinds_that_are_not_on_the_train_are_not_assembled() -> None:
     )
     check_pantographs(scene)
     assert table().as_published is False
+
+
+def test_keys_of_all_kinds_are_listed_and_known() -> None:
+    listed = {line.split()[0] for line in key_table().splitlines()}
+    known = known_keys(Scene)
+    for key in (
+        "pantographs.*.masses_kg",
+        "pantographs.*.working_height_m",
+        "pantographs.*.bodies.*.inertia_kg_m2",
+        "pantographs.*.joints.*.slide_axis_j",
+        "pantographs.*.joints.*.curve_m",
+        "pantographs.*.forces.*.pull_by_extension",
+        "pantographs.*.corrections.*.published",
+    ):
+        assert key in listed
+        assert is_known(key.replace("*", "any"), known)
+    # Below one kind only its keys are near.
+    location = ("pantographs", "any", "lumped", "hed")
+    assert not any(".bodies" in key for key in known_keys(Scene, location))
+    kinds = next(row for row in key_table().splitlines() if row.startswith("pantographs.*.type"))
+    assert kinds.endswith("one of lumped, multibody")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -83,3 +84,32 @@ def test_paper_s_pantograph_runs_nearly_as_its_tables_at_the_working_height() ->
     check("mean [N]", ours.mean(), theirs.mean(), within=change * theirs.std())
     check("deviation [N]", ours.std(), theirs.std(), within=change * theirs.std())
     assert ours.std() != theirs.std()
+
+
+def test_continued_run_of_the_paper_s_pantograph_is_the_uninterrupted_one() -> None:
+    """The same operations on the same numbers, with a second pantograph of another model."""
+    line = en50318_line(4)
+    mesh, at = mesh_of(line, 3), 300
+    leading = train(70.0, 110.0, 150.0, data=paper.data(), static_force=150.0, raise_time=0.2)
+    trailing = train(70.0, 110.0, 150.0, behind=(40.0,)).placements
+    both = replace(leading, placements=leading.placements + trailing)
+    problem = problem_of(line, WHOLE, train=both)
+    kept = {}
+
+    def keep(view: object) -> None:
+        if view.step == at:
+            kept.update({name: np.array(value) for name, value in view.checkpoint().items()})
+
+    whole, rest = History(keep), History()
+    march, _ = start_march(problem, mesh)
+    march.run([whole])
+    march.destroy()
+    march, _ = start_march(problem, mesh)
+    march.restore(kept)
+    march.run([rest])
+    march.destroy()
+    assert len(rest.time) == len(whole.time) - at > 100
+    for channel in ("contact_force", "head_height"):
+        expected = whole[channel][at:]
+        assert expected.shape[1] == 2
+        check(channel, rest[channel], expected, within=1e-12 * np.abs(expected).max())

@@ -142,11 +142,8 @@ ASSIGNMENTS = {
         [f"{KIND}.joints.slide.type=spherical", f"{KIND}.joints.slide.i=space"],
         "ties the head 'head' to space",
     ),
-    "out of reach": (
-        [
-            f"{KIND}.working_height_m=3",
-            f"{KIND}.joints.lock={{type='prescribed_point', body='mast', coordinate_m=1}}",
-        ],
+    "arm locked": (
+        [f"{KIND}.joints.lock={{type='prescribed_point', body='mast', coordinate_m=1}}"],
         "leave no way to raise",
     ),
     "too weak": (
@@ -184,6 +181,15 @@ def test_a_broken_pantograph_ends_in_one_sentence_and_code_2(name: str, scene: P
     assert "\n" not in sentence
     assert expected in sentence, sentence
     assert list(scene.parent.iterdir()) == [scene]
+
+
+def test_paper_does_not_reach_six_metres() -> None:
+    """Its two arms together are below 4 m long."""
+    words = ["check", "ambrosio2012", "--set", "pantographs.seven_body.working_height_m=6"]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 2, result.output
+    assert "'stabilisation_arm' does not reach its working height of 6 m" in result.stderr
+    assert result.stderr.count("\n") == 1
 
 
 def test_paper_as_published_names_the_joint_that_does_not_close() -> None:
