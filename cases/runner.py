@@ -120,7 +120,7 @@ def run_case(
     RunBroken
         If files cannot be written.
     """
-    on_root(comm, lambda: _refuse_to_write(out_dir, force))
+    on_root(comm, lambda: refuse_to_write(out_dir, force))
     phases = Phases()
     problem = scene.to_problem()
     at_rest = _at_rest(scene, problem, comm, phases)
@@ -321,7 +321,8 @@ def _checkpoint(out_dir: Path) -> dict[str, Any]:
         return results.checkpoint
 
 
-def _refuse_to_write(out_dir: Path, force: bool) -> None:
+def refuse_to_write(out_dir: Path, force: bool) -> None:
+    """Raise InputError if a folder cannot be written to or holds a run; ``force`` allows that."""
     place = next(p for p in (out_dir, *out_dir.absolute().parents) if p.exists())
     if not place.is_dir() or not os.access(place, os.W_OK | os.X_OK):
         raise InputError(

@@ -138,10 +138,9 @@ def _conclude(
     plan: Plan, module: ModuleType, out_dir: Path, ended: Sequence[Ended], begin: float
 ) -> str:
     from catenary.cases import sweep_output
-    from catenary.postproc.storage import write_whole
+    from catenary.postproc.storage import write_all
     from catenary.postproc.study_report import verdict_text, write_study
 
-    out_dir.mkdir(parents=True, exist_ok=True)
     runs = {one.variant.name: StudyRun(one, out_dir / RUNS / one.variant.name) for one in ended}
     study = module.conclude(runs)
     table = sweep_output.rows(ended)
@@ -153,11 +152,10 @@ def _conclude(
         f"{sum(one.skipped for one in ended)} runs were done already",
     }
     files = write_study(study, out_dir, table, facts)
-    write_whole(out_dir / "study.csv", sweep_output.as_csv(table))
-    files.append(out_dir / "study.csv")
+    files += write_all(out_dir, {"study.csv": sweep_output.as_csv(table)})
     told = [f"{name}: {value}" for name, value in facts.items()]
-    listed = [str(path) for path in files if path.suffix in (".html", ".json")]
-    return "\n".join([verdict_text(study), "", *told, "", *listed, str(out_dir / "study.csv")])
+    listed = [str(path) for path in files if path.stem == "study"]
+    return "\n".join([verdict_text(study), "", *told, "", *listed])
 
 
 def _load(path: Path) -> ModuleType:

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from catenary.cases.jobs import Ended, Job
-from catenary.cases.runner import RESULT, run_case
+from catenary.cases.runner import RESULT, refuse_to_write, run_case
 from catenary.postproc.result_file import DONE, INTERRUPTED
 from catenary.postproc.results import Results
-from catenary.postproc.storage import plain, write_whole
-from catenary.solver.errors import CatenaryError, InputError, RunBroken
+from catenary.postproc.storage import plain, write_all
+from catenary.solver.errors import CatenaryError, InputError
 from catenary.solver.parallel import on_root
 
 RECORD = "variant.json"
@@ -50,7 +50,10 @@ def run_jobs(
     Raises
     ------
     InputError
-        If a job's folder holds other results and ``force`` is not given; nothing is run then.
+        If ``out_dir`` cannot be written to, or if it or a job's folder holds other results and
+        ``force`` is not given; nothing is run then.
+    RunBroken
+        If a record of what is done cannot be written.
     """
     earlier = on_root(comm, lambda: _earlier(jobs, out_dir, force, measure is not None))
     ended: list[Ended] = []
@@ -81,7 +84,7 @@ def _run(
     petsc_options: Sequence[str],
     measure: Measure | None,
 ) -> Ended:
-    """Run one job and leave its record. Collective; breaks only if files cannot be written."""
+    """Run one job and leave its record. Collective; raises only if that cannot be written."""
     clock = time.perf_counter()
     on_root(comm, lambda: (folder / RECORD).unlink(missing_ok=True))
     try:
@@ -118,17 +121,13 @@ def _leave_record(job: Job, folder: Path, measure: Measure | None, wall: float) 
     }
     if not job.keep_results:
         (folder / RESULT).unlink()
-    try:
-        write_whole(folder / RECORD, json.dumps(plain(record), indent=1) + "\n")
-    except OSError as error:
-        raise RunBroken(f"writing {folder / RECORD} failed ({error.strerror or error})") from error
+    write_all(folder, {RECORD: json.dumps(plain(record), indent=1) + "\n"})
     return measured
 
 
 def _earlier(jobs: Sequence[Job], out_dir: Path, force: bool, measured: bool) -> list[Ended | None]:
     """What is there of each job: how it ended, None if it is to be run."""
-    if out_dir.exists() and not out_dir.is_dir():
-        raise InputError(f"-o {out_dir} is a file; name a folder for the results")
+    refuse_to_write(out_dir, force)
     if force:
         return [None] * len(jobs)
     return [_found(job, out_dir / job.variant.name, measured) for job in jobs]

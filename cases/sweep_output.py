@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from catenary.cases.jobs import LINE_COLUMNS, PANTOGRAPH_COLUMNS, Ended
 from catenary.cases.units import unit_of
 from catenary.postproc import plots
-from catenary.postproc.storage import plain, write_whole
+from catenary.postproc.storage import plain, write_all
 
 TABLE, RECORD, PICTURE = "sweep.csv", "sweep.json", "sweep.png"
 PLOTTED = ("mean_N", "std_N", "max_N", "min_N", "max_uplift_mm")
@@ -122,9 +122,7 @@ def write(out_dir: Path, case: str, ended: Sequence[Ended], plotted: Sequence[st
     }
     if sum(one.done for one in ended) > 1:
         content[PICTURE] = plots.png(draw(table, varied_keys(ended), plotted))
-    for name, data in content.items():
-        write_whole(out_dir / name, data)
-    return [out_dir / name for name in content]
+    return write_all(out_dir, content)
 
 
 def draw(table: Sequence[dict[str, Any]], keys: Sequence[str], plotted: Sequence[str]) -> Figure:

@@ -133,3 +133,25 @@ def write_whole(path: Path, content: bytes | str) -> None:
     except BaseException:
         partial.unlink(missing_ok=True)
         raise
+
+
+def write_all(folder: Path, content: Mapping[str, bytes | str]) -> list[Path]:
+    """Write files of a folder by name, each as ``write_whole``; returns their paths.
+
+    The folder is made if it is not there.
+
+    Raises
+    ------
+    RunBroken
+        If one cannot be written.
+    """
+    for name, data in content.items():
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            write_whole(folder / name, data)
+        except OSError as error:
+            raise RunBroken(
+                f"writing {folder / name} failed ({error.strerror or error}): free some space or "
+                "choose another output folder; what was written before stays readable"
+            ) from error
+    return [folder / name for name in content]

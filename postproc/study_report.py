@@ -19,7 +19,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from catenary.postproc import plots
-from catenary.postproc.storage import plain, write_whole
+from catenary.postproc.storage import plain, write_all
 
 REPRODUCED, NOT_REPRODUCED, UNDECIDED = "reproduced", "not reproduced", "cannot be decided"
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -113,9 +113,7 @@ def write_study(
         "runs": list(rows),
     }
     content["study.json"] = json.dumps(plain(record), indent=1, ensure_ascii=False) + "\n"
-    for name, data in content.items():
-        write_whole(out_dir / name, data)
-    return [out_dir / name for name in content]
+    return write_all(out_dir, content)
 
 
 def columns_csv(columns: Mapping[str, Sequence[Any] | np.ndarray]) -> str:

@@ -19,7 +19,7 @@ from catenary.postproc.study_report import (
     StudyTable,
 )
 
-_FORCES = ("mean_N", "std_N", "max_N", "min_N", "loss_percent")
+_FORCES = ("mean_N", "std_N", "max_N", "min_N", "loss_percent", "std_0_5_N", "std_5_20_N")
 
 
 def conclude(runs: Mapping[str, StudyRun], table: Mapping[str, Any]) -> Study:

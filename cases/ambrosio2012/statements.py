@@ -29,13 +29,18 @@ SPEED_RATIO = 0.7
 
 @dataclass(frozen=True)
 class Force:
-    """Contact force of one pantograph in the stretch, 20 Hz low-pass [N]; losses of the raw one."""
+    """Contact force of one pantograph in the stretch, 20 Hz low-pass [N]; losses of the raw one.
+
+    ``std_0_5`` and ``std_5_20`` are the deviations of the bands 0-5 and 5-20 Hz.
+    """
 
     mean: float
     std: float
     maximum: float
     minimum: float
     loss_percent: float
+    std_0_5: float
+    std_5_20: float
 
     @property
     def amplitude(self) -> float:

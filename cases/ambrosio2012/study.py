@@ -6,7 +6,7 @@ figures 8 to 14, ``ranking.py`` says which open input moves what.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
@@ -57,6 +57,7 @@ def read_table(shortened: bool = False) -> dict[str, Any]:
 def variants(scene: Scene, shortened: bool) -> list[StudyVariant]:
     """All runs; only those of the first reading, which the figures show, keep their results."""
     table = read_table(shortened)
+    own = scene.train.pantographs[0].name
     planned = []
     for number, reading in enumerate(table["readings"]):
         for damping, alpha in table["dampings"].items():
@@ -64,7 +65,8 @@ def variants(scene: Scene, shortened: bool) -> list[StudyVariant]:
                 name = run_name(reading["name"], damping, train["name"])
                 assignments = (*table["always"], *alpha, *reading["set"], *train["set"])
                 keys = {"reading": reading["name"], "damping": damping, "train": train["name"]}
-                planned.append(StudyVariant(Variant(name, assignments, keys), number == 0))
+                filled = _with_kind(assignments, reading.get("kind", own))
+                planned.append(StudyVariant(Variant(name, filled, keys), number == 0))
     for title, changes in variations(table).items():
         for damping, alpha in table["dampings"].items():
             name = run_name(VARIED, damping, title)
@@ -72,17 +74,14 @@ def variants(scene: Scene, shortened: bool) -> list[StudyVariant]:
             planned.append(
                 StudyVariant(Variant(name, (*table["always"], *alpha, *changes), keys), False)
             )
-    kind = scene.train.pantographs[0].name
-    filled = [_with_kind(one, kind) for one in planned]
-    check_keys([one.variant for one in filled], f"in {TABLE}")
-    _refuse_same_names(filled)
-    return filled
+    check_keys([one.variant for one in planned], f"in {TABLE}")
+    _refuse_same_names(planned)
+    return planned
 
 
-def _with_kind(one: StudyVariant, kind: str) -> StudyVariant:
-    given = one.variant
-    assignments = tuple(Template(text).safe_substitute(kind=kind) for text in given.assignments)
-    return StudyVariant(Variant(given.name, assignments, given.varied), one.keep_results)
+def _with_kind(assignments: Sequence[str], kind: str) -> tuple[str, ...]:
+    """Assignments with the name of a kind of pantograph in the place of $kind."""
+    return tuple(Template(text).safe_substitute(kind=kind) for text in assignments)
 
 
 def _refuse_same_names(planned: list[StudyVariant]) -> None:

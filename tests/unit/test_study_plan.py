@@ -15,7 +15,8 @@ from typer.testing import CliRunner
 from catenary.cases.ambrosio2012.study import read_table
 from catenary.cases.catalogue import shipped
 from catenary.cases.cli import app
-from catenary.cases.study import find_study, make_plan
+from catenary.cases.scene import load_scene
+from catenary.cases.study import Plan, find_study, make_plan
 from catenary.postproc.study_report import (
     NOT_REPRODUCED,
     REPRODUCED,
@@ -75,9 +76,14 @@ def test_a_study_that_cannot_be_used_is_told(study: str, sentence: str, tmp_path
         make_plan(str(own_case(tmp_path, study)))
 
 
-def test_the_papers_study_holds_every_train_under_both_dampings_and_every_variation() -> None:
+@pytest.fixture(scope="module")
+def plan() -> Plan:
+    """The paper's study, all its scenes checked."""
+    return make_plan("ambrosio2012")
+
+
+def test_every_train_runs_under_both_dampings_and_so_does_every_variation(plan: Plan) -> None:
     table = read_table()
-    plan = make_plan("ambrosio2012")
     variations = sum(len(group) for group in table["variations"].values())
     assert len(plan.jobs) == 2 * (len(table["readings"]) * len(table["trains"]) + variations)
     assert plan.path == find_study("ambrosio2012")
@@ -88,9 +94,9 @@ def test_the_papers_study_holds_every_train_under_both_dampings_and_every_variat
     )
 
 
-def test_all_trains_start_and_are_judged_at_the_same_place_of_a_span() -> None:
+def test_all_trains_start_and_are_judged_at_the_same_place_of_a_span(plan: Plan) -> None:
     # The trailing pantograph starts at 110 m; the stretch lies a whole number of spans of 54 m on.
-    for job in make_plan("ambrosio2012").jobs:
+    for job in plan.jobs:
         if job.keep_results:
             scene = job.scene
             behind = max(one.behind_m for one in scene.train.pantographs)
@@ -99,10 +105,19 @@ def test_all_trains_start_and_are_judged_at_the_same_place_of_a_span() -> None:
             assert (scene.evaluation.from_m - 400.0) % 54.0 == 0.0
 
 
-def test_the_kind_of_pantograph_is_the_cases_own() -> None:
-    plan = make_plan("ambrosio2012", ["train.pantographs.0.name=lumped"])
-    names = {one.name for job in plan.jobs for one in job.scene.train.pantographs}
-    assert names == {"lumped"}
+def test_the_kind_of_pantograph_is_the_cases_own_or_the_readings(plan: Plan) -> None:
+    own = load_scene("ambrosio2012").train.pantographs[0].name
+    kinds = {reading["name"]: reading.get("kind", own) for reading in read_table()["readings"]}
+    assert {own, "lumped"} == set(kinds.values())
+    for job in plan.jobs:
+        reading = job.variant.varied["reading"]
+        if reading in kinds:
+            assert {one.name for one in job.scene.train.pantographs} == {kinds[reading]}
+
+
+def test_the_users_kind_takes_the_place_of_the_cases() -> None:
+    plan = make_plan("ambrosio2012", ["train.pantographs.0.name=lumped"], shortened=True)
+    assert {one.name for job in plan.jobs for one in job.scene.train.pantographs} == {"lumped"}
 
 
 def study() -> Study:

@@ -16,7 +16,7 @@ SEPARATIONS = {"single": None, "31m": 31.0, "85m": 85.0, "200m": 200.0}
 
 def force(std: float, reach: float, mean: float = 150.0, loss: float = 0.0) -> Force:
     """A force whose extremes lie ``reach`` [N] from its mean."""
-    return Force(mean, std, mean + reach, mean - reach, loss)
+    return Force(mean, std, mean + reach, mean - reach, loss, 0.8 * std, 0.6 * std)
 
 
 def run(separation: float | None, forces: list[Force], slack: Slack) -> Run:

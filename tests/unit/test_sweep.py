@@ -155,6 +155,16 @@ def test_a_variant_that_breaks_does_not_stop_the_others(tmp_path: Path) -> None:
     assert sound["outcome"] == "done" and float(sound["std_N"]) > 0
 
 
+def test_a_sweep_whose_variants_all_break_still_has_its_table(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    done = invoke(
+        "sweep", CASE, "-o", str(out), "--vary", SLACK.replace("=", "=-90,"), "--set", *TINY
+    )  # fmt: skip
+    assert done.exit_code == 1
+    assert "2 of 2 variants broke" in done.stderr
+    assert {path.name for path in out.iterdir()} == {"sweep.csv", "sweep.json"}
+
+
 def test_measures_are_taken_and_results_dropped_on_request(tmp_path: Path) -> None:
     (job,) = tiny(Variant("one", ()))
     slim = Job(job.variant, job.scene, keep_results=False)
@@ -169,6 +179,15 @@ def test_measures_are_taken_and_results_dropped_on_request(tmp_path: Path) -> No
     assert second.skipped and second.measured == first.measured
     (third,) = run_jobs([job], tmp_path, COMM, measure=measure)  # now the file is wanted
     assert not third.skipped and (tmp_path / "one" / "run.h5").exists()
+
+
+def test_reports_are_written_on_request(tmp_path: Path) -> None:
+    (job,) = make_jobs(CASE, [Variant("one", ())], TINY, full_report=True)
+    run_jobs(tiny(Variant("one", ())), tmp_path, COMM)
+    assert not (tmp_path / "one" / "report.html").exists()
+    (ended,) = run_jobs([job], tmp_path, COMM)  # done before, but without its report
+    assert not ended.skipped
+    assert (tmp_path / "one" / "report.html").exists()
 
 
 @pytest.mark.parametrize(
@@ -192,6 +211,12 @@ def test_bad_input_is_one_sentence_and_writes_nothing(
     assert sentence in done.stderr
     assert done.stderr.count("\n") == 1
     assert not out.exists()
+
+
+def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_run(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(InputError, match="cannot be made or written to"):
+        run_jobs(tiny(), tmp_path / "file" / "out", COMM)
 
 
 def test_results_in_place_of_a_file_are_refused(tmp_path: Path) -> None:
