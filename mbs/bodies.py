@@ -136,12 +136,21 @@ class Motion:
         return np.concatenate([places, self.velocities])
 
     def from_vector(self, state: np.ndarray) -> Motion:
-        """The motion that ``to_vector`` gave as ``state``, Euler parameters normalised."""
+        """The motion of an integrated ``state`` (13 n,), Euler parameters normalised."""
         n = self.n_bodies
-        places = state[: 7 * n].reshape(n, 7)
+        places = state[: 7 * n].reshape(n, 7).copy()
+        places[:, 3:] = normalised(places[:, 3:])
+        return self._at(places, state[7 * n :])
+
+    def restored(self, state: np.ndarray) -> Motion:
+        """The motion that ``to_vector`` gave as ``state``, to the last digit."""
+        n = self.n_bodies
+        return self._at(state[: 7 * n].reshape(n, 7), state[7 * n :])
+
+    def _at(self, places: np.ndarray, velocities: np.ndarray) -> Motion:
         position = np.vstack([places[:, :3], np.zeros(3)])
-        parameters = np.vstack([normalised(places[:, 3:]), [1.0, 0.0, 0.0, 0.0]])
-        return Motion(self.numbers, position, parameters, *_split(state[7 * n :]))
+        parameters = np.vstack([places[:, 3:], [1.0, 0.0, 0.0, 0.0]])
+        return Motion(self.numbers, position, parameters, *_split(velocities))
 
     def place_rates(self) -> np.ndarray:
         """Rates of positions and Euler parameters, shape (7 n,)."""

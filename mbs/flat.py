@@ -19,9 +19,11 @@ from catenary.mbs.forces import Actuator, BumpStop, Force, SpringDamper
 from catenary.mbs.joints import (
     AXES,
     ORIGIN,
+    Constant,
     Fixed,
     Joint,
     PointOnLine,
+    PrescribedAngle,
     PrescribedPoint,
     Prismatic,
     Revolute,
@@ -123,6 +125,16 @@ def _(joint: Fixed) -> list[Product]:
 def _(joint: PrescribedPoint) -> list[Product]:
     way = unit(joint.along)
     return [Product(SPACE, way, joint.body, joint.at, SPACE, ORIGIN, joint.law)]
+
+
+@products_of.register
+def _(joint: PrescribedAngle) -> list[Product] | None:
+    if not isinstance(joint.law, Constant):
+        return None
+    angle, forward = joint.law.number, unit(joint.normal_i)
+    side = cross(unit(joint.axis_i), forward)
+    normal = np.cos(angle) * side - np.sin(angle) * forward
+    return [Product(joint.i, normal, joint.j, unit(joint.normal_j))]
 
 
 class FlatRows:

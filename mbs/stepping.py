@@ -15,7 +15,8 @@ coming step. Then q = q* + beta h^2 d, v = v* + gamma h d, a = a + d, and errors
 h^3 from the prediction, are removed from places and velocities. With beta = 1/4 and gamma = 1/2,
 the trapezoidal rule, it is of second order; what C and K leave out is of order h^3 in a step.
 
-A step may be cut into substeps; what comes out at its end is affine in f all the same.
+A step may be cut into substeps, over which the forces change evenly from those of the step before
+to f: what comes out at the end is affine in f all the same, and of second order.
 
 Sources: N. M. Newmark, J. Eng. Mech. Div. ASCE 85, 1959; Ambrosio et al., 2012, equation (3.6).
 """
@@ -136,7 +137,8 @@ class Stepper:
         by_force = none, none, none
         for number in range(1, self._substeps + 1):
             end = self.time + number * h
-            solved = self._solve(motion, acceleration, by_force, end, h)
+            share = number / self._substeps
+            solved = self._solve(motion, acceleration, by_force, share, end, h)
             by_force = solved.by_force
             if number < self._substeps:
                 motion = self._finished(
@@ -189,10 +191,14 @@ class Stepper:
         motion: Motion,
         acceleration: np.ndarray,
         by_force: tuple[np.ndarray, np.ndarray, np.ndarray],
+        share: float,
         end: float,
         h: float,
     ) -> _Solved:
-        """A substep: its prediction and what it changes with the forces last taken."""
+        """A substep: its prediction and what it changes with the forces last taken.
+
+        ``share`` of a change of forces has happened at its end.
+        """
         system, beta, gamma = self.system, self._beta, self._gamma
         velocities = motion.velocities
         there = motion.moved(h * velocities + 0.5 * h**2 * acceleration).with_velocities(
@@ -212,11 +218,11 @@ class Stepper:
         self._solver.factor(operator, rows.jacobian)
         force = system.generalised_forces(there, end) + ways @ self.forces - mass * acceleration
         resisted = stiffness[:, None] * (gradient @ moved) + damping[:, None] * (gradient @ sped)
-        more = ways - mass[:, None] * pushed - gradient.T @ resisted
-        closing, share = self._closing(rows, acceleration, h)
+        more = share * ways - mass[:, None] * pushed - gradient.T @ resisted
+        closing, part = self._closing(rows, acceleration, h)
         solution = self._solver.solve(
             np.column_stack([force, more]),
-            np.column_stack([closing, -share * (rows.jacobian @ pushed)]),
+            np.column_stack([closing, -part * (rows.jacobian @ pushed)]),
         )
         change, by = solution[:, 0], solution[:, 1:]
         return _Solved(

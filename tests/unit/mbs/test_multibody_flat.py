@@ -29,6 +29,7 @@ from catenary.mbs.joints import (
     Revolute,
     RevolutePrismatic,
     Spherical,
+    constant,
     tabulated,
 )
 from catenary.mbs.kinematics import stacked
@@ -47,6 +48,7 @@ JOINTS: tuple[Joint, ...] = (
     Spherical("spherical", "a", "b", AT_I, AT_J),
     Revolute("on space", SPACE, "b", AT_I, AT_J, ALONG, ACROSS),
     PrescribedAngle("angle", "a", "b", TABLE, (0, 1, 0), (1, 0, 0), (0, 0, 1)),
+    PrescribedAngle("still", "b", "a", constant(0.4), (0, 1, 0), (1, 0, 0), (0, 0, 1)),
     PointOnLine("line", "a", "b", AT_I, AT_J, ALONG),
     Prismatic("prismatic", "a", "b", AT_I, AT_J, ALONG, ACROSS, (1.0, 0.0, 1.0), (2.0, 1.0, 0.6)),
     RevolutePrismatic("slide", "a", "b", AT_I, AT_J, ALONG, ACROSS, (1.0, 2.0, 0.0)),
