@@ -14,6 +14,7 @@ import numpy as np
 
 from catenary.cases.checks_contact import check_contact
 from catenary.cases.checks_pantograph import check_pantographs
+from catenary.cases.checks_vehicle import check_vehicle
 from catenary.cases.keys import is_known, known_keys
 from catenary.cases.messages import refuse, shown, unknown_key
 from catenary.meshgen.line import Line
@@ -49,6 +50,7 @@ def check(scene: Scene) -> None:
     _dropper_lengths(scene, line)
     _speed(scene, line)
     _running(scene, line)
+    check_vehicle(scene, line)
     _evaluation(scene)
     _raising(scene)
     _standard(scene)
@@ -131,14 +133,17 @@ def _separations(scene: Scene) -> None:
     if behind[0] != 0:
         key = "train.pantographs.0.behind_m"
         _refuse(scene, key, behind[0], "the first pantograph leads, so it must be 0")
+    ahead = scene.strips_ahead()
     for i in range(1, len(behind)):
-        if behind[i] < behind[i - 1] + MIN_SEPARATION:
+        strips = ahead[i - 1] + ahead[i]
+        if behind[i] < behind[i - 1] + MIN_SEPARATION + strips - _TINY:
+            because = f", because its strips and that one's take {strips:g} m" if strips else ""
             _refuse(
                 scene,
                 f"train.pantographs.{i}.behind_m",
                 behind[i],
-                f"it must be at least {MIN_SEPARATION:g} m more than the {behind[i - 1]:g} m of "
-                "the pantograph before it",
+                f"it must be at least {MIN_SEPARATION + strips:g} m more than the "
+                f"{behind[i - 1]:g} m of the pantograph before it{because}",
             )
 
 
@@ -223,7 +228,11 @@ def _running(scene: Scene, line: Line) -> None:
     first, last = line.running_range
     start, end = scene.train.start_m, scene.end_m
     rear = scene.train.pantographs[-1].behind_m
+    ahead = scene.strips_ahead()
+    first, last = first + ahead[-1], last - max(ahead)
     inside = f"the running range is {first:g} to {last:g} m"
+    if any(ahead):
+        inside += ", strips included"
     if not first - _TINY <= start <= last + _TINY:
         _refuse(scene, "train.start_m", start, f"it must lie inside the line: {inside}")
     if start - rear < first - _TINY:

@@ -11,6 +11,7 @@ import numpy as np
 
 from catenary.cases.convert_contact import contact_law_of
 from catenary.cases.convert_pantograph import pantograph_of, static_force
+from catenary.cases.convert_vehicle import vehicle_of
 from catenary.cases.schema_line import LineTable, WireTable
 from catenary.cases.units import length_from_mm, speed_from_km_h
 from catenary.meshgen.line import DropperKind, Line, SteadyArm, Wire
@@ -184,4 +185,5 @@ def _train(scene: Scene) -> Train:
         end=scene.end_m,
         raise_time=scene.train.raise_time_s,
         placements=tuple(placements),
+        vehicle=None if scene.vehicle is None else vehicle_of(scene.vehicle),
     )

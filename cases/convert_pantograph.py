@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from catenary.cases import schema_mechanism as schema
+from catenary.cases.schema_head import StripsTable
 from catenary.cases.schema_pantograph import MultibodyTable, PantographTable
 from catenary.cases.units import angle_from_deg, speed_from_km_h
 from catenary.mbs.bodies import Body
@@ -35,6 +36,7 @@ from catenary.mbs.joints import (
 )
 from catenary.mbs.lumped import LumpedData
 from catenary.mbs.multibody import MultibodyData, stand
+from catenary.mbs.strips import Strips, Suspension, Turning
 from catenary.mbs.system import System
 
 
@@ -48,11 +50,34 @@ def pantograph_of(name: str, table: PantographTable, speed_km_h: float) -> Panto
     """
     if isinstance(table, MultibodyTable):
         return multibody_of(name, table, speed_km_h)
+    spring, damper = table.stiffnesses_N_per_m[0], table.dampings_N_s_per_m[0]
+    roll = table.roll
     return LumpedData(
         tuple(table.masses_kg),
         tuple(table.stiffnesses_N_per_m),
         tuple(table.dampings_N_s_per_m),
+        strips_of(table.strips, spring, damper),
+        None
+        if roll is None
+        else _turning(roll.inertia_kg_m2, roll.spring_distance_m, spring, damper),
     )
+
+
+def strips_of(table: StripsTable, spring: float = 0.0, damper: float = 0.0) -> Strips:
+    """Strips of a head whose own spring [N/m] and damper [N s/m] also hold its pitch."""
+    suspension = pitch = None
+    if table.mass_kg is not None and table.stiffness_N_per_m is not None:
+        suspension = Suspension(table.mass_kg, table.stiffness_N_per_m, table.damping_N_s_per_m)
+    inertia, distance = table.pitch_inertia_kg_m2, table.pitch_spring_distance_m
+    if inertia is not None and distance is not None:
+        pitch = _turning(inertia, distance, spring, damper)
+    return Strips(table.number, table.spacing_m or 0.0, table.length_m, suspension, pitch)
+
+
+def _turning(inertia: float, distance: float, spring: float, damper: float) -> Turning:
+    """A head on two halves of its spring and damper at a distance [m] from each other."""
+    square = (0.5 * distance) ** 2
+    return Turning(inertia, spring * square, damper * square)
 
 
 def static_force(name: str, table: PantographTable, speed_km_h: float) -> float | None:
@@ -106,6 +131,7 @@ def multibody_of(name: str, table: MultibodyTable, speed_km_h: float) -> Multibo
         static_force=wanted_force(table, speed_km_h),
         assembly_tolerance=table.assembly_tolerance_m,
         wind=tuple(wind),
+        strips=strips_of(table.strips),
     )
 
 

@@ -122,6 +122,8 @@ def make_plan(scene: Scene) -> Plan:
     length = np.diff(mesh.x(mesh.wires[CONTACT_WIRE]))
     n_droppers, n_arms = mesh.droppers.shape[0], mesh.steady_arms.size
     columns = 1 + _PER_PANTOGRAPH * len(train.placements) + n_droppers + n_arms
+    strips = [len(place.data.strip_offsets) for place in train.placements]
+    columns += sum(strips) if max(strips) > 1 else 0
     return Plan(
         case=scene.case.name,
         title=scene.case.title,

@@ -28,7 +28,9 @@ from catenary.cases.schema_run import (
     PetscTable,
     TrainTable,
 )
+from catenary.cases.schema_vehicle import VehicleTable
 from catenary.cases.table import Table
+from catenary.cases.vehicle_files import take_in_files
 from catenary.solver import effects as effect_registry
 from catenary.solver.errors import InputError
 
@@ -47,6 +49,9 @@ class Scene(Table):
         min_length=1, description="the kinds of pantograph, by name"
     )
     train: TrainTable = Field(description="the train and its pantographs")
+    vehicle: VehicleTable | None = Field(
+        None, description="how the vehicle moves its pantographs' bases"
+    )
     contact: ContactTable = Field(
         default_factory=ContactTable, description="contact between head and wire"
     )
@@ -84,7 +89,14 @@ class Scene(Table):
         running_end = line.running_range[1]
         behind = max(placement.behind_m for placement in self.train.pantographs)
         run_out = sum(line.span_lengths) / line.n_spans
+        # The foremost strip must not leave the line either.
+        running_end -= max(self.strips_ahead())
         return float(min(running_end, self.evaluation.to_m + behind + run_out))
+
+    def strips_ahead(self) -> list[float]:
+        """How far the outer strips of each pantograph are from its middle, along the track [m]."""
+        kinds = (self.pantographs.get(place.name) for place in self.train.pantographs)
+        return [0.0 if kind is None else kind.strips.ahead for kind in kinds]
 
     def to_line(self) -> Line:
         """The line in SI units. Not collective."""
@@ -153,6 +165,7 @@ def scene_from(raw: dict[str, Any], origin: Origin, folder: Path | None = None) 
 
     raw = copy.deepcopy(raw)
     _fill_in(raw, folder, "mesh.file" in origin.overridden)
+    take_in_files(raw, origin, folder)
     try:
         scene = Scene.model_validate(raw)
     except ValidationError as failed:

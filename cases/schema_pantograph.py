@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 
 from catenary.cases.loading import assign
+from catenary.cases.schema_head import RollTable, StripsTable
 from catenary.cases.schema_mechanism import BodyTable, ForceTable, JointTable, Name
 from catenary.cases.table import TAKE_AWAY, Table, ascending, exactly_one
 from catenary.solver.errors import InputError
@@ -33,6 +34,7 @@ class _Pressing(Table):
     nominal_height_m: float | None = Field(
         None, gt=0, le=20, description="head height at which the static force holds"
     )
+    strips: StripsTable = Field(default_factory=StripsTable, description="collector strips")
 
     @model_validator(mode="after")
     def _forces_by_speed(self) -> _Pressing:
@@ -57,6 +59,9 @@ class LumpedTable(_Pressing):
         description="springs below each mass, the last one to the base; only that may be 0"
     )
     dampings_N_s_per_m: list[DampingValue] = Field(description="dampers below each mass")
+    roll: RollTable | None = Field(
+        None, description="how the head rolls; acts with effects.head_roll"
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> LumpedTable:
@@ -71,6 +76,14 @@ class LumpedTable(_Pressing):
             raise ValueError("must have springs between its masses: only the last of "
                              "stiffnesses_N_per_m may be 0")  # fmt: skip
         exactly_one(self, "static_force_N", "static_force_by_speed")
+        if self.strips.mass >= self.masses_kg[0]:
+            raise ValueError(
+                f"must have a head heavier than its strips, but masses_kg gives it "
+                f"{self.masses_kg[0]:g} kg and strips.mass_kg gives them {self.strips.mass:g} kg"
+            )
+        turns = self.roll is not None or self.strips.pitch_inertia_kg_m2 is not None
+        if turns and n == 1:
+            raise ValueError("needs a mass below a head that rolls or pitches")
         return self
 
 
@@ -130,6 +143,15 @@ class MultibodyTable(_Pressing):
             raise ValueError(
                 f"must not have {given[0]} with calibrate = false, because the static force "
                 f"follows from the actuator{TAKE_AWAY}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _pitching(self) -> MultibodyTable:
+        if self.strips.pitch_inertia_kg_m2 is not None:
+            raise ValueError(
+                "must not have strips.pitch_inertia_kg_m2, because the pitch of its head follows "
+                f"from bodies, joints and forces{TAKE_AWAY}"
             )
         return self
 

@@ -16,6 +16,7 @@ SUFFIXES: dict[str, str] = {
     "_N_m2": "N m2",
     "_deg": "deg",
     "_km_h": "km/h",
+    "_hz": "Hz",
     "_per_s": "1/s",
     "_mm": "mm",
     "_kg": "kg",

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 PANTOGRAPH = "pantograph"
 ARM = "steady arm"
 DROPPER = "dropper"
+STRIP = "strip"
 RUN = "run"
 
 
@@ -19,8 +20,8 @@ class Channel:
     name : name of the dataset in the result file
     unit : SI unit, "-" if none
     meaning : what it is and which sign it has, in words
-    per : what a column stands for: ``PANTOGRAPH``, ``ARM``, ``DROPPER``, or ``RUN`` for one value
-        a step
+    per : what a column stands for: ``PANTOGRAPH``, ``ARM``, ``DROPPER``, ``STRIP``, or ``RUN`` for
+        one value a step
     """
 
     name: str
@@ -54,6 +55,14 @@ CHANNELS: dict[str, Channel] = {
         Channel("dropper_force", "N", "tension of a dropper, negative in compression", DROPPER),
     )
 }
+
+# Only of runs in which a pantograph has more than one strip.
+STRIP_FORCE = Channel(
+    "strip_force",
+    "N",
+    "share of a strip in the contact force, pantograph by pantograph, the leading strip first",
+    STRIP,
+)
 
 ENERGIES: dict[str, Channel] = {
     channel.name: channel

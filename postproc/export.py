@@ -71,6 +71,11 @@ def pantographs_csv(results: Results) -> str:
             prefix = f"{name} " if len(names) > 1 else ""
             heads.append(prefix + channel.label)
             columns.append(values[:, p])
+    for name, forces in zip(names, results.strip_forces(), strict=False):
+        prefix = f"{name} " if len(names) > 1 else ""
+        for number in range(forces.shape[1] if forces.shape[1] > 1 else 0):
+            heads.append(f"{prefix}strip {number + 1} {channels.STRIP_FORCE.label}")
+            columns.append(forces[:, number])
     stream = io.StringIO()
     csv.writer(stream, lineterminator="\n").writerow(heads)
     np.savetxt(stream, np.column_stack(columns), fmt="%.9g", delimiter=",")

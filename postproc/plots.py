@@ -125,6 +125,30 @@ def contact_force(results: Results) -> Figure:
     return figure
 
 
+def strip_forces(results: Results) -> Figure:
+    """Share of each strip in the contact force along the track, 20 Hz low-pass, for pantographs
+    with more than one."""
+    position = results.channel("contact_position")
+    shown = [(p, forces) for p, forces in enumerate(results.strip_forces()) if forces.shape[1] > 1]
+    start, end = float(position.min()), float(position.max())
+    figure = new_figure(0.7 + 2.7 * len(shown))
+    panels = figure.subplots(len(shown), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    for axes, (p, forces) in zip(panels, shown, strict=True):
+        mark_line(axes, results, start, end)
+        for number in range(forces.shape[1]):
+            try:
+                force = filters.low_pass(forces[:, number], results.dt)
+            except InputError:  # sampled too slowly; the report says so
+                force = forces[:, number]
+            label = ("leading strip", "trailing strip")[number]
+            axes.plot(position[:, p], force, color=colour(number), linewidth=1.2, label=label)
+        name = results.pantograph_names()[p]
+        tidy(axes, "", "force of a strip [N]", name.capitalize())
+        legend_above(axes)
+    panels[-1].set_xlabel("position of the pantograph along the track [m]")
+    return figure
+
+
 def force_statistics(results: Results, statistics: RunStatistics) -> Figure:
     """Bars of mean, deviation, extremes and mean +- 3 sigma of each pantograph."""
     groups = ("mean", "std", "maximum", "minimum", "stat_max", "stat_min")

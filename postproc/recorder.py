@@ -85,6 +85,7 @@ class Recorder:
         self._force = np.zeros((rows, n_p))
         self._head = np.zeros((rows, n_p))
         self._wire = np.zeros((rows, n_p))
+        self._strips = np.zeros((rows, sum(stage.n_strips) if stage.several_strips else 0))
         self._guarded(lambda: self._open(stage))
 
     def observe(self, view: StepView) -> None:
@@ -96,6 +97,8 @@ class Recorder:
             self._force[row] = view.contact_force
             self._head[row] = view.head_height
             self._wire[row] = view.wire_height
+            if self._strips.shape[1]:
+                self._strips[row] = view.strip_force
         self._arms[row] = view.arm_uplift
         self._droppers[row] = view.dropper_force
         self._rows = row + 1
@@ -186,6 +189,8 @@ class Recorder:
             "channels/arm_uplift": arms,
             "channels/dropper_force": droppers,
         }
+        if self._strips.shape[1]:
+            blocks[f"channels/{channels.STRIP_FORCE.name}"] = self._strips[:rows]
         if self._energies:
             table = np.array(self._energies)
             blocks.update({f"energy/{n}": table[:, i] for i, n in enumerate(channels.ENERGIES)})

@@ -124,6 +124,9 @@ def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
         drawn.append(
             ("contact_force", "Contact force along the track.", plots.contact_force(results))
         )
+        if results.strip_forces():
+            caption = "Shares of the collector strips in the contact force, below 20 Hz."
+            drawn.append(("strip_forces", caption, plots.strip_forces(results)))
         if len(statistics.complaints) < len(statistics.pantographs):
             drawn += [
                 (

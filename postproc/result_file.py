@@ -149,6 +149,8 @@ def _table(stage: Stage, with_energies: bool) -> dict[str, tuple[Channel, int]]:
     table = {"time": (channels.TIME, 0)}
     for channel in channels.CHANNELS.values():
         table[f"channels/{channel.name}"] = (channel, columns[channel.per])
+    if stage.several_strips:
+        table[f"channels/{channels.STRIP_FORCE.name}"] = (channels.STRIP_FORCE, sum(stage.n_strips))
     if with_energies:
         table.update({f"energy/{c.name}": (c, 0) for c in channels.ENERGIES.values()})
     return table
@@ -161,6 +163,7 @@ def _write_head(file: h5py.File, stage: Stage, header: Header, n_ranks: int) -> 
         "dt_s": stage.dt,
         "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         "n_steps_planned": stage.n_steps,
+        "n_strips": list(stage.n_strips),
     }
     for name, value in {**header.attributes, **fixed}.items():
         file.attrs[name] = as_attribute(value)

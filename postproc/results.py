@@ -24,6 +24,7 @@ _JSON_ATTRIBUTES = (
     "phase_wall_s",
     "inner_iterations",
     "pantographs",
+    "n_strips",
 )
 
 
@@ -118,8 +119,8 @@ class Results:
 
     @cached_property
     def _length(self) -> int:
-        group = self._file["channels"]
-        return min(self._file["time"].shape[0], *(group[n].shape[0] for n in channels.CHANNELS))
+        lengths = [dataset.shape[0] for dataset in self._file["channels"].values()]
+        return min(self._file["time"].shape[0], *lengths)
 
     @cached_property
     def time(self) -> np.ndarray:
@@ -134,6 +135,21 @@ class Results:
     def n_pantographs(self) -> int:
         """Number of pantographs."""
         return int(self._file["channels/contact_force"].shape[1])
+
+    def n_strips(self) -> list[int]:
+        """Number of strips of each pantograph, by their order; one each in files without."""
+        told: list[int] = self.attributes.get("n_strips", [])
+        return told or [1] * self.n_pantographs
+
+    def strip_forces(self) -> list[np.ndarray]:
+        """Shares of the strips in the contact force of each pantograph, (n, its strips) each [N].
+
+        Empty if no pantograph has more than one.
+        """
+        counts = self.n_strips()
+        if max(counts, default=1) == 1:
+            return []
+        return np.split(self.channel(channels.STRIP_FORCE.name), np.cumsum(counts)[:-1], axis=1)
 
     def pantograph_facts(self) -> list[dict[str, Any]]:
         """What is told of each pantograph, by their order: ``kind``, ``model``, ``description``,

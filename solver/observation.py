@@ -38,6 +38,11 @@ class Stage:
     owned_nodes: np.ndarray
     n_strips: tuple[int, ...] = ()
 
+    @property
+    def several_strips(self) -> bool:
+        """Whether any pantograph has more than one strip, so that their shares are of interest."""
+        return max(self.n_strips, default=1) > 1
+
 
 @dataclass
 class StepView:

@@ -1,0 +1,84 @@
+"""Courses of a vehicle that stand in CSV files, put into the scene in place of the files' names.
+
+A result then holds the numbers themselves, and does not change with the file.
+"""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+from catenary.cases.messages import Origin, shown
+from catenary.solver.errors import InputError
+
+_DIRECTIONS, _COURSES = ("vertical", "lateral"), ("by_time", "by_place")
+
+
+def take_in_files(raw: dict[str, Any], origin: Origin, folder: Path | None) -> None:
+    """Replace every ``by_..._file`` of a raw scene's vehicle by the pairs that it holds, in place.
+
+    Names in the case file are relative to its ``folder``, those of the command line to the working
+    directory.
+
+    Raises
+    ------
+    InputError
+        A file is not there, holds no pairs of numbers, or stands beside the pairs themselves.
+    """
+    vehicle = raw.get("vehicle")
+    if not isinstance(vehicle, dict):
+        return
+    for direction in _DIRECTIONS:
+        table = vehicle.get(direction)
+        if not isinstance(table, dict):
+            continue
+        for course in _COURSES:
+            name = table.get(f"{course}_file")
+            if not isinstance(name, str) or not name:
+                continue
+            key = f"vehicle.{direction}.{course}_file"
+            if course in table:
+                raise InputError(
+                    f"{key} is {shown(name)} {origin.of(key)}; vehicle.{direction}.{course} is "
+                    "given too: take one of them away"
+                )
+            own = key in origin.overridden or folder is None
+            path = (Path.cwd() if own else folder or Path()) / name
+            table[course] = _pairs(path, f"{key} is {shown(name)} {origin.of(key)}")
+            del table[f"{course}_file"]
+
+
+def _pairs(path: Path, where: str) -> list[list[float]]:
+    """Two columns of numbers; comments after #, and one line of names before the numbers."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise InputError(f"{where}; it cannot be read: {_why(error)}") from error
+    pairs: list[list[float]] = []
+    named = False
+    for number, cells in enumerate(csv.reader(text.splitlines()), start=1):
+        line = [cell.strip() for cell in ",".join(cells).split("#")[0].split(",")]
+        if line == [""]:
+            continue
+        try:
+            values = [float(cell) for cell in line]
+        except ValueError:
+            values = []
+        if len(values) == 2:
+            pairs.append(values)
+        elif pairs or named:
+            raise InputError(
+                f"{where}; its line {number} must hold two numbers and a comma between"
+            )
+        else:
+            named = True
+    if not pairs:
+        raise InputError(f"{where}; it holds no pairs of numbers")
+    return pairs
+
+
+def _why(error: Exception) -> str:
+    if isinstance(error, OSError):
+        return (error.strerror or "no reason is given").lower()
+    return "it is not text"

@@ -1,0 +1,239 @@
+"""Strips, roll and vehicle in a scene: converted to SI, refused in one sentence."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from catenary.cases.checks import MIN_SEPARATION
+from catenary.cases.messages import Origin
+from catenary.cases.scene import Scene, load_scene, scene_from
+from catenary.mbs.base_motion import Harmonic, Table, VehicleMotion
+from catenary.mbs.irregularity import Irregularity
+from catenary.mbs.multibody import MultibodyData
+from catenary.mbs.strips import Strips, Suspension, Turning
+from catenary.solver.errors import InputError
+
+CASE = "ac_simple"
+KIND = "pantographs.three_masses"
+TWO = [f"{KIND}.strips.number=2", f"{KIND}.strips.spacing_m=0.56"]
+LONG = f"{KIND}.strips.length_m=1.6"
+ROLL = [f"{KIND}.roll={{inertia_kg_m2=2.0, spring_distance_m=0.6}}", "effects.head_roll=true"]
+MOVES = "effects.vehicle_motion=true"
+FRA = "vehicle.irregularity.spectrum=fra_6"
+
+
+def load(*overrides: str) -> Scene:
+    return load_scene(CASE, overrides)
+
+
+def test_one_strip_fixed_to_the_head_is_the_default() -> None:
+    (place,) = load().to_problem().train.placements
+    assert place.data.strips == Strips()
+    assert place.data.strip_offsets == (0.0,)
+
+
+def test_a_head_s_springs_become_those_of_its_roll_and_pitch() -> None:
+    """Two halves of 7000 N/m and 45 N s/m at half their distance: k d^2 / 4."""
+    pitch = [f"{KIND}.strips.pitch_inertia_kg_m2=0.4", f"{KIND}.strips.pitch_spring_distance_m=0.3"]
+    own = [f"{KIND}.strips.mass_kg=1.2", f"{KIND}.strips.stiffness_N_per_m=9000"]
+    more = [f"{KIND}.strips.damping_N_s_per_m=20", LONG]
+    (place,) = load(*TWO, *pitch, *own, *more, *ROLL).to_problem().train.placements
+    strips = place.data.strips
+    assert place.data.roll == Turning(2.0, 7000 * 0.3**2, 45 * 0.3**2)
+    assert strips == Strips(
+        2, 0.56, 1.6, Suspension(1.2, 9000, 20), Turning(0.4, 7000 * 0.15**2, 45 * 0.15**2)
+    )
+    assert place.data.strip_offsets == (0.28, -0.28)
+
+
+def test_a_multibody_head_takes_strips_and_rolls_as_its_bodies_do() -> None:
+    kind = "pantographs.seven_body"
+    scene = load_scene(
+        "ambrosio2012",
+        [f"{kind}.strips.number=2", f"{kind}.strips.spacing_m=0.5", f"{kind}.strips.length_m=1.6",
+         "effects.head_roll=true", "train.start_m=120"],
+    )  # fmt: skip
+    (place,) = scene.to_problem().train.placements
+    assert isinstance(place.data, MultibodyData)
+    assert place.data.strips == Strips(2, 0.5, 1.6)
+
+
+def test_a_vehicle_is_the_sum_of_what_its_tables_give() -> None:
+    vertical = [
+        "vehicle.vertical.amplitude_m=0.01",
+        "vehicle.vertical.frequency_hz=1.5",
+        "vehicle.vertical.phase_deg=90",
+        "vehicle.vertical.by_time=[[0, 0], [10, 0.01], [20, 0.02], [30, 0]]",
+    ]
+    lateral = ["vehicle.lateral.by_place=[[0, 0], [500, 0.05], [1000, 0], [2000, 0.01]]"]
+    scene = load(*vertical, *lateral, FRA, "vehicle.irregularity.seed=5", MOVES, *ROLL, LONG)
+    track = Irregularity("fra_6", 3.0, 100.0, 5)
+    assert scene.to_problem().train.vehicle == VehicleMotion(
+        (
+            Table((0, 10, 20, 30), (0, 0.01, 0.02, 0)),
+            Harmonic(0.01, 1.5, math.pi / 2),
+            track,
+        ),
+        (Table((0, 500, 1000, 2000), (0, 0.05, 0, 0.01), along_track=True), track),
+    )
+
+
+def test_files_are_taken_in_and_the_resolved_scene_needs_them_no_more(tmp_path: Path) -> None:
+    pairs = [[0.0, 0.0], [700.0, 0.01], [1400.0, 0.02], [2000.0, 0.0]]
+    file = tmp_path / "track.csv"
+    text = "place [m], height [m]\n# surveyed\n" + "\n".join(f"{x}, {z}" for x, z in pairs)
+    file.write_text(text + "\n\n")
+    scene = load(f"vehicle.vertical.by_place_file={file}", MOVES)
+    assert scene.vehicle is not None and scene.vehicle.vertical is not None
+    assert scene.vehicle.vertical.by_place == pairs
+    file.unlink()
+    again = scene_from(scene.resolved(), Origin("a result"))
+    assert again.to_problem() == scene.to_problem()
+
+
+def test_a_case_s_files_are_beside_it(tmp_path: Path) -> None:
+    from catenary.cases.catalogue import find_case
+
+    (tmp_path / "sway.csv").write_text("0,0\n10,0.01\n20,0\n30,0.01\n")
+    case = find_case(CASE).read_text()
+    (tmp_path / "case.toml").write_text(case + '\n[vehicle.vertical]\nby_time_file = "sway.csv"\n')
+    scene = load_scene(tmp_path / "case.toml", [MOVES])
+    assert scene.vehicle is not None and scene.vehicle.vertical is not None
+    assert scene.vehicle.vertical.by_time == [[0, 0], [10, 0.01], [20, 0], [30, 0.01]]
+
+
+def test_a_run_ends_before_the_foremost_strip_leaves_the_line() -> None:
+    to_the_end = ["evaluation.to_m=1600"]
+    assert load(*to_the_end).end_m == pytest.approx(1650.0)
+    assert load(*to_the_end, *TWO).end_m == pytest.approx(1650.0 - 0.28)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "sentence"),
+    [
+        ([f"{KIND}.strips.number=3"], "must be 1 or 2"),
+        ([f"{KIND}.strips.number=2"], "needs spacing_m for number = 2"),
+        ([f"{KIND}.strips.spacing_m=0.5"], "must not have spacing_m with number = 1"),
+        ([f"{KIND}.strips.mass_kg=1"], "mass_kg and stiffness_N_per_m together"),
+        ([f"{KIND}.strips.damping_N_s_per_m=1"], "must not have damping_N_s_per_m without"),
+        (
+            [*TWO, f"{KIND}.strips.mass_kg=4", f"{KIND}.strips.stiffness_N_per_m=9000"],
+            "masses_kg gives it 7.5 kg and strips.mass_kg gives them 8 kg",
+        ),
+        (
+            [*TWO, f"{KIND}.strips.pitch_inertia_kg_m2=1"],
+            "pitch_inertia_kg_m2 and pitch_spring_distance_m together",
+        ),
+        (
+            [f"{KIND}.strips.length_m=0.39"],
+            "strips.length_m is 0.39 m on the command line (--set); at 110 m the wire is 0.2 m "
+            "beside the strips' middle (line.stagger_m), so that they must be at least 0.4 m long",
+        ),
+        ([ROLL[0]], "roll on the command line (--set) acts only with effects.head_roll = true"),
+        ([ROLL[1]], "no head of the train can roll; give one a table such as"),
+        (ROLL, f"it needs {KIND}.strips.length_m"),
+        ([FRA], "vehicle on the command line (--set) acts only with effects.vehicle_motion"),
+        ([MOVES], "there is no table [vehicle]"),
+        (["vehicle.irregularity.spectrum=fra_1", MOVES], "it must be fra_4, fra_5, fra_6"),
+        ([FRA, "vehicle.irregularity.shortest_m=200", MOVES], "must have waves"),
+        ([FRA, "numerics.dt_s=6e-3", MOVES], "a wave must take 8 of these"),
+        (["vehicle.vertical.amplitude_m=0.1", MOVES], "amplitude_m and frequency_hz together"),
+        (["vehicle.vertical.phase_deg=10", MOVES], "must not have phase_deg without amplitude_m"),
+        (["vehicle.vertical={}", MOVES], "needs by_time, by_place"),
+        (["vehicle={}", MOVES], "needs vertical, lateral or irregularity"),
+        (
+            ["vehicle.vertical.by_time=[[0, 0], [1, 0], [1, 0], [90, 0]]", MOVES],
+            "ascending order, but 1 follows 1",
+        ),
+        (
+            ["vehicle.vertical.by_time=[[0, 0], [1, 0], [2, 0], [3, 0]]", MOVES],
+            "holds from 0 to 3 s, but the run needs it from 0 to 13.68 s",
+        ),
+        (
+            ["vehicle.vertical.by_place=[[200, 0], [300, 0], [400, 0], [2000, 0]]", MOVES],
+            "holds from 200 to 2000 m, but the run needs it from 110 to",
+        ),
+        (
+            ["vehicle.vertical.by_place=[[0, 0], [300, 20], [400, 0], [2000, 0]]", MOVES],
+            "must stay within 1 m, but is 20 m at 300",
+        ),
+        (["vehicle.vertical.by_time_file=no.csv", MOVES], "cannot be read: no such file"),
+        (
+            ["vehicle.lateral.amplitude_m=0.1", "vehicle.lateral.frequency_hz=1", MOVES],
+            "acts only with effects.head_roll = true",
+        ),
+        (
+            [*ROLL, f"{KIND}.strips.length_m=0.45", "vehicle.irregularity.spectrum=fra_4", MOVES],
+            "beside the strips' middle (line.stagger_m and vehicle)",
+        ),
+        (
+            [*TWO, "train.pantographs.0.behind_m=0.0", "train.start_m=0.1"],
+            "must lie inside the line: the running range is 0.28 to 1649.72 m, strips included",
+        ),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_refused(overrides: list[str], sentence: str) -> None:
+    with pytest.raises(InputError) as refused:
+        load(*overrides)
+    assert sentence in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_strips_of_neighbours_must_not_overlap() -> None:
+    """A metre between heads, and half a spacing of either."""
+    two = load_scene(CASE).resolved()
+    two["pantographs"]["three_masses"]["strips"] = {"number": 2, "spacing_m": 0.56}
+    two["train"]["pantographs"].append({"name": "three_masses", "behind_m": 1.5})
+    with pytest.raises(InputError, match="at least 1.56 m more than the 0 m .* strips") as refused:
+        scene_from(two, Origin("here"))
+    assert "train.pantographs.1.behind_m is 1.5 m" in str(refused.value)
+    two["train"]["pantographs"][1]["behind_m"] = MIN_SEPARATION + 0.56
+    assert len(scene_from(two, Origin("here")).to_problem().train.placements) == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "it holds no pairs of numbers"),
+        ("x, y\na, b\n", "its line 2 must hold two numbers"),
+        ("0, 0\n1, 0.1, 7\n", "its line 2 must hold two numbers"),
+        ("0, 0\n1; 0.1\n", "its line 2 must hold two numbers"),
+        ("0, 0\n1, nan\n2, 0\n3, 0\n", "finite"),
+        ("\x00", "it holds no pairs"),
+    ],
+)
+def test_files_that_are_no_course_are_refused(tmp_path: Path, text: str, sentence: str) -> None:
+    file = tmp_path / "course.csv"
+    file.write_text(text)
+    with pytest.raises(InputError, match=sentence):
+        load(f"vehicle.vertical.by_time_file={file}", MOVES)
+
+
+def test_a_multibody_head_s_pitch_is_its_bodies_business() -> None:
+    kind = "pantographs.seven_body.strips"
+    with pytest.raises(InputError, match="pitch of its head follows from bodies"):
+        load_scene(
+            "ambrosio2012",
+            [f"{kind}.number=2", f"{kind}.spacing_m=0.5", f"{kind}.pitch_inertia_kg_m2=1",
+             f"{kind}.pitch_spring_distance_m=0.2"],
+        )  # fmt: skip
+    with pytest.raises(InputError, match=r"part of the head, which weighs 7\.8 kg"):
+        load_scene(
+            "ambrosio2012",
+            [f"{kind}.mass_kg=9", f"{kind}.stiffness_N_per_m=9000"],
+        )
+
+
+def test_a_sway_that_the_strip_covers_is_fine() -> None:
+    """0.2 m of stagger and 0.05 m of sway, whose sum of 0.25 m is nearly reached."""
+    sway = ["vehicle.lateral.amplitude_m=0.05", "vehicle.lateral.frequency_hz=1.7", MOVES, *ROLL]
+    assert load(*sway, f"{KIND}.strips.length_m=0.5").to_problem()
+    with pytest.raises(InputError) as refused:
+        load(*sway, f"{KIND}.strips.length_m=0.45")
+    needed = float(str(refused.value).split("at least ")[1].split(" m")[0])
+    assert 0.45 < needed <= 0.5
+    assert np.isclose(needed, 0.5, atol=0.03)
