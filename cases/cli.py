@@ -50,9 +50,10 @@ Shortened = Annotated[
 Force = Annotated[bool, typer.Option("--force", help="Replace what is there.")]
 
 
-def _load(
+def load(
     case: str, assignments: list[str] | None, extras: list[str] | None, shortened: bool = False
 ) -> Scene:
+    """The scene of a verb that takes no options for PETSc. Not collective."""
     from catenary.cases.petsc_options import split_extras
     from catenary.cases.scene import load_scene
 
@@ -229,7 +230,7 @@ def plan(
     """Serial."""
     from catenary.cases.plan import make_plan, plan_text
 
-    console.say(plan_text(make_plan(_load(case, assignments, extras, shortened))))
+    console.say(plan_text(make_plan(load(case, assignments, extras, shortened))))
 
 
 @app.command(
@@ -251,7 +252,7 @@ def check(
     from catenary.cases.pantograph_facts import kind_lines
     from catenary.solver.equilibrium import find_form
 
-    scene = _load(case, assignments, extras, shortened)
+    scene = load(case, assignments, extras, shortened)
     problem = scene.to_problem()
     mesh = mesh_of(scene)
     find_form(problem, mesh)
@@ -281,7 +282,7 @@ def mesh(
     """Serial."""
     from catenary.cases.meshing import write_mesh_of
 
-    made = write_mesh_of(_load(case, assignments, extras), out, force)
+    made = write_mesh_of(load(case, assignments, extras), out, force)
     console.say(f"{out}: {made.n_nodes} nodes, {made.droppers.shape[0]} droppers")
 
 
@@ -312,7 +313,7 @@ def static(
 
     if out is not None:
         new_file(out, (".csv", ".json"), force)
-    scene = _load(case, assignments, extras)
+    scene = load(case, assignments, extras)
     from catenary.cases.runner import static_table
 
     table = static_table(scene)
@@ -358,7 +359,7 @@ def compare(
 
 
 # The verbs of other files, which take what is above.
-from catenary.cases import cli_studies  # noqa: E402
+from catenary.cases import cli_pantograph, cli_studies  # noqa: E402, F401
 
 
 def main() -> None:
