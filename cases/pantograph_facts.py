@@ -7,6 +7,7 @@ from typing import Any
 from catenary.cases.scene import Scene
 from catenary.mbs.build import PantographData
 from catenary.mbs.multibody import MultibodyData, describe, describe_assembly, stand
+from catenary.mbs.strips import Strips
 from catenary.solver.problem import Problem
 
 
@@ -18,10 +19,22 @@ def model_of(data: PantographData) -> str:
 def description_of(data: PantographData, static_force: float) -> str:
     """A line about a pantograph."""
     if isinstance(data, MultibodyData):
-        return describe(data)
+        return describe(data) + _strips_of(data.strips)
     masses = ", ".join(f"{mass:g}" for mass in data.masses)
     noun = "mass" if len(data.masses) == 1 else "masses"
-    return f"lumped: {len(data.masses)} {noun} of {masses} kg; {static_force:.1f} N"
+    text = f"lumped: {len(data.masses)} {noun} of {masses} kg; {static_force:.1f} N"
+    return text + _strips_of(data.strips)
+
+
+def _strips_of(strips: Strips) -> str:
+    """What is not the usual single strip, fixed to the head."""
+    if strips.number == 1 and strips.suspension is None:
+        return ""
+    text = "; 1 strip" if strips.number == 1 else f"; 2 strips {strips.spacing:g} m apart"
+    if strips.suspension is None:
+        return text
+    own = strips.suspension
+    return f"{text} of {own.mass:g} kg on {own.stiffness:g} N/m"
 
 
 def header_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:

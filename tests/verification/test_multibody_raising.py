@@ -6,14 +6,17 @@ import numpy as np
 import paper_pantograph as ambrosio
 from measuring import check, orders, print_table
 
+from catenary.mbs.base_motion import BaseMotion, Harmonic, VehicleMotion
 from catenary.mbs.constraint_handling import Baumgarte
 from catenary.mbs.forces import PointForce
 from catenary.mbs.integrators import integrate
 from catenary.mbs.joints import PrescribedPoint, constant
+from catenary.mbs.lateral import LateralPath
 from catenary.mbs.lumped import LumpedData, LumpedPantograph
 from catenary.mbs.raising import RaisingData, RaisingPantograph
 from catenary.mbs.reduction import ReducedMechanism, reduce_mechanism
 from catenary.mbs.statics import calibrate_actuator, equilibrium
+from catenary.mbs.strips import Strips, Suspension, Turning
 
 EPS = np.finfo(float).eps
 ARM, HEAD = ambrosio.STABILISATION_ARM, ambrosio.HEAD
@@ -49,6 +52,46 @@ def test_mechanism_that_is_the_same_at_all_heights_is_two_lumped_masses() -> Non
     check("energy [J]", found.energy(), expected.energy(), within=1e-8)
     check("static force [N]", found.static_force(5.0), 120.0, within=1e-10)
     assert abs(found.position[0] - 5.0) > 0.01
+
+
+def test_strips_roll_and_a_moving_base_are_the_same_for_both_models() -> None:
+    """A base that carries along all of a mechanism leaves it what a chain without a last spring is.
+
+    The frame's damper stands on the base in both. Round-off as above, of 1500 steps.
+    """
+    same = np.ones(5)
+    frame = ReducedMechanism(
+        np.linspace(0.0, 9.0, 5), 15.0 * same, 190.0 * same, 90.0 * same, carried=15.0 * same
+    )
+    own = Suspension(0.8, 9000.0, 20.0)
+    strips = Strips(2, 0.5, 1.6, own, Turning(0.3, 90.0, 2.0))
+    roll = Turning(2.0, 470.0, 3.0)
+    data = RaisingData(frame, 7.2, 4200.0, 10.0, 70.0, 0.1, 0.2, strips, roll)
+    chain = LumpedData((7.2, 15.0), (4200.0, 0.0), (10.0, 90.0), strips, roll)
+    vehicle = VehicleMotion((Harmonic(0.02, 2.0, 0.3),), (Harmonic(0.05, 1.0),))
+    base = BaseMotion(vehicle, 100.0, 70.0)
+    path = LateralPath(
+        np.array([0.0, 150.0, 300.0]), (0.2, -0.2, 0.2), 100.0, strips.offsets, 70.0, base
+    )
+    found = RaisingPantograph(data, 0.5, 1e-3, lateral=path, base=base)
+    expected = LumpedPantograph(chain, 120.0, 5.0, 0.5, 1e-3, lateral=path, base=base)
+    for pantograph in (found, expected):
+        pantograph.place(5.0, velocity=0.1)
+    force = np.zeros(2)
+    for number in range(1500):
+        time = 1e-3 * (number + 1)
+        mine, other = found.predict(time), expected.predict(time)
+        if number > 300:
+            force[:] = 60.0 + 40.0 * np.sin(9.0 * time), 55.0 + 30.0 * np.cos(17.0 * time)
+        found.advance(force)
+        expected.advance(force)
+    within = 1500 * EPS * 5.0 * 100
+    check("heights [m]", mine.height, other.height, within=within)
+    check("velocities [m/s]", mine.velocity, other.velocity, within=100 * within)
+    check("height compliance", mine.height_compliance, other.height_compliance, within=1e-18)
+    check("velocity compliance", mine.velocity_compliance, other.velocity_compliance, within=1e-15)
+    check("state", found.position, expected.position, within=within)
+    assert np.abs(found.position[3]) > 1e-3  # the roll
 
 
 def test_paper_s_pantograph_let_go_rises_like_all_its_bodies() -> None:

@@ -92,6 +92,31 @@ ASSIGNMENTS = {
     "end behind the line": (["train.end_m=1321"], "0 to 1320 m"),
     "no pantograph": (["train.pantographs=[]"], "at least 1"),
     "unknown pantograph": (["train.pantographs.0.name=referense"], "did you mean reference?"),
+    "strip shorter than the stagger": (
+        ["line.stagger_m=0.2", "pantographs.reference.strips.length_m=0.3"],
+        "so that they must be at least 0.4 m long",
+    ),
+    "strips that overlap": (
+        [
+            "pantographs.reference.strips.number=2",
+            "pantographs.reference.strips.spacing_m=0.6",
+            "train.pantographs.1.name=reference",
+            "train.pantographs.1.behind_m=1.2",
+        ],
+        "at least 1.6 m more than the 0 m",
+    ),
+    "roll without its effect": (
+        ["pantographs.reference.roll={inertia_kg_m2=2, spring_distance_m=0.6}"],
+        "acts only with effects.head_roll = true",
+    ),
+    "vehicle without its effect": (
+        ["vehicle.irregularity.spectrum=fra_6"],
+        "acts only with effects.vehicle_motion = true",
+    ),
+    "no such spectrum": (
+        ["vehicle.irregularity.spectrum=fra_9", "effects.vehicle_motion=true"],
+        "it must be fra_4, fra_5",
+    ),
     "first one trails": (["train.pantographs.0.behind_m=5"], "must be 0"),
     "two in one place": (
         ["train.pantographs.1.name=reference", "train.pantographs.1.behind_m=0"],
