@@ -18,7 +18,7 @@ class SteppedHead:
     head : HeadParts
     n : number of all coordinates; those that are not the head's are heights
     dt, beta, gamma : Newmark step [s] and parameters, those of the line
-    lateral : where the wire crosses the strips, None if the head does not roll
+    lateral : where the wire crosses the strips, None if the head is not to roll
     """
 
     def __init__(
@@ -32,7 +32,8 @@ class SteppedHead:
     ) -> None:
         s = len(head.offsets)
         self.strip_offsets = head.offsets
-        self._n, self._roll, self._lateral = n, head.roll, lateral
+        # Where the wire crosses the strips of a head that cannot roll makes no difference.
+        self._n, self._roll, self._lateral = n, head.roll, lateral if head.roll >= 0 else None
         self._level = np.ones(n)
         self._level[: head.n] = head.level
         self._touch = np.zeros((2, s, n))
@@ -58,13 +59,6 @@ class SteppedHead:
     def velocity(self) -> np.ndarray:
         """Velocities, upward, shape (n,) [m/s] or [rad/s]."""
         return self._state[self._n : 2 * self._n]
-
-    @property
-    def lateral(self) -> np.ndarray:
-        """Where the wire was on the strips in the latest step, to the left, shape (s,) [m]."""
-        if self._lateral is None:
-            return np.zeros(len(self.strip_offsets))
-        return self._lateral.place
 
     def place(self, head_height: float, velocity: float = 0.0) -> None:
         """Put the pantograph without contact to where its head is at this height [m].

@@ -9,7 +9,7 @@ centre. Angles are small: 0.1 rad would be an error of 0.5 %.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -91,7 +91,7 @@ class HeadParts:
     touch: np.ndarray
     level: np.ndarray
     roll: int
-    offsets: tuple[float, ...] = field(default=(0.0,))
+    offsets: tuple[float, ...]
 
     @cached_property
     def n(self) -> int:

@@ -8,6 +8,7 @@ from scipy import linalg
 from scipy.interpolate import CubicSpline
 
 from catenary.mbs import head_kernels
+from catenary.mbs.lateral import LateralPath
 from catenary.mbs.lumped import LumpedData, LumpedPantograph
 from catenary.mbs.raising import RaisingData, RaisingPantograph
 from catenary.mbs.reduction import ReducedMechanism
@@ -161,3 +162,16 @@ def test_a_head_raised_as_a_whole_strains_no_spring(suspended: bool) -> None:
 def test_strips_heavier_than_their_head_are_refused() -> None:
     with pytest.raises(ValueError, match="strips of 8 kg are part of a head of 8 kg"):
         head_parts(8.0, 1.0, 0.0, Strips(2, 0.5, None, Suspension(4.0, 1.0, 0.0)))
+
+
+def test_where_the_wire_crosses_a_head_that_cannot_roll_makes_no_difference() -> None:
+    path = LateralPath(np.array([0.0, 100.0]), (0.2, -0.2), 0.0, (0.0,), 50.0)
+    pantographs = (
+        LumpedPantograph(THREE, 120.0, 5.5, 0.0, DT, lateral=path),
+        LumpedPantograph(THREE, 120.0, 5.5, 0.0, DT),
+    )
+    for pantograph in pantographs:
+        pantograph.place(5.5)
+        pantograph.predict(DT)
+        pantograph.advance(np.array([100.0]))
+    assert np.array_equal(pantographs[0].state(), pantographs[1].state())
