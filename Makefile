@@ -8,6 +8,7 @@ PYTEST := $(PYTHON) -m pytest
 MPI_PYTEST := $(PYTHON) -m mpi4py -m pytest -p no:cacheprovider
 PARTS := meshgen solver mbs postproc cases
 RESULT := results/ambrosio2012
+LONG_RUNS := $(wildcard tests/benchmarks/test_multibody_*.py)
 
 # Open MPI starts neither as root nor with more ranks than cores unless told to; other MPI
 # libraries know neither option.
@@ -20,7 +21,7 @@ endif
 .DEFAULT_GOAL := help
 # The targets share .venv and two cores: one after the other, also under make -j.
 .NOTPARALLEL:
-.PHONY: help setup run test test-unit test-verification test-mpi test-regression bench lint format clean
+.PHONY: help setup run test test-unit test-verification test-mpi test-regression bench long-runs lint format clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -53,7 +54,10 @@ test-mpi: setup ## the same answers on 2 and 3 ranks
 
 bench: setup ## what a step costs against its floor and against the paper's correction
 	@mkdir -p results
-	$(PYTEST) -q -s tests/benchmarks --benchmark-json=results/bench.json
+	$(PYTEST) -q -s tests/benchmarks $(LONG_RUNS:%=--ignore=%) --benchmark-json=results/bench.json
+
+long-runs: setup ## all bodies of a pantograph over 20 s and ten minutes; some seven minutes
+	$(PYTEST) -q -s $(LONG_RUNS)
 
 lint: setup ## ruff (lint and format) and mypy
 	$(PYTHON) -m ruff check .

@@ -12,7 +12,7 @@ from scipy.signal import find_peaks
 from catenary.mbs.bodies import Motion, Vector
 from catenary.mbs.forces import PointForce
 from catenary.mbs.joints import PrescribedPoint, constant
-from catenary.mbs.linearisation import LinearModel, linearise, of_chain
+from catenary.mbs.linearisation import LinearModel, linearise, of_chain, with_strips
 from catenary.mbs.lumped import LumpedData
 from catenary.mbs.multibody import MultibodyData, reduced, stand
 from catenary.mbs.statics import equilibrium
@@ -27,7 +27,8 @@ WIRE, HELD = "wire on the head", "arm held for a moment"
 class HeadResponse:
     """Small motions of a pantograph around rest under a wire that presses on its head.
 
-    ``model``: linearised motions, loaded at the head; ``static_force`` [N]; ``masses`` [kg] by
+    ``model``: linearised motions, loaded at the head, or at all its strips alike if they have
+    springs of their own; ``static_force`` [N]; ``masses`` [kg] by
     name, equivalent ones of a mechanism; ``lift_stiffness`` [N/m]: by how much less the raising
     pushes a metre higher, negative if it pushes more.
     """
@@ -59,7 +60,8 @@ def head_response(data: LumpedData | MultibodyData, static_force: float) -> Head
         return _of_mechanism(data)
     if isinstance(data, LumpedData):
         masses = {f"mass {k + 1}": mass for k, mass in enumerate(data.masses)}
-        return HeadResponse(of_chain(data), static_force, masses, data.stiffnesses[-1])
+        model = with_strips(of_chain(data), data.strips)
+        return HeadResponse(model, static_force, masses, data.stiffnesses[-1])
     raise InputError(f"There is no frequency response of a {type(data).__name__}.")
 
 
@@ -71,7 +73,8 @@ def _of_mechanism(data: MultibodyData) -> HeadResponse:
         f"head ({data.head})": standing.head.mass,
         f"frame at the arm ({data.arm})": float(frame_mass),
     }
-    return HeadResponse(linearise(system, rest, data.head), force, masses, -float(lift_slope))
+    model = with_strips(linearise(system, rest, data.head), data.strips)
+    return HeadResponse(model, force, masses, -float(lift_slope))
 
 
 def pressed_at_rest(data: MultibodyData) -> tuple[System, Motion, float]:

@@ -7,7 +7,7 @@ and what constant forces do when their levers change.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from catenary.mbs.bodies import Motion, Vector
 from catenary.mbs.joints import ORIGIN, unit
 from catenary.mbs.kinematics import point
 from catenary.mbs.lumped import LumpedData
+from catenary.mbs.strips import Strips
 from catenary.mbs.system import System
 from catenary.solver.errors import InputError, RunBroken
 
@@ -128,6 +129,34 @@ def of_chain(data: LumpedData) -> LinearModel:
         data.chain(data.stiffnesses),
         push,
         np.eye(data.n_masses),
+    )
+
+
+def with_strips(model: LinearModel, strips: Strips) -> LinearModel:
+    """The same head with its strips on their own springs, loaded on all of them alike.
+
+    The strips' masses are part of what the model's loaded point carries; they move as one.
+    """
+    sprung = strips.suspension
+    if sprung is None:
+        return model
+    way = np.append(-model.push, 1.0)  # stretch of the strips' springs
+    stretch = strips.number * np.outer(way, way)
+
+    def grown(matrix: np.ndarray) -> np.ndarray:
+        return np.pad(matrix, (0, 1))
+
+    mass = grown(model.mass)
+    together = strips.number * sprung.mass
+    mass[:-1, :-1] -= together * np.outer(model.push, model.push)
+    mass[-1, -1] = together
+    return replace(
+        model,
+        mass=mass,
+        damping=grown(model.damping) + sprung.damping * stretch,
+        stiffness=grown(model.stiffness) + sprung.stiffness * stretch,
+        push=np.append(np.zeros_like(model.push), 1.0),
+        ways=np.pad(model.ways, ((0, 0), (0, 1))),
     )
 
 

@@ -1,4 +1,4 @@
-"""All bodies in the time loop for ten minutes. Not part of ``make test``: some three minutes.
+"""All bodies in the time loop for ten minutes. Not part of ``make test``: some five minutes.
 
     .venv/bin/python -m pytest -s tests/benchmarks/test_multibody_ten_minutes.py
 

@@ -21,7 +21,8 @@ from catenary.cases.scene import load_scene
 from catenary.solver import effects
 from catenary.solver.errors import RunBroken
 
-VERBS = ["run", "restart", "sweep", "list", "plan", "check", "mesh", "static", "report", "compare"]
+VERBS = ["run", "restart", "sweep", "list", "plan", "check", "mesh", "static", "pantograph"]
+VERBS += ["report", "compare"]
 SUMMARY = {
     "case": "en50318_2002",
     "speed_km_h": 250.0,

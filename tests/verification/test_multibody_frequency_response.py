@@ -18,6 +18,7 @@ from catenary.mbs.bodies import SPACE, Body
 from catenary.mbs.build import raising_data
 from catenary.mbs.constraint_handling import Baumgarte
 from catenary.mbs.forces import Gravity, PointForce, SpringDamper
+from catenary.mbs.frequency_response import head_response
 from catenary.mbs.integrators import integrate
 from catenary.mbs.joints import Prismatic, Revolute, Spherical
 from catenary.mbs.kinematics import point
@@ -25,6 +26,7 @@ from catenary.mbs.linearisation import apparent_mass, linearise, of_chain
 from catenary.mbs.lumped import LumpedData
 from catenary.mbs.raising import RaisingPantograph
 from catenary.mbs.stepping import Stepper
+from catenary.mbs.strips import Strips, Suspension
 from catenary.mbs.system import System
 from catenary.solver.errors import InputError
 
@@ -96,6 +98,19 @@ def test_two_masses_in_closed_form() -> None:
     expected = (d2 + s1) / (d1 * d2 + s1 * (d1 + d2))
     found = of_chain(LumpedData((m1, m2), (k1, k2), (c1, c2))).receptance(FREQUENCIES)
     check("H [m/N]", np.abs(found - expected), 0.0, within=1e-13 * np.abs(expected))
+
+
+def test_strips_on_springs_of_their_own_are_a_mass_more() -> None:
+    """Two strips of 1.1 kg on 5000 N/m each, of a head of 7.2 kg: three masses in a chain."""
+    strips = Strips(2, 0.4, suspension=Suspension(1.1, 5000.0, 20.0))
+    data = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0), strips)
+    chain = LumpedData((2.2, 5.0, 15.0), (1e4, 4200.0, 50.0), (40.0, 10.0, 90.0))
+    expected = of_chain(chain)
+    found = head_response(data, 120.0).model
+    check("H [m/N]", np.abs(found.receptance(FREQUENCIES) / expected.receptance(FREQUENCIES) - 1.0),
+          0.0, within=1e-12)  # fmt: skip
+    mine, other = ([mode.frequency for mode in model.modes()] for model in (found, expected))
+    check("frequencies [Hz]", mine, other, within=1e-9)
 
 
 def test_hanging_rod_pushed_aside_at_its_end() -> None:
