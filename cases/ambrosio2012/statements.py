@@ -174,8 +174,8 @@ def _deviation(runs: Runs) -> Judged:
     below = sum(ratio < STD_RATIO for ratio, *_ in ratios[AVERAGE])
     found = (
         f"light: {above} of {len(ratios[LIGHT])} pantographs above 30 %, the smallest "
-        f"{100 * lowest[0]:.0f} % ({lowest[2]:.1f} N, {lowest[1]}); average: {below} of "
-        f"{len(ratios[AVERAGE])} below, the largest {100 * highest[0]:.0f} % "
+        f"{100 * lowest[0]:.1f} % ({lowest[2]:.1f} N, {lowest[1]}); average: {below} of "
+        f"{len(ratios[AVERAGE])} below, the largest {100 * highest[0]:.1f} % "
         f"({highest[2]:.1f} N, {highest[1]})"
     )
     return Judged(_verdict(holds), found)

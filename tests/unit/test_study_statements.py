@@ -81,8 +81,8 @@ def test_runs_as_the_paper_says_reproduce_all_nine() -> None:
     [
         (1, changed(AVERAGE, "85m", 1, mean=156.0), "150.0 to 156.0 N"),
         (1, changed(LIGHT, "single", 0, mean=144.0), "144.0 to 150.0 N"),
-        (2, changed(AVERAGE, "31m", 1, std=45.1), "the largest 30 % (45.1 N, 31m trailing)"),
-        (2, changed(LIGHT, "single", 0, std=44.9), "the smallest 30 % (44.9 N, single)"),
+        (2, changed(AVERAGE, "31m", 1, std=45.1), "the largest 30.1 % (45.1 N, 31m trailing)"),
+        (2, changed(LIGHT, "single", 0, std=44.9), "the smallest 29.9 % (44.9 N, single)"),
         (3, changed(LIGHT, "85m", 1, maximum=400.0), "maximum 400.0 N 85m trailing"),
         (3, changed(AVERAGE, "31m", 0, minimum=1.0), "minimum 1.0 N 31m leading"),
         (3, changed(AVERAGE, "single", 0, std=60.0), "deviation 60.0 N single"),
