@@ -7,7 +7,7 @@ enough apart do not see each other, so many columns come from one solve.
 from __future__ import annotations
 
 import heapq
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -57,12 +57,22 @@ class ShortColumns:
         self.start = start
         self.values = values
 
-    def add(self, column: int, factor: float, target: np.ndarray) -> None:
-        """Add ``factor`` times a column to a local array, shape (n_local,)."""
-        values = self.values[column]
-        if values.size:
-            begin = self.start[column]
-            target[begin : begin + values.size] += factor * values
+    def packed(self) -> PackedColumns:
+        """The same in one array."""
+        sizes = np.array([values.size for values in self.values], dtype=np.int64)
+        offset = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
+        return PackedColumns(self.start, offset, np.concatenate([*self.values, np.zeros(0)]))
+
+
+class PackedColumns(NamedTuple):
+    """Columns one after the other: that of number i is ``data[offset[i] : offset[i + 1]]``.
+
+    ``start`` (n,) holds the local number of the first unknown of each.
+    """
+
+    start: np.ndarray
+    offset: np.ndarray
+    data: np.ndarray
 
 
 def compute(

@@ -58,9 +58,14 @@ class ContactWire:
         self._owned = mine.astype(float)
         self._local = np.where(mine, self.dofs - ownership.first, 0)
 
-    def locate(self, touches: Touches) -> None:
-        """Fill ``touches`` for their positions; a node belongs to the element that it ends."""
+    def locate(self, start: np.ndarray, way: float, touches: Touches) -> None:
+        """Fill ``touches`` for a ``way`` [m] ahead of each ``start`` (n,) [m].
+
+        A node belongs to the element that it ends.
+        """
         kernels.locate(
+            start,
+            way,
             touches.x,
             self.x,
             self._local,
@@ -78,8 +83,7 @@ class ContactWire:
     def rest_height(self, x: np.ndarray) -> np.ndarray:
         """Height of the line at rest at positions ``x`` [m], shape as ``x``."""
         touches = Touches(x.size)
-        touches.x[:] = x
-        self.locate(touches)
+        self.locate(x, 0.0, touches)
         return np.asarray((touches.whole_value * touches.rest).sum(axis=1))
 
     def nodes_between(self, low: float, high: float) -> tuple[int, int]:

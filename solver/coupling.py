@@ -17,9 +17,10 @@ import numpy as np
 
 from catenary.solver.errors import RunBroken
 from catenary.solver.heads import Heads
-from catenary.solver.inner import Gap, InnerProblem, InnerSolution, LineResponse, TensionBySlack
+from catenary.solver.inner import InnerProblem, InnerSolution
 from catenary.solver.law_in_steps import LawInSteps
 from catenary.solver.problem import Numerics
+from catenary.solver.response import LineResponse
 
 # Forces that grow beyond this [N] will not come back.
 _DIVERGED = 1e9
@@ -34,9 +35,7 @@ class Coupling(Protocol):
     extrapolates: bool
     law: LawInSteps
 
-    def solve(
-        self, line: LineResponse, heads: Heads, tension_by_slack: TensionBySlack
-    ) -> InnerSolution:
+    def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
         """Contact forces and compensations of slack droppers.
 
         Raises
@@ -89,9 +88,7 @@ class Explicit(_RemembersLaw):
         self.law = inner.law
         self._inner = inner
 
-    def solve(
-        self, line: LineResponse, heads: Heads, tension_by_slack: TensionBySlack
-    ) -> InnerSolution:
+    def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
         """Forces of the law at the extrapolation."""
         law = self.law
         depth = heads.early_height - line.early_height
@@ -99,8 +96,10 @@ class Explicit(_RemembersLaw):
         if not law.pulls:
             np.maximum(force, 0.0, out=force)
         _refuse_diverged(force)
-        slack, rounds = self._inner.slack_under(line, force, tension_by_slack)
-        return Gap(line, heads).solution(force, slack, rounds)
+        slack = self._inner.slack_under(line, force)
+        gap = self._inner.gap
+        gap.put(line, heads)
+        return InnerSolution(force, slack, *gap.under(force, slack), rounds=1)
 
 
 class Iterated:
@@ -114,12 +113,12 @@ class Iterated:
 
     extrapolates = False
 
-    def __init__(self, inner: InnerProblem, n: int, tolerance: float, max_iterations: int) -> None:
+    def __init__(self, inner: InnerProblem, tolerance: float, max_iterations: int) -> None:
         self.law = inner.law
         self._inner = inner
         self._tolerance = tolerance
         self._max_iterations = max_iterations
-        self._latest = np.zeros(n)
+        self._latest = np.zeros(inner.law.n)
 
     def state(self) -> np.ndarray:
         """The latest forces, from which the next step starts, and what the law remembers."""
@@ -131,13 +130,12 @@ class Iterated:
         self._latest = state[:n].copy()
         self.law.restore(state[n:])
 
-    def solve(
-        self, line: LineResponse, heads: Heads, tension_by_slack: TensionBySlack
-    ) -> InnerSolution:
+    def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
         """Forces after as many exchanges as they need."""
-        gap, law, force = Gap(line, heads), self.law, self._latest
+        gap, law, force = self._inner.gap, self.law, self._latest
+        gap.put(line, heads)
         for number in range(1, self._max_iterations + 1):
-            slack, _ = self._inner.slack_under(line, force, tension_by_slack)
+            slack = self._inner.slack_under(line, force)
             new = law.force(*gap.under(force, slack)).copy()
             if not law.pulls:
                 np.maximum(new, 0.0, out=new)
@@ -146,8 +144,8 @@ class Iterated:
             force = new
             if change <= self._tolerance:
                 self._latest = force
-                slack, _ = self._inner.slack_under(line, force, tension_by_slack)
-                return gap.solution(force, slack, number)
+                slack = self._inner.slack_under(line, force)
+                return InnerSolution(force, slack, *gap.under(force, slack), rounds=number)
         raise RunBroken(
             f"line and pantographs do not agree on the contact forces within "
             f"{self._max_iterations} exchanges (numerics.max_iterations): these still change by "
@@ -155,16 +153,15 @@ class Iterated:
         )
 
 
-def make_coupling(law: LawInSteps, n: int, kept_ratio: float, numerics: Numerics) -> Coupling:
-    """The coupling that the numerics ask for, for n contacts.
-
-    ``kept_ratio`` is the share of its stiffness that a slack dropper keeps.
-    """
-    inner = InnerProblem(law, kept_ratio)
+def make_coupling(
+    law: LawInSteps, kept_ratio: float, band: np.ndarray, numerics: Numerics
+) -> Coupling:
+    """The coupling that the numerics ask for; ``kept_ratio`` and ``band`` as for `InnerProblem`."""
+    inner = InnerProblem(law, kept_ratio, band)
     if numerics.coupling == "explicit":
         return Explicit(inner)
     if numerics.coupling == "iterated":
-        return Iterated(inner, n, numerics.eps_force, numerics.max_iterations)
+        return Iterated(inner, numerics.eps_force, numerics.max_iterations)
     return Implicit(inner)
 
 

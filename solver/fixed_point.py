@@ -58,7 +58,7 @@ class FixedPoint:
         external = self.loads(time)
         force = self._force
         for _ in range(self.numerics.max_iterations):
-            force, height, depth, rate = self._contact(touches, heads, force)
+            force, depth, rate = self._contact(touches, heads, force)
             compensation = self._compensation()
             self._latest[0] = line.displacement
             self._latest[1] = line.velocity
@@ -78,7 +78,7 @@ class FixedPoint:
         # All ranks hold the same forces, so that all remember the same impacts.
         self.law.accept(time, depth, rate, force)
         if self.comm.rank == 0:
-            self.pantographs.advance(force, self.law.reported(force), height)
+            self.pantographs.advance(force, self.law.reported(force), depth)
         return not stop
 
     def state(self) -> np.ndarray:
@@ -105,18 +105,18 @@ class FixedPoint:
 
     def _contact(
         self, touches: Touches, heads: Heads, force: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Contact forces [N], wire heights [m], depths [m] and their rates [m/s] from the latest
-        iterate, on all ranks."""
-        height, rate = self.interaction.heights(touches)
-        both = np.concatenate([height, rate])
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Contact forces [N], depths [m] and their rates [m/s] from the latest iterate, on all
+        ranks."""
+        both = np.zeros((2, force.size))
+        self.interaction.heights(touches, both[0], both[1])
         if self.comm.size > 1:
             self.comm.Allreduce(MPI.IN_PLACE, both)
-        height, rate = both[: force.size], both[force.size :]
+        height, rate = both
         depth = heads.height - heads.height_compliance @ force - height
         speed = heads.velocity - heads.velocity_compliance @ force - rate
         new = self.law.force(depth, speed).copy()
-        return (new if self.law.pulls else np.maximum(new, 0.0)), height, depth, speed
+        return (new if self.law.pulls else np.maximum(new, 0.0)), depth, speed
 
     def _compensation(self) -> np.ndarray:
         """Forces that cancel what owned droppers push (eq. 2.7) [N]."""

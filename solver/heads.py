@@ -27,12 +27,6 @@ class Heads:
         """Number of contacts."""
         return int(self.height.size)
 
-    def is_finite(self) -> bool:
-        """Whether all are numbers."""
-        total = self.height.sum() + self.velocity.sum()
-        total += self.height_compliance.sum() + self.velocity_compliance.sum()
-        return bool(np.isfinite(total))
-
     def pack(self) -> np.ndarray:
         """All numbers as one array, for a message."""
         parts = (self.height, self.velocity, self.height_compliance, self.velocity_compliance)

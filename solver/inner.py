@@ -18,92 +18,99 @@ found: Newton's method, which for a convex spring comes from one side and cannot
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.solver import kernels
+from catenary.solver import inner_kernels
 from catenary.solver.errors import RunBroken
 from catenary.solver.heads import Heads
 from catenary.solver.law_in_steps import LawInSteps
+from catenary.solver.response import LineResponse
 
 # Mostly one or two rounds are needed; a set that cycles shows within a few.
 _MAX_ROUNDS = 30
 # Newton's method on a law doubles its digits with each tangent.
 _MAX_TANGENTS = 50
-
-
-@dataclass
-class LineResponse:
-    """The line's side of the inner problem, for n contacts and m droppers that may slacken.
-
-    Attributes
-    ----------
-    height, rate : (n,) free wire height [m] and its total rate [m/s] at the contacts
-    height_by_force, rate_by_force : (n, n) B [m/N] and its rate [m/(N s)]
-    droppers : (m,) their numbers
-    tension : (m,) T0 [N]
-    tension_by_force : (m, n) Q [-]
-    height_by_slack, rate_by_slack : (m, n) P [m/N] and its rate [m/(N s)]
-    early_height, early_rate : (n,) what the line's motion extrapolates to, or (0,) if not asked
-    """
-
-    height: np.ndarray
-    rate: np.ndarray
-    height_by_force: np.ndarray
-    rate_by_force: np.ndarray
-    droppers: np.ndarray
-    tension: np.ndarray
-    tension_by_force: np.ndarray
-    height_by_slack: np.ndarray
-    rate_by_slack: np.ndarray
-    early_height: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    early_rate: np.ndarray = field(default_factory=lambda: np.zeros(0))
+# What there is to say of a step that holds something that is no number.
+NOT_FINITE = "it has no finite solution; try a smaller numerics.dt_s"
+# Droppers that the arrays have room for at first.
+_FIRST_ROOM = 32
 
 
 @dataclass
 class InnerSolution:
-    """Contact forces (n,) [N], compensations (m,) [N], wire heights (n,) [m], depths (n,) [m] and
-    their rates (n,) [m/s] at the contacts, rounds of all iterations."""
+    """What a step's forces are; the arrays are overwritten by the next step.
+
+    ``contact_force`` (n,) [N]; ``compensation`` (m,) [N] of the droppers with a row; ``depth`` (n,)
+    [m] and its ``rate`` (n,) [m/s] at the contacts; ``rounds`` of all iterations.
+    """
 
     contact_force: np.ndarray
     compensation: np.ndarray
-    wire_height: np.ndarray
     depth: np.ndarray
     rate: np.ndarray
     rounds: int
 
 
-TensionBySlack = Callable[[np.ndarray], np.ndarray]
-
-
 class Gap:
-    """Depths and rates at n contacts as functions of contact forces and compensations."""
+    """Depths and rates at n contacts as functions of contact forces and compensations.
 
-    def __init__(self, line: LineResponse, heads: Heads) -> None:
-        self.line = line
-        self.depth = heads.height - line.height
-        self.rate = heads.velocity - line.rate
-        self.depth_by_force = heads.height_compliance + line.height_by_force
-        self.rate_by_force = heads.velocity_compliance + line.rate_by_force
+    Attributes
+    ----------
+    depth, rate : (n,) without forces [m], [m/s]
+    depth_by_force, rate_by_force : (n, n) what forces take off them [m/N], [m/(N s)]
+    """
+
+    def __init__(self, n: int) -> None:
+        self.depth, self.rate = np.zeros(n), np.zeros(n)
+        self.depth_by_force, self.rate_by_force = np.zeros((n, n)), np.zeros((n, n))
+        self._under = np.zeros((2, n))
+        self._line = LineResponse(n, 0)
+
+    def put(self, line: LineResponse, heads: Heads) -> None:
+        """Take the answers of both sides for this step.
+
+        Raises
+        ------
+        RunBroken
+            If one of them is no number; it would compare as out of contact and go unnoticed.
+        """
+        self._line = line
+        finite = inner_kernels.gap(
+            heads.height,
+            heads.velocity,
+            heads.height_compliance,
+            heads.velocity_compliance,
+            line.height,
+            line.rate,
+            line.height_by_force,
+            line.rate_by_force,
+            self.depth,
+            self.rate,
+            self.depth_by_force,
+            self.rate_by_force,
+        )
+        if not finite:
+            raise RunBroken(NOT_FINITE)
 
     def under(self, force: np.ndarray, slack: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Depths [m] and rates [m/s] under forces (n,) and compensations (m,) [N]."""
-        depth = self.depth - self.depth_by_force @ force
-        rate = self.rate - self.rate_by_force @ force
-        if slack.size:
-            depth += self.line.height_by_slack.T @ slack
-            rate += self.line.rate_by_slack.T @ slack
+        """Depths [m] and rates [m/s] under forces (n,) and compensations (m,) [N]; overwritten by
+        the next call."""
+        depth, rate = self._under
+        inner_kernels.under(
+            self.depth_by_force,
+            self.rate_by_force,
+            self.depth,
+            self.rate,
+            self._line.rows,
+            slack.size,
+            force,
+            slack,
+            depth,
+            rate,
+        )
         return depth, rate
-
-    def solution(self, force: np.ndarray, slack: np.ndarray, rounds: int) -> InnerSolution:
-        """Everything that follows from forces (n,) and compensations (m,) [N]."""
-        line = self.line
-        height = line.height + line.height_by_force @ force
-        if slack.size:
-            height -= line.height_by_slack.T @ slack
-        return InnerSolution(force, slack, height, *self.under(force, slack), rounds)
 
 
 class InnerProblem:
@@ -115,101 +122,124 @@ class InnerProblem:
     ----------
     law : LawInSteps
     kept_ratio : share r of its stiffness that a slack dropper keeps
+    band : (n_droppers, 2 half + 1), ``band[e, d - e + half]`` is G_de [-]; (0, 1) if droppers do
+        not slacken
     """
 
-    def __init__(self, law: LawInSteps, kept_ratio: float) -> None:
+    def __init__(self, law: LawInSteps, kept_ratio: float, band: np.ndarray) -> None:
         self.law = law
+        self.gap = Gap(law.n)
         self._released = 1.0 - kept_ratio
+        self._band = band
+        self._make_room(_FIRST_ROOM)
 
-    def solve(
-        self, line: LineResponse, heads: Heads, tension_by_slack: TensionBySlack
-    ) -> InnerSolution:
-        """Forces of the step; ``tension_by_slack`` gives G (m, m) of some droppers (m,) [-].
+    def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
+        """Forces of the step.
 
         Raises
         ------
         RunBroken
             If the active set does not settle.
         """
-        gap, law = Gap(line, heads), self.law
+        gap, law = self.gap, self.law
+        gap.put(line, heads)
         # Without a force heads stand highest: from there Newton's method comes from one side.
         law.linearise(gap.depth, gap.rate)
         rounds = 0
         for _ in range(_MAX_TANGENTS):
-            force, slack, more = self._with_tangents(gap, tension_by_slack)
+            force, slack, more = self._with_tangents(line)
             rounds += more
+            depth, rate = gap.under(force, slack)
             if law.is_linear:
-                return gap.solution(force, slack, rounds)
-            law.linearise(*gap.under(force, slack))
+                return InnerSolution(force, slack, depth, rate, rounds)
+            law.linearise(depth, rate)
             if law.agrees(force):
-                return gap.solution(force, slack, rounds)
-        raise RunBroken("the contact law of this step finds no force")
+                return InnerSolution(force, slack, depth, rate, rounds)
+        raise RunBroken("the contact law finds no force; take a smaller numerics.dt_s")
 
-    def slack_under(
-        self, line: LineResponse, force: np.ndarray, tension_by_slack: TensionBySlack
-    ) -> tuple[np.ndarray, int]:
-        """Compensations (m,) [N] under given contact forces (n,) [N], and the rounds needed."""
-        m = line.tension.size
-        if not m or not kernels.any_pushed(line.tension, line.tension_by_force, force):
-            return np.zeros(m), 0
-        matrix = np.eye(m) - self._released * tension_by_slack(line.droppers)
-        right = -self._released * (line.tension + line.tension_by_force @ force)
-        return _settle(matrix, right, np.zeros(m, dtype=bool))
+    def slack_under(self, line: LineResponse, force: np.ndarray) -> np.ndarray:
+        """Compensations (m,) [N] under given contact forces (n,) [N]."""
+        n, m = self.law.n, line.count
+        if not m or not inner_kernels.any_pushed(line.rows, m, n, force):
+            return np.zeros(m)
+        self._make_room(m)
+        push = np.zeros((2, n))
+        inner_kernels.couple(
+            line.rows, m, n, self._released, self._band, push, self._matrix, self._right
+        )
+        matrix = self._matrix[n : n + m, n : n + m].copy()
+        right = self._right[n : n + m] - self._released * (line.couplings(0) @ force)
+        always, solution = np.zeros(m, dtype=bool), np.zeros(m)
+        rounds = inner_kernels.settle(matrix, right, always, solution, _MAX_ROUNDS)
+        if rounds <= 0:
+            _pivot(matrix, right, always, solution)
+        return solution
 
-    def _with_tangents(
-        self, gap: Gap, tension_by_slack: TensionBySlack
-    ) -> tuple[np.ndarray, np.ndarray, int]:
+    def _with_tangents(self, line: LineResponse) -> tuple[np.ndarray, np.ndarray, int]:
         """Contact forces (n,) and compensations (m,) [N] for the law's tangents, and the rounds."""
-        law, line = self.law, gap.line
-        n, m = gap.depth.size, line.droppers.size
-        push, softness = np.empty(n), np.empty((n, n))
-        kernels.press(
+        gap, n, m = self.gap, self.law.n, line.count
+        self._make_room(m)
+        rounds, size = inner_kernels.solve(
             gap.depth,
             gap.rate,
             gap.depth_by_force,
             gap.rate_by_force,
-            law.own,
-            law.offset,
-            law.by_depth,
-            law.by_rate,
-            push,
-            softness,
+            self.law.tangents,
+            line.rows,
+            m,
+            self._released,
+            self._band,
+            self._always,
+            self._matrix,
+            self._right,
+            self._solution,
+            _MAX_ROUNDS,
         )
-        always = np.full(n, law.pulls)
-        force, rounds = _settle(softness, push, always)
-        if m == 0 or not kernels.any_pushed(line.tension, line.tension_by_force, force):
-            return force, np.zeros(m), rounds
-        matrix = np.empty((n + m, n + m))
-        matrix[:n, :n] = softness
-        matrix[:n, n:] = -(law.by_depth * line.height_by_slack + law.by_rate * line.rate_by_slack).T
-        matrix[n:, :n] = self._released * line.tension_by_force
-        matrix[n:, n:] = np.eye(m) - self._released * tension_by_slack(line.droppers)
-        right = np.concatenate([push, -self._released * line.tension])
-        solution, rounds = _settle(matrix, right, np.concatenate([always, np.zeros(m, dtype=bool)]))
-        return solution[:n], solution[n:], rounds
+        if rounds <= 0:
+            matrix, right = self._matrix[:size, :size].copy(), self._right[:size].copy()
+            rounds = _pivot(matrix, right, self._always[:size], self._solution[:size]) - rounds
+            force = self._solution[:n]
+            if size == n and m and inner_kernels.any_pushed(line.rows, m, n, force):
+                return self._with_all(line, rounds)
+        return self._solution[:n], self._solution[n:size], rounds
+
+    def _with_all(self, line: LineResponse, rounds: int) -> tuple[np.ndarray, np.ndarray, int]:
+        """The same by pivoting, droppers included, where contacts alone needed it already."""
+        n, size = self.law.n, self.law.n + line.count
+        inner_kernels.couple(
+            line.rows, line.count, n, self._released, self._band, self.law.tangents[2:],
+            self._matrix, self._right,
+        )  # fmt: skip
+        matrix, right = self._matrix[:size, :size].copy(), self._right[:size].copy()
+        rounds += _pivot(matrix, right, self._always[:size], self._solution[:size])
+        return self._solution[:n], self._solution[n:size], rounds
+
+    def _make_room(self, n_droppers: int) -> None:
+        n = self.law.n
+        room = getattr(self, "_room", -1)
+        if n_droppers <= room:
+            return
+        self._room = max(n_droppers, 2 * room)
+        size = n + self._room
+        self._matrix, self._right = np.zeros((size, size)), np.zeros(size)
+        self._solution = np.zeros(size)
+        self._always = np.zeros(size, dtype=bool)
+        self._always[:n] = self.law.pulls
 
 
-def _settle(matrix: np.ndarray, right: np.ndarray, always: np.ndarray) -> tuple[np.ndarray, int]:
-    """Solve x = max(0, x - (matrix x - right)) entry by entry, or freely where ``always``."""
-    solution, rounds = kernels.settle(matrix, right, always, _MAX_ROUNDS)
-    if rounds > 0:
-        return solution, rounds
-    return _pivot(matrix, right, always, -rounds)
+def _pivot(matrix: np.ndarray, right: np.ndarray, always: np.ndarray, solution: np.ndarray) -> int:
+    """Murty's least-index pivoting: slower, but it cannot cycle for a P-matrix.
 
-
-def _pivot(
-    matrix: np.ndarray, right: np.ndarray, always: np.ndarray, rounds: int
-) -> tuple[np.ndarray, int]:
-    """Murty's least-index pivoting: slower, but it cannot cycle for a P-matrix."""
+    Fills the solution and returns the rounds needed.
+    """
     acts = always.copy()
-    solution = np.zeros(right.size)
     scale = 1e-12 * (1.0 + np.abs(right).max())
-    for extra in range(1, 20 * right.size + 100):
-        kernels.solve_on(matrix, right, acts, solution)
+    for rounds in range(1, 20 * right.size + 100):
+        inner_kernels.solve_on(matrix, right, acts, solution)
         residual = matrix @ solution - right
         wrong = np.where(acts, (solution < -scale) & ~always, residual < -scale)
         if not wrong.any():
-            return solution, rounds + extra
+            return rounds
         first = int(np.argmax(wrong))
         acts[first] = not acts[first]
     raise RunBroken("contacts and slack droppers of this step have no common solution")

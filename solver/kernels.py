@@ -41,6 +41,8 @@ def correct(displacement, velocity, acceleration, position_factor, velocity_fact
 
 @compiled
 def locate(
+    start,
+    way,
     x,
     nodes,
     local_of_node,
@@ -54,8 +56,12 @@ def locate(
     whole_slope,
     rest,
 ):
-    """Element, Hermite functions and unknowns at each position ``x``; see ``contact.Touches``."""
+    """Position ``x``, element, Hermite functions and unknowns after a ``way`` from each ``start``.
+
+    See ``contact.Touches``.
+    """
     for i in range(x.size):
+        x[i] = start[i] + way
         e = min(max(np.searchsorted(nodes, x[i]) - 1, 0), nodes.size - 2)
         length = nodes[e + 1] - nodes[e]
         xi = (x[i] - nodes[e]) / length
@@ -113,161 +119,161 @@ def combine(elements, weights, first_node, start, offset, data, answers, filled)
 
 
 @compiled
-def influence(answers, local, weights, result):
-    """``result[i, j]`` = interpolation at touch i of the answer to force j."""
-    if answers.shape[1] == 0:
-        return
+def tension(displacement, velocity, ends, laws, result):
+    """Tension N0 + k e + c e' of droppers as if they could push [N].
+
+    ``ends`` (n, 2) holds local unknowns of upper and lower end, ``laws`` (n, 4) rest force,
+    stiffness, damping and place. Returns whether all are numbers.
+    """
+    total = 0.0
+    for d in range(ends.shape[0]):
+        upper, lower = ends[d, 0], ends[d, 1]
+        stretch = displacement[upper] - displacement[lower]
+        speed = velocity[upper] - velocity[lower]
+        result[d] = laws[d, 0] + laws[d, 1] * stretch + laws[d, 2] * speed
+        total += result[d]
+    return np.isfinite(total)
+
+
+@compiled
+def influence(answers, local, weights, factor, result):
+    """``result[i, j]`` = ``factor`` times the interpolation at touch i of the answer to force j."""
     for i in range(local.shape[0]):
         for j in range(answers.shape[0]):
             total = 0.0
-            for k in range(4):
-                total += weights[i, k] * answers[j, local[i, k]]
-            result[i, j] = total
+            if answers.shape[1] > 0:
+                for k in range(4):
+                    total += weights[i, k] * answers[j, local[i, k]]
+            result[i, j] = factor * total
 
 
 @compiled
-def tension(displacement, velocity, upper, lower, rest, stiffness, damping, result):
-    """Tension N0 + k e + c e' of droppers as if they could push [N]."""
-    for d in range(upper.size):
-        stretch = displacement[upper[d]] - displacement[lower[d]]
-        speed = velocity[upper[d]] - velocity[lower[d]]
-        result[d] = rest[d] + stiffness[d] * stretch + damping[d] * speed
-
-
-@compiled
-def may_slacken(
-    force, margin, bound, per_acceleration, upper, lower, x, contact_x, reach, answers, chosen
+def respond(
+    displacement,
+    velocity,
+    local,
+    value,
+    slope,
+    rest,
+    train_speed,
+    answers,
+    slope_answers,
+    uses_rate,
+    position_factor,
+    velocity_factor,
+    height,
+    rate,
+    height_by_force,
+    rate_by_force,
 ):
-    """Number of droppers, listed in ``chosen``, whose tension may fall below ``margin``.
+    """A rank's share of heights, rates and compliances at the touches; see ``LineResponse``.
 
-    Contact i may press with up to ``bound[i]`` and touches those within ``reach`` of it.
+    Returns whether the heights are numbers.
     """
-    count = 0
+    heights(displacement, velocity, local, value, slope, rest, train_speed, height, rate)
+    influence(answers, local, value, 1.0, height_by_force)
+    if uses_rate:
+        influence(answers, local, slope, train_speed * position_factor, rate_by_force)
+    for i in range(height.size):
+        for j in range(height.size):
+            if uses_rate:
+                rate_by_force[i, j] += velocity_factor * height_by_force[i, j]
+            height_by_force[i, j] *= position_factor
+    return np.isfinite(height.sum() + rate.sum())
+
+
+@compiled
+def watch(
+    force,
+    margin,
+    bound,
+    numbers,
+    ends,
+    laws,
+    contact_x,
+    reach,
+    answers,
+    slope_answers,
+    uses_rate,
+    train_speed,
+    position_factor,
+    velocity_factor,
+    rows,
+):
+    """Number of droppers whose tension may fall below ``margin``; a row each, as far as they fit.
+
+    ``force`` (n,) is their tension if they could push; contact i may press with up to
+    ``bound[i]`` and touches those within ``reach`` of it.
+    """
+    count, n = 0, contact_x.size
     for d in range(force.size):
+        per_acceleration = laws[d, 1] * position_factor + laws[d, 2] * velocity_factor
+        upper, lower = ends[d, 0], ends[d, 1]
         candidate = force[d] < margin
         if not candidate:
-            for i in range(contact_x.size):
-                if abs(x[d] - contact_x[i]) <= reach:
-                    spread = answers[i, upper[d]] - answers[i, lower[d]]
-                    if force[d] + per_acceleration[d] * spread * bound[i] < margin:
+            for i in range(n):
+                if abs(laws[d, 3] - contact_x[i]) <= reach:
+                    spread = answers[i, upper] - answers[i, lower]
+                    if force[d] + per_acceleration * spread * bound[i] < margin:
                         candidate = True
                         break
-        if candidate:
-            chosen[count] = d
-            count += 1
+        if not candidate:
+            continue
+        if count < rows.shape[0]:
+            row = rows[count]
+            row[0], row[1] = numbers[d], force[d]
+            for i in range(n):
+                spread = answers[i, upper] - answers[i, lower]
+                row[2 + i] = per_acceleration * spread
+                row[2 + n + i] = position_factor * spread
+                row[2 + 2 * n + i] = 0.0
+                if uses_rate:
+                    slopes = slope_answers[i, upper] - slope_answers[i, lower]
+                    row[2 + 2 * n + i] = (
+                        velocity_factor * spread + train_speed * position_factor * slopes
+                    )
+        count += 1
     return count
 
 
 @compiled
-def move(begin, values, factor, acceleration, displacement, velocity, c_position, c_velocity):
-    """Add ``factor`` times a column to the acceleration, and what follows to the state."""
-    for j in range(values.size):
-        change = factor * values[j]
-        acceleration[begin + j] += change
-        displacement[begin + j] += c_position * change
-        velocity[begin + j] += c_velocity * change
+def superpose(
+    force,
+    answers,
+    filled,
+    numbers,
+    compensation,
+    start,
+    offset,
+    data,
+    acceleration,
+    displacement,
+    velocity,
+    position_factor,
+    velocity_factor,
+):
+    """Add the answers to contact forces and to compensations of some droppers to the state.
 
-
-@compiled
-def press(depth, rate, by_force, rate_by_force, own, offset, by_depth, by_rate, push, softness):
-    """Right-hand side and matrix of the contact forces when no dropper is slack.
-
-    ``own`` f = ``offset`` + ``by_depth`` d + ``by_rate`` d' at each contact, with depth d and rate
-    d' that are ``depth`` - ``by_force`` f and ``rate`` - ``rate_by_force`` f.
+    ``data[offset[d] : offset[d + 1]]`` is the column of dropper d from the local unknown
+    ``start[d]`` on.
     """
-    for i in range(depth.size):
-        push[i] = offset[i] + by_depth[i] * depth[i] + by_rate[i] * rate[i]
-        for j in range(depth.size):
-            softness[i, j] = by_depth[i] * by_force[i, j] + by_rate[i] * rate_by_force[i, j]
-        softness[i, i] += own[i]
-
-
-@compiled
-def hertz(depth, rate, speed, stiffness, exponent, hysteresis, offset, by_depth, by_rate, force):
-    """Tangents of f = K d^n (1 + chi d' / d0') at each contact, with f and what f is less them."""
-    for i in range(depth.size):
-        d = depth[i]
-        if d <= 0.0:
-            offset[i] = by_depth[i] = by_rate[i] = force[i] = 0.0
-            continue
-        spring = stiffness * d**exponent
-        loss = 1.0 + hysteresis * rate[i] / speed[i]
-        force[i] = spring * loss
-        by_depth[i] = exponent * spring / d * loss
-        by_rate[i] = spring * hysteresis / speed[i]
-        if by_depth[i] < 0.0:
-            # Beyond the speed at which the law would pull it has no spring either.
-            by_depth[i] = 0.0
-        offset[i] = force[i] - by_depth[i] * d - by_rate[i] * rate[i]
-
-
-@compiled
-def any_pushed(free_tension, by_force, force):
-    """Whether contact forces alone leave any of the droppers in compression."""
-    for d in range(free_tension.size):
-        value = free_tension[d]
-        for i in range(force.size):
-            value += by_force[d, i] * force[i]
-        if value < 0.0:
-            return True
-    return False
-
-
-@compiled
-def solve_on(matrix, right, acts, solution):
-    """Solution of the rows and columns that act, zero elsewhere, by elimination with pivoting."""
-    index = np.flatnonzero(acts)
-    m = index.size
-    a = np.empty((m, m + 1))
-    for i in range(m):
-        for j in range(m):
-            a[i, j] = matrix[index[i], index[j]]
-        a[i, m] = right[index[i]]
-    for k in range(m):
-        pivot = k
-        for i in range(k + 1, m):
-            if abs(a[i, k]) > abs(a[pivot, k]):
-                pivot = i
-        if pivot != k:
-            for j in range(k, m + 1):
-                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
-        for i in range(k + 1, m):
-            share = a[i, k] / a[k, k]
-            for j in range(k + 1, m + 1):
-                a[i, j] -= share * a[k, j]
-    solution[:] = 0.0
-    for i in range(m - 1, -1, -1):
-        value = a[i, m]
-        for j in range(i + 1, m):
-            value -= a[i, j] * solution[index[j]]
-        solution[index[i]] = value / a[i, i]
-
-
-@compiled
-def settle(matrix, right, always, max_rounds):
-    """Active-set iteration for x = max(0, x - (matrix x - right)), freely where ``always``.
-
-    Returns the solution and the rounds needed, which are negative if the set did not settle.
-    """
-    n = right.size
-    acts = np.empty(n, dtype=np.bool_)
-    for i in range(n):
-        acts[i] = always[i] or right[i] > 0.0
-    solution = np.zeros(n)
-    for rounds in range(1, max_rounds + 1):
-        solve_on(matrix, right, acts, solution)
-        changed = False
-        for i in range(n):
-            residual = -right[i]
-            for j in range(n):
-                residual += matrix[i, j] * solution[j]
-            now = always[i] or solution[i] - residual > 0.0
-            if now != acts[i]:
-                acts[i] = now
-                changed = True
-        if not changed:
-            return solution, rounds
-    return solution, -max_rounds
+    for i in range(force.size):
+        f = force[i]
+        if f != 0.0:
+            for j in range(filled[i, 0], filled[i, 1]):
+                change = f * answers[i, j]
+                acceleration[j] += change
+                displacement[j] += position_factor * change
+                velocity[j] += velocity_factor * change
+    for k in range(numbers.size):
+        d, f = numbers[k], compensation[k]
+        begin = start[d] - offset[d]
+        if f != 0.0:
+            for j in range(offset[d], offset[d + 1]):
+                change = f * data[j]
+                acceleration[begin + j] -= change
+                displacement[begin + j] -= position_factor * change
+                velocity[begin + j] -= velocity_factor * change
 
 
 def warm_up() -> None:
@@ -279,6 +285,8 @@ def warm_up() -> None:
     predict(reals, reals, reals, reals, 1.0, 1.0, 1.0, 1.0)
     correct(reals, reals, reals, 1.0, 1.0, 1.0)
     locate(
+        one,
+        1.0,
         one,
         nodes,
         np.zeros((2, 2), dtype=np.int64),
@@ -295,11 +303,18 @@ def warm_up() -> None:
     heights(reals, reals, places, table, table, table, 1.0, one, one)
     bounds = np.zeros(3, dtype=np.int64)
     combine(numbers, table, 0, bounds, bounds, columns, table, range_filled)
-    influence(table, places, table, np.zeros((1, 1)))
-    tension(reals, reals, numbers, numbers, one, one, one, one)
-    may_slacken(one, 1.0, one, one, numbers, numbers, one, one, 1.0, table, numbers)
-    move(0, reals, 1.0, reals, reals, reals, 1.0, 1.0)
-    press(one, one, np.eye(1), np.eye(1), one, one, one, one, one, np.eye(1))
-    hertz(one, one, one, 1.0, 1.5, 0.0, one, one, one, one)
-    any_pushed(one, np.eye(1), one)
-    settle(np.eye(1), one, np.zeros(1, dtype=np.bool_), 1)
+    square, none = np.zeros((1, 1)), np.zeros((1, 0))
+    respond(
+        reals, reals, places, table, table, table, 1.0, table, none, False, 1.0, 1.0,
+        one, one, square, square,
+    )  # fmt: skip
+    ends, laws = np.zeros((1, 2), dtype=np.int64), np.zeros((1, 4))
+    tension(reals, reals, ends, laws, one)
+    watch(
+        one, 1.0, one, numbers, ends, laws, one, 1.0, table, none, False, 1.0, 1.0, 1.0,
+        np.zeros((1, 5)),
+    )  # fmt: skip
+    superpose(
+        one, table, range_filled, numbers, one, numbers, bounds, columns, reals, reals, reals,
+        1.0, 1.0,
+    )  # fmt: skip

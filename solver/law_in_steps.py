@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from catenary.solver import kernels
+from catenary.solver import inner_kernels
 from catenary.solver.contact_laws import HertzLaw, KinematicLaw, LinearLaw
 from catenary.solver.errors import RunBroken
 from catenary.solver.problem import Problem
@@ -24,15 +24,14 @@ class LawInSteps(Protocol):
 
     Attributes
     ----------
-    own, offset, by_depth, by_rate : (n,), the tangents; ``offset`` [N], [N/m], [N s/m]
+    n : number of contacts
+    tangents : (4, n), rows own [-], offset [N], by_depth [N/m] and by_rate [N s/m]
     is_linear : whether the tangents are the law
     pulls : whether forces below zero are part of the law
     """
 
-    own: np.ndarray
-    offset: np.ndarray
-    by_depth: np.ndarray
-    by_rate: np.ndarray
+    n: int
+    tangents: np.ndarray
     is_linear: bool
     pulls: bool
 
@@ -71,10 +70,10 @@ class _Tangents:
     is_linear = True
 
     def __init__(self, n: int, own: float, by_depth: float, by_rate: float, pulls: bool) -> None:
-        self.own = np.full(n, own)
-        self.offset = np.zeros(n)
-        self.by_depth = np.full(n, by_depth)
-        self.by_rate = np.full(n, by_rate)
+        self.n = n
+        self.tangents = np.zeros((4, n))
+        self.tangents[0] = own
+        self.tangents[2:] = [[by_depth], [by_rate]]
         self.pulls = pulls
 
     def linearise(self, depth: np.ndarray, rate: np.ndarray) -> None:
@@ -82,7 +81,7 @@ class _Tangents:
 
     def force(self, depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """Spring and damper (n,) [N]."""
-        return np.asarray(self.by_depth * depth + self.by_rate * rate)
+        return np.asarray(self.tangents[2] * depth + self.tangents[3] * rate)
 
     def agrees(self, force: np.ndarray) -> bool:
         """Always."""
@@ -127,16 +126,16 @@ class HertzInSteps(_Tangents):
     def linearise(self, depth: np.ndarray, rate: np.ndarray) -> None:
         """Tangents at depths and rates (n,)."""
         law = self._law
-        kernels.hertz(
+        inner_kernels.hertz(
             depth,
             rate,
             self._speed,
             law.stiffness,
             law.exponent,
             law.hysteresis,
-            self.offset,
-            self.by_depth,
-            self.by_rate,
+            self.tangents[1],
+            self.tangents[2],
+            self.tangents[3],
             self._force,
         )
 

@@ -208,7 +208,9 @@ class March:
         numerics, n = self._problem.numerics, self._pantographs.n_contacts
         self._law = law_in_steps(self._problem, n)
         if numerics.scheme == "one_solve":
-            coupling = make_coupling(self._law, n, self._kept_ratio, numerics)
+            slack = self._interaction.slack_coupling
+            band = np.zeros((0, 1)) if slack is None or slack.band is None else slack.band
+            coupling = make_coupling(self._law, self._kept_ratio, band, numerics)
             return OneSolve(
                 self._comm, self._interaction, self._pantographs, coupling, self._loads()
             )

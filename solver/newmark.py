@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from catenary.solver import kernels
+from catenary.solver import inner_kernels, kernels
 from catenary.solver.compliance import Windows
 from catenary.solver.distribution import Ownership
 from catenary.solver.errors import RunBroken
@@ -36,6 +36,7 @@ class NewmarkLine:
 
     def __init__(self, comm: Any, model: Model, ownership: Ownership, numerics: Numerics) -> None:
         kernels.warm_up()
+        inner_kernels.warm_up()
         dt, beta, gamma = numerics.dt, numerics.beta, numerics.gamma
         self._comm = comm
         self.ownership = ownership

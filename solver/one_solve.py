@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from catenary.solver import inner_kernels
 from catenary.solver.contact import Touches
 from catenary.solver.coupling import Coupling
 from catenary.solver.errors import RunBroken
-from catenary.solver.exchange import Exchange, Merged, Reply, Verdict
+from catenary.solver.exchange import Exchange, Reply, Verdict
 from catenary.solver.heads import Heads
+from catenary.solver.inner import NOT_FINITE, InnerSolution
 from catenary.solver.interaction import Interaction
 from catenary.solver.pantographs import Pantographs
+from catenary.solver.response import LineResponse
 from catenary.solver.schemes import Counters, LoadSource
 
 # First guesses of what droppers elsewhere may lose [N] and of contact forces [N]; both grow when
@@ -43,22 +45,30 @@ class OneSolve:
         self._exchange = Exchange(self.comm, n, self.coupling.extrapolates)
         self._margin = _FIRST_MARGIN
         self._bound = np.full(n, _FIRST_BOUND)
-        self._advance: Callable[[], None] = lambda: None
+        self._none = np.zeros(n)
+        self._drop = np.zeros(0)
+        if self.interaction.slack_coupling is not None:
+            self._drop = np.zeros(self.interaction.slack_coupling.n_droppers)
+        self._found: InnerSolution | None = None
         self._why = ""
 
     def step(self, time: float, stop: bool) -> bool:
         line, interaction = self.interaction.line, self.interaction
         line.predict()
         touches = self.pantographs.move_to(time)
-        early = interaction.heights(touches) if self.coupling.extrapolates else None
+        if self.coupling.extrapolates:
+            share = self._exchange.share
+            interaction.heights(touches, share.early_height, share.early_rate)
         line.free_acceleration(self.loads(time))
         interaction.place(touches)
         # From here on the line holds the end of the step without contacts and slack droppers.
         line.correct()
-        reply = self._solve_inner(time, stop, touches, early)
+        reply = self._solve_inner(time, stop, touches)
         interaction.superpose(reply.contact_force, reply.droppers, reply.compensation)
-        if self.comm.rank == 0:
-            self._advance()
+        if self._found is not None:
+            law, found = self.coupling.law, self._found
+            force = found.contact_force
+            self.pantographs.advance(force, law.reported(force), found.depth)
         self.counters.steps += 1
         self.counters.solves += 1
         return reply.verdict == Verdict.ADVANCE
@@ -71,29 +81,24 @@ class OneSolve:
         """Continue from what ``state`` returned."""
         self.coupling.restore(state)
 
-    def _solve_inner(
-        self,
-        time: float,
-        stop: bool,
-        touches: Touches,
-        early: tuple[np.ndarray, np.ndarray] | None,
-    ) -> Reply:
-        line = self.interaction.line
+    def _solve_inner(self, time: float, stop: bool, touches: Touches) -> Reply:
+        exchange, interaction = self._exchange, self.interaction
         heads = self._heads(time) if self.comm.rank == 0 else None
         while True:
-            share = self.interaction.response(touches, self._bound, self._margin)
-            if early is not None:
-                share.early_height, share.early_rate = early
-            broken = not np.isfinite(share.height.sum() + line.acceleration.sum())
-            merged = self._exchange.to_root(share, stop, broken)
+            share = exchange.share
+            interaction.respond(touches, self._bound, self._margin, share)
+            share.wants_to_stop = stop
+            merged = exchange.to_root()
             answer = None
             if merged is not None and heads is not None:
                 answer = self._answer(time, merged, heads)
-            reply = self._exchange.from_root(answer)
+            reply = exchange.from_root(answer)
             if reply.verdict == Verdict.BROKEN:
                 raise self._broken(time)
             if reply.verdict == Verdict.ENLARGE:
-                self._exchange.enlarge(int(reply.contact_force[0]))
+                early = share.early_height.copy(), share.early_rate.copy()
+                exchange.enlarge(2 * reply.room)
+                exchange.share.early_height[:], exchange.share.early_rate[:] = early
             elif reply.verdict == Verdict.REPEAT:
                 self._margin *= 2.0
                 self._bound *= 2.0
@@ -117,50 +122,48 @@ class OneSolve:
             f"{float(self.pantographs.position[0]):.1f} m: {why}"
         )
 
-    def _coupling_among(self, droppers: np.ndarray) -> np.ndarray:
-        """How compensations of these droppers change each other's tension, (m, m) [-]."""
-        coupling = self.interaction.slack_coupling
-        assert coupling is not None
-        return coupling.among(droppers)
-
-    def _answer(self, time: float, merged: Merged, heads: Heads) -> Reply:
+    def _answer(self, time: float, response: LineResponse, heads: Heads) -> Reply:
         """What rank 0 makes of all shares."""
-        n = self.pantographs.n_contacts
-        empty, none = np.zeros(0, dtype=int), np.zeros(0)
-        response, coupling = merged.response, self.interaction.slack_coupling
-        # A head that is no number would compare as out of contact and go unnoticed.
-        if merged.broken or not heads.is_finite():
-            self._why = "it has no finite solution; try a smaller numerics.dt_s"
-            return Reply(Verdict.BROKEN, np.zeros(n), empty, none)
-        if merged.overflow:
-            return Reply(Verdict.ENLARGE, np.full(n, float(2 * merged.overflow)), empty, none)
-        try:
-            result = self.coupling.solve(response, heads, self._coupling_among)
-        except RunBroken as error:
-            self._why = str(error)
-            return Reply(Verdict.BROKEN, np.zeros(n), empty, none)
-        droppers, compensation = empty, none
-        if coupling is not None:
-            if result.compensation.any():
-                slack = np.flatnonzero(result.compensation)
-                droppers, compensation = response.droppers[slack], result.compensation[slack]
-                missed = self._margin < coupling.largest_drop_elsewhere(
-                    response.droppers, result.compensation
-                )
-            else:
-                missed = False
-            if missed or (result.contact_force > self._bound).any():
-                return Reply(Verdict.REPEAT, np.zeros(n), empty, none)
-        self.counters.rounds += result.rounds
-        self.counters.slack_dropper_steps += droppers.size
+        self._found = None
+        if response.is_broken:
+            self._why = NOT_FINITE
+            return Reply(Verdict.BROKEN, self._none)
+        room = self._exchange.missing_room(response)
+        if room:
+            return Reply(Verdict.ENLARGE, self._none, room=room)
         law = self.coupling.law
         try:
-            law.accept(time, result.depth, result.rate, result.contact_force)
+            found = self.coupling.solve(response, heads)
+            if self._left_out(response, found):
+                return Reply(Verdict.REPEAT, self._none)
+            law.accept(time, found.depth, found.rate, found.contact_force)
         except RunBroken as error:
             self._why = str(error)
-            return Reply(Verdict.BROKEN, np.zeros(n), empty, none)
-        self._advance = lambda: self.pantographs.advance(
-            result.contact_force, law.reported(result.contact_force), result.wire_height
+            return Reply(Verdict.BROKEN, self._none)
+        self._found = found
+        self.counters.rounds += found.rounds
+        verdict = Verdict.ADVANCE_AND_STOP if response.wants_to_stop else Verdict.ADVANCE
+        slack = found.compensation
+        if not slack.size:
+            return Reply(verdict, found.contact_force)
+        pushed = slack != 0.0
+        self.counters.slack_dropper_steps += int(pushed.sum())
+        return Reply(verdict, found.contact_force, response.droppers[pushed], slack[pushed])
+
+    def _left_out(self, response: LineResponse, found: InnerSolution) -> bool:
+        """Whether a dropper without a row may have gone slack: margin or bound were too small."""
+        coupling, slack = self.interaction.slack_coupling, found.compensation
+        if coupling is None:
+            return False
+        return bool(
+            inner_kernels.leaves_out(
+                found.contact_force,
+                self._bound,
+                response.rows,
+                slack.size,
+                slack,
+                coupling.band,
+                self._margin,
+                self._drop,
+            )
         )
-        verdict = Verdict.ADVANCE_AND_STOP if merged.stop else Verdict.ADVANCE
-        return Reply(verdict, result.contact_force, droppers, compensation)

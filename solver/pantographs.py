@@ -13,6 +13,7 @@ from catenary.mbs.build import Operation, make_pantograph, roll_of
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lateral import LateralPath
 from catenary.meshgen.mesh import CONTACT_WIRE
+from catenary.solver import inner_kernels
 from catenary.solver.contact import ContactWire, Touches
 from catenary.solver.equilibrium import Elasticity, Equilibrium
 from catenary.solver.heads import Heads
@@ -47,14 +48,16 @@ class Pantographs:
         counts = [len(own) for own in offsets]
         ends = np.cumsum([0, *counts])
         self._strips = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
+        self._ends = ends.astype(np.int64)
         self._contact_start = np.repeat(self._start, counts) + np.concatenate(offsets)
         self._touches = Touches(self.n_contacts)
         self._touches.x[:] = self._contact_start
         self.position = self._start.copy()
-        self.contact_force = np.zeros(self.n)
         self.strip_force = np.zeros(self.n_contacts)
-        self.wire_height = wire.rest_height(self._start)
-        self.head_height = self.wire_height.copy()
+        self._told = np.zeros((3, self.n))
+        self.contact_force, self.head_height, self.wire_height = self._told
+        self.wire_height[:] = wire.rest_height(self._start)
+        self.head_height[:] = self.wire_height
         self._heads = Heads(self.n_contacts)
         self.models: list[Pantograph] = []
         if on_this_rank:
@@ -80,10 +83,9 @@ class Pantographs:
 
     def move_to(self, time: float) -> Touches:
         """Move the contacts to where they are at ``time`` [s]; their places on the wire."""
-        np.multiply(self._speed, time, out=self.position)
-        np.add(self._contact_start, self._speed * time, out=self._touches.x)
-        self.position += self._start
-        self._wire.locate(self._touches)
+        way = self._speed * time
+        np.add(self._start, way, out=self.position)
+        self._wire.locate(self._contact_start, way, self._touches)
         return self._touches
 
     def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
@@ -104,21 +106,24 @@ class Pantographs:
             heads.velocity_compliance[strips, strips] = head.velocity_compliance
         return heads
 
-    def advance(
-        self, contact_force: np.ndarray, reported: np.ndarray, wire_height: np.ndarray
-    ) -> None:
-        """Take the step with these forces and wire heights (n_contacts,). Rank 0 only.
+    def advance(self, contact_force: np.ndarray, reported: np.ndarray, depth: np.ndarray) -> None:
+        """Take the step with these forces and depths (n_contacts,). Rank 0 only.
 
         ``reported`` is what of the forces counts as contact force in the records.
         """
         heads = self._heads
-        self.strip_force[:] = reported
-        head_height = heads.height - heads.height_compliance @ contact_force
-        for i, (model, strips) in enumerate(zip(self.models, self._strips, strict=True)):
+        for model, strips in zip(self.models, self._strips, strict=True):
             model.advance(contact_force[strips])
-            self.contact_force[i] = reported[strips].sum()
-            self.head_height[i] = head_height[strips].mean()
-            self.wire_height[i] = wire_height[strips].mean()
+        self.strip_force[:] = reported
+        inner_kernels.tell(
+            contact_force,
+            reported,
+            heads.height,
+            heads.height_compliance,
+            depth,
+            self._ends,
+            self._told,
+        )
 
     def _make(
         self, problem: Problem, placement: Placement, nominal_height: float, wire_height: float

@@ -16,9 +16,9 @@ from catenary.solver.contact_laws import HertzLaw, KinematicLaw, LinearLaw
 from catenary.solver.coupling import Coupling, make_coupling
 from catenary.solver.errors import RunBroken
 from catenary.solver.heads import Heads
-from catenary.solver.inner import LineResponse
 from catenary.solver.law_in_steps import LinearInSteps
 from catenary.solver.problem import Problem
+from catenary.solver.response import LineResponse
 
 COUPLINGS = ("implicit", "iterated", "explicit")
 
@@ -73,14 +73,10 @@ class Wall:
         )
         law = LinearInSteps(LinearLaw(stiffness, 0.0), 1, pulls=True)
         accurate = numerics(dt, coupling=coupling, eps_force=1e-9)
-        self.coupling: Coupling = make_coupling(law, 1, 0.0, accurate)
+        self.coupling: Coupling = make_coupling(law, 0.0, np.zeros((0, 1)), accurate)
         self.heads, self.dt, self.time = Heads(1), dt, 0.0
         self.mass.restore(np.array([1e-3, 0.0, -stiffness * 1e-3 / mass]))
-        zero, none = np.zeros(1), np.zeros((0, 1))
-        self.line = LineResponse(
-            zero, zero, np.zeros((1, 1)), np.zeros((1, 1)), np.zeros(0, int), np.zeros(0),
-            none, none, none, zero, zero,
-        )  # fmt: skip
+        self.line = LineResponse(1, 0, early=True)
 
     def largest(self, n_steps: int) -> float:
         """Largest depth on the way, beside that at the start."""
@@ -93,7 +89,7 @@ class Wall:
             self.heads.velocity_compliance[:] = head.velocity_compliance
             early = self.mass.extrapolate(self.time)
             self.heads.early_height[:], self.heads.early_velocity[:] = early
-            result = self.coupling.solve(self.line, self.heads, lambda droppers: np.zeros((0, 0)))
+            result = self.coupling.solve(self.line, self.heads)
             self.mass.advance(result.contact_force)
             found = max(found, abs(float(self.mass.position[0])))
             if found > 1.0:

@@ -20,8 +20,9 @@ from scipy.optimize import brentq
 from catenary.mbs.lumped import LumpedData, LumpedPantograph
 from catenary.solver.contact_laws import HYSTERESIS, HertzLaw, LinearLaw
 from catenary.solver.heads import Heads
-from catenary.solver.inner import InnerProblem, LineResponse
+from catenary.solver.inner import InnerProblem
 from catenary.solver.law_in_steps import HertzInSteps, LawInSteps, LinearInSteps
+from catenary.solver.response import LineResponse
 
 MASS, STIFFNESS = 8.0, 1e6
 
@@ -37,7 +38,7 @@ class Bounce:
     def __post_init__(self) -> None:
         data = LumpedData((MASS,), (0.0,), (0.0,))
         self.ball = LumpedPantograph(data, self.lift, 0.0, raise_time=0.0, dt=self.dt)
-        self.inner = InnerProblem(self.law, 0.0)
+        self.inner = InnerProblem(self.law, 0.0, np.zeros((0, 1)))
         self.heads = Heads(1)
         self.time, self.depth, self.force = 0.0, 0.0, 0.0
 
@@ -54,19 +55,9 @@ class Bounce:
         self.heads.height[:], self.heads.velocity[:] = head.height, head.velocity
         self.heads.height_compliance[:] = head.height_compliance
         self.heads.velocity_compliance[:] = head.velocity_compliance
-        none = np.zeros((0, 1))
-        line = LineResponse(
-            np.array([wire]),
-            np.zeros(1),
-            np.zeros((1, 1)),
-            np.zeros((1, 1)),
-            np.zeros(0, dtype=int),
-            np.zeros(0),
-            none,
-            none,
-            none,
-        )
-        found = self.inner.solve(line, self.heads, lambda droppers: np.zeros((0, 0)))
+        line = LineResponse(1, 0)
+        line.height[:] = wire
+        found = self.inner.solve(line, self.heads)
         self.ball.advance(found.contact_force)
         self.law.accept(self.time, found.depth, found.rate, found.contact_force)
         self.depth, self.force = float(found.depth[0]), float(found.contact_force[0])

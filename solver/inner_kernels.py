@@ -1,0 +1,294 @@
+"""The compiled loops of the inner problem: contact forces, slack droppers, contact laws.
+
+Not collective; see `inner` for the equations and `kernels` for how they are compiled.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from catenary.solver.kernels import compiled
+
+# Columns of a row of a dropper that may slacken, before its 3 n numbers for n contacts.
+NUMBER, TENSION, COUPLINGS = 0, 1, 2
+
+
+@compiled
+def gap(
+    head_height,
+    head_velocity,
+    head_compliance,
+    head_velocity_compliance,
+    height,
+    rate,
+    height_by_force,
+    rate_by_force,
+    depth,
+    depth_rate,
+    depth_by_force,
+    depth_rate_by_force,
+):
+    """Depths and rates at the contacts without forces, and what forces take off them.
+
+    Returns whether all of them are numbers.
+    """
+    total = 0.0
+    for i in range(depth.size):
+        depth[i] = head_height[i] - height[i]
+        depth_rate[i] = head_velocity[i] - rate[i]
+        total += depth[i] + depth_rate[i]
+        for j in range(depth.size):
+            depth_by_force[i, j] = head_compliance[i, j] + height_by_force[i, j]
+            depth_rate_by_force[i, j] = head_velocity_compliance[i, j] + rate_by_force[i, j]
+            total += depth_by_force[i, j] + depth_rate_by_force[i, j]
+    return np.isfinite(total)
+
+
+@compiled
+def press(depth, rate, by_force, rate_by_force, own, offset, by_depth, by_rate, push, softness):
+    """Right-hand side and matrix of the contact forces when no dropper is slack.
+
+    ``own`` f = ``offset`` + ``by_depth`` d + ``by_rate`` d' at each contact, with depth d and rate
+    d' that are ``depth`` - ``by_force`` f and ``rate`` - ``rate_by_force`` f.
+    """
+    for i in range(depth.size):
+        push[i] = offset[i] + by_depth[i] * depth[i] + by_rate[i] * rate[i]
+        for j in range(depth.size):
+            softness[i, j] = by_depth[i] * by_force[i, j] + by_rate[i] * rate_by_force[i, j]
+        softness[i, i] += own[i]
+
+
+@compiled
+def hertz(depth, rate, speed, stiffness, exponent, hysteresis, offset, by_depth, by_rate, force):
+    """Tangents of f = K d^n (1 + chi d' / d0') at each contact, with f and what f is less them."""
+    for i in range(depth.size):
+        d = depth[i]
+        if d <= 0.0:
+            offset[i] = by_depth[i] = by_rate[i] = force[i] = 0.0
+            continue
+        spring = stiffness * d**exponent
+        loss = 1.0 + hysteresis * rate[i] / speed[i]
+        force[i] = spring * loss
+        by_depth[i] = exponent * spring / d * loss
+        by_rate[i] = spring * hysteresis / speed[i]
+        if by_depth[i] < 0.0:
+            # Beyond the speed at which the law would pull it has no spring either.
+            by_depth[i] = 0.0
+        offset[i] = force[i] - by_depth[i] * d - by_rate[i] * rate[i]
+
+
+@compiled
+def any_pushed(rows, count, n, force):
+    """Whether contact forces alone leave any of the droppers in compression."""
+    for d in range(count):
+        value = rows[d, TENSION]
+        for i in range(n):
+            value += rows[d, COUPLINGS + i] * force[i]
+        if value < 0.0:
+            return True
+    return False
+
+
+@compiled
+def couple(rows, count, n, released, band, push, matrix, right):
+    """The rows and columns of slack droppers beside those of the contacts, which stand there.
+
+    ``band[e, d - e + half]`` is by how much a unit compensation of dropper e takes off the
+    tension of dropper d; ``push`` (2, n) holds what depth and rate are worth at each contact.
+    """
+    half = band.shape[1] // 2
+    for d in range(count):
+        row = n + d
+        right[row] = -released * rows[d, TENSION]
+        for i in range(n):
+            matrix[row, i] = released * rows[d, COUPLINGS + i]
+            lifted, rising = rows[d, COUPLINGS + n + i], rows[d, COUPLINGS + 2 * n + i]
+            matrix[i, row] = -(push[0, i] * lifted + push[1, i] * rising)
+        for e in range(count):
+            offset = int(rows[d, NUMBER]) - int(rows[e, NUMBER]) + half
+            value = 0.0
+            if 0 <= offset < band.shape[1]:
+                value = -released * band[int(rows[e, NUMBER]), offset]
+            matrix[row, n + e] = value
+        matrix[row, row] += 1.0
+
+
+@compiled
+def solve_on(matrix, right, acts, solution):
+    """Solution of the rows and columns that act, zero elsewhere, by elimination with pivoting."""
+    index = np.flatnonzero(acts)
+    m = index.size
+    a = np.empty((m, m + 1))
+    for i in range(m):
+        for j in range(m):
+            a[i, j] = matrix[index[i], index[j]]
+        a[i, m] = right[index[i]]
+    for k in range(m):
+        pivot = k
+        for i in range(k + 1, m):
+            if abs(a[i, k]) > abs(a[pivot, k]):
+                pivot = i
+        if pivot != k:
+            for j in range(k, m + 1):
+                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
+        for i in range(k + 1, m):
+            share = a[i, k] / a[k, k]
+            for j in range(k + 1, m + 1):
+                a[i, j] -= share * a[k, j]
+    solution[:] = 0.0
+    for i in range(m - 1, -1, -1):
+        value = a[i, m]
+        for j in range(i + 1, m):
+            value -= a[i, j] * solution[index[j]]
+        solution[index[i]] = value / a[i, i]
+
+
+@compiled
+def settle(matrix, right, always, solution, max_rounds):
+    """Active-set iteration for x = max(0, x - (matrix x - right)), freely where ``always``.
+
+    Returns the rounds needed, which are not positive if the set did not settle.
+    """
+    n = right.size
+    acts = np.empty(n, dtype=np.bool_)
+    for i in range(n):
+        acts[i] = always[i] or right[i] > 0.0
+    for rounds in range(1, max_rounds + 1):
+        solve_on(matrix, right, acts, solution)
+        changed = False
+        for i in range(n):
+            residual = -right[i]
+            for j in range(n):
+                residual += matrix[i, j] * solution[j]
+            now = always[i] or solution[i] - residual > 0.0
+            if now != acts[i]:
+                acts[i] = now
+                changed = True
+        if not changed:
+            return rounds
+    return -max_rounds
+
+
+@compiled
+def solve(
+    depth,
+    rate,
+    by_force,
+    rate_by_force,
+    tangents,
+    rows,
+    count,
+    released,
+    band,
+    always,
+    matrix,
+    right,
+    solution,
+    max_rounds,
+):
+    """Contact forces and compensations for a law's tangents: rounds needed, and unknowns used.
+
+    ``tangents`` (4, n) holds own, offset, by_depth and by_rate. If no contact force pushes a
+    dropper together there are n unknowns, else n + ``count``. Rounds are not positive if the active
+    set did not settle; the problem then stands in ``matrix`` and ``right``.
+    """
+    n = depth.size
+    press(
+        depth,
+        rate,
+        by_force,
+        rate_by_force,
+        tangents[0],
+        tangents[1],
+        tangents[2],
+        tangents[3],
+        right,
+        matrix,
+    )
+    rounds = settle(matrix[:n, :n], right[:n], always[:n], solution[:n], max_rounds)
+    if rounds <= 0 or not any_pushed(rows, count, n, solution):
+        return rounds, n
+    couple(rows, count, n, released, band, tangents[2:], matrix, right)
+    size = n + count
+    rounds = settle(matrix[:size, :size], right[:size], always[:size], solution[:size], max_rounds)
+    return rounds, size
+
+
+@compiled
+def under(by_force, rate_by_force, depth, rate, rows, count, force, slack, at_depth, at_rate):
+    """Depths and rates at the contacts under forces and compensations."""
+    n = depth.size
+    for i in range(n):
+        d, r = depth[i], rate[i]
+        for j in range(n):
+            d -= by_force[i, j] * force[j]
+            r -= rate_by_force[i, j] * force[j]
+        for k in range(count):
+            d += rows[k, COUPLINGS + n + i] * slack[k]
+            r += rows[k, COUPLINGS + 2 * n + i] * slack[k]
+        at_depth[i], at_rate[i] = d, r
+
+
+@compiled
+def leaves_out(force, bound, rows, count, slack, band, margin, drop):
+    """Whether a dropper without a row may have gone slack: ``bound`` or ``margin`` were too small.
+
+    That is, a contact force is beyond its bound (n,) or compensations (``count``,) take more
+    than the margin [N] off a dropper elsewhere. ``drop`` (n_droppers,) is room to work, all zero
+    before and after.
+    """
+    for i in range(force.size):
+        if force[i] > bound[i]:
+            return True
+    half, n = band.shape[1] // 2, drop.size
+    largest = 0.0
+    for k in range(count):
+        if slack[k] != 0.0:
+            e = int(rows[k, NUMBER])
+            for d in range(max(0, e - half), min(n, e + half + 1)):
+                drop[d] += slack[k] * band[e, d - e + half]
+    for k in range(count):
+        drop[int(rows[k, NUMBER])] = 0.0
+    for k in range(count):
+        if slack[k] != 0.0:
+            e = int(rows[k, NUMBER])
+            for d in range(max(0, e - half), min(n, e + half + 1)):
+                largest = max(largest, drop[d])
+                drop[d] = 0.0
+    return largest > margin
+
+
+@compiled
+def tell(force, reported, head_height, compliance, depth, ends, told):
+    """Contact force, head height and wire height of each pantograph, (3, n_pantographs).
+
+    Pantograph p has the contacts from ``ends[p]`` to ``ends[p + 1]``: the sum of their forces, and
+    the means of their heights.
+    """
+    for p in range(ends.size - 1):
+        told[:, p] = 0.0
+        for i in range(ends[p], ends[p + 1]):
+            height = head_height[i]
+            for j in range(ends[p], ends[p + 1]):
+                height -= compliance[i, j] * force[j]
+            told[0, p] += reported[i]
+            told[1, p] += height
+            told[2, p] += height - depth[i]
+        told[1:, p] /= ends[p + 1] - ends[p]
+
+
+def warm_up() -> None:
+    """Compile all of them, or load them from Numba's cache."""
+    one, square, rows = np.zeros(1), np.eye(1), np.zeros((1, 5))
+    gap(one, one, square, square, one, one, square, square, one, one, square, square)
+    hertz(one, one, one, 1.0, 1.5, 0.0, one, one, one, one)
+    any_pushed(rows, 1, 1, one)
+    solve(
+        one, one, square, square, np.ones((4, 1)), rows, 1, 1.0, np.zeros((1, 1)),
+        np.zeros(2, dtype=np.bool_), np.eye(2), np.zeros(2), np.zeros(2), 1,
+    )  # fmt: skip
+    settle(square, one, np.zeros(1, dtype=np.bool_), one, 1)
+    solve_on(square, one, np.zeros(1, dtype=np.bool_), one)
+    under(square, square, one, one, rows, 1, one, one, one, one)
+    leaves_out(one, one, rows, 1, one, np.zeros((1, 1)), 1.0, one)
+    tell(one, one, one, square, one, np.array([0, 1]), np.zeros((3, 1)))
