@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from catenary.cases.catalogue import find_case
 from catenary.cases.jobs import Ended, Job, make_jobs
-from catenary.cases.scene import load_scene
+from catenary.cases.scene import Scene, load_scene
 from catenary.cases.variants import Variant, slug
 from catenary.solver.errors import InputError
 from catenary.solver.parallel import on_root
@@ -47,9 +47,10 @@ class Plan:
 
 
 class StudyRun(NamedTuple):
-    """A run of a study as ``conclude`` sees it: how it ended and the folder of its results."""
+    """A run of a study as ``conclude`` sees it: how it ended, its scene, its results' folder."""
 
     ended: Ended
+    scene: Scene
     folder: Path
 
 
@@ -141,7 +142,10 @@ def _conclude(
     from catenary.postproc.storage import write_all
     from catenary.postproc.study_report import verdict_text, write_study
 
-    runs = {one.variant.name: StudyRun(one, out_dir / RUNS / one.variant.name) for one in ended}
+    runs = {
+        one.variant.name: StudyRun(one, job.scene, out_dir / RUNS / one.variant.name)
+        for one, job in zip(ended, plan.jobs, strict=True)
+    }
     study = module.conclude(runs)
     table = sweep_output.rows(ended)
     wall = sum(one.wall for one in ended)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from catenary.cases.ambrosio2012 import figures, ranking, statements
+from catenary.cases.ambrosio2012 import figures, ranking, ringing, statements
 from catenary.cases.ambrosio2012.statements import AVERAGE, DAMPINGS, LIGHT, Force, Run, Runs, Slack
 from catenary.cases.ambrosio2012.study import VARIED, run_name, variations
 from catenary.cases.study import StudyRun
@@ -56,7 +56,11 @@ def conclude(runs: Mapping[str, StudyRun], table: Mapping[str, Any]) -> Study:
                     explained if one is first else found[one["name"]])
             for one in readings
         ],  # fmt: skip
-        tables=[*(_table_of(one, judged[one["name"]]) for one in readings), ranking.table(ranked)],
+        tables=[
+            *(_table_of(one, judged[one["name"]]) for one in readings),
+            ringing.table(_bands(runs, readings, judged)),
+            ranking.table(ranked),
+        ],
         figures=figures.draw(
             {
                 damping: {
@@ -69,6 +73,22 @@ def conclude(runs: Mapping[str, StudyRun], table: Mapping[str, Any]) -> Study:
             judged[first["name"]],
         ),
     )  # fmt: skip
+
+
+def _bands(
+    runs: Mapping[str, StudyRun],
+    readings: Sequence[Mapping[str, Any]],
+    judged: Mapping[str, Runs],
+) -> dict[str, tuple[ringing.Band, Runs]]:
+    """The first modes of each reading's line beside its runs; without readings that broke."""
+    return {
+        one["title"]: (
+            ringing.band_of(runs[run_name(one["name"], LIGHT, "single")].scene),
+            judged[one["name"]],
+        )
+        for one in readings
+        if judged[one["name"]][LIGHT].get("single") is not None
+    }
 
 
 def _was_run(runs: Mapping[str, StudyRun], reading: str) -> bool:
