@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from h5py import h5d, h5s, h5t
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.postproc.gathering import ColumnGather
@@ -165,14 +166,20 @@ class FieldRecorder:
         # Room for uncompressed snapshots, so that a full disk cannot spoil what is there.
         need = len(times) * (4 * 4 * self._n_nodes + 2048)
         reserve(self._h5, self._h5.stat().st_size, need + MARGIN)
+        scalar = np.zeros(self._n_nodes, dtype=np.float32)
         vector = np.zeros((self._n_nodes, 3), dtype=np.float32)
-        packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
         with opened(self._h5, "r+") as file:
+            # HDF5's own calls, and no compression: a tenth of the time for twice the space.
+            places = [
+                (file[group].id, h5s.create_simple(values.shape), values)
+                for group, values in (("uplift", scalar), ("displacement", vector))
+            ]
             for row, time in enumerate(times):
-                name = _name(len(self._written))
-                vector[:, 2] = uplift[row]
-                file.create_dataset(f"uplift/{name}", data=vector[:, 2], **packed)
-                file.create_dataset(f"displacement/{name}", data=vector, **packed)
+                name = _name(len(self._written)).encode()
+                scalar[:] = vector[:, 2] = uplift[row]
+                for group, space, values in places:
+                    made = h5d.create(group, name, h5t.IEEE_F32LE, space)
+                    made.write(h5s.ALL, h5s.ALL, values)
                 self._written.append(time)
             file["times"].resize(len(self._written), axis=0)
             file["times"][-len(times) :] = times

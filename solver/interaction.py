@@ -36,6 +36,7 @@ class Droppers:
         # Change of tension per unit of relative acceleration within the step.
         self.per_acceleration = stiffness * line.position_factor + damping * line.velocity_factor
         self.latest_tension = np.zeros(self.numbers.size)
+        self._carried = np.zeros(self.numbers.size)
         self._line = line
 
     def find_tension(self) -> bool:
@@ -51,6 +52,15 @@ class Droppers:
         """Tension in the line's present motion [N], shape (n,), overwritten by the next call."""
         self.find_tension()
         return self.latest_tension
+
+    def carried(self, kept_ratio: float) -> np.ndarray:
+        """Tension in the line's present motion, of which droppers keep a share where they would
+        push [N], shape (n,), overwritten by the next call."""
+        line = self._line
+        kernels.carried(
+            line.displacement, line.velocity, self.ends, self.laws, kept_ratio, self._carried
+        )
+        return self._carried
 
     def energy_of_pushing(self) -> float:
         """Elastic energy that the owned droppers would hold by pushing, were they springs [J]."""

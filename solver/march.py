@@ -28,11 +28,12 @@ from catenary.solver.law_in_steps import law_in_steps
 from catenary.solver.linear import PREFIX, refused_options
 from catenary.solver.model import Model
 from catenary.solver.newmark import NewmarkLine
-from catenary.solver.observation import Observer, Stage, StepView
+from catenary.solver.observation import Observer, Stage
 from catenary.solver.one_solve import OneSolve
 from catenary.solver.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.problem import Problem
 from catenary.solver.schemes import LoadSource, Scheme
+from catenary.solver.showing import Showing
 from catenary.solver.stepper import Stepper
 
 
@@ -99,8 +100,15 @@ class March:
             problem, self._interaction.wire, nominal_height, comm.rank == 0
         )
         self._scheme = self._make_scheme(on)
-        self._form = form
-        self._tension = self._dropper_law()
+        self._showing = Showing(
+            comm,
+            model,
+            form,
+            self._interaction,
+            self._pantographs,
+            self._scheme,
+            self._kept_ratio,
+        )
         self._first_step = 0
         self._start_time = 0.0
 
@@ -116,20 +124,10 @@ class March:
 
         Collective; every rank passes the same checkpoint.
         """
-        rows = slice(self.ownership.first, self.ownership.last)
-        self._line.displacement[:] = checkpoint["displacement"][rows]
-        self._line.velocity[:] = checkpoint["velocity"][rows]
-        self._line.acceleration[:] = checkpoint["acceleration"][rows]
         self._first_step = int(checkpoint["step"])
         self._start_time = self._first_step * self._problem.numerics.dt
         self._pantographs.move_to(self._start_time)
-        self._pantographs.contact_force[:] = checkpoint["contact_force"]
-        self._pantographs.head_height[:] = checkpoint["head_height"]
-        self._pantographs.wire_height[:] = checkpoint["wire_height"]
-        self._pantographs.strip_force[:] = checkpoint["strip_force"]
-        self._scheme.restore(checkpoint["contacts"])
-        for i, pantograph in enumerate(self._pantographs.models):
-            pantograph.restore(checkpoint[f"pantograph_{i}"])
+        self._showing.restore(checkpoint)
 
     def run(
         self,
@@ -150,7 +148,8 @@ class March:
         """
         ts = self._make_ts(observers, stop_requested)
         try:
-            self._start(observers, self._make_stage(self._form))
+            dt = self._problem.numerics.dt
+            self._start(observers, self._showing.stage(dt, self._start_time, self.n_steps))
             begin = clock.perf_counter()
             ts.solve(self._line.solution)
             wall = clock.perf_counter() - begin
@@ -237,43 +236,6 @@ class March:
             return lambda time: []
         return lambda time: [(dofs, load.values(time)[mine]) for load, mine, dofs in parts]
 
-    def _make_stage(self, form: Equilibrium) -> Stage:
-        mesh = self._model.mesh
-        points = mesh.points.copy()
-        points[:, 2] = form.height
-        arms = self._model.dofs(mesh.steady_arms)
-        mine = self.ownership.owned(arms)
-        self._arm_rows = arms[mine] - self.ownership.first
-        nodes = np.arange(mesh.n_nodes)
-        owned_nodes = nodes[self.ownership.owned(self._model.dofs(nodes))]
-        self._node_rows = self._model.dofs(owned_nodes) - self.ownership.first
-        return Stage(
-            n_pantographs=self._pantographs.n,
-            dt=self._problem.numerics.dt,
-            start_time=self._start_time,
-            n_steps=self.n_steps,
-            arm_x=mesh.x(mesh.steady_arms),
-            dropper_x=mesh.x(mesh.droppers[:, 1]),
-            owned_arms=np.flatnonzero(mine),
-            owned_droppers=self._interaction.droppers.numbers,
-            node_points=points,
-            owned_nodes=owned_nodes,
-            n_strips=self._pantographs.n_strips,
-        )
-
-    def _dropper_law(self) -> Callable[[], np.ndarray]:
-        """Tension of the owned droppers as they are, slack ones included [N]."""
-        on, droppers = self._model.terms_of, self._interaction.droppers
-        if "dropper_slackening" not in on:
-            return droppers.tension
-        kept = self._kept_ratio
-
-        def tension() -> np.ndarray:
-            linear = droppers.tension()
-            return np.maximum(linear, kept * linear)
-
-        return tension
-
     @property
     def _kept_ratio(self) -> float:
         """Share of its stiffness that a slack dropper keeps."""
@@ -329,63 +291,13 @@ class March:
     def _show(self, ts: PETSc.TS, observers: Sequence[Observer], step: int, time: float) -> None:
         if self._stepper.broken:
             return
-        pantographs, line = self._pantographs, self._line
-        view = StepView(
-            step=step,
-            time=time,
-            contact_position=pantographs.position,
-            contact_force=pantographs.contact_force,
-            head_height=pantographs.head_height,
-            wire_height=pantographs.wire_height,
-            dropper_force=self._tension(),
-            arm_uplift=line.displacement[self._arm_rows],
-            node_uplift=lambda: line.displacement[self._node_rows],
-            energies=self._energies,
-            checkpoint=lambda: self._checkpoint(step),
-            strip_force=pantographs.strip_force,
-        )
+        view = self._showing.view(step, time)
         try:
             for observer in observers:
                 observer.observe(view)
         except RunBroken as error:
             # An exception must not pass through PETSc; observers raise it on all ranks.
             self._stepper.give_up(ts, str(error))
-
-    def _energies(self) -> tuple[float, float]:
-        """Kinetic and elastic energy relative to equilibrium, slack droppers as they are [J].
-
-        Collective.
-        """
-        kinetic, elastic = self._line.energies()
-        if "dropper_slackening" in self._model.terms_of:
-            pushing = self._comm.allreduce(self._interaction.droppers.energy_of_pushing())
-            elastic -= (1.0 - self._kept_ratio) * pushing
-        return kinetic, elastic
-
-    def _checkpoint(self, step: int) -> dict[str, Any] | None:
-        """Everything needed to continue after ``step``, on rank 0. Collective."""
-        line = self._line
-        whole = {
-            name: self._comm.gather(values.copy(), root=0)
-            for name, values in (
-                ("displacement", line.displacement),
-                ("velocity", line.velocity),
-                ("acceleration", line.acceleration),
-            )
-        }
-        if self._comm.rank != 0:
-            return None
-        result: dict[str, Any] = {k: np.concatenate(parts) for k, parts in whole.items() if parts}
-        result["step"] = step
-        pantographs = self._pantographs
-        result["contact_force"] = pantographs.contact_force.copy()
-        result["head_height"] = pantographs.head_height.copy()
-        result["wire_height"] = pantographs.wire_height.copy()
-        result["strip_force"] = pantographs.strip_force.copy()
-        result["contacts"] = self._scheme.state()
-        for i, pantograph in enumerate(pantographs.models):
-            result[f"pantograph_{i}"] = pantograph.state()
-        return result
 
 
 def _finish(observers: Sequence[Observer], outcome: str) -> str:

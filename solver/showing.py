@@ -1,0 +1,145 @@
+"""What a march shows its observers: the stage, the state after each step, and checkpoints."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from catenary.solver.equilibrium import Equilibrium
+from catenary.solver.interaction import Interaction
+from catenary.solver.model import Model
+from catenary.solver.observation import Stage, StepView
+from catenary.solver.pantographs import Pantographs
+from catenary.solver.schemes import Scheme
+
+
+class Showing:
+    """The marched line and train as observers see them, from the arrays that the march steps.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+    model, form : of the line
+    kept_ratio : share of its stiffness that a slack dropper keeps
+    """
+
+    def __init__(
+        self,
+        comm: Any,
+        model: Model,
+        form: Equilibrium,
+        interaction: Interaction,
+        pantographs: Pantographs,
+        scheme: Scheme,
+        kept_ratio: float,
+    ) -> None:
+        self._comm = comm
+        self._model = model
+        self._form = form
+        self._interaction = interaction
+        self._pantographs = pantographs
+        self._scheme = scheme
+        self._line = interaction.line
+        self._slackens = "dropper_slackening" in model.terms_of
+        self._kept_ratio = kept_ratio
+        # Of what a dropper would push: all of it where droppers do not slacken.
+        self._pushed_share = kept_ratio if self._slackens else 1.0
+        first, owned = self._line.ownership.first, self._line.ownership.owned
+        arms = model.dofs(model.mesh.steady_arms)
+        self._owned_arms = np.flatnonzero(owned(arms))
+        self._arm_rows = arms[self._owned_arms] - first
+        nodes = np.arange(model.mesh.n_nodes)
+        self._owned_nodes = nodes[owned(model.dofs(nodes))]
+        self._node_rows = model.dofs(self._owned_nodes) - first
+        self._view = StepView(
+            step=0,
+            time=0.0,
+            contact_position=pantographs.position,
+            contact_force=pantographs.contact_force,
+            head_height=pantographs.head_height,
+            wire_height=pantographs.wire_height,
+            dropper_force=interaction.droppers.carried(self._pushed_share),
+            arm_uplift=np.zeros(self._arm_rows.size),
+            node_uplift=lambda: self._line.displacement[self._node_rows],
+            energies=self._energies,
+            checkpoint=self._checkpoint,
+            strip_force=pantographs.strip_force,
+        )
+
+    def stage(self, dt: float, start_time: float, n_steps: int) -> Stage:
+        """What stays the same for the whole run."""
+        mesh = self._model.mesh
+        points = mesh.points.copy()
+        points[:, 2] = self._form.height
+        return Stage(
+            n_pantographs=self._pantographs.n,
+            dt=dt,
+            start_time=start_time,
+            n_steps=n_steps,
+            arm_x=mesh.x(mesh.steady_arms),
+            dropper_x=mesh.x(mesh.droppers[:, 1]),
+            owned_arms=self._owned_arms,
+            owned_droppers=self._interaction.droppers.numbers,
+            node_points=points,
+            owned_nodes=self._owned_nodes,
+            n_strips=self._pantographs.n_strips,
+        )
+
+    def view(self, step: int, time: float) -> StepView:
+        """The state after a step; the same object each time."""
+        view = self._view
+        view.step, view.time = step, time
+        self._interaction.droppers.carried(self._pushed_share)
+        np.take(self._line.displacement, self._arm_rows, out=view.arm_uplift)
+        return view
+
+    def restore(self, checkpoint: dict[str, Any]) -> None:
+        """Continue from a checkpoint, which all ranks pass. Not collective."""
+        line, pantographs = self._line, self._pantographs
+        rows = slice(line.ownership.first, line.ownership.last)
+        line.displacement[:] = checkpoint["displacement"][rows]
+        line.velocity[:] = checkpoint["velocity"][rows]
+        line.acceleration[:] = checkpoint["acceleration"][rows]
+        pantographs.contact_force[:] = checkpoint["contact_force"]
+        pantographs.head_height[:] = checkpoint["head_height"]
+        pantographs.wire_height[:] = checkpoint["wire_height"]
+        pantographs.strip_force[:] = checkpoint["strip_force"]
+        self._scheme.restore(checkpoint["contacts"])
+        for i, pantograph in enumerate(pantographs.models):
+            pantograph.restore(checkpoint[f"pantograph_{i}"])
+
+    def _energies(self) -> tuple[float, float]:
+        """Kinetic and elastic energy relative to equilibrium, slack droppers as they are [J].
+
+        Collective.
+        """
+        kinetic, elastic = self._line.energies()
+        if self._slackens:
+            pushing = self._comm.allreduce(self._interaction.droppers.energy_of_pushing())
+            elastic -= (1.0 - self._kept_ratio) * pushing
+        return kinetic, elastic
+
+    def _checkpoint(self) -> dict[str, Any] | None:
+        """Everything needed to continue after the step shown last, on rank 0. Collective."""
+        line, pantographs = self._line, self._pantographs
+        whole = {
+            name: self._comm.gather(values.copy(), root=0)
+            for name, values in (
+                ("displacement", line.displacement),
+                ("velocity", line.velocity),
+                ("acceleration", line.acceleration),
+            )
+        }
+        if self._comm.rank != 0:
+            return None
+        result: dict[str, Any] = {k: np.concatenate(parts) for k, parts in whole.items() if parts}
+        result["step"] = self._view.step
+        result["contact_force"] = pantographs.contact_force.copy()
+        result["head_height"] = pantographs.head_height.copy()
+        result["wire_height"] = pantographs.wire_height.copy()
+        result["strip_force"] = pantographs.strip_force.copy()
+        result["contacts"] = self._scheme.state()
+        for i, pantograph in enumerate(pantographs.models):
+            result[f"pantograph_{i}"] = pantograph.state()
+        return result
