@@ -126,6 +126,9 @@ def _pantograph_names(scene: Scene) -> None:
                 else f"it must be one of {', '.join(scene.pantographs)}"
             )
             _refuse(scene, f"train.pantographs.{i}.name", place.name, hint)
+        if place.reversed and scene.pantographs[place.name].type == "lumped":
+            key = f"train.pantographs.{i}.reversed"
+            _refuse(scene, key, True, f"{place.name} is a chain of lumped masses, with no front")
 
 
 def _separations(scene: Scene) -> None:

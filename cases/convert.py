@@ -173,7 +173,9 @@ def _train(scene: Scene) -> Train:
         assert force is not None  # checks_pantograph.py has refused speeds outside the table
         placements.append(
             Placement(
-                data=pantograph_of(place.name, kind, scene.train.speed_km_h),
+                data=pantograph_of(
+                    place.name, kind, scene.train.speed_km_h, reversed=place.reversed
+                ),
                 static_force=force,
                 behind=place.behind_m,
                 nominal_height=kind.nominal_height_m,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -38,10 +39,13 @@ from catenary.mbs.lumped import LumpedData
 from catenary.mbs.multibody import MultibodyData, stand
 from catenary.mbs.strips import Strips, Suspension, Turning
 from catenary.mbs.system import System
+from catenary.mbs.turning_round import turned_round
 
 
-def pantograph_of(name: str, table: PantographTable, speed_km_h: float) -> PantographData:
-    """The data of a pantograph's model under way with a speed.
+def pantograph_of(
+    name: str, table: PantographTable, speed_km_h: float, *, reversed: bool = False
+) -> PantographData:
+    """The data of a pantograph's model under way with a speed, which may run the other way round.
 
     Raises
     ------
@@ -49,7 +53,8 @@ def pantograph_of(name: str, table: PantographTable, speed_km_h: float) -> Panto
         Published numbers of a multibody pantograph are not allowed.
     """
     if isinstance(table, MultibodyTable):
-        return multibody_of(name, table, speed_km_h)
+        data = multibody_of(name, table, speed_km_h)
+        return replace(data, system=turned_round(data.system)) if reversed else data
     spring, damper = table.stiffnesses_N_per_m[0], table.dampings_N_s_per_m[0]
     roll = table.roll
     return LumpedData(

@@ -29,6 +29,10 @@ class PlacementTable(Table):
     behind_m: float = Field(
         0.0, ge=0, le=1000, description="distance behind the leading pantograph"
     )
+    reversed: bool = Field(
+        False,
+        description="whether a multibody pantograph runs the other way round: its x points back",
+    )
 
 
 class TrainTable(Table):

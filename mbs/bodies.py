@@ -78,7 +78,8 @@ class Body:
                 f"Body {self.name!r}: mass {self.mass} and inertia {tuple(self.inertia)} "
                 "must be positive, with three moments of inertia."
             )
-        if np.dot(self.turn, self.turn) > 1.0:
+        # Half a turn has e0 = 0, which round-off must not refuse.
+        if np.dot(self.turn, self.turn) > 1.0 + 1e-12:
             raise InputError(
                 f"Body {self.name!r}: turn {tuple(self.turn)} is longer than 1, "
                 "so that there is no e0 to it."
@@ -87,8 +88,8 @@ class Body:
     @property
     def parameters(self) -> np.ndarray:
         """Euler parameters at the start, shape (4,)."""
-        e0 = np.sqrt(1.0 - np.dot(self.turn, self.turn))
-        return np.array([e0, *self.turn])
+        e0 = np.sqrt(max(0.0, 1.0 - np.dot(self.turn, self.turn)))
+        return normalised(np.array([e0, *self.turn]))
 
 
 @dataclass(frozen=True)

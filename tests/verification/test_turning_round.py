@@ -1,0 +1,77 @@
+"""A pantograph that runs the other way round: the same to gravity, another to the wind."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from measuring import check
+
+from catenary.cases.scene import load_scene
+from catenary.mbs.forces import PointForce
+from catenary.mbs.multibody import MultibodyData, reduced, stand
+from catenary.mbs.turning_round import turned_round
+from catenary.solver.errors import InputError
+
+EPS = np.finfo(float).eps
+KNEE = (-0.820, 0.0, 0.0)
+DRAG = 80.0
+AS_IT_IS = 'train.pantographs=[{name="seven_body"}]'
+REVERSED = 'train.pantographs=[{name="seven_body", reversed=true}]'
+
+
+def data_of(assignment: str) -> MultibodyData:
+    scene = load_scene("ambrosio2012", [assignment])
+    (placement,) = scene.to_problem().train.placements
+    assert isinstance(placement.data, MultibodyData)
+    return placement.data
+
+
+def dragged(data: MultibodyData, force: float) -> MultibodyData:
+    """With a force on the knee along the running direction."""
+    return replace(data, wind=(PointForce("drag", "lower_arm", (force, 0.0, 0.0), KNEE),))
+
+
+def test_gravity_does_not_tell_which_way_a_pantograph_runs() -> None:
+    one, other = data_of(AS_IT_IS), data_of(REVERSED)
+    knee = one.system.bodies[1].position[0], other.system.bodies[1].position[0]
+    assert knee[0] == -knee[1] != 0.0
+    found, expected = stand(other), stand(one)
+    check("actuator [N]", found.actuator_force, expected.actuator_force, within=1e-4)
+    gaps = [[miss.gap for miss in standing.missed] for standing in (found, expected)]
+    check("joints missed [m]", gaps[0], gaps[1], within=1e-12)
+    a, b = reduced(one), reduced(other)
+    check("heights [m]", b.heights, a.heights, within=1e-12)
+    # Iterations end at 1e-9 of forces of 1e4 N.
+    for name in ("masses", "lifts", "dampings"):
+        check(name, getattr(b, name), getattr(a, name), within=1e-4)
+
+
+def test_drag_on_the_knee_lifts_one_way_and_presses_the_other() -> None:
+    """By virtual work it lifts with F dx/dh of the knee, whose sign is the orientation's."""
+    lifts = {}
+    for assignment in (AS_IT_IS, REVERSED):
+        data = data_of(assignment)
+        calm = reduced(data).lifts
+        with_wind = reduced(dragged(data, -DRAG)).lifts
+        lifts[assignment] = with_wind - calm
+    one, other = lifts[AS_IT_IS], lifts[REVERSED]
+    print(f"knee trailing {one[len(one) // 2]:+.1f} N, knee first {other[len(other) // 2]:+.1f} N")
+    check("lift of the drag [N]", other, -one, within=1e-3)
+    assert np.abs(one).min() > 1.0
+
+
+def test_twice_turned_round_is_as_before() -> None:
+    system = data_of(AS_IT_IS).system
+    again = turned_round(turned_round(system))
+    for body, before in zip(again.bodies, system.bodies, strict=True):
+        check("position [m]", body.position, before.position, within=0.0 + 1e-300)
+        check("turn", body.turn, before.turn, within=2 * EPS)
+    assert again.joints[1:] == system.joints[1:]
+    assert again.forces == system.forces
+
+
+def test_lumped_masses_have_no_front() -> None:
+    with pytest.raises(InputError, match=r"train\.pantographs\.0\.reversed is true .* no front"):
+        load_scene("ambrosio2012", ['train.pantographs=[{name="lumped", reversed=true}]'])
