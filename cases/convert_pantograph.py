@@ -36,7 +36,7 @@ from catenary.mbs.joints import (
     constant,
 )
 from catenary.mbs.lumped import LumpedData
-from catenary.mbs.multibody import MultibodyData, stand
+from catenary.mbs.multibody import AllBodies, MultibodyData, stand
 from catenary.mbs.strips import Strips, Suspension, Turning
 from catenary.mbs.system import System
 from catenary.mbs.turning_round import turned_round
@@ -137,6 +137,11 @@ def multibody_of(name: str, table: MultibodyTable, speed_km_h: float) -> Multibo
         assembly_tolerance=table.assembly_tolerance_m,
         wind=tuple(wind),
         strips=strips_of(table.strips),
+        all_bodies=(
+            AllBodies(table.constraint_handling, table.substeps)
+            if table.motion == "all_bodies"
+            else None
+        ),
     )
 
 

@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
+from pydantic import (
+    Discriminator,
+    Field,
+    SerializerFunctionWrapHandler,
+    Tag,
+    ValidationError,
+    model_serializer,
+    model_validator,
+)
 
 from catenary.cases.loading import assign
 from catenary.cases.schema_head import RollTable, StripsTable
@@ -15,6 +23,8 @@ from catenary.solver.errors import InputError
 Mass = Annotated[float, Field(gt=0, le=1000)]
 Stiffness = Annotated[float, Field(ge=0, le=1e8)]
 DampingValue = Annotated[float, Field(ge=0, le=1e6)]
+# What acts only where all bodies are moved.
+_OF_ALL_BODIES = ("constraint_handling", "substeps")
 
 
 class _Pressing(Table):
@@ -116,6 +126,19 @@ class MultibodyTable(_Pressing):
         0.05, gt=0, le=1, description="by how much a joint may miss in the given positions"
     )
     gravity: bool = Field(True, description="whether the bodies weigh something")
+    motion: Literal["reduced", "all_bodies"] = Field(
+        "reduced",
+        description="in the time loop: the mechanism as tables over the arm's height, or all "
+        "bodies with their joints, which takes tens of times longer",
+    )
+    constraint_handling: Literal["coordinate_partitioning", "augmented_lagrangian", "baumgarte"] = (
+        Field(
+            "coordinate_partitioning", description="how joints are kept, with motion = all_bodies"
+        )
+    )
+    substeps: int = Field(
+        1, ge=1, le=100, description="of a step of the line, with motion = all_bodies"
+    )
     as_published: bool = Field(False, description="take the published numbers of the corrections")
     bodies: dict[str, BodyTable] = Field(min_length=2, max_length=100, description="rigid bodies")
     joints: dict[str, JointTable] = Field(min_length=1, max_length=100, description="joints")
@@ -154,6 +177,30 @@ class MultibodyTable(_Pressing):
                 f"from bodies, joints and forces{TAKE_AWAY}"
             )
         return self
+
+    @model_validator(mode="after")
+    def _moved(self) -> MultibodyTable:
+        if self.motion == "all_bodies":
+            if self.strips.mass_kg is not None:
+                raise ValueError(
+                    "must not have strips.mass_kg with motion = all_bodies, because strips on "
+                    f"springs of their own are no bodies{TAKE_AWAY}"
+                )
+            return self
+        for key in _OF_ALL_BODIES:
+            if key in self.model_fields_set:
+                raise ValueError(
+                    f"must not have {key} with motion = reduced, because it acts only with "
+                    f"motion = all_bodies{TAKE_AWAY}"
+                )
+        return self
+
+    @model_serializer(mode="wrap")
+    def _acting(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """All keys that act; a table made of them is the same again."""
+        plain: dict[str, Any] = handler(self)
+        idle = _OF_ALL_BODIES if self.motion == "reduced" else ()
+        return {key: value for key, value in plain.items() if key not in idle}
 
     @model_validator(mode="after")
     def _corrected(self) -> MultibodyTable:

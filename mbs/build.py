@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from catenary.mbs import head_kernels
 from catenary.mbs.base_motion import BaseMotion
+from catenary.mbs.full import FullPantograph
 from catenary.mbs.head_turning import PITCH, ROLL, head_turning
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lateral import LateralPath
@@ -42,9 +43,17 @@ def make_pantograph(data: PantographData, operation: Operation) -> Pantograph:
     """The model that ``data`` describes. Not collective."""
     head_kernels.warm_up()
     if isinstance(data, MultibodyData):
+        if data.all_bodies is not None:
+            way = data.all_bodies
+            return FullPantograph(data, *operation, way.handling, way.substeps)
         raising = raising_data(data, operation.static_force, operation.nominal_height)
         return RaisingPantograph(raising, *operation[2:])
     return LumpedPantograph(data, *operation)
+
+
+def has_joints(data: PantographData) -> bool:
+    """Whether joints of a running pantograph may open, because all its bodies are moved."""
+    return isinstance(data, MultibodyData) and data.all_bodies is not None
 
 
 def raising_data(data: MultibodyData, static_force: float, nominal_height: float) -> RaisingData:

@@ -40,6 +40,15 @@ HOLDER = "height of the arm"
 
 
 @dataclass(frozen=True)
+class AllBodies:
+    """How all bodies are moved in the time loop: joints kept by ``handling``, one of
+    `step_solvers.METHODS`, in so many ``substeps`` of the line's step."""
+
+    handling: str = "coordinate_partitioning"
+    substeps: int = 1
+
+
+@dataclass(frozen=True)
 class MultibodyData:
     """A pantograph as a multibody system; heights from the base, x along the track, z up.
 
@@ -48,6 +57,7 @@ class MultibodyData:
     of mass, None for where the joints close; ``actuator`` is the force to be calibrated to
     ``static_force`` [N], both None if forces hold as they are; ``wind`` are forces that act under
     way, not at standstill, where the static force is measured; ``strips`` are parts of the head.
+    ``all_bodies`` has all bodies in the time loop; with None the mechanism is reduced to tables.
     """
 
     name: str
@@ -60,6 +70,7 @@ class MultibodyData:
     assembly_tolerance: float = 0.05
     wind: tuple[PointForce, ...] = ()
     strips: Strips = ONE_STRIP
+    all_bodies: AllBodies | None = None
 
     @property
     def strip_offsets(self) -> tuple[float, ...]:
@@ -191,7 +202,12 @@ def describe(data: MultibodyData) -> str:
     )
     if standing.actuator_force is not None:
         text += f"; {data.actuator} at {standing.actuator_force:.0f} N"
-    return f"{text} for {standing.static_force:.1f} N"
+    text += f" for {standing.static_force:.1f} N"
+    if data.all_bodies is None:
+        return f"{text}; reduced to tables over its height"
+    way = data.all_bodies
+    cut = "" if way.substeps == 1 else f" in {way.substeps} substeps"
+    return f"{text}; all bodies in the time loop{cut}, joints kept by {way.handling}"
 
 
 def describe_assembly(missed: tuple[Miss, ...]) -> str:

@@ -64,6 +64,14 @@ STRIP_FORCE = Channel(
     STRIP,
 )
 
+# Only of runs in which all bodies of a pantograph are moved.
+CONSTRAINT_VIOLATION = Channel(
+    "constraint_violation",
+    "m",
+    "largest open joint of a pantograph whose bodies are all moved, NaN for any other",
+    PANTOGRAPH,
+)
+
 ENERGIES: dict[str, Channel] = {
     channel.name: channel
     for channel in (

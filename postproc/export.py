@@ -71,6 +71,12 @@ def pantographs_csv(results: Results) -> str:
             prefix = f"{name} " if len(names) > 1 else ""
             heads.append(prefix + channel.label)
             columns.append(values[:, p])
+    violations = results.constraint_violations()
+    if violations is not None:
+        for p, name in enumerate(names):
+            prefix = f"{name} " if len(names) > 1 else ""
+            heads.append(prefix + channels.CONSTRAINT_VIOLATION.label)
+            columns.append(violations[:, p])
     for name, forces in zip(names, results.strip_forces(), strict=False):
         prefix = f"{name} " if len(names) > 1 else ""
         for number in range(forces.shape[1] if forces.shape[1] > 1 else 0):

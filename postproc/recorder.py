@@ -86,6 +86,7 @@ class Recorder:
         self._head = np.zeros((rows, n_p))
         self._wire = np.zeros((rows, n_p))
         self._strips = np.zeros((rows, sum(stage.n_strips) if stage.several_strips else 0))
+        self._violation = np.zeros((rows, n_p if stage.joints_in_loop else 0))
         self._guarded(lambda: self._open(stage))
 
     def observe(self, view: StepView) -> None:
@@ -99,6 +100,8 @@ class Recorder:
             self._wire[row] = view.wire_height
             if self._strips.shape[1]:
                 self._strips[row] = view.strip_force
+            if self._violation.shape[1]:
+                self._violation[row] = view.constraint_violation
         self._arms[row] = view.arm_uplift
         self._droppers[row] = view.dropper_force
         self._rows = row + 1
@@ -191,6 +194,9 @@ class Recorder:
         }
         if self._strips.shape[1]:
             blocks[f"channels/{channels.STRIP_FORCE.name}"] = self._strips[:rows]
+        if self._violation.shape[1]:
+            name = channels.CONSTRAINT_VIOLATION.name
+            blocks[f"channels/{name}"] = self._violation[:rows]
         if self._energies:
             table = np.array(self._energies)
             blocks.update({f"energy/{n}": table[:, i] for i, n in enumerate(channels.ENERGIES)})

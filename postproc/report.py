@@ -175,7 +175,7 @@ def _html(
         about=about,
         results=results,
         statistics=statistics,
-        statistics_rows=_statistics_rows(statistics),
+        statistics_rows=_statistics_rows(statistics) + _violation_row(results),
         criteria=criteria,
         digits=lambda criterion: 3 if criterion.unit == "%" else 1,
         failed=[c for c in criteria if c.passed is False],
@@ -200,6 +200,16 @@ def _statistics_rows(statistics: RunStatistics) -> list[tuple[str, str, list[str
     return [
         (label, unit, [_number(factor * getattr(p, name), digits) for p in statistics.pantographs])
         for label, name, unit, factor, digits in _STATISTICS_ROWS
+    ]
+
+
+def _violation_row(results: Results) -> list[tuple[str, str, list[str]]]:
+    """Joints of the whole run, where a pantograph has any in the time loop."""
+    if results.constraint_violations() is None:
+        return []
+    found = results.largest_violations()
+    return [
+        ("largest open joint, whole run", "m", ["–" if v is None else f"{v:.1e}" for v in found])
     ]
 
 

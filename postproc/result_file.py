@@ -151,6 +151,9 @@ def _table(stage: Stage, with_energies: bool) -> dict[str, tuple[Channel, int]]:
         table[f"channels/{channel.name}"] = (channel, columns[channel.per])
     if stage.several_strips:
         table[f"channels/{channels.STRIP_FORCE.name}"] = (channels.STRIP_FORCE, sum(stage.n_strips))
+    if stage.joints_in_loop:
+        channel = channels.CONSTRAINT_VIOLATION
+        table[f"channels/{channel.name}"] = (channel, columns[channel.per])
     if with_energies:
         table.update({f"energy/{c.name}": (c, 0) for c in channels.ENERGIES.values()})
     return table

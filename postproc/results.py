@@ -151,6 +151,21 @@ class Results:
             return []
         return np.split(self.channel(channels.STRIP_FORCE.name), np.cumsum(counts)[:-1], axis=1)
 
+    def constraint_violations(self) -> np.ndarray | None:
+        """Largest open joint of each pantograph at each record, (n, n_pantographs) [m].
+
+        NaN where a pantograph has no joints in the time loop, None if none has.
+        """
+        name = channels.CONSTRAINT_VIOLATION.name
+        return self.channel(name) if name in self._file["channels"] else None
+
+    def largest_violations(self) -> list[float | None]:
+        """The same over the whole run (n_pantographs,) [m], None without joints in the loop."""
+        found = self.constraint_violations()
+        if found is None or not len(found):
+            return [None] * self.n_pantographs
+        return [None if np.isnan(largest) else float(largest) for largest in found.max(axis=0)]
+
     def pantograph_facts(self) -> list[dict[str, Any]]:
         """What is told of each pantograph, by their order: ``kind``, ``model``, ``description``,
         ``static_force_N``, ``actuator_force_N``; empty tables in files without."""

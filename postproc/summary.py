@@ -39,8 +39,13 @@ def summarise(
         "inner_iterations": attributes.get("inner_iterations", {}),
         "evaluation_m": [start, end],
         "pantographs": [
-            _pantograph(p, told)
-            for p, told in zip(statistics.pantographs, results.pantograph_facts(), strict=True)
+            _pantograph(p, told, violation)
+            for p, told, violation in zip(
+                statistics.pantographs,
+                results.pantograph_facts(),
+                results.largest_violations(),
+                strict=True,
+            )
         ],
         "supports": _supports(statistics),
         "droppers": {
@@ -73,7 +78,9 @@ def real_time_factor(results: Results) -> float | None:
     return results.attributes["marched_s"] / wall if wall else None
 
 
-def _pantograph(p: PantographStatistics, told: Mapping[str, Any]) -> dict[str, Any]:
+def _pantograph(
+    p: PantographStatistics, told: Mapping[str, Any], violation: float | None
+) -> dict[str, Any]:
     return {
         "name": p.name,
         "kind": told.get("kind"),
@@ -91,6 +98,7 @@ def _pantograph(p: PantographStatistics, told: Mapping[str, Any]) -> dict[str, A
         "loss_percent": p.loss_percent,
         "arcing_percent": p.arcing_percent,
         "contact_height_range_mm": 1e3 * p.contact_height_range,
+        "max_constraint_violation_m": violation,
     }
 
 

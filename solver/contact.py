@@ -86,6 +86,12 @@ class ContactWire:
         self.locate(x, 0.0, touches)
         return np.asarray((touches.whole_value * touches.rest).sum(axis=1))
 
+    def rest_slope(self, x: np.ndarray) -> np.ndarray:
+        """Slope dw/dx of the line at rest at positions ``x`` [m], shape as ``x`` [-]."""
+        touches = Touches(x.size)
+        self.locate(x, 0.0, touches)
+        return np.asarray((touches.whole_slope * touches.rest).sum(axis=1))
+
     def nodes_between(self, low: float, high: float) -> tuple[int, int]:
         """Range of the wire's nodes whose elements cover [low, high] [m], ends included."""
         # A position that is start + V t may miss an end by round-off and fall in the next element.

@@ -14,6 +14,7 @@ from catenary.solver.heads import Heads
 from catenary.solver.interaction import Interaction
 from catenary.solver.law_in_steps import LawInSteps
 from catenary.solver.pantographs import Pantographs
+from catenary.solver.parallel import on_root
 from catenary.solver.problem import Numerics
 from catenary.solver.schemes import Counters, LoadSource
 
@@ -77,8 +78,8 @@ class FixedPoint:
         self._force = force
         # All ranks hold the same forces, so that all remember the same impacts.
         self.law.accept(time, depth, rate, force)
-        if self.comm.rank == 0:
-            self.pantographs.advance(force, self.law.reported(force), depth)
+        moved = self.pantographs
+        on_root(self.comm, lambda: moved.advance(force, self.law.reported(force), depth))
         return not stop
 
     def state(self) -> np.ndarray:
@@ -92,15 +93,11 @@ class FixedPoint:
         self.law.restore(state[n:])
 
     def _heads_everywhere(self, time: float) -> Heads:
-        """Rank 0's prediction on all ranks."""
+        """Rank 0's prediction on all ranks, which all know if there is none."""
+        if self.comm.size == 1:
+            return self.pantographs.predict(time)
         heads = self._heads
-        packed = np.zeros(2 * heads.n + 2 * heads.n**2)
-        if self.comm.rank == 0:
-            heads = self.pantographs.predict(time)
-            packed = heads.pack()
-        if self.comm.size > 1:
-            self.comm.Bcast(packed, root=0)
-            heads.unpack(packed)
+        heads.unpack(on_root(self.comm, lambda: self.pantographs.predict(time).pack()))
         return heads
 
     def _contact(

@@ -96,9 +96,7 @@ class March:
             "dropper_slackening" in on,
         )
         nominal_height = nominal_height_rule(model, form, elasticity)
-        self._pantographs = Pantographs(
-            problem, self._interaction.wire, nominal_height, comm.rank == 0
-        )
+        self._pantographs = Pantographs(comm, problem, self._interaction.wire, nominal_height)
         self._scheme = self._make_scheme(on)
         self._showing = Showing(
             comm,

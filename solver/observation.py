@@ -17,6 +17,7 @@ class Stage:
     ----------
     n_pantographs : number of pantographs
     n_strips : of each pantograph in running order
+    joints_in_loop : whether a pantograph has joints that may open, all its bodies being moved
     dt, start_time : time step and time of the initial state [s]
     n_steps : steps planned
     arm_x, dropper_x : positions of steady arms and droppers [m]
@@ -37,6 +38,7 @@ class Stage:
     node_points: np.ndarray
     owned_nodes: np.ndarray
     n_strips: tuple[int, ...] = ()
+    joints_in_loop: bool = False
 
     @property
     def several_strips(self) -> bool:
@@ -60,6 +62,8 @@ class StepView:
     checkpoint : () -> dict of arrays on rank 0 with which to continue, None elsewhere; collective
     strip_force : (number of all strips,) share of each strip in the contact force, pantograph by
         pantograph, the leading strip first [N], rank 0 only
+    constraint_violation : (n_pantographs,) largest open joint [m], NaN for those without joints in
+        the time loop, rank 0 only
     """
 
     step: int
@@ -74,6 +78,7 @@ class StepView:
     energies: Callable[[], tuple[float, float]]
     checkpoint: Callable[[], dict[str, Any] | None]
     strip_force: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    constraint_violation: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 class Observer(Protocol):

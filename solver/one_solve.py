@@ -16,6 +16,7 @@ from catenary.solver.heads import Heads
 from catenary.solver.inner import NOT_FINITE, InnerSolution
 from catenary.solver.interaction import Interaction
 from catenary.solver.pantographs import Pantographs
+from catenary.solver.parallel import on_root
 from catenary.solver.response import LineResponse
 from catenary.solver.schemes import Counters, LoadSource
 
@@ -65,13 +66,20 @@ class OneSolve:
         line.correct()
         reply = self._solve_inner(time, stop, touches)
         interaction.superpose(reply.contact_force, reply.droppers, reply.compensation)
-        if self._found is not None:
-            law, found = self.coupling.law, self._found
-            force = found.contact_force
-            self.pantographs.advance(force, law.reported(force), found.depth)
+        if self.pantographs.joints_in_loop:
+            on_root(self.comm, self._advance)  # joints may fail to close, which all must know
+        else:
+            self._advance()
         self.counters.steps += 1
         self.counters.solves += 1
         return reply.verdict == Verdict.ADVANCE
+
+    def _advance(self) -> None:
+        """Move the pantographs on. Does nothing but on rank 0."""
+        found = self._found
+        if found is not None:
+            force = found.contact_force
+            self.pantographs.advance(force, self.coupling.law.reported(force), found.depth)
 
     def state(self) -> np.ndarray:
         """What coupling and law remember, as one array."""
@@ -90,7 +98,7 @@ class OneSolve:
             share.wants_to_stop = stop
             merged = exchange.to_root()
             answer = None
-            if merged is not None and heads is not None:
+            if merged is not None:
                 answer = self._answer(time, merged, heads)
             reply = exchange.from_root(answer)
             if reply.verdict == Verdict.BROKEN:
@@ -106,10 +114,16 @@ class OneSolve:
             else:
                 return reply
 
-    def _heads(self, time: float) -> Heads:
-        heads = self.pantographs.predict(time)
-        if self.coupling.extrapolates:
-            heads.early_height[:], heads.early_velocity[:] = self.pantographs.extrapolate(time)
+    def _heads(self, time: float) -> Heads | None:
+        """What rank 0 predicts of the heads, None if a pantograph cannot go on."""
+        try:
+            heads = self.pantographs.predict(time)
+            if self.coupling.extrapolates:
+                heads.early_height[:], heads.early_velocity[:] = self.pantographs.extrapolate(time)
+        except RunBroken as error:
+            # Told with the answer: the other ranks wait for that.
+            self._why = str(error)
+            return None
         return heads
 
     def _broken(self, time: float) -> RunBroken:
@@ -122,9 +136,11 @@ class OneSolve:
             f"{float(self.pantographs.position[0]):.1f} m: {why}"
         )
 
-    def _answer(self, time: float, response: LineResponse, heads: Heads) -> Reply:
+    def _answer(self, time: float, response: LineResponse, heads: Heads | None) -> Reply:
         """What rank 0 makes of all shares."""
         self._found = None
+        if heads is None:
+            return Reply(Verdict.BROKEN, self._none)
         if response.is_broken:
             self._why = NOT_FINITE
             return Reply(Verdict.BROKEN, self._none)

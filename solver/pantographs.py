@@ -4,25 +4,32 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from scipy import integrate
 
 from catenary.mbs.base_motion import BaseMotion
-from catenary.mbs.build import Operation, make_pantograph, roll_of
+from catenary.mbs.build import Operation, has_joints, make_pantograph, roll_of
+from catenary.mbs.full import FullPantograph
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lateral import LateralPath
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver import inner_kernels
 from catenary.solver.contact import ContactWire, Touches
+from catenary.solver.contact_laws import KinematicLaw
 from catenary.solver.equilibrium import Elasticity, Equilibrium
 from catenary.solver.heads import Heads
 from catenary.solver.model import Model
+from catenary.solver.parallel import on_root
 from catenary.solver.problem import Placement, Problem
 
 
 class Pantographs:
-    """All pantographs of a train, n of them, with their n_contacts strips.
+    """All pantographs of a train, n of them, with their n_contacts strips. Collective to make.
+
+    Each is placed at the wire at rest. With a kinematic contact it already moves up and down with
+    the wire under way, V dw/dx: a head at rest would have to be brought to that within one step.
 
     Attributes
     ----------
@@ -31,14 +38,22 @@ class Pantographs:
     contact_force, head_height, wire_height : (n,) after the latest step, rank 0 only: the sum over
         a pantograph's strips, and their means
     strip_force : (n_contacts,) the same of each strip
+    joints_in_loop : whether a pantograph has joints that may open, all ranks
+    constraint_violation : (n,) largest open joint after the latest step [m], NaN for pantographs
+        without joints in the loop, rank 0 only
+
+    Raises
+    ------
+    CatenaryError
+        On all ranks, if a pantograph does not reach the wire.
     """
 
     def __init__(
         self,
+        comm: Any,
         problem: Problem,
         wire: ContactWire,
         nominal_height: Callable[[Placement], float],
-        on_this_rank: bool,
     ) -> None:
         train = problem.train
         self._wire = wire
@@ -59,12 +74,10 @@ class Pantographs:
         self.wire_height[:] = wire.rest_height(self._start)
         self.head_height[:] = self.wire_height
         self._heads = Heads(self.n_contacts)
+        self.joints_in_loop = any(has_joints(placement.data) for placement in train.placements)
+        self.constraint_violation = np.full(self.n, np.nan)
         self.models: list[Pantograph] = []
-        if on_this_rank:
-            self.models = [
-                self._make(problem, placement, nominal_height(placement), float(height))
-                for placement, height in zip(train.placements, self.wire_height, strict=True)
-            ]
+        on_root(comm, lambda: self._make_all(problem, nominal_height))
 
     @property
     def n(self) -> int:
@@ -114,6 +127,8 @@ class Pantographs:
         heads = self._heads
         for model, strips in zip(self.models, self._strips, strict=True):
             model.advance(contact_force[strips])
+        if self.joints_in_loop:
+            self.look_at_joints()
         self.strip_force[:] = reported
         inner_kernels.tell(
             contact_force,
@@ -125,9 +140,24 @@ class Pantographs:
             self._told,
         )
 
-    def _make(
-        self, problem: Problem, placement: Placement, nominal_height: float, wire_height: float
-    ) -> Pantograph:
+    def look_at_joints(self) -> None:
+        """Note by how much joints are open now. Does nothing where there are no models."""
+        for number, model in enumerate(self.models):
+            if isinstance(model, FullPantograph):
+                self.constraint_violation[number] = model.constraint_violation()
+
+    def _make_all(self, problem: Problem, nominal_height: Callable[[Placement], float]) -> None:
+        """Make and place all models. Rank 0 only."""
+        velocity = np.zeros(self.n)
+        if isinstance(problem.contact, KinematicLaw):
+            velocity = self._speed * self._wire.rest_slope(self._start)
+        for number, placement in enumerate(problem.train.placements):
+            model = self._make(problem, placement, nominal_height(placement))
+            model.place(float(self.wire_height[number]), float(velocity[number]))
+            self.models.append(model)
+        self.look_at_joints()
+
+    def _make(self, problem: Problem, placement: Placement, nominal_height: float) -> Pantograph:
         numerics = problem.numerics
         base = _base_of(problem, placement)
         operation = Operation(
@@ -140,9 +170,7 @@ class Pantographs:
             _lateral_path(problem, placement, base),
             base,
         )
-        model = make_pantograph(placement.data, operation)
-        model.place(wire_height)
-        return model
+        return make_pantograph(placement.data, operation)
 
 
 def _base_of(problem: Problem, placement: Placement) -> BaseMotion | None:

@@ -65,6 +65,7 @@ class Showing:
             energies=self._energies,
             checkpoint=self._checkpoint,
             strip_force=pantographs.strip_force,
+            constraint_violation=pantographs.constraint_violation,
         )
 
     def stage(self, dt: float, start_time: float, n_steps: int) -> Stage:
@@ -84,6 +85,7 @@ class Showing:
             node_points=points,
             owned_nodes=self._owned_nodes,
             n_strips=self._pantographs.n_strips,
+            joints_in_loop=self._pantographs.joints_in_loop,
         )
 
     def view(self, step: int, time: float) -> StepView:
@@ -108,6 +110,7 @@ class Showing:
         self._scheme.restore(checkpoint["contacts"])
         for i, pantograph in enumerate(pantographs.models):
             pantograph.restore(checkpoint[f"pantograph_{i}"])
+        pantographs.look_at_joints()
 
     def _energies(self) -> tuple[float, float]:
         """Kinetic and elastic energy relative to equilibrium, slack droppers as they are [J].
