@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 
 from catenary.cases.checks_contact import check_contact
-from catenary.cases.checks_pantograph import check_pantographs
+from catenary.cases.checks_pantograph import check_heights, check_pantographs
 from catenary.cases.checks_vehicle import check_vehicle
 from catenary.cases.keys import is_known, known_keys
 from catenary.cases.messages import refuse, shown, unknown_key
@@ -48,6 +48,7 @@ def check(scene: Scene) -> None:
     line = scene.to_line()
     _droppers_inside_spans(scene, line)
     _dropper_lengths(scene, line)
+    check_heights(scene, line)
     _speed(scene, line)
     _running(scene, line)
     check_vehicle(scene, line)

@@ -7,11 +7,13 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, NoReturn
 
 from catenary.cases.convert_pantograph import multibody_of, wanted_force
-from catenary.cases.messages import shown
+from catenary.cases.messages import refuse, shown
 from catenary.cases.schema_mechanism import ActuatorTable
 from catenary.cases.schema_pantograph import MultibodyTable
 from catenary.mbs.bodies import SPACE
-from catenary.mbs.multibody import stand
+from catenary.mbs.joints import PrescribedPoint, constant
+from catenary.mbs.multibody import HOLDER, MultibodyData, reduced, stand
+from catenary.meshgen.line import Line
 from catenary.solver.errors import InputError, RunBroken
 
 if TYPE_CHECKING:
@@ -32,6 +34,44 @@ def check_pantographs(scene: Scene) -> None:
     for name in scene.pantographs:
         if name in on_the_train:
             _mechanism(scene, name)
+
+
+def check_heights(scene: Scene, line: Line) -> None:
+    """Raise ``InputError`` if a mechanism does not reach the wire from the height that it is put
+    to by its ``nominal_height_m``."""
+    lowest = line.contact_height - max(max(sags, default=0.0) for sags in line.pre_sag)
+    heights = lowest, line.contact_height
+    for name in dict.fromkeys(place.name for place in scene.train.pantographs):
+        table = scene.pantographs[name]
+        if not isinstance(table, MultibodyTable) or table.nominal_height_m is None:
+            continue
+        data = multibody_of(name, table, scene.train.speed_km_h)
+        working = stand(data).working_height
+        for height in heights:
+            if _reaches(data, working + height - table.nominal_height_m):
+                continue
+            refuse(
+                scene.origin,
+                f"pantographs.{name}.nominal_height_m",
+                table.nominal_height_m,
+                f"the contact wire hangs at {lowest:.4g} to {line.contact_height:.4g} m, where its "
+                f"head would be {height - table.nominal_height_m:+.4g} m away from there, beyond "
+                "the reach of its mechanism",
+            )
+
+
+def _reaches(data: MultibodyData, arm: float) -> bool:
+    """Whether a mechanism can have its arm at a height above its base [m]."""
+    if data.all_bodies is None:
+        heights = reduced(data).heights
+        return bool(heights[0] <= arm <= heights[-1])
+    standing = stand(data)
+    holder = PrescribedPoint(HOLDER, data.arm, constant(arm))
+    try:
+        standing.system.with_joints(holder).assemble(standing.motion)
+    except InputError:
+        return False
+    return True
 
 
 def _names(scene: Scene, kind: str, table: MultibodyTable) -> None:

@@ -166,6 +166,12 @@ class FullPantograph:
         RunBroken
             The head does not reach this height.
         """
+        try:
+            self._place(head_height, velocity)
+        except InputError as error:
+            raise self._beyond_reach(head_height) from error
+
+    def _place(self, head_height: float, velocity: float) -> None:
         data, number = self._data, self._rest.numbers[self._data.head]
         wanted, motion = head_height - self._zero, self._rest
         if self._base is not None:
@@ -180,9 +186,7 @@ class FullPantograph:
             if abs(off) <= PLACED:
                 break
         else:
-            raise RunBroken(
-                f"The head of pantograph {data.name!r} cannot be put to {head_height:g} m."
-            )
+            raise self._beyond_reach(head_height)
         self._hold_down.force = held_force(self._still, holder, motion)
         if velocity:
             raising = self._still.with_joints(
@@ -248,6 +252,12 @@ class FullPantograph:
         system, motion = self.system, self.motion
         elastic = sum(f.energy(motion) for f in system.forces if not isinstance(f, Gravity))
         return 0.5 * float(system.mass @ motion.velocities**2) + elastic
+
+    def _beyond_reach(self, head_height: float) -> RunBroken:
+        return RunBroken(
+            f"The head of pantograph {self._data.name!r} does not reach a wire at a height of "
+            f"{head_height:.4g} m: {head_height - self._zero:.4g} m above its base."
+        )
 
     def _head_under(self, static_force: float) -> float:
         """Height of the head above the base, arm at its working height, wire on the head [m]."""

@@ -1,0 +1,148 @@
+"""A pantograph with all its bodies: the same on one rank and on all, errors included.
+
+Run by ``mpirun -n N python -m mpi4py -m pytest tests/mpi``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from catenary.cases.meshing import mesh_of
+from catenary.cases.scene import load_scene
+from catenary.meshgen.mesh import LineMesh
+from catenary.solver.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.errors import RunBroken
+from catenary.solver.march import March
+from catenary.solver.observation import Stage, StepView
+from catenary.solver.parallel import on_root
+from catenary.solver.problem import Problem
+
+# The parallel solve leaves a relative residual of 1e-16 a step, which grows at most in proportion
+# over some hundred steps; as in test_same_answers.py.
+TOLERANCE = 1e-9
+SCENE = (
+    "line.n_spans=8",
+    "train.start_m=120",
+    "train.end_m=150",
+    "train.raise_time_s=0.1",
+    "evaluation.from_m=130",
+    "evaluation.to_m=150",
+    "pantographs.seven_body.motion=all_bodies",
+)
+
+
+class Watched:
+    """Observer that keeps forces and open joints on rank 0."""
+
+    def __init__(self) -> None:
+        self.force: list[np.ndarray] = []
+        self.open: list[np.ndarray] = []
+
+    def start(self, stage: Stage) -> None:
+        assert stage.joints_in_loop
+
+    def observe(self, view: StepView) -> None:
+        self.force.append(view.contact_force.copy())
+        self.open.append(view.constraint_violation.copy())
+
+    def finish(self, outcome: str) -> None:
+        pass
+
+
+@pytest.fixture(scope="module")
+def case() -> tuple[Problem, LineMesh]:
+    def make() -> tuple[Problem, LineMesh]:
+        scene = load_scene("ambrosio2012", SCENE)
+        return scene.to_problem(), mesh_of(scene)
+
+    return on_root(MPI.COMM_WORLD, make)
+
+
+def marched(comm: Any, problem: Problem, mesh: LineMesh) -> tuple[str, Watched]:
+    """March on ``comm``; how it ended, and what was seen. Collective."""
+    model, form = find_form(problem, mesh)
+    lift = elasticity(model, *middle_span(problem.line))
+    watched = Watched()
+    with March(comm, problem, model, form, lift) as march:
+        outcome = march.run([watched]).outcome
+    return outcome, watched
+
+
+@pytest.mark.parametrize("scheme", ["one_solve", "fixed_point"])
+def test_all_ranks_give_the_answer_of_one(case: tuple[Problem, LineMesh], scheme: str) -> None:
+    problem, mesh = case
+    numerics = replace(problem.numerics, scheme=scheme, eps_d=1e-13, eps_v=1e-10)
+    problem = replace(problem, numerics=numerics)
+    if scheme == "fixed_point":
+        problem = replace(problem, train=replace(problem.train, end=problem.train.start + 10.0))
+    outcome, together = marched(MPI.COMM_WORLD, problem, mesh)
+    assert outcome == "done"
+    _, alone = marched(MPI.COMM_SELF, problem, mesh)
+    if MPI.COMM_WORLD.rank == 0:
+        reference = np.array(alone.force)
+        off = np.abs(np.array(together.force) - reference).max() / reference.max()
+        print(f"{MPI.COMM_WORLD.size} ranks, {scheme}: {off:.2e}, expected below {TOLERANCE}")
+        assert off < TOLERANCE
+        assert 0.0 < np.array(together.open).max() < 1e-9
+
+
+@pytest.mark.parametrize("motion", ["all bodies", "reduced"])
+@pytest.mark.parametrize("scheme", ["one_solve", "fixed_point"])
+def test_a_pantograph_that_cannot_go_on_ends_the_run_on_all_ranks(
+    case: tuple[Problem, LineMesh], scheme: str, motion: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rank 0 alone moves it, and the others must not wait for what it cannot tell."""
+    from catenary.mbs.full import FullPantograph
+    from catenary.mbs.raising import RaisingPantograph
+
+    problem, mesh = case
+    kind: Any = FullPantograph
+    if motion == "reduced":
+        kind = RaisingPantograph
+        (place,) = problem.train.placements
+        place = replace(place, data=replace(place.data, all_bodies=None))  # type: ignore[arg-type]
+        problem = replace(problem, train=replace(problem.train, placements=(place,)))
+    problem = replace(problem, numerics=replace(problem.numerics, scheme=scheme))
+    predict = kind.predict
+
+    def lost(self: Any, time: float) -> Any:
+        if time > 0.0105:
+            raise RunBroken("lost its way")
+        return predict(self, time)
+
+    monkeypatch.setattr(kind, "predict", lost)
+    model, form = find_form(problem, mesh)
+    lift = elasticity(model, *middle_span(problem.line))
+    with March(MPI.COMM_WORLD, problem, model, form, lift) as march:
+        ended = march.run([])
+    assert "lost its way" in ended.outcome
+    assert ended.n_steps == 10
+
+
+def test_joints_that_do_not_close_end_the_run_on_all_ranks(
+    case: tuple[Problem, LineMesh], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from catenary.mbs.full import FullPantograph
+
+    problem, mesh = case
+
+    def stuck(self: Any, contact_force: np.ndarray) -> None:
+        raise RunBroken("joints cannot be kept closed")
+
+    monkeypatch.setattr(FullPantograph, "advance", stuck)
+    outcome, _ = marched(MPI.COMM_WORLD, problem, mesh)
+    assert outcome == "joints cannot be kept closed"
+
+
+def test_a_wire_out_of_reach_is_told_on_all_ranks(case: tuple[Problem, LineMesh]) -> None:
+    problem, mesh = case
+    (place,) = problem.train.placements
+    high = replace(place, nominal_height=9.0)
+    problem = replace(problem, train=replace(problem.train, placements=(high,)))
+    with pytest.raises(RunBroken, match="does not reach a wire at a height of 5"):
+        marched(MPI.COMM_WORLD, problem, mesh)

@@ -1,0 +1,72 @@
+"""Open joints: recorded only where all bodies of a pantograph are moved."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from catenary.postproc import export
+from catenary.postproc.report import write_report
+from catenary.postproc.results import Results
+
+
+@pytest.fixture
+def with_joints(make_march: Any) -> Any:
+    """Two pantographs: the leading one's joints open by 1e-12 m times the step, no joints."""
+
+    class Jointed(make_march):  # type: ignore[misc]
+        def stage(self, first_step: int = 0) -> Any:
+            return replace(super().stage(first_step), joints_in_loop=True)
+
+        def view(self, step: int) -> Any:
+            view = super().view(step)
+            view.constraint_violation = np.array([1e-12 * step, np.nan])
+            return view
+
+    return Jointed(n_steps=600)
+
+
+def test_each_step_has_the_largest_open_joint(
+    tmp_path: Path, with_joints: Any, record_run: Any
+) -> None:
+    record_run(tmp_path / "run.h5", with_joints)
+    with Results(tmp_path) as results:
+        found = results.constraint_violations()
+        assert found is not None
+        np.testing.assert_array_equal(found[:, 0], 1e-12 * np.arange(601))
+        assert np.isnan(found[:, 1]).all()
+        assert results.largest_violations() == [6e-10, None]
+        rows = list(csv.reader(io.StringIO(export.pantographs_csv(results))))
+    heads = [head for head in rows[0] if "violation" in head]
+    assert heads == ["leading constraint_violation [m]", "trailing constraint_violation [m]"]
+    assert float(rows[101][rows[0].index(heads[0])]) == pytest.approx(1e-10, rel=1e-8)
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert file["channels/constraint_violation"].attrs["unit"] == "m"
+
+
+def test_summary_and_report_tell_the_largest(
+    tmp_path: Path, with_joints: Any, record_run: Any
+) -> None:
+    record_run(tmp_path / "run.h5", with_joints)
+    write_report(tmp_path, tmp_path)
+    told = json.loads((tmp_path / "summary.json").read_text())["pantographs"]
+    assert [one["max_constraint_violation_m"] for one in told] == [6e-10, None]
+    report = (tmp_path / "report.html").read_text()
+    assert "largest open joint, whole run" in report
+    assert "6.0e-10" in report
+
+
+def test_runs_without_joints_have_no_such_channel(run_folder: Path) -> None:
+    with h5py.File(run_folder / "run.h5") as file:
+        assert "constraint_violation" not in file["channels"]
+    with Results(run_folder) as results:
+        assert results.constraint_violations() is None
+        assert results.largest_violations() == [None, None]

@@ -1,0 +1,129 @@
+"""Which bodies of a mechanism are moved in the time loop: keys, what they become, what is told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from catenary.cases.messages import Origin
+from catenary.cases.plan import estimate_march, make_plan, plan_text
+from catenary.cases.scene import Scene, load_scene, scene_from
+from catenary.mbs.build import has_joints
+from catenary.mbs.full import FullPantograph
+from catenary.mbs.joints import PrescribedPoint, constant
+from catenary.mbs.lumped import LumpedData
+from catenary.mbs.multibody import AllBodies, MultibodyData, reduced
+from catenary.mbs.raising import RaisingPantograph
+from catenary.solver.errors import InputError, RunBroken
+
+CASE, KIND = "ambrosio2012", "pantographs.seven_body"
+ALL = f"{KIND}.motion=all_bodies"
+OWN_KEYS = {"constraint_handling", "substeps"}
+
+
+def load(*overrides: str) -> Scene:
+    return load_scene(CASE, overrides)
+
+
+def data(scene: Scene) -> MultibodyData:
+    found = scene.to_problem().train.placements[0].data
+    assert isinstance(found, MultibodyData)
+    return found
+
+
+def test_a_mechanism_is_reduced_unless_the_scene_says_otherwise() -> None:
+    assert data(load()).all_bodies is None
+    assert not has_joints(data(load()))
+    assert not has_joints(LumpedData((1.0,), (0.0,), (0.0,)))
+
+
+@pytest.mark.parametrize(
+    ("overrides", "expected"),
+    [
+        ([], AllBodies("coordinate_partitioning", 1)),
+        ([f"{KIND}.constraint_handling=baumgarte"], AllBodies("baumgarte", 1)),
+        (
+            [f"{KIND}.constraint_handling=augmented_lagrangian", f"{KIND}.substeps=4"],
+            AllBodies("augmented_lagrangian", 4),
+        ),
+    ],
+)
+def test_all_bodies_reach_the_time_loop(overrides: list[str], expected: AllBodies) -> None:
+    found = data(load(ALL, *overrides))
+    assert found.all_bodies == expected
+    assert has_joints(found)
+
+
+def test_the_model_is_the_one_that_was_asked_for() -> None:
+    from catenary.mbs.build import Operation, make_pantograph
+
+    operation = Operation(150.0, 5.08, 0.5, 1e-3, 0.25, 0.5)
+    assert isinstance(make_pantograph(data(load(ALL)), operation), FullPantograph)
+    assert isinstance(make_pantograph(data(load()), operation), RaisingPantograph)
+
+
+@pytest.mark.parametrize("overrides", [[], [ALL], [ALL, f"{KIND}.substeps=3"]])
+def test_resolved_scene_is_the_same_again_and_holds_only_what_acts(overrides: list[str]) -> None:
+    scene = load(*overrides)
+    table = scene.resolved()["pantographs"]["seven_body"]
+    assert OWN_KEYS & set(table) == (OWN_KEYS if overrides else set())
+    again = scene_from(scene.resolved(), Origin("a result"))
+    assert again.to_problem() == scene.to_problem()
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        ([f"{KIND}.substeps=2"], "substeps with motion = reduced, because it acts only with"),
+        ([f"{KIND}.motion=reduced", f"{KIND}.constraint_handling=baumgarte"], "must not have"),
+        ([ALL, f"{KIND}.substeps=0"], f"{KIND}.substeps is 0"),
+        ([ALL, f"{KIND}.substeps=1.5"], "must be a whole number"),
+        ([ALL, f"{KIND}.constraint_handling=lagrange"], "coordinate_partitioning"),
+        ([f"{KIND}.motion=full"], "must be reduced or all_bodies"),
+        (
+            [ALL, f"{KIND}.strips.mass_kg=1", f"{KIND}.strips.stiffness_N_per_m=5000"],
+            "strips on springs of their own are no bodies",
+        ),
+        (["pantographs.lumped.motion=all_bodies"], "pantographs.lumped.motion on the command line"),
+        ([f"{KIND}.nominal_height_m=9"], "-3.973 m away from there, beyond the reach"),
+        ([ALL, f"{KIND}.nominal_height_m=9"], "-3.973 m away from there, beyond the reach"),
+    ],
+)
+def test_what_does_not_fit_is_refused_in_one_sentence(overrides: list[str], words: str) -> None:
+    with pytest.raises(InputError) as refused:
+        load(*overrides)
+    assert words in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_bodies_go_where_their_loops_still_close_and_tables_where_they_end() -> None:
+    """0.65 m below its working height the arm is beyond its tables, but not beyond its joints."""
+    below = f"{KIND}.nominal_height_m=4.4"
+    assert load(ALL, below).pantographs["seven_body"].nominal_height_m == 4.4
+    with pytest.raises(InputError, match="beyond the reach of its mechanism"):
+        load(below)
+    lowest = reduced(data(load())).heights[0]
+    bodies = data(load()).system
+    arm = PrescribedPoint("arm low", "stabilisation_arm", constant(lowest - 0.05))
+    held = bodies.with_joints(arm)
+    closed = held.assemble(bodies.start()).motion
+    assert np.abs(held.constraints(closed, 0.0).value).max() < 1e-9
+
+
+def test_a_wire_beyond_the_bodies_reach_breaks_the_start_in_one_sentence() -> None:
+    pantograph = FullPantograph(data(load(ALL)), 150.0, 5.08, 0.5, 1e-3)
+    with pytest.raises(RunBroken, match="'seven_body' does not reach a wire at a height of 9 m"):
+        pantograph.place(9.0)
+
+
+def test_plan_names_the_model_and_counts_its_cost_and_channel() -> None:
+    reduced_plan, plan = make_plan(load()), make_plan(load(ALL, f"{KIND}.substeps=2"))
+    assert "reduced to tables over its height" in plan_text(reduced_plan)
+    told = "all bodies in the time loop in 2 substeps, joints kept by coordinate_partitioning"
+    assert told in plan_text(plan)
+    n = plan.n_steps
+    more = plan.march - reduced_plan.march
+    expected = estimate_march(0, n, "one_solve", 2) - estimate_march(0, n, "one_solve")
+    assert more == pytest.approx(expected, rel=1e-9)
+    # 0.2 to 0.4 ms a substep.
+    assert 2 * 2e-4 * n < more < 2 * 4e-4 * n
+    assert plan.file_size - reduced_plan.file_size == 8 * (n + 1)
