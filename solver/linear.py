@@ -54,21 +54,31 @@ class StepSolver:
     matrix : the operator A, kept by reference
     ownership : Ownership
     overlap : range of unknowns [low, high) that influences this rank's own
+    model_block_size : unknowns of a node; the matrix may have blocks of stations
     """
 
     def __init__(
-        self, comm: Any, matrix: PETSc.Mat, ownership: Ownership, overlap: tuple[int, int]
+        self,
+        comm: Any,
+        matrix: PETSc.Mat,
+        ownership: Ownership,
+        overlap: tuple[int, int],
+        model_block_size: int,
     ) -> None:
         self._ksp = PETSc.KSP().create(comm)
         self._ksp.setOptionsPrefix(PREFIX)
         self._ksp.setOperators(matrix)
         self._ksp.setType(PETSc.KSP.Type.PREONLY)
         pc = self._ksp.getPC()
+        # In blocks of stations a line is block tridiagonal: Cholesky's factor in the order along
+        # the track has no more blocks than the matrix, and fewest numbers of all. In blocks of
+        # nodes, where nodes do not pair, nested dissection takes two thirds of the time of that.
+        pairs = matrix.getBlockSize() > model_block_size
         if comm.size == 1:
-            pc.setType(PETSc.PC.Type.LU)
-            pc.setFactorOrdering(PETSc.Mat.OrderingType.ND)
+            pc.setType(PETSc.PC.Type.CHOLESKY if pairs else PETSc.PC.Type.LU)
+            pc.setFactorOrdering(_ordering(pairs))
         else:
-            self._set_up_schwarz(pc, ownership, overlap)
+            self._set_up_schwarz(pc, ownership, overlap, matrix.getBlockSize(), pairs)
         # Of an iteration that the options ask for; a direct solver has no tolerance.
         self._ksp.setTolerances(rtol=_DIRECT)
         with refused_options():
@@ -109,18 +119,22 @@ class StepSolver:
         self._ksp.destroy()
 
     @staticmethod
-    def _set_up_schwarz(pc: PETSc.PC, ownership: Ownership, overlap: tuple[int, int]) -> None:
+    def _set_up_schwarz(
+        pc: PETSc.PC, ownership: Ownership, overlap: tuple[int, int], block: int, pairs: bool
+    ) -> None:
         pc.setType(PETSc.PC.Type.ASM)
         pc.setASMType(PETSc.PC.ASMType.RESTRICT)
         own = PETSc.IS().createStride(ownership.n_local, ownership.first, 1, comm=PETSc.COMM_SELF)
         low, high = overlap if ownership.n_local else (ownership.first, ownership.first)
+        # Whole blocks; there are no others, and ends of the line are ends of blocks.
+        low, high = low - low % block, high + -high % block
         wide = PETSc.IS().createStride(high - low, low, 1, comm=PETSc.COMM_SELF)
         pc.setASMLocalSubdomains(1, [wide], [own])
         options = PETSc.Options(PREFIX)
         for name, value in (
             ("sub_ksp_type", "preonly"),
-            ("sub_pc_type", "lu"),
-            ("sub_pc_factor_mat_ordering_type", "nd"),
+            ("sub_pc_type", "cholesky" if pairs else "lu"),
+            ("sub_pc_factor_mat_ordering_type", _ordering(pairs)),
         ):
             if not options.hasName(name):
                 options.setValue(name, value)
@@ -148,3 +162,7 @@ class StepSolver:
             self._ksp.setTolerances(rtol=1e-14, max_it=200)
         for vector in (solution, right, residual):
             vector.destroy()
+
+
+def _ordering(pairs: bool) -> str:
+    return str(PETSc.Mat.OrderingType.NATURAL if pairs else PETSc.Mat.OrderingType.ND)

@@ -18,7 +18,7 @@ from catenary.solver.errors import RunBroken
 from catenary.solver.linear import StepSolver
 from catenary.solver.locality import reach
 from catenary.solver.model import Model
-from catenary.solver.operators import assemble
+from catenary.solver.operators import assemble, station_block
 from catenary.solver.problem import Numerics
 
 
@@ -56,6 +56,7 @@ class NewmarkLine:
                 stiffness=self.position_factor,
                 damping=self.velocity_factor,
                 held_diagonal=1.0,
+                block_size=station_block(model, ownership),
             ),
             "stiffness": assemble(comm, model, ownership, stiffness=1.0),
         }
@@ -81,7 +82,7 @@ class NewmarkLine:
                 [ownership.first // model.block_size, ownership.last // model.block_size - 1]
             ]
             overlap = self.windows.around(float(ends[0]), float(ends[1]))
-        self.solver = StepSolver(comm, operators["step"], ownership, overlap)
+        self.solver = StepSolver(comm, operators["step"], ownership, overlap, model.block_size)
         n = ownership.n_local
         names = ("displacement", "velocity", "acceleration", "work", "right")
         # The vectors wrap our arrays, so that nothing in the loop makes or copies arrays. An array
