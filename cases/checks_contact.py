@@ -62,8 +62,8 @@ def _loss(scene: Scene) -> None:
         )
 
 
-# Below it the force of a moving kinematic contact alternates with a growing amplitude: accelerations
-# of Newmark's average acceleration remember a jump forever.
+# Below it the force of a moving kinematic contact alternates with a growing amplitude:
+# accelerations of Newmark's average acceleration remember a jump forever.
 KINEMATIC_GAMMA = 0.55
 
 

@@ -86,7 +86,9 @@ def _names(scene: Scene, kind: str, table: MultibodyTable) -> None:
     if table.actuator is not None:
         _known(scene, f"{key}.actuator", table.actuator, list(table.forces))
     for place, name in _uses(table):
-        _known(scene, f"{key}.{place}", name, [*bodies, SPACE])
+        # What is on one body alone would be without effect on what is at rest.
+        on_one = place.endswith(".body")
+        _known(scene, f"{key}.{place}", name, bodies if on_one else [*bodies, SPACE])
     for what in ("joints", "forces"):
         for label, one in getattr(table, what).items():
             if getattr(one, "i", None) == getattr(one, "j", SPACE):
@@ -137,10 +139,10 @@ def _static_forces(scene: Scene, on_the_train: set[str]) -> None:
         if wanted_force(table, speed) is None:
             first, last = table.static_force_by_speed[0][0], table.static_force_by_speed[-1][0]
             key = "train.speed_km_h"
+            held = f"{first:g} km/h" if first == last else f"{first:g} to {last:g} km/h"
             raise InputError(
                 f"{key} is {speed:g} km/h {scene.origin.of(key)}; "
-                f"pantographs.{name}.static_force_by_speed only holds forces for {first:g} to "
-                f"{last:g} km/h"
+                f"pantographs.{name}.static_force_by_speed only holds forces for {held}"
             )
 
 

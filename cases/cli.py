@@ -40,6 +40,12 @@ Assignments = Annotated[
         help="Replace a key of the scene, KEY= takes it away; repeatable.",
     ),
 ]
+Out = Annotated[
+    Path,
+    typer.Option(
+        "-o", "--out", parser=console.folder, metavar="<path>", help="Folder for the results."
+    ),
+]
 MoreAssignments = Annotated[
     list[str] | None,
     typer.Argument(metavar="KEY=VALUE", help="Further assignments after --set."),
@@ -82,7 +88,7 @@ Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more.")]
 @console.guarded
 def run(
     case: Case,
-    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")],
+    out: Out,
     extras: PetscOptions = None,
     assignments: Assignments = None,
     shortened: Shortened = False,

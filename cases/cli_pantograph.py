@@ -34,6 +34,8 @@ def pantograph(
         typer.Option(
             "-o",
             "--out",
+            parser=console.folder,
+            metavar="<path>",
             help="Folder for receptance.csv, receptance.png and lumped.toml.",
         ),
     ] = None,

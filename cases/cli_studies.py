@@ -29,7 +29,7 @@ _SHOWN_BROKEN = 3
 @console.guarded
 def sweep(
     case: cli.Case,
-    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")],
+    out: cli.Out,
     extras: cli.PetscOptions = None,
     vary: Annotated[
         list[str] | None,

@@ -6,6 +6,7 @@ import functools
 import os
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -32,6 +33,17 @@ def complain(sentence: str) -> None:
     """Print one sentence to standard error on rank 0. Not collective."""
     if speaks():
         typer.echo(f"catenary: {' '.join(sentence.split())}", err=True)
+
+
+def folder(text: str) -> Path:
+    """The folder that an option names. Not collective.
+
+    An empty name, such as that of a shell's variable without a value, is refused: it would stand
+    for the working directory.
+    """
+    if not text.strip():
+        raise typer.BadParameter("it is empty; name a folder, the working directory by a dot")
+    return Path(text)
 
 
 def world() -> Any:

@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 
 from pydantic import BaseModel, ValidationError
 
-from catenary.cases.keys import known_keys, nearest, without_kinds
+from catenary.cases.keys import is_known, known_keys, nearest, without_kinds
 from catenary.cases.units import unit_of
 from catenary.solver.errors import InputError
 
@@ -18,13 +18,18 @@ COMMAND_LINE = "on the command line (--set)"
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a scene's keys were written: its file, and the keys given by ``--set``."""
+    """Where a scene's keys were written: its file, the keys given by ``--set``, and pairs of a key
+    and the file that its value was read from."""
 
     file: str
     overridden: tuple[str, ...] = ()
+    taken_in: tuple[tuple[str, str], ...] = ()
 
     def of(self, key: str) -> str:
         """Place of a key, with its preposition, for use in a sentence."""
+        for above, file in self.taken_in:
+            if key == above or key.startswith(above + "."):
+                return f"in {file}"
         for given in self.overridden:
             if key == given or key.startswith(given + ".") or given.startswith(key + "."):
                 return COMMAND_LINE
@@ -79,7 +84,9 @@ _WANTED: dict[str, Callable[[dict[str, Any]], str]] = {
     "dict_type": lambda c: "must be a table",
     "model_type": lambda c: "must be a table",
     "literal_error": lambda c: f"must be {c['expected'].replace(chr(39), '')}",
-    "too_short": lambda c: f"must have at least {c['min_length']} entries",
+    "too_short": lambda c: (
+        f"must have at least {c['min_length']} {'entry' if c['min_length'] == 1 else 'entries'}"
+    ),
     "too_long": lambda c: f"must have at most {c['max_length']} entries",
     "string_too_short": lambda c: "must not be empty",
     "string_too_long": lambda c: f"must have at most {c['max_length']} characters",
@@ -122,7 +129,11 @@ def _sentence(
     where = origin.of(key)
     kind = problem["type"]
     if kind == "extra_forbidden":
-        return unknown_key(key, where, known_keys(model, problem["loc"]))
+        of_this_kind = known_keys(model, problem["loc"])
+        if not is_known(key, of_this_kind) and is_known(key, known_keys(model)):
+            chosen = [part for part in problem["loc"] if part not in parts]
+            return f"{key} {where} does not belong to type {chosen[-1]}"
+        return unknown_key(key, where, of_this_kind)
     if kind == "missing":
         meaning = field.description if field is not None else ""
         return f"{key}{f' ({meaning})' if meaning else ''} is missing {where}"

@@ -165,7 +165,7 @@ def scene_from(raw: dict[str, Any], origin: Origin, folder: Path | None = None) 
 
     raw = copy.deepcopy(raw)
     _fill_in(raw, folder, "mesh.file" in origin.overridden)
-    take_in_files(raw, origin, folder)
+    origin = take_in_files(raw, origin, folder)
     try:
         scene = Scene.model_validate(raw)
     except ValidationError as failed:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from catenary.cases.table import TAKE_AWAY, Table
 
@@ -12,26 +12,54 @@ from catenary.cases.table import TAKE_AWAY, Table
 _SUSPENSION = ("mass_kg", "stiffness_N_per_m")
 _PITCH = ("pitch_inertia_kg_m2", "pitch_spring_distance_m")
 
+# What weighs or turns less than this is none of a pantograph's parts [kg], [kg m2]; accelerations
+# of far less are beyond a computer's numbers.
+LEAST_MASS, LEAST_INERTIA = 1e-3, 1e-6
+
+
+def _no_less_mass(mass: float) -> float:
+    if mass < LEAST_MASS:
+        raise ValueError(f"must be at least {LEAST_MASS:g} kg")
+    return mass
+
+
+def _no_less_inertia(inertia: float) -> float:
+    if inertia < LEAST_INERTIA:
+        raise ValueError(f"must be at least {LEAST_INERTIA:g} kg m2")
+    return inertia
+
+
+def _no_switch(value: Any) -> Any:
+    if isinstance(value, bool):
+        raise ValueError("must be 1 or 2")
+    return value
+
+
+SomeMass = AfterValidator(_no_less_mass)
+SomeInertia = AfterValidator(_no_less_inertia)
+
 
 class StripsTable(Table):
     """Collector strips, fixed to the head or on springs of their own."""
 
-    number: Literal[1, 2] = Field(1, description="strips of the head, one or two")
+    number: Annotated[Literal[1, 2], BeforeValidator(_no_switch)] = Field(
+        1, description="strips of the head, one or two"
+    )
     spacing_m: float | None = Field(
         None, gt=0, le=3, description="between two strips, along the track"
     )
     length_m: float | None = Field(
         None, gt=0, le=5, description="of a strip, across the track; unchecked if absent"
     )
-    mass_kg: float | None = Field(
-        None, gt=0, le=100, description="of each strip on springs of its own, part of the head's"
+    mass_kg: Annotated[float, Field(gt=0, le=100), SomeMass] | None = Field(
+        None, description="of each strip on springs of its own, part of the head's"
     )
     stiffness_N_per_m: float | None = Field(
         None, gt=0, le=1e8, description="between each strip and the head"
     )
     damping_N_s_per_m: float = Field(0.0, ge=0, le=1e6, description="between each strip and head")
-    pitch_inertia_kg_m2: float | None = Field(
-        None, gt=0, le=1000, description="of a lumped head that pitches between two strips"
+    pitch_inertia_kg_m2: Annotated[float, Field(gt=0, le=1000), SomeInertia] | None = Field(
+        None, description="of a lumped head that pitches between two strips"
     )
     pitch_spring_distance_m: float | None = Field(
         None, gt=0, le=3, description="along the track, between the springs below such a head"
@@ -70,7 +98,9 @@ class StripsTable(Table):
 class RollTable(Table):
     """A lumped head that rolls on two springs beside each other."""
 
-    inertia_kg_m2: float = Field(gt=0, le=1000, description="of the head, about the track")
+    inertia_kg_m2: Annotated[float, Field(gt=0, le=1000), SomeInertia] = Field(
+        description="of the head, about the track"
+    )
     spring_distance_m: float = Field(
         gt=0, le=3, description="across the track, between the springs below the head"
     )

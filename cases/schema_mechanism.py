@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from catenary.cases.schema_head import SomeInertia, SomeMass
 from catenary.cases.table import Table, ascending, exactly_one
 from catenary.mbs.bodies import SPACE
 
@@ -54,9 +55,9 @@ _ORIGIN = [0.0, 0.0, 0.0]
 class BodyTable(Table):
     """A rigid body; its axes are principal axes of inertia through its centre of mass."""
 
-    mass_kg: float = Field(gt=0, le=10000, description="mass")
+    mass_kg: Annotated[float, Field(gt=0, le=10000), SomeMass] = Field(description="mass")
     inertia_kg_m2: Annotated[
-        list[Annotated[float, Field(gt=0, le=1e6)]], Field(min_length=3, max_length=3)
+        list[Annotated[float, Field(gt=0, le=1e6), SomeInertia]], Field(min_length=3, max_length=3)
     ] = Field(description="moments of inertia about the body's axes")
     position_m: Point = Field(description="centre of mass at the start, joints roughly closed")
     turn: Turn = Field(_ORIGIN, description="Euler parameters e1, e2, e3 at the start")

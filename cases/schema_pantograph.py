@@ -15,12 +15,12 @@ from pydantic import (
 )
 
 from catenary.cases.loading import assign
-from catenary.cases.schema_head import RollTable, StripsTable
+from catenary.cases.schema_head import RollTable, SomeMass, StripsTable
 from catenary.cases.schema_mechanism import BodyTable, ForceTable, JointTable, Name
 from catenary.cases.table import TAKE_AWAY, Table, ascending, exactly_one
 from catenary.solver.errors import InputError
 
-Mass = Annotated[float, Field(gt=0, le=1000)]
+Mass = Annotated[float, Field(gt=0, le=1000), SomeMass]
 Stiffness = Annotated[float, Field(ge=0, le=1e8)]
 DampingValue = Annotated[float, Field(ge=0, le=1e6)]
 # What acts only where all bodies are moved.
@@ -51,7 +51,12 @@ class _Pressing(Table):
         if self.static_force_by_speed is not None:
             ascending([pair[0] for pair in self.static_force_by_speed],
                       "the speeds of static_force_by_speed")  # fmt: skip
-            for _, force in self.static_force_by_speed:
+            for speed, force in self.static_force_by_speed:
+                if not 0 <= speed <= 1000:
+                    raise ValueError(
+                        "must have speeds between 0 and 1000 km/h in static_force_by_speed, but "
+                        f"one is {speed:g}"
+                    )
                 if not 0 < force <= 1000:
                     raise ValueError(
                         "must have forces between 0 and 1000 N in static_force_by_speed, "

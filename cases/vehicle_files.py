@@ -6,17 +6,21 @@ A result then holds the numbers themselves, and does not change with the file.
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from catenary.cases.messages import Origin, shown
 from catenary.solver.errors import InputError
 
+_LONGEST_NAME = 1000
 _DIRECTIONS, _COURSES = ("vertical", "lateral"), ("by_time", "by_place")
 
 
-def take_in_files(raw: dict[str, Any], origin: Origin, folder: Path | None) -> None:
+def take_in_files(raw: dict[str, Any], origin: Origin, folder: Path | None) -> Origin:
     """Replace every ``by_..._file`` of a raw scene's vehicle by the pairs that it holds, in place.
+
+    Returns where all keys were written then.
 
     Names in the case file are relative to its ``folder``, those of the command line to the working
     directory.
@@ -28,7 +32,8 @@ def take_in_files(raw: dict[str, Any], origin: Origin, folder: Path | None) -> N
     """
     vehicle = raw.get("vehicle")
     if not isinstance(vehicle, dict):
-        return
+        return origin
+    taken: list[tuple[str, str]] = []
     for direction in _DIRECTIONS:
         table = vehicle.get(direction)
         if not isinstance(table, dict):
@@ -45,8 +50,10 @@ def take_in_files(raw: dict[str, Any], origin: Origin, folder: Path | None) -> N
                 )
             own = key in origin.overridden or folder is None
             path = (Path.cwd() if own else folder or Path()) / name
-            table[course] = _pairs(path, f"{key} is {shown(name)} {origin.of(key)}")
+            table[course] = _pairs(path, f"{key} is {_named(name)} {origin.of(key)}")
             del table[f"{course}_file"]
+            taken.append((f"vehicle.{direction}.{course}", str(path)))
+    return replace(origin, taken_in=tuple(taken))
 
 
 def _pairs(path: Path, where: str) -> list[list[float]]:
@@ -76,6 +83,11 @@ def _pairs(path: Path, where: str) -> list[list[float]]:
     if not pairs:
         raise InputError(f"{where}; it holds no pairs of numbers")
     return pairs
+
+
+def _named(name: str) -> str:
+    """A file's name, whole as long as it can be one: its end tells most."""
+    return f'"{name}"' if len(name) <= _LONGEST_NAME and name.isprintable() else shown(name)
 
 
 def _why(error: Exception) -> str:

@@ -35,6 +35,8 @@ TRAVEL = 0.01
 # Forces on further motions of the mechanism that show that it has no hold, over its weight. A link
 # that may spin between two balls, a little off its balance, stays well below.
 ADRIFT = 0.01
+# More than any actuator's force [N].
+MOST_FORCE = 1e7
 # The joint that holds the arm in what is computed here.
 HOLDER = "height of the arm"
 
@@ -148,6 +150,11 @@ def stand(data: MultibodyData) -> Standing:
     if data.actuator is not None and data.static_force is not None:
         found = calibrate_actuator(system, data.actuator, holder, motion, data.static_force)
         push, force, before = found.actuator_force, found.static_force, found.force_before
+        if abs(push) > MOST_FORCE:
+            raise InputError(
+                f"its actuator {data.actuator!r} would need {push:.3g} N for its static force of "
+                f"{force:g} N: it hardly acts on the arm {data.arm!r}; check its points"
+            )
         system = system.with_force_changed(data.actuator, force=push)
     else:
         force = before = held_force(system, holder, motion)

@@ -160,7 +160,10 @@ def calibrate_actuator(
     unit_force = max(1.0, abs(force))
     gain = (pressed(force + unit_force) - had) / unit_force
     if abs(gain) < 1e-9:
-        raise InputError(f"Actuator {actuator!r} does not act on what {holder.name!r} holds.")
+        raise InputError(
+            f"Actuator {actuator!r} does not act on the {holder.name}: move its points off what "
+            "it turns about, or to other bodies."
+        )
     push, reached = force, had
     for _ in range(20):
         push += (static_force - reached) / gain
@@ -168,8 +171,8 @@ def calibrate_actuator(
         if abs(reached - static_force) <= 1e-9 * max(1.0, abs(static_force)):
             return Calibration(push, reached, gain, had)
     raise RunBroken(
-        f"No force of actuator {actuator!r} gives the static force {static_force:g} N; "
-        f"{push:g} N give {reached:g} N."
+        f"Actuator {actuator!r} would need {push:.3g} N for a static force of {static_force:g} N, "
+        "which is beyond calculation: check its points, springs and stops."
     )
 
 

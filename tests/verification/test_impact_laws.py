@@ -1,7 +1,7 @@
 """A ball on a fixed wire: restitution of each contact law, and the energy of contact cycles.
 
-For m dv/dt = -K d^n (1 + chi v / v0) the time drops out: m v dv / (1 + chi v / v0) = -K d^n dd. From
-touching with v0 to leaving with -e v0 this integrates to
+For m dv/dt = -K d^n (1 + chi v / v0) the time drops out: m v dv / (1 + chi v / v0) = -K d^n dd.
+From touching with v0 to leaving with -e v0 this integrates to
 
     chi (1 + e) = log((1 + chi) / (1 - chi e)),
 

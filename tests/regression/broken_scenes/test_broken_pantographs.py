@@ -146,6 +146,60 @@ ASSIGNMENTS = {
         [f"{KIND}.joints.lock={{type='prescribed_point', body='mast', coordinate_m=1}}"],
         "leave no way to raise",
     ),
+    "hardly a mass": (
+        [f"{KIND}.bodies.mast.mass_kg=1e-300"],
+        "is 1e-300 on the command line (--set); it must be at least 0.001 kg",
+    ),
+    "hardly an inertia": (
+        [f"{KIND}.bodies.mast.inertia_kg_m2=[1, 1e-300, 1]"],
+        "inertia_kg_m2.1 is 1e-300 on the command line (--set); it must be at least 1e-06 kg m2",
+    ),
+    "switch for a number of strips": (
+        [f"{KIND}.strips.number=true"],
+        f"{KIND}.strips.number is true on the command line (--set); it must be 1 or 2",
+    ),
+    "force on what is at rest": (
+        [f"{KIND}.forces.push={{type='point_force', body='space', force_N=[0, 0, 9]}}"],
+        f'{KIND}.forces.push.body is "space" on the command line (--set); it must be one of mast',
+    ),
+    "joint of what is at rest": (
+        [f"{KIND}.joints.point={{type='prescribed_point', body='space', coordinate_m=0}}"],
+        f'{KIND}.joints.point.body is "space"',
+    ),
+    "other model's table": ([f"{KIND}.type=lumped"], "does not belong to type lumped"),
+    "negative speed of a force": (
+        [f"{KIND}.static_force_N=", f"{KIND}.static_force_by_speed=[[-300, 90], [300, 90]]"],
+        "must have speeds between 0 and 1000 km/h in static_force_by_speed, but one is -300",
+    ),
+    "force for one other speed": (
+        [f"{KIND}.static_force_N=", f"{KIND}.static_force_by_speed=[[200, 90]]"],
+        "static_force_by_speed only holds forces for 200 km/h",
+    ),
+    "no joints": ([f"{KIND}.joints={{}}"], "must have at least 1 entry"),
+    "actuator nearly across": (
+        [
+            f"{KIND}.forces.side={{type='actuator', j='mast', at_i_m=[-1, 0, 0.999999], "
+            "force_N=1}",
+            f"{KIND}.actuator=side",
+        ],
+        "it hardly acts on the arm 'mast'; check its points",
+    ),
+    "stop that nothing overcomes": (
+        [
+            f"{KIND}.forces.stop={{type='bump_stop', j='mast', at_i_m=[0, 0, -50], longest_m=1, "
+            "stiffness_N_per_m=1e8}",
+        ],
+        "for a static force of 120 N, which is beyond calculation",
+    ),
+    "wire out of reach": (
+        [f"{KIND}.nominal_height_m=9"],
+        "away from there, beyond the reach of its mechanism",
+    ),
+    "substeps of tables": ([f"{KIND}.substeps=2"], "acts only with motion = all_bodies"),
+    "motion of lumped masses": (
+        ["pantographs.reference.motion=all_bodies"],
+        "pantographs.reference.motion on the command line (--set) does not belong to type lumped",
+    ),
     "too weak": (
         [f"{KIND}.calibrate=false", f"{KIND}.static_force_N=", f"{KIND}.forces.jack.force_N=100"],
         "its actuators cannot raise it",

@@ -219,7 +219,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
             ),
             "actuator": "side",
         },
-        "'side' does not act on what",
+        "'side' does not act on the height of the arm",
     ),
 }
 

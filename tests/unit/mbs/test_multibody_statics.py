@@ -100,5 +100,5 @@ def test_what_has_no_answer_is_said() -> None:
     with pytest.raises(InputError, match="no force 'lift'"):
         calibrate_actuator(lever(), "lift", holder, lever().start(), 50.0)
     useless = lever().with_forces(Actuator("idle", SPACE, "rod", (-1.0, 0, 0), (0, 0, 0), 1.0))
-    with pytest.raises(InputError, match="'idle' does not act on what 'wire' holds"):
+    with pytest.raises(InputError, match="'idle' does not act on the wire"):
         calibrate_actuator(useless, "idle", holder, useless.start(), 50.0)
