@@ -131,8 +131,7 @@ def _sentence(
     if kind == "extra_forbidden":
         of_this_kind = known_keys(model, problem["loc"])
         if not is_known(key, of_this_kind) and is_known(key, known_keys(model)):
-            chosen = [part for part in problem["loc"] if part not in parts]
-            return f"{key} {where} does not belong to type {chosen[-1]}"
+            return f"{key} {where} does not belong to type {_kind(problem['loc'], parts)}"
         return unknown_key(key, where, of_this_kind)
     if kind == "missing":
         meaning = field.description if field is not None else ""
@@ -144,6 +143,17 @@ def _sentence(
     unit = unit_of(key)
     shown_unit = f" [{unit}]" if unit and kind in _OF_A_NUMBER else ""
     return f"{key} is {shown(value)} {where}; it {wanted}{shown_unit}"
+
+
+def _kind(loc: Sequence[int | str], parts: Sequence[int | str]) -> str:
+    """The last kind of table in a pydantic location, from what is left without kinds."""
+    left, kind = list(parts), ""
+    for part in loc:
+        if left and part == left[0]:
+            left.pop(0)
+        else:
+            kind = str(part)
+    return kind
 
 
 def _location(loc: Sequence[int | str], raw: Any) -> list[str]:
