@@ -7,6 +7,8 @@ axes all bodies weigh more by its acceleration, which is exact for a base that d
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -214,7 +216,8 @@ class FullPantograph:
         self._aim(time)
         # The loop's clock counts: a restart begins at any time.
         self._stepper.time = time - self._dt
-        found = self._stepper.predict(time)
+        with self._named():
+            found = self._stepper.predict(time)
         displacement, velocity, _ = found.changes(np.zeros(len(self._points)))
         heights, gradients = self._touching(found.motion)
         head = self._head
@@ -226,8 +229,15 @@ class FullPantograph:
         return head
 
     def advance(self, contact_force: np.ndarray) -> None:
-        """Take the step predicted last with these contact forces (s,) [N]."""
-        self._stepper.advance(np.asarray(contact_force, dtype=float))
+        """Take the step predicted last with these contact forces (s,) [N].
+
+        Raises
+        ------
+        RunBroken
+            Its joints cannot be kept closed, or numbers are not finite.
+        """
+        with self._named():
+            self._stepper.advance(np.asarray(contact_force, dtype=float))
 
     def state(self) -> np.ndarray:
         """Places, velocities, accelerations, contact forces, and what holds it down."""
@@ -252,6 +262,14 @@ class FullPantograph:
         system, motion = self.system, self.motion
         elastic = sum(f.energy(motion) for f in system.forces if not isinstance(f, Gravity))
         return 0.5 * float(system.mass @ motion.velocities**2) + elastic
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        """Say of which pantograph it is that breaks."""
+        try:
+            yield
+        except RunBroken as error:
+            raise RunBroken(f"Pantograph {self._data.name!r}: {error}") from error
 
     def _beyond_reach(self, head_height: float) -> RunBroken:
         return RunBroken(

@@ -22,7 +22,7 @@ from catenary.mbs.raising import RaisingPantograph
 from catenary.mbs.spins import without_spins
 from catenary.mbs.step_solvers import METHODS
 from catenary.mbs.strips import Strips, Suspension
-from catenary.solver.errors import CatenaryError, InputError
+from catenary.solver.errors import CatenaryError, InputError, RunBroken
 
 STATIC, HEIGHT, DT = 150.0, 5.08, 1e-3
 WIRE = 5e4  # [N/m] contact, on a wire that does not give way
@@ -220,3 +220,13 @@ def test_strips_with_springs_of_their_own_are_refused() -> None:
     with pytest.raises(InputError, match="'seven_body': strips with a suspension of their own"):
         FullPantograph(replace(paper.data(), strips=strips), STATIC, HEIGHT, 0.5, DT)
     assert stand(paper.data()).n_freedoms == 5
+
+
+def test_breaking_is_told_with_the_pantograph_s_name() -> None:
+    """A contact force beyond all measure throws the head too far for its joints to follow."""
+    pantograph = full()
+    pantograph.place(HEIGHT)
+    with pytest.raises(RunBroken, match="Pantograph 'seven_body': "):
+        for number in range(20):
+            pantograph.predict((number + 1) * DT)
+            pantograph.advance(np.array([1e9]))
