@@ -96,10 +96,11 @@ class Explicit(_RemembersLaw):
         if not law.pulls:
             np.maximum(force, 0.0, out=force)
         _refuse_diverged(force)
-        slack = self._inner.slack_under(line, force)
-        gap = self._inner.gap
-        gap.put(line, heads)
-        return InnerSolution(force, slack, *gap.under(force, slack), rounds=1)
+        inner = self._inner
+        inner.pivoted = False
+        slack = inner.slack_under(line, force)
+        inner.gap.put(line, heads)
+        return InnerSolution(force, slack, *inner.gap.under(force, slack), 1, inner.pivoted)
 
 
 class Iterated:
@@ -134,6 +135,7 @@ class Iterated:
         """Forces after as many exchanges as they need."""
         gap, law, force = self._inner.gap, self.law, self._latest
         gap.put(line, heads)
+        self._inner.pivoted = False
         for number in range(1, self._max_iterations + 1):
             slack = self._inner.slack_under(line, force)
             new = law.force(*gap.under(force, slack)).copy()
@@ -145,7 +147,8 @@ class Iterated:
             if change <= self._tolerance:
                 self._latest = force
                 slack = self._inner.slack_under(line, force)
-                return InnerSolution(force, slack, *gap.under(force, slack), rounds=number)
+                depth, rate = gap.under(force, slack)
+                return InnerSolution(force, slack, depth, rate, number, self._inner.pivoted)
         raise RunBroken(
             f"line and pantographs do not agree on the contact forces within "
             f"{self._max_iterations} exchanges (numerics.max_iterations): these still change by "

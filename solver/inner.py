@@ -43,7 +43,8 @@ class InnerSolution:
     """What a step's forces are; the arrays are overwritten by the next step.
 
     ``contact_force`` (n,) [N]; ``compensation`` (m,) [N] of the droppers with a row; ``depth`` (n,)
-    [m] and its ``rate`` (n,) [m/s] at the contacts; ``rounds`` of all iterations.
+    [m] and its ``rate`` (n,) [m/s] at the contacts; ``rounds`` of all iterations; ``pivoted``
+    whether an active set cycled, so that pivoting had to find it.
     """
 
     contact_force: np.ndarray
@@ -51,6 +52,7 @@ class InnerSolution:
     depth: np.ndarray
     rate: np.ndarray
     rounds: int
+    pivoted: bool = False
 
 
 class Gap:
@@ -124,6 +126,10 @@ class InnerProblem:
     kept_ratio : share r of its stiffness that a slack dropper keeps
     band : (n_droppers, 2 half + 1), ``band[e, d - e + half]`` is G_de [-]; (0, 1) if droppers do
         not slacken
+
+    Attributes
+    ----------
+    pivoted : whether an active set has cycled since this was last set to False
     """
 
     def __init__(self, law: LawInSteps, kept_ratio: float, band: np.ndarray) -> None:
@@ -131,6 +137,7 @@ class InnerProblem:
         self.gap = Gap(law.n)
         self._released = 1.0 - kept_ratio
         self._band = band
+        self.pivoted = False
         self._make_room(_FIRST_ROOM)
 
     def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
@@ -143,6 +150,7 @@ class InnerProblem:
         """
         gap, law = self.gap, self.law
         gap.put(line, heads)
+        self.pivoted = False
         # Without a force heads stand highest: from there Newton's method comes from one side.
         law.linearise(gap.depth, gap.rate)
         rounds = 0
@@ -151,10 +159,10 @@ class InnerProblem:
             rounds += more
             depth, rate = gap.under(force, slack)
             if law.is_linear:
-                return InnerSolution(force, slack, depth, rate, rounds)
+                return InnerSolution(force, slack, depth, rate, rounds, self.pivoted)
             law.linearise(depth, rate)
             if law.agrees(force):
-                return InnerSolution(force, slack, depth, rate, rounds)
+                return InnerSolution(force, slack, depth, rate, rounds, self.pivoted)
         raise RunBroken("the contact law finds no force; take a smaller numerics.dt_s")
 
     def slack_under(self, line: LineResponse, force: np.ndarray) -> np.ndarray:
@@ -172,6 +180,7 @@ class InnerProblem:
         always, solution = np.zeros(m, dtype=bool), np.zeros(m)
         rounds = inner_kernels.settle(matrix, right, always, solution, _MAX_ROUNDS)
         if rounds <= 0:
+            self.pivoted = True
             _pivot(matrix, right, always, solution)
         return solution
 
@@ -196,6 +205,7 @@ class InnerProblem:
             _MAX_ROUNDS,
         )
         if rounds <= 0:
+            self.pivoted = True
             matrix, right = self._matrix[:size, :size].copy(), self._right[:size].copy()
             rounds = _pivot(matrix, right, self._always[:size], self._solution[:size]) - rounds
             force = self._solution[:n]

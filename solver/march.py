@@ -22,6 +22,7 @@ from catenary.solver.coupling import make_coupling
 from catenary.solver.distribution import distribute
 from catenary.solver.equilibrium import Elasticity, Equilibrium
 from catenary.solver.errors import CatenaryError, InputError, RunBroken
+from catenary.solver.events import event
 from catenary.solver.fixed_point import FixedPoint
 from catenary.solver.interaction import Interaction
 from catenary.solver.law_in_steps import law_in_steps
@@ -98,6 +99,7 @@ class March:
         nominal_height = nominal_height_rule(model, form, elasticity)
         self._pantographs = Pantographs(comm, problem, self._interaction.wire, nominal_height)
         self._scheme = self._make_scheme(on)
+        self._show_event = event("Show")
         self._showing = Showing(
             comm,
             model,
@@ -289,6 +291,7 @@ class March:
     def _show(self, ts: PETSc.TS, observers: Sequence[Observer], step: int, time: float) -> None:
         if self._stepper.broken:
             return
+        self._show_event.begin()
         view = self._showing.view(step, time)
         try:
             for observer in observers:
@@ -296,6 +299,7 @@ class March:
         except RunBroken as error:
             # An exception must not pass through PETSc; observers raise it on all ranks.
             self._stepper.give_up(ts, str(error))
+        self._show_event.end()
 
 
 def _finish(observers: Sequence[Observer], outcome: str) -> str:

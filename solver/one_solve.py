@@ -11,6 +11,7 @@ from catenary.solver import inner_kernels
 from catenary.solver.contact import Touches
 from catenary.solver.coupling import Coupling
 from catenary.solver.errors import RunBroken
+from catenary.solver.events import NAMES, event
 from catenary.solver.exchange import Exchange, Reply, Verdict
 from catenary.solver.heads import Heads
 from catenary.solver.inner import NOT_FINITE, InnerSolution
@@ -52,24 +53,33 @@ class OneSolve:
             self._drop = np.zeros(self.interaction.slack_coupling.n_droppers)
         self._found: InnerSolution | None = None
         self._why = ""
+        self._events = {name: event(name) for name in NAMES}
 
     def step(self, time: float, stop: bool) -> bool:
-        line, interaction = self.interaction.line, self.interaction
+        line, interaction, events = self.interaction.line, self.interaction, self._events
+        events["LineFree"].begin()
         line.predict()
         touches = self.pantographs.move_to(time)
         if self.coupling.extrapolates:
             share = self._exchange.share
             interaction.heights(touches, share.early_height, share.early_rate)
         line.free_acceleration(self.loads(time))
-        interaction.place(touches)
         # From here on the line holds the end of the step without contacts and slack droppers.
         line.correct()
+        events["LineFree"].end()
+        events["LineColumns"].begin()
+        interaction.place(touches)
+        events["LineColumns"].end()
         reply = self._solve_inner(time, stop, touches)
+        events["LineSuperpose"].begin()
         interaction.superpose(reply.contact_force, reply.droppers, reply.compensation)
+        events["LineSuperpose"].end()
+        events["PantoAdvance"].begin()
         if self.pantographs.joints_in_loop:
             on_root(self.comm, self._advance)  # joints may fail to close, which all must know
         else:
             self._advance()
+        events["PantoAdvance"].end()
         self.counters.steps += 1
         self.counters.solves += 1
         return reply.verdict == Verdict.ADVANCE
@@ -90,11 +100,15 @@ class OneSolve:
         self.coupling.restore(state)
 
     def _solve_inner(self, time: float, stop: bool, touches: Touches) -> Reply:
-        exchange, interaction = self._exchange, self.interaction
+        exchange, interaction, events = self._exchange, self.interaction, self._events
+        events["ContactInner"].begin()
         heads = self._heads(time) if self.comm.rank == 0 else None
+        events["ContactInner"].end()
         while True:
             share = exchange.share
+            events["ContactShare"].begin()
             interaction.respond(touches, self._bound, self._margin, share)
+            events["ContactShare"].end()
             share.wants_to_stop = stop
             merged = exchange.to_root()
             answer = None
@@ -158,6 +172,7 @@ class OneSolve:
             return Reply(Verdict.BROKEN, self._none)
         self._found = found
         self.counters.rounds += found.rounds
+        self.counters.pivoted_steps += found.pivoted
         verdict = Verdict.ADVANCE_AND_STOP if response.wants_to_stop else Verdict.ADVANCE
         slack = found.compensation
         if not slack.size:

@@ -28,8 +28,9 @@ from catenary.solver.problem import Placement, Problem
 class Pantographs:
     """All pantographs of a train, n of them, with their n_contacts strips. Collective to make.
 
-    Each is placed at the wire at rest. With a kinematic contact it already moves up and down with
-    the wire under way, V dw/dx: a head at rest would have to be brought to that within one step.
+    Each is placed at the wire at rest, or ``start_below`` it. With a kinematic contact it already
+    moves up and down with the wire under way, V dw/dx: a head at rest would have to be brought to
+    that within one step.
 
     Attributes
     ----------
@@ -72,7 +73,7 @@ class Pantographs:
         self._told = np.zeros((3, self.n))
         self.contact_force, self.head_height, self.wire_height = self._told
         self.wire_height[:] = wire.rest_height(self._start)
-        self.head_height[:] = self.wire_height
+        self.head_height[:] = self.wire_height - train.start_below
         self._heads = Heads(self.n_contacts)
         self.joints_in_loop = any(has_joints(placement.data) for placement in train.placements)
         self.constraint_violation = np.full(self.n, np.nan)
@@ -153,7 +154,7 @@ class Pantographs:
             velocity = self._speed * self._wire.rest_slope(self._start)
         for number, placement in enumerate(problem.train.placements):
             model = self._make(problem, placement, nominal_height(placement))
-            model.place(float(self.wire_height[number]), float(velocity[number]))
+            model.place(float(self.head_height[number]), float(velocity[number]))
             self.models.append(model)
         self.look_at_joints()
 

@@ -44,7 +44,8 @@ class Placement:
 class Train:
     """``speed`` [m/s]; ``start`` and ``end`` [m] of the leading pantograph; ``raise_time`` [s] in
     which the static force grows from zero to its value; ``vehicle`` is how the pantographs' bases
-    move, with the effect ``vehicle_motion``."""
+    move, with the effect ``vehicle_motion``; heads start ``start_below`` [m] below the wire at
+    rest."""
 
     speed: float
     start: float
@@ -52,6 +53,7 @@ class Train:
     raise_time: float
     placements: tuple[Placement, ...]
     vehicle: VehicleMotion | None = None
+    start_below: float = 0.0
 
 
 @dataclass(frozen=True)

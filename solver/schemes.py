@@ -13,11 +13,17 @@ LoadSource = Callable[[float], list[tuple[np.ndarray, np.ndarray]]]
 
 @dataclass
 class Counters:
-    """What the steps of a run needed."""
+    """What the steps of a run needed.
+
+    ``repeated_steps``: bounds of what may slacken were too small; ``pivoted_steps``: the active
+    set of contacts and slack droppers cycled, and pivoting found it; ``unconverged_steps``: the
+    fixed-point correction gave up, which ends the run.
+    """
 
     steps: int = 0
     rounds: int = 0
     repeated_steps: int = 0
+    pivoted_steps: int = 0
     slack_dropper_steps: int = 0
     solves: int = 0
     unconverged_steps: int = 0
