@@ -82,6 +82,13 @@ def _kinematic(scene: Scene) -> None:
                 value,
                 f"contact.law kinematic has no force before the motion is known: take {needed}",
             )
+    if scene.train.start_below_m:
+        refuse(
+            scene.origin,
+            "train.start_below_m",
+            scene.train.start_below_m,
+            "contact.law kinematic has no gap that a head could rise through: take another law",
+        )
     if numerics.newmark_gamma < KINEMATIC_GAMMA:
         refuse(
             scene.origin,

@@ -186,6 +186,7 @@ def _train(scene: Scene) -> Train:
         start=scene.train.start_m,
         end=scene.end_m,
         raise_time=scene.train.raise_time_s,
+        start_below=scene.train.start_below_m,
         placements=tuple(placements),
         vehicle=None if scene.vehicle is None else vehicle_of(scene.vehicle),
     )

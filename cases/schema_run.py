@@ -52,6 +52,12 @@ class TrainTable(Table):
     raise_time_s: float = Field(
         0.5, ge=0, le=60, description="time in which the static force grows from zero"
     )
+    start_below_m: float = Field(
+        0.0,
+        ge=0,
+        le=5,
+        description="how far below the wire at rest all heads start, so that they are raised",
+    )
     pantographs: list[PlacementTable] = Field(
         min_length=1, max_length=16, description="pantographs in running order, leading one first"
     )

@@ -85,6 +85,10 @@ def test_the_resolved_scene_is_the_same_again(overrides: list[str]) -> None:
             ["contact.law=kinematic", NO_STIFFNESS, *DAMPED, "numerics.scheme=fixed_point"],
             "take one_solve",
         ),
+        (
+            ["contact.law=kinematic", NO_STIFFNESS, "train.start_below_m=0.1"],
+            "no gap that a head could rise through",
+        ),
         (["contact.law=hertz", "effects.contact_loss=false"], "has no force that pulls"),
         (["contact.law=hertz", "effects.contact_damping=true"], "has no damping"),
         (["effects.contact_damping=true"], "needs a value greater than 0"),

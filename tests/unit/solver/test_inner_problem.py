@@ -137,6 +137,7 @@ def test_pivoting_finds_the_same_solution(case: Case) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(inner, "_MAX_ROUNDS", 0)
         pivoted = case.solve()
+    assert pivoted.pivoted and not usual.pivoted
     assert case.violation(pivoted) < TOLERANCE
     assert pivoted.contact_force == pytest.approx(usual.contact_force, abs=10 * TOLERANCE)
     assert pivoted.compensation == pytest.approx(usual.compensation, abs=10 * TOLERANCE)
@@ -160,6 +161,7 @@ def test_a_problem_that_cycles_is_handed_to_the_pivoting() -> None:
             solutions.append(x)
     assert len(solutions) == 1
     assert found.compensation == pytest.approx(solutions[0], abs=100 * EPS * np.abs(right).max())
+    assert found.pivoted
 
 
 def one_contact(height: float, may_lose_contact: bool = True) -> InnerSolution:
