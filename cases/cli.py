@@ -74,6 +74,13 @@ PetscOptions = Annotated[
     list[str] | None,
     typer.Argument(metavar="-- PETSC_OPTION", help="Options for PETSc, after --."),
 ]
+MoreAndPetscOptions = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="KEY=VALUE -- PETSC_OPTION",
+        help="Further assignments after --set, and after -- options for PETSc.",
+    ),
+]
 Strict = Annotated[
     bool, typer.Option("--strict", help="Exit with 3 if an acceptance criterion fails.")
 ]
@@ -84,13 +91,13 @@ Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more.")]
     "run",
     help="Simulate a case and write its results into a folder.",
     epilog="Example: catenary run en50318_2002 -o results/en300 --set train.speed_km_h=300 "
-    "-- -log_view",
+    "-- -log_view; catenary run ambrosio2012 --study -o results/study",
 )
 @console.guarded
 def run(
     case: Case,
     out: Out,
-    extras: PetscOptions = None,
+    extras: MoreAndPetscOptions = None,
     assignments: Assignments = None,
     shortened: Shortened = False,
     force: Force = False,

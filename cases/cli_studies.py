@@ -30,7 +30,7 @@ _SHOWN_BROKEN = 3
 def sweep(
     case: cli.Case,
     out: cli.Out,
-    extras: cli.PetscOptions = None,
+    extras: cli.MoreAndPetscOptions = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(

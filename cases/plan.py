@@ -13,17 +13,22 @@ from catenary.mbs.multibody import MultibodyData
 from catenary.solver import effects
 from catenary.solver.problem import Problem
 
-# Cost model of the march on one rank, fitted to the processor time of runs of the case ac_simple
-# with 3e3 to 1e5 unknowns on a two-core machine of 2026 (Debian 12, PETSc 3.18): overhead of a
-# step, and time per unknown. The fit is good to 40 % there, and machines differ by a factor of
+# Cost model of the march on one rank, records included: overhead of a step, and time per unknown.
+# Runs of the case ambrosio2012 on 25, 100 and 1000 spans, 4.5e3 to 1.8e5 unknowns, on a two-core
+# machine of 2026 (Debian 12, PETSc 3.18) lie within 40 % of it, and machines differ by a factor of
 # two; the plan calls it an estimate.
-STEP_OVERHEAD = 2.0e-4  # [s]
-STEP_PER_UNKNOWN = 1.6e-8  # [s]
-# The fixed-point scheme repeats the solve; 1.7 to 2.4 times the time of one_solve was measured.
-FIXED_POINT_FACTOR = 2.0
+STEP_OVERHEAD = 4.0e-5  # [s]
+STEP_PER_UNKNOWN = 1.1e-8  # [s]
+# The fixed-point scheme repeats the solve; 3 times the time of one_solve was measured.
+FIXED_POINT_FACTOR = 3.0
 # A substep of a pantograph with all its bodies: 0.21 to 0.38 ms were measured with the paper's
 # seven, by the way of keeping joints.
 ALL_BODIES_SUBSTEP = 3.0e-4  # [s]
+
+# Time between two flushes of the result file, each of which takes some 5 ms [s], and what may wait
+# for one in memory [B].
+FLUSH_EVERY = 0.5
+FLUSH_MEMORY = 1e8
 
 # Resident memory of the same runs, report included: program and libraries, then per unknown.
 MEMORY_BASE = 2.3e8  # [B]
@@ -180,6 +185,16 @@ def _substeps(problem: Problem) -> int:
     kinds = [place.data for place in problem.train.placements]
     ways = [kind.all_bodies for kind in kinds if isinstance(kind, MultibodyData)]
     return sum(way.substeps for way in ways if way is not None)
+
+
+def flush_cadence(problem: Problem, n_dofs: int) -> int:
+    """Steps between two flushes: about half a second of wall time, and what fits into memory.
+
+    The same on any number of ranks, so that their files are.
+    """
+    step = estimate_march(n_dofs, 1, problem.numerics.scheme, _substeps(problem))
+    # There are fewer channels than unknowns.
+    return max(1, min(round(FLUSH_EVERY / step), int(FLUSH_MEMORY / (_BYTES * n_dofs))))
 
 
 def plan_text(plan: Plan) -> str:

@@ -22,7 +22,7 @@ from petsc4py import PETSc
 from catenary.cases.interrupts import StopRequest
 from catenary.cases.meshing import mesh_of
 from catenary.cases.pantograph_facts import header_facts
-from catenary.cases.plan import effect_rows
+from catenary.cases.plan import effect_rows, flush_cadence
 from catenary.cases.scene import Scene
 from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.fields import FieldRecorder
@@ -211,11 +211,12 @@ def _march(
             march.restore(on_root(comm, lambda: _checkpoint(out_dir)))
     header = _header(scene, problem, at_rest, petsc_options) if comm.rank == 0 else None
     dt, output = problem.numerics.dt, scene.output
+    flush_every = output.flush_every_steps or flush_cadence(problem, at_rest.model.n_dofs)
     recorder = Recorder(
         comm,
         out_dir / RESULT,
         header,
-        flush_every=output.flush_every_steps,
+        flush_every=flush_every,
         energy_every=_cadence(output.energy_every_s, dt),
         resume=resume,
     )
@@ -229,7 +230,7 @@ def _march(
             at_rest.mesh.wires,
             at_rest.mesh.droppers,
             every=field_every,
-            flush_every=output.flush_every_steps,
+            flush_every=flush_every,
             resume=resume,
         )
         observers.insert(0, fields)

@@ -134,7 +134,7 @@ class MultibodyTable(_Pressing):
     motion: Literal["reduced", "all_bodies"] = Field(
         "reduced",
         description="in the time loop: the mechanism as tables over the arm's height, or all "
-        "bodies with their joints, which takes tens of times longer",
+        "bodies with their joints, which makes a run several times longer",
     )
     constraint_handling: Literal["coordinate_partitioning", "augmented_lagrangian", "baumgarte"] = (
         Field(

@@ -141,8 +141,12 @@ class OutputTable(Table):
     energy_every_s: float = Field(
         0.05, ge=0, le=1e4, description="cadence of the line's energy; 0 writes none"
     )
-    flush_every_steps: int = Field(
-        500, ge=1, le=10**7, description="steps after which the result file is brought up to date"
+    flush_every_steps: int | None = Field(
+        None,
+        ge=1,
+        le=10**7,
+        description="steps after which the result file is brought up to date; about half a "
+        "second's worth if absent",
     )
 
 

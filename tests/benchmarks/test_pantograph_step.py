@@ -27,7 +27,7 @@ from catenary.solver.march import March
 
 CASE = "ambrosio2012"
 N_STEPS, ROUNDS = 3000, 7
-# What the step of a pantograph may take on one core, beside wires that take some 200 us [us].
+# What the step of a pantograph may take on one core, beside a whole step of some 65 us [us].
 LIMITS = {"lumped, 2 masses": 5.0, "lumped, 3 masses": 5.0, "seven bodies": 10.0}
 _median_us: dict[str, float] = {}
 
