@@ -15,7 +15,7 @@ NAMES = {
     "LineFree": "prediction, product with K, solve and correction of the line",
     "LineColumns": "answers of the line to unit contact forces",
     "ContactShare": "heights, compliances and tensions that this rank owns",
-    "ContactGather": "shares to rank 0",
+    "ContactReduce": "shares to rank 0",
     "ContactInner": "pantographs' predictions and the inner problem, on rank 0",
     "ContactReply": "forces to all ranks",
     "LineSuperpose": "answers to the forces",

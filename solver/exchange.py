@@ -1,7 +1,8 @@
 """The step's messages: every rank's share of the inner problem to rank 0, the forces back.
 
-One gather and one broadcast of fixed size a step, whatever the number of ranks; they also carry
-the wish to stop and the news of a failure, so that all ranks leave the loop at the same step.
+One reduction to rank 0 and one broadcast of fixed size a step, whatever the number of ranks; what
+a rank sends besides are rows of droppers that may slacken, if it owns any. Both also carry the wish
+to stop and the news of a failure, so that all ranks leave the loop at the same step.
 """
 
 from __future__ import annotations
@@ -10,10 +11,13 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
+from mpi4py import MPI
 
 from catenary.solver.response import LineResponse
 
 _FIRST_CAPACITY = 32
+# Numbers before the forces in a reply, and the tag of rows.
+_HEAD, _ROWS = 3, 7
 _NO_NUMBERS, _NO_FORCES = np.zeros(0, dtype=np.int64), np.zeros(0)
 
 
@@ -41,7 +45,7 @@ class Reply(NamedTuple):
 
 
 class Exchange:
-    """Gathers and broadcasts for ``n_contacts``. All methods are collective.
+    """Sums up and broadcasts for ``n_contacts``. All methods are collective.
 
     Attributes
     ----------
@@ -60,62 +64,77 @@ class Exchange:
 
     def enlarge(self, capacity: int) -> None:
         """Make room for at least ``capacity`` droppers a rank."""
-        n, size, is_root = self._n, self._comm.size, self._comm.rank == 0
+        n = self._n
         self.share = LineResponse(n, capacity, self._early)
-        self._merged, self._all = self.share, None
-        self._answer = np.zeros(3 + n)
-        if size > 1:
-            self._answer = np.zeros(3 + n + 2 * capacity * size)
-            if is_root:
-                self._merged = LineResponse(n, capacity * size, self._early)
-                self._all = np.zeros((size, self.share.packet.size))
+        self._merged = LineResponse(n, capacity, self._early)
+        self._answer = np.zeros(_HEAD + n + 2 * capacity)
 
     def to_root(self) -> LineResponse | None:
-        """Sum of all shares on rank 0, None elsewhere."""
-        if self._comm.size == 1:
-            return self.share
-        self._comm.Gather(self.share.packet, self._all, root=0)
-        return self._merge() if self._all is not None else None
-
-    def missing_room(self, merged: LineResponse) -> int:
-        """How many droppers a rank had to report if they did not fit, otherwise 0. Rank 0 only."""
-        counts = [merged.count] if self._all is None else self._all[:, 0]
-        most = int(max(counts))
-        return most if most > self.share.capacity else 0
+        """Sum of all shares on rank 0, with the rows of all; None elsewhere."""
+        comm, share, merged = self._comm, self.share, self._merged
+        if comm.size == 1:
+            return share
+        is_root = comm.rank == 0
+        # Two ranks at most own the ends of an element: the order of summing does not matter.
+        comm.Reduce(share.summed, merged.summed if is_root else None, op=MPI.SUM, root=0)
+        if not is_root:
+            if share.count:
+                comm.Send(share.rows[: share.count], dest=0, tag=_ROWS)
+            return None
+        self._receive_rows()
+        return self._merged
 
     def from_root(self, reply: Reply | None) -> Reply:
         """Rank 0's reply on all ranks; None is passed elsewhere."""
-        if self._comm.size == 1:
+        comm, answer, n = self._comm, self._answer, self._n
+        if comm.size == 1:
             assert reply is not None
             return reply
-        answer, n = self._answer, self._n
+        room = (answer.size - _HEAD - n) // 2
         if reply is not None:
             count = reply.droppers.size
-            answer[:3] = reply.verdict, count, reply.room
-            answer[3 : 3 + n] = reply.contact_force
-            answer[3 + n : 3 + n + count] = reply.droppers
-            answer[3 + n + count : 3 + n + 2 * count] = reply.compensation
-        self._comm.Bcast(answer, root=0)
+            answer[:_HEAD] = reply.verdict, count, reply.room
+            answer[_HEAD : _HEAD + n] = reply.contact_force
+            if count <= room:
+                answer[_HEAD + n : _HEAD + n + count] = reply.droppers
+                answer[_HEAD + n + count : _HEAD + n + 2 * count] = reply.compensation
+        comm.Bcast(answer, root=0)
         count = int(answer[1])
+        pairs = answer[_HEAD + n : _HEAD + n + 2 * count]
+        if count > room:
+            # More slack droppers at once than a rank reports: rare, and told in a second message.
+            pairs = np.zeros(2 * count)
+            if reply is not None:
+                pairs[:count], pairs[count:] = reply.droppers, reply.compensation
+            comm.Bcast(pairs, root=0)
         return Reply(
             Verdict(int(answer[0])),
-            answer[3 : 3 + n].copy(),
-            answer[3 + n : 3 + n + count].astype(np.int64),
-            answer[3 + n + count : 3 + n + 2 * count].copy(),
+            answer[_HEAD : _HEAD + n].copy(),
+            pairs[:count].astype(np.int64),
+            pairs[count : 2 * count].copy(),
             int(answer[2]),
         )
 
-    def _merge(self) -> LineResponse:
-        """All shares as one: sums, and the rows one after the other."""
-        parts, merged, size = self._all, self._merged, self.share.n_summed
-        assert parts is not None
-        parts[:, :size].sum(axis=0, out=merged.packet[:size])
-        counts = np.minimum(parts[:, 0], self.share.capacity).astype(int)
-        end = 0
-        for part, count in zip(parts[:, size:], counts, strict=True):
-            if count:
-                rows = part.reshape(self.share.rows.shape)
-                merged.rows[end : end + count] = rows[:count]
-                end += count
-        merged.count = end
-        return merged
+    def _receive_rows(self) -> None:
+        """Rows of all ranks one after the other, rank by rank."""
+        comm, share, merged = self._comm, self.share, self._merged
+        total = merged.count
+        if total > merged.capacity:
+            larger = LineResponse(self._n, 2 * total, self._early)
+            larger.summed[:] = merged.summed
+            self._merged = merged = larger
+        merged.rows[: share.count] = share.rows[: share.count]
+        missing = total - share.count
+        parts, status = {}, MPI.Status()
+        while missing > 0:
+            comm.Probe(source=MPI.ANY_SOURCE, tag=_ROWS, status=status)
+            rows = np.empty(
+                (status.Get_count(MPI.DOUBLE) // share.rows.shape[1], share.rows.shape[1])
+            )
+            comm.Recv(rows, source=status.Get_source(), tag=_ROWS)
+            parts[status.Get_source()] = rows
+            missing -= len(rows)
+        end = share.count
+        for source in sorted(parts):
+            merged.rows[end : end + len(parts[source])] = parts[source]
+            end += len(parts[source])

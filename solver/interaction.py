@@ -194,9 +194,9 @@ class Interaction:
         )
         # What is no number anywhere is one at the next dropper in the step after.
         response.is_broken = not (self.droppers.find_tension() and finite)
-        response.count = 0
+        count = 0
         if self._may_slacken:
-            response.count = kernels.watch(
+            count = kernels.watch(
                 self.droppers.latest_tension,
                 margin,
                 force_bound,
@@ -213,6 +213,7 @@ class Interaction:
                 line.velocity_factor,
                 response.rows,
             )
+        response.put_count(count)
 
     def superpose(
         self, contact_force: np.ndarray, droppers: np.ndarray, compensation: np.ndarray

@@ -78,12 +78,14 @@ class StepSolver:
             pc.setType(PETSc.PC.Type.CHOLESKY if pairs else PETSc.PC.Type.LU)
             pc.setFactorOrdering(_ordering(pairs))
         else:
-            self._set_up_schwarz(pc, ownership, overlap, matrix.getBlockSize(), pairs)
+            self._set_up_schwarz(pc, ownership, overlap, matrix.getBlockSize())
         # Of an iteration that the options ask for; a direct solver has no tolerance.
         self._ksp.setTolerances(rtol=_DIRECT)
         with refused_options():
             self._ksp.setFromOptions()
             self._ksp.setUp()
+            if pc.getType() == PETSc.PC.Type.ASM:
+                self._set_up_own_solvers(pc, pairs)
             self._ksp.setUpOnBlocks()
         self._verify(matrix)
         self._direct = self.is_direct
@@ -120,7 +122,7 @@ class StepSolver:
 
     @staticmethod
     def _set_up_schwarz(
-        pc: PETSc.PC, ownership: Ownership, overlap: tuple[int, int], block: int, pairs: bool
+        pc: PETSc.PC, ownership: Ownership, overlap: tuple[int, int], block: int
     ) -> None:
         pc.setType(PETSc.PC.Type.ASM)
         pc.setASMType(PETSc.PC.ASMType.RESTRICT)
@@ -130,14 +132,21 @@ class StepSolver:
         low, high = low - low % block, high + -high % block
         wide = PETSc.IS().createStride(high - low, low, 1, comm=PETSc.COMM_SELF)
         pc.setASMLocalSubdomains(1, [wide], [own])
-        options = PETSc.Options(PREFIX)
-        for name, value in (
-            ("sub_ksp_type", "preonly"),
-            ("sub_pc_type", "cholesky" if pairs else "lu"),
-            ("sub_pc_factor_mat_ordering_type", _ordering(pairs)),
-        ):
-            if not options.hasName(name):
-                options.setValue(name, value)
+
+    @staticmethod
+    def _set_up_own_solvers(pc: PETSc.PC, pairs: bool) -> None:
+        """Make this rank's own solver direct unless options say otherwise."""
+        given = PETSc.Options(PREFIX)
+        for solver in pc.getASMSubKSP():
+            own = solver.getPC()
+            # A rank may own nothing, of which there is no Cholesky factor.
+            factors_pairs = pairs and solver.getOperators()[0].getSize()[0] > 0
+            if not given.hasName("sub_ksp_type"):
+                solver.setType(PETSc.KSP.Type.PREONLY)
+            if not given.hasName("sub_pc_type"):
+                own.setType(PETSc.PC.Type.CHOLESKY if factors_pairs else PETSc.PC.Type.LU)
+            if not given.hasName("sub_pc_factor_mat_ordering_type"):
+                own.setFactorOrdering(_ordering(factors_pairs))
 
     def _verify(self, matrix: PETSc.Mat) -> None:
         """Measure the residual for a load on every unknown; iterate if it is not round-off."""

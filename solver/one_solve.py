@@ -158,9 +158,8 @@ class OneSolve:
         if response.is_broken:
             self._why = NOT_FINITE
             return Reply(Verdict.BROKEN, self._none)
-        room = self._exchange.missing_room(response)
-        if room:
-            return Reply(Verdict.ENLARGE, self._none, room=room)
+        if response.missing_room:
+            return Reply(Verdict.ENLARGE, self._none, room=response.missing_room)
         law = self.coupling.law
         try:
             found = self.coupling.solve(response, heads)

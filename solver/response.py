@@ -1,4 +1,4 @@
-"""The line's side of the inner problem, as the one array that a rank sends."""
+"""The line's side of the inner problem, as a rank sends it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class LineResponse:
 
     Attributes
     ----------
-    packet : everything in one array; all below are views of it
+    summed : everything that adds up over ranks, in one array; the others but ``rows`` are its views
     height, rate : (n,) free wire height [m] and its total rate [m/s] at the contacts
     height_by_force, rate_by_force : (n, n) B [m/N] and its rate [m/(N s)]
     early_height, early_rate : (n,) what the line's motion extrapolates to, or (0,) if not asked
@@ -29,23 +29,28 @@ class LineResponse:
         n, n_early = n_contacts, n_contacts if early else 0
         self.n_contacts, self.capacity = n, capacity
         sizes = (4, n, n, n * n, n * n, n_early, n_early)
-        self.n_summed = sum(sizes)
-        self.packet = np.zeros(self.n_summed + capacity * (COUPLINGS + 3 * n))
-        parts = np.split(self.packet[: self.n_summed], np.cumsum(sizes)[:-1])
+        self.summed = np.zeros(sum(sizes))
+        parts = np.split(self.summed, np.cumsum(sizes)[:-1])
         self._flags, self.height, self.rate = parts[:3]
         self.height_by_force = parts[3].reshape(n, n)
         self.rate_by_force = parts[4].reshape(n, n)
         self.early_height, self.early_rate = parts[5:]
-        self.rows = self.packet[self.n_summed :].reshape(capacity, COUPLINGS + 3 * n)
+        self.rows = np.zeros((capacity, COUPLINGS + 3 * n))
 
     @property
     def count(self) -> int:
-        """Number of droppers that may slacken; beyond ``capacity`` they have no row."""
+        """Number of droppers that may slacken and have a row."""
         return int(self._flags[0])
 
-    @count.setter
-    def count(self, count: int) -> None:
-        self._flags[0] = count
+    @property
+    def missing_room(self) -> int:
+        """How many rows would have been needed, if there was no room for them; else 0."""
+        return int(self._flags[3])
+
+    def put_count(self, count: int) -> None:
+        """Say how many droppers may slacken; beyond ``capacity`` they have no row."""
+        self._flags[0] = min(count, self.capacity)
+        self._flags[3] = count if count > self.capacity else 0
 
     @property
     def wants_to_stop(self) -> bool:
@@ -68,14 +73,14 @@ class LineResponse:
     @property
     def droppers(self) -> np.ndarray:
         """Numbers of the droppers with a row (m,)."""
-        return self.rows[: min(self.count, self.capacity), NUMBER].astype(np.int64)
+        return self.rows[: self.count, NUMBER].astype(np.int64)
 
     @property
     def tension(self) -> np.ndarray:
         """T0 (m,) [N]."""
-        return self.rows[: min(self.count, self.capacity), TENSION]
+        return self.rows[: self.count, TENSION]
 
     def couplings(self, kind: int) -> np.ndarray:
         """Q, P or the rate of P, for ``kind`` 0, 1 or 2, shape (m, n)."""
         begin = COUPLINGS + kind * self.n_contacts
-        return self.rows[: min(self.count, self.capacity), begin : begin + self.n_contacts]
+        return self.rows[: self.count, begin : begin + self.n_contacts]

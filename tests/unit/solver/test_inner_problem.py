@@ -87,7 +87,7 @@ def make_case(
     line.height[:], line.rate[:] = rng.normal(size=(2, n))
     line.height_by_force[:] = position * among_contacts
     line.rate_by_force[:] = velocity * among_contacts
-    line.count = m
+    line.put_count(m)
     line.rows[:, 0], line.rows[:, 1] = np.arange(m), rng.normal(size=m)
     line.couplings(0)[:] = per_acceleration[:, None] * between
     line.couplings(1)[:] = position * between
@@ -148,7 +148,7 @@ def test_a_problem_that_cycles_is_handed_to_the_pivoting() -> None:
     matrix = np.array([[1.0, -3.0, 2.0], [3.0, 1.0, 0.0], [-3.0, -2.0, 1.0]])
     right = np.array([1.0, -2.0, 3.0])
     line = LineResponse(0, 3)
-    line.count = 3
+    line.put_count(3)
     line.rows[:, 0], line.rows[:, 1] = np.arange(3), -right
     law = LinearInSteps(LinearLaw(1.0, 0.0), 0, pulls=False)
     found = InnerProblem(law, 0.0, band_of(np.eye(3) - matrix)).solve(line, Heads(0))
