@@ -11,11 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from catenary.postproc import export, plots, standards
 from catenary.postproc import statistics as stats
+from catenary.postproc.indicators import Indicators, indicate
 from catenary.postproc.remarks import remarks
 from catenary.postproc.results import Results
 from catenary.postproc.standards import KMH, Criterion
@@ -171,11 +173,14 @@ def _html(
     )
     environment.filters["number"] = _number
     about = results.attributes
+    indicators = indicate(results)
     return environment.get_template("report.html.j2").render(
         about=about,
         results=results,
         statistics=statistics,
-        statistics_rows=_statistics_rows(statistics) + _violation_row(results),
+        statistics_rows=_statistics_rows(statistics)
+        + _error_rows(indicators)
+        + _violation_row(results),
         criteria=criteria,
         digits=lambda criterion: 3 if criterion.unit == "%" else 1,
         failed=[c for c in criteria if c.passed is False],
@@ -187,8 +192,8 @@ def _html(
         droppers=export.dropper_table(results),
         reference_span=results.reference_span + 1,
         elasticity=1e3 * results.static("elasticity"),
-        remarks=remarks(results),
-        facts=_facts(results),
+        remarks=[*indicators.warnings, *remarks(results)],
+        facts=_facts(results) + _mesh_facts(indicators),
         phases=about.get("phase_wall_s", {}),
         config=json.dumps(about["config"], indent=2, ensure_ascii=False),
         pictures={p.name: p for p in pictures},
@@ -200,6 +205,30 @@ def _statistics_rows(statistics: RunStatistics) -> list[tuple[str, str, list[str
     return [
         (label, unit, [_number(factor * getattr(p, name), digits) for p in statistics.pantographs])
         for label, name, unit, factor, digits in _STATISTICS_ROWS
+    ]
+
+
+def _error_rows(found: Indicators) -> list[tuple[str, str, list[str]]]:
+    """What the time step is estimated to change, pantograph by pantograph."""
+    label = "estimated error of the force history by the time step, 20 Hz, rms"
+    shares = [f"{_number(100.0 * share, 2)}" for share in found.relative_error]
+    return [
+        (label, "N", [_number(float(error), 2) for error in found.force_error]),
+        ("the same, of the standard deviation", "%", shares),
+    ]
+
+
+def _mesh_facts(found: Indicators) -> list[tuple[str, str]]:
+    """The shortest waves of the mesh beside those that matter."""
+    required = (
+        f"{found.required_frequency:.0f} Hz" if np.isfinite(found.required_frequency) else "–"
+    )
+    return [
+        (
+            "waves on the contact wire that the mesh carries within 1 %",
+            f"up to {found.resolved_frequency:.0f} Hz; ahead of the train 20 Hz at the pantograph "
+            f"excite {required}",
+        )
     ]
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from catenary.postproc import indicators
 from catenary.postproc.results import Results
 from catenary.postproc.standards import KMH, Criterion, verdict
 from catenary.postproc.statistics import PantographStatistics, RunStatistics
@@ -56,6 +57,7 @@ def summarise(
         "static": _static(results),
         "acceptance": [_criterion(c) for c in criteria],
         "passed": verdict(criteria) if results.complete else None,
+        "indicators": indicators.as_table(indicators.indicate(results)),
         "complaints": statistics.complaints,
         "effects_on": [name for name, _, _ in attributes["effects_on"]],
         "effects_off": [name for name, _, _ in attributes["effects_off"]],

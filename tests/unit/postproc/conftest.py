@@ -21,6 +21,15 @@ N_SPANS, SPAN = 16, 50.0
 DROPPERS = tuple(5.0 + 5.0 * k for k in range(9))
 SPEED = 300.0 / 3.6
 EVALUATION = (250.0, 550.0)
+LINE_CONFIG = {
+    "n_spans": N_SPANS,
+    "contact_wire": {
+        "tension_N": 20e3,
+        "mass_kg_per_m": 1.33,
+        "bending_stiffness_N_m2": 180.0,
+    },
+    "damping": {"alpha_s": 1e-4, "beta_per_s": 0.0125},
+}
 
 
 def make_line() -> Line:
@@ -97,7 +106,7 @@ def make_header(line: Line, mesh: LineMesh, **attributes: Any) -> Header:
         "system": "ac",
         "edition": "2006",
         "versions": {"catenary": "0.1.0", "petsc": "3.18.5", "python": "3.11"},
-        "config": {"line": {"n_spans": N_SPANS}, "numerics": {"dt_s": 1e-3, "scheme": "one_solve"}},
+        "config": {"line": LINE_CONFIG, "numerics": {"dt_s": 1e-3, "scheme": "one_solve"}},
         "effects_on": [
             ("vertical", "vertical motion of the tensioned wires", "always"),
             ("dropper_slackening", "droppers that slacken", "default"),
