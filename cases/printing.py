@@ -119,8 +119,9 @@ def summary_text(summary: Mapping[str, Any], folder: Path) -> str:
             f"  {words[row['passed']]:10}  {row['criterion']}: {_number(row['value'], 2)}, limit "
             f"{_number(row['limit'], 2)} {row.get('unit', '')}".rstrip()
         )
-    lines += ["", *(f"  WARNING     {text}" for text in summary["indicators"]["warnings"])]
-    lines += [""] * bool(summary["indicators"]["warnings"]) + [f"Results: {folder}"]
+    warnings = summary.get("indicators", {}).get("warnings", [])  # older runs have none
+    lines += ["", *(f"  WARNING     {text}" for text in warnings)]
+    lines += [""] * bool(warnings) + [f"Results: {folder}"]
     return "\n".join(lines)
 
 
