@@ -52,9 +52,9 @@ test-mpi: setup ## the same answers on 2 and 3 ranks
 	timeout 600 mpirun -n 2 $(MPI_FLAGS) $(MPI_PYTEST) tests/mpi
 	timeout 600 mpirun -n 3 $(MPI_FLAGS) $(MPI_PYTEST) tests/mpi
 
-bench: setup ## what a step costs against its floor and against the paper's correction
+bench: setup ## what steps cost: against their floor, by phase, spans and ranks
 	@mkdir -p results
-	$(PYTEST) -q -s tests/benchmarks $(LONG_RUNS:%=--ignore=%) --benchmark-json=results/bench.json
+	MPI_FLAGS="$(MPI_FLAGS)" $(PYTEST) -q -s tests/benchmarks $(LONG_RUNS:%=--ignore=%) --benchmark-json=results/bench.json
 
 long-runs: setup ## all bodies of a pantograph over 20 s and ten minutes; some seven minutes
 	$(PYTEST) -q -s $(LONG_RUNS)

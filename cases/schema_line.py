@@ -166,7 +166,7 @@ class TransitionTable(Table):
 class LineTable(Table):
     """The line from anchor to anchor."""
 
-    n_spans: int = Field(ge=1, le=2000, description="number of spans from anchor to anchor")
+    n_spans: int = Field(ge=1, le=20_000, description="number of spans from anchor to anchor")
     span_m: Annotated[LengthList, Field(min_length=1, max_length=2000)] = Field(
         description="span length, or a list of span lengths that is repeated"
     )

@@ -1,0 +1,88 @@
+"""Times the march of a long line on the ranks it is started on, and prints a line of JSON.
+
+mpirun -n 2 python -m mpi4py step_cost.py SPANS STEPS
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+from mpi4py import MPI
+
+from catenary.cases.meshing import mesh_of
+from catenary.cases.scene import load_scene
+from catenary.solver.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.march import March
+from catenary.solver.model import build
+from catenary.solver.parallel import on_root
+
+CHUNKS = 3
+
+
+def main(n_spans: int, n_steps: int) -> None:
+    comm = MPI.COMM_WORLD
+    begin = time.perf_counter()
+    scene = load_scene("ambrosio2012", [f"line.n_spans={n_spans}", *room(n_spans)])
+    problem = scene.to_problem()
+    mesh = on_root(comm, lambda: mesh_of(scene))
+
+    def rest() -> tuple:
+        model, form = find_form(problem, mesh)
+        return form, model.dropper_lengths, elasticity(model, *middle_span(problem.line))
+
+    form, lengths, lift = on_root(comm, rest)
+    model = build(problem, mesh, lengths)
+    at_rest = time.perf_counter()
+    walls = []
+    for chunk in range(CHUNKS + 1):
+        train = problem.train
+        length = n_steps * problem.numerics.dt * train.speed
+        march = March(
+            comm,
+            replace(problem, train=replace(train, end=train.start + length)),
+            model,
+            form,
+            lift,
+        )
+        if chunk == 0:
+            ready = time.perf_counter()
+        outcome = march.run([])
+        walls.append(outcome.wall / outcome.n_steps)
+        march.destroy()
+    peak = comm.reduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024.0, MPI.SUM)
+    if comm.rank == 0:
+        print(
+            json.dumps(
+                {
+                    "spans": n_spans,
+                    "unknowns": model.n_dofs,
+                    "ranks": comm.size,
+                    "rest_s": at_rest - begin,
+                    "ready_s": ready - begin,
+                    # The first march pays for pages and caches.
+                    "us_per_step": 1e6 * float(np.median(walls[1:])),
+                    "peak_bytes": peak,
+                }
+            )
+        )
+
+
+def room(n_spans: int) -> list[str]:
+    """Where a train runs on a line of this many spans: in its middle, so that all ranks see it."""
+    if n_spans <= 25:
+        return ["evaluation.from_m=160", "evaluation.to_m=200"]
+    middle = 54 * (n_spans // 2)
+    return [
+        f"train.start_m={middle - 60}",
+        f"evaluation.from_m={middle}",
+        f"evaluation.to_m={middle + 60}",
+    ]
+
+
+if __name__ == "__main__":
+    main(*(int(argument) for argument in sys.argv[1:3]))
