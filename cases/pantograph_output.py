@@ -98,6 +98,21 @@ def lumped_toml(found: PantographStudy) -> str:
     return "\n".join(lines) + "\n"
 
 
+def inline_table(found: PantographStudy) -> str:
+    """The fitted model as the value of ``pantographs.NAME=...`` on the command line."""
+    data = found.fit.data
+    parts = [
+        'type = "lumped"',
+        f"masses_kg = {_list(data.masses)}",
+        f"stiffnesses_N_per_m = {_list(data.stiffnesses)}",
+        f"dampings_N_s_per_m = {_list(data.dampings)}",
+        f"static_force_N = {found.static_force:.6g}",
+    ]
+    if found.nominal_height is not None:
+        parts.append(f"nominal_height_m = {found.nominal_height!r}")
+    return "{" + ", ".join(parts) + "}"
+
+
 def _list(values: tuple[float, ...]) -> str:
     # TOML wants a point or an exponent in a float, and takes an integer for one as well.
     return "[" + ", ".join(f"{value:.6g}" for value in values) + "]"

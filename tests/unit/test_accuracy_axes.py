@@ -1,0 +1,119 @@
+"""The table of axes: what each varies, on which cases, and how runs are shared."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from catenary.cases.accuracy_axes import AXES, DISCRETISATION, parse_axes
+from catenary.cases.accuracy_plan import Plan, make_plan
+from catenary.cases.cli import app
+from catenary.cases.scene import load_scene
+from catenary.solver.errors import InputError
+
+CASE = "en50318_2002"
+
+
+@pytest.fixture(scope="module")
+def plan() -> Plan:
+    """All axes of the reference model."""
+    return make_plan(CASE, parse_axes(None))
+
+
+def test_all_levels_of_the_reference_model_make_scenes(plan: Plan) -> None:
+    for planned in plan.axes:
+        assert not planned.refused, planned.axis.name
+        names = [level.name for level in planned.levels]
+        assert len(set(names)) == len(names)
+        assert (planned.check is not None) == (planned.axis.kind == DISCRETISATION)
+    names = [job.variant.name for job in plan.jobs]
+    assert len(set(names)) == len(names)
+
+
+def test_settings_that_make_the_same_scene_are_run_once(plan: Plan) -> None:
+    scenes = [json.dumps(job.scene.resolved(), sort_keys=True, default=str) for job in plan.jobs]
+    assert len(set(scenes)) == len(scenes)
+    runs = {planned.axis.name: planned.runs for planned in plan.axes}
+    # The case has 1 ms, average acceleration, 5e4 N/m and droppers that slacken.
+    own = runs["dt"]["1_ms"]
+    assert runs["scheme"]["average_acceleration"] == own
+    assert runs["contact"]["linear_50000"] == own
+    assert runs["dropper"]["slackening"] == own
+
+
+def test_references_are_finer_than_all_levels_and_checks_finer_still() -> None:
+    scene = load_scene(CASE)
+    for quick in (False, True):
+        for axis in AXES.values():
+            if axis.reference is None:
+                continue
+            pair = axis.reference(quick)
+            for name, size in pair.level.sizes:
+                sizes = [level.size(name) for level in axis.chosen(scene, quick)]
+                assert all(other is None or other >= size for other in sizes), axis.name
+                assert (pair.check.size(name) or 0.0) < size
+            assert pair.level.sizes not in [level.sizes for level in axis.chosen(scene, quick)]
+
+
+def test_a_mechanism_is_varied_as_one() -> None:
+    plan = make_plan("ambrosio2012", parse_axes("pantograph"))
+    (planned,) = plan.axes
+    assert [*planned.runs] == [
+        "fitted_1_mass",
+        "fitted_2_mass",
+        "fitted_3_mass",
+        "reduced",
+        "all_bodies",
+    ]
+    jobs = {job.variant.name: job for job in plan.jobs}
+    fitted = jobs[planned.runs["fitted_3_mass"]].scene
+    assert len(fitted.pantographs[fitted.train.pantographs[0].name].masses_kg) == 3
+    assert planned.runs["reduced"] == planned.reference
+
+
+def test_a_pantograph_that_is_fitted_to_itself_is_found_again(plan: Plan) -> None:
+    """The fit of two masses to the reference model's two masses: 7.2 and 15 kg."""
+    jobs = {job.variant.name: job.scene for job in plan.jobs}
+    scene = jobs[plan.axes[-1].runs["fitted_2_mass"]]
+    masses = scene.pantographs["fitted_2"].masses_kg
+    # The fit ends when its residual changes by less than 1e-8; masses follow to some 1e-4.
+    assert masses == pytest.approx([7.2, 15.0], rel=1e-3)
+    assert scene.train.pantographs[0].name == "fitted_2"
+
+
+def test_a_level_that_a_case_does_not_allow_is_told() -> None:
+    """Strips with a mass of their own are not moved with all bodies."""
+    strips = "pantographs.seven_body.strips"
+    own = (f"{strips}.mass_kg=1.0", f"{strips}.stiffness_N_per_m=2e4")
+    (planned,) = make_plan("ambrosio2012", parse_axes("pantograph"), own).axes
+    assert [*planned.refused] == ["all_bodies"]
+    assert "strips" in planned.refused["all_bodies"]
+    assert "all_bodies" not in planned.runs
+
+
+def test_an_own_mesh_leaves_nothing_to_refine(tmp_path: Path) -> None:
+    path = tmp_path / "line.msh"
+    runner = CliRunner()
+    made = runner.invoke(app, ["mesh", CASE, "-o", str(path)])
+    assert made.exit_code == 0, made.output
+    own = (f"mesh.file={path}", "mesh.elements_per_gap=")
+    with pytest.raises(InputError, match="nothing to vary"):
+        make_plan(CASE, parse_axes("elements,grid"), own)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--axes", "step"), "there are dt, elements"),
+        (("--axes", "dt,dt"), "twice"),
+        (("--target", "0"), "percentage"),
+        (("--repeats", "0"), "between 1 and"),
+    ],
+)
+def test_bad_input_is_one_sentence(words: tuple[str, ...], said: str, tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["accuracy", CASE, "-o", str(tmp_path / "out"), *words])
+    assert done.exit_code == 2
+    assert said in done.stderr and not (tmp_path / "out").exists()
