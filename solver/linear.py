@@ -136,17 +136,14 @@ class StepSolver:
     @staticmethod
     def _set_up_own_solvers(pc: PETSc.PC, pairs: bool) -> None:
         """Make this rank's own solver direct unless options say otherwise."""
-        given = PETSc.Options(PREFIX)
         for solver in pc.getASMSubKSP():
             own = solver.getPC()
             # A rank may own nothing, of which there is no Cholesky factor.
             factors_pairs = pairs and solver.getOperators()[0].getSize()[0] > 0
-            if not given.hasName("sub_ksp_type"):
-                solver.setType(PETSc.KSP.Type.PREONLY)
-            if not given.hasName("sub_pc_type"):
-                own.setType(PETSc.PC.Type.CHOLESKY if factors_pairs else PETSc.PC.Type.LU)
-            if not given.hasName("sub_pc_factor_mat_ordering_type"):
-                own.setFactorOrdering(_ordering(factors_pairs))
+            solver.setType(PETSc.KSP.Type.PREONLY)
+            own.setType(PETSc.PC.Type.CHOLESKY if factors_pairs else PETSc.PC.Type.LU)
+            own.setFactorOrdering(_ordering(factors_pairs))
+            solver.setFromOptions()
 
     def _verify(self, matrix: PETSc.Mat) -> None:
         """Measure the residual for a load on every unknown; iterate if it is not round-off."""
