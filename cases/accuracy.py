@@ -24,8 +24,9 @@ from catenary.postproc.statistics import covers
 RUNS = "runs"
 # Distance at which histories are compared [m]: 20 Hz are waves of 0.25 m at 18 km/h.
 _SPACING = 0.25
-# Marches that take longer than this are timed once: a disturbance is short beside them [s].
-_LONG = 3.0
+# Marches of more steps times unknowns than this, some three seconds, are timed once: disturbances
+# are short beside them.
+_LONG = 1.5e8
 
 
 @dataclass(frozen=True)
@@ -96,9 +97,10 @@ def run(
         return None, ended
     every = list(ended)
     times = {one.variant.name: [one.summary["march_wall_s"]] for one in ended if one.done}
-    short = [job for job in plan.jobs if times.get(job.variant.name, [_LONG])[0] < _LONG]
+    work = {one.variant.name: _work(one) for one in ended if one.done}
+    short = [job for job in plan.jobs if work.get(job.variant.name, _LONG) < _LONG]
     for number in range(2, plan.repeats + 1):
-        tell(f"timed for the {number}. time: the {len(short)} runs below {_LONG:g} s")
+        tell(f"again, for their time, no. {number} of {plan.repeats}: {len(short)} short runs")
         repeated = run_jobs([again(job, number) for job in short], folder, comm, **options)
         every += repeated
         if _interrupted(repeated):
@@ -175,6 +177,10 @@ def _estimate(summary: dict[str, Any]) -> float:
     """The largest of the pantographs' estimated errors [N], NaN if there is none."""
     told = [v for v in summary["indicators"]["time_step"]["force_error_N"] if v is not None]
     return max(told, default=math.nan)
+
+
+def _work(one: Ended) -> float:
+    return float(one.summary["n_steps"]) * float(one.summary["n_dofs"])
 
 
 def _interrupted(ended: Sequence[Ended]) -> bool:
