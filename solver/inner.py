@@ -138,6 +138,7 @@ class InnerProblem:
         self._released = 1.0 - kept_ratio
         self._band = band
         self.pivoted = False
+        self._room = -1
         self._make_room(_FIRST_ROOM)
 
     def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
@@ -226,10 +227,9 @@ class InnerProblem:
 
     def _make_room(self, n_droppers: int) -> None:
         n = self.law.n
-        room = getattr(self, "_room", -1)
-        if n_droppers <= room:
+        if n_droppers <= self._room:
             return
-        self._room = max(n_droppers, 2 * room)
+        self._room = max(n_droppers, 2 * self._room)
         size = n + self._room
         self._matrix, self._right = np.zeros((size, size)), np.zeros(size)
         self._solution = np.zeros(size)
