@@ -259,10 +259,15 @@ def _droppers(scene: Scene) -> list[Level]:
 
 
 def _pantographs(scene: Scene) -> list[Level]:
-    """Lumped chains fitted to the scene's leading kind; a mechanism also with all its bodies."""
+    """Lumped chains fitted to the scene's leading kind; a mechanism also with all its bodies.
+
+    A chain is not fitted with more masses than it has: the data say nothing of the others.
+    """
     kind = scene.train.pantographs[0].name
-    levels = [_fitted(scene, kind, n) for n in (1, 2, 3)]
-    if scene.pantographs[kind].type == "multibody":
+    table = scene.pantographs[kind]
+    most = len(table.masses_kg) if table.type == "lumped" else 3
+    levels = [_fitted(scene, kind, n) for n in range(1, min(most, 3) + 1)]
+    if table.type == "multibody":
         motion = f"pantographs.{kind}.motion"
         levels.append(Level("reduced", (f"{motion}=reduced",), quick=True))
         levels.append(Level("all_bodies", (f"{motion}=all_bodies",)))
