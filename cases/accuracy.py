@@ -101,6 +101,7 @@ def run(
     short = [job for job in plan.jobs if work.get(job.variant.name, _LONG) < _LONG]
     for number in range(2, plan.repeats + 1):
         tell(f"again, for their time, no. {number} of {plan.repeats}: {len(short)} short runs")
+        short.reverse()  # whatever else the machine does now and then meets others
         repeated = run_jobs([again(job, number) for job in short], folder, comm, **options)
         every += repeated
         if _interrupted(repeated):
