@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -147,3 +148,29 @@ def test_windows_hold_all_unknowns_within_reach() -> None:
     assert windows.around(2.5, 2.5) == (2 * 2, 7 * 2)
     assert windows.around(0.0, 0.0) == (0, 4 * 2)
     assert windows.around(0.0, 2.5) == (0, 7 * 2)
+
+
+def test_reach_covers_gaps_of_very_different_lengths() -> None:
+    """Long elements decay slowly: the middle of the line, at a mast between short ones, is no
+    measure for loads next to the long gap."""
+    positions_in_span = (10.4, 36.8, 43.6, 46.2, 47.7)
+    usual = en50318_line(5)
+    line = replace(
+        usual,
+        span_lengths=(49.3,) * 5,
+        dropper_positions=(positions_in_span,) * 5,
+        pre_sag=((0.0,) * 5,) * 5,
+    )
+    problem = problem_of(line, DAMPED, damping=Damping(3.5e-3, 0.0))
+    model = find_form(problem, mesh_of(line, 4))[0]
+    dt = 1e-3
+    coefficients = (1.0, 0.25 * dt**2, 0.5 * dt)
+    found = reach(model, coefficients)
+    free = np.setdiff1d(np.arange(model.n_dofs), model.constrained)
+    columns = np.abs(inverse_columns(model, coefficients, free))
+    x = positions(model)
+    far = np.abs(x[:, None] - x[free]) > found
+    assert far.any(), "the line is too short to show anything"
+    leak = np.where(far, columns, 0.0).max(axis=0) / columns.max(axis=0)
+    print(f"reach {found:.1f} m, largest share beyond it {leak.max():.1e}")
+    assert leak.max() < 10 * DECAY
