@@ -8,6 +8,7 @@ PYTEST := $(PYTHON) -m pytest
 MPI_PYTEST := $(PYTHON) -m mpi4py -m pytest -p no:cacheprovider
 PARTS := meshgen solver mbs postproc cases
 RESULT := results/ambrosio2012
+SEED ?= 1
 LONG_RUNS := $(wildcard tests/benchmarks/test_multibody_*.py)
 
 # Open MPI starts neither as root nor with more ranks than cores unless told to; other MPI
@@ -21,7 +22,7 @@ endif
 .DEFAULT_GOAL := help
 # The targets share .venv and two cores: one after the other, also under make -j.
 .NOTPARALLEL:
-.PHONY: help setup run test test-unit test-verification test-mpi test-regression bench long-runs lint format clean
+.PHONY: help setup run test test-unit test-verification test-mpi test-regression bench long-runs fuzz lint format clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -55,6 +56,11 @@ test-mpi: setup ## the same answers on 2 and 3 ranks
 bench: setup ## what steps cost: against their floor, by phase, spans and ranks
 	@mkdir -p results
 	MPI_FLAGS="$(MPI_FLAGS)" $(PYTEST) -q -s tests/benchmarks $(LONG_RUNS:%=--ignore=%) --benchmark-json=results/bench.json
+
+fuzz: setup ## 2000 random scenes that run and 2000 that are refused; SEED=... for others
+	@echo "seeds from $(SEED); FUZZ_SEED=<seed> FUZZ_CASES=1 $(PYTEST) tests/regression/test_fuzz.py replays one"
+	FUZZ_SEED=$(SEED) FUZZ_CASES=2000 $(PYTEST) -q tests/regression/test_fuzz.py
+	FUZZ_SEED=$(SEED) FUZZ_CASES=100 timeout 900 mpirun -n 2 $(MPI_FLAGS) $(MPI_PYTEST) -q tests/regression/test_fuzz.py
 
 long-runs: setup ## all bodies of a pantograph over 20 s and ten minutes; some seven minutes
 	$(PYTEST) -q -s $(LONG_RUNS)

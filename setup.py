@@ -13,6 +13,7 @@ setup(
             "*/README.md",
             "*/reference/*.csv",
             "*/study.toml",
+            "*/hard.toml",
             "*/*.py",
         ],
         "catenary.postproc": ["templates/*"],

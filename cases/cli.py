@@ -373,7 +373,7 @@ def compare(
 
 
 # The verbs of other files, which take what is above.
-from catenary.cases import cli_accuracy, cli_pantograph, cli_studies  # noqa: E402, F401
+from catenary.cases import cli_accuracy, cli_hard, cli_pantograph, cli_studies  # noqa: E402, F401
 
 
 def main() -> None:

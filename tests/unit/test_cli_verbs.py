@@ -22,7 +22,7 @@ from catenary.solver import effects
 from catenary.solver.errors import RunBroken
 
 VERBS = ["run", "restart", "sweep", "list", "plan", "check", "mesh", "static", "pantograph"]
-VERBS += ["report", "compare"]
+VERBS += ["report", "compare", "hard"]
 SUMMARY = {
     "case": "en50318_2002",
     "speed_km_h": 250.0,

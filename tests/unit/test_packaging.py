@@ -55,6 +55,7 @@ def data_files() -> set[str]:
         "cases/*/README.md",
         "cases/*/reference/*.csv",
         "cases/*/study.toml",
+        "cases/*/hard.toml",
         "cases/*/*.py",
         "postproc/templates/*",
     )

@@ -1,0 +1,135 @@
+"""The verb ``hard``: runs the collection of hard cases and tells which limits they keep.
+
+Imported by ``cli``, whose app it extends.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from catenary.cases import cli, console
+from catenary.solver.errors import InputError
+
+if TYPE_CHECKING:
+    from catenary.cases.hard_cases import HardCase
+    from catenary.cases.hard_checks import Criterion
+
+TABLES = ("hard.csv", "hard.md")
+
+
+@cli.app.command(
+    "hard",
+    help="Run the collection of hard cases and print which limits they keep: energy, bounds, "
+    "refinement, schemes, and ranks under mpirun. Some two minutes; exits with 3 if a limit is "
+    "not kept.",
+    epilog="Example: catenary hard -o results/hard",
+)
+@console.guarded
+def hard(
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="NAME", help="Only the hard cases named.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--out",
+            parser=console.folder,
+            metavar="<path>",
+            help="Folder for the table as hard.csv and hard.md.",
+        ),
+    ] = None,
+    shortened: Annotated[
+        bool, typer.Option("--short", help="Shorter runs, steps halved once only.")
+    ] = False,
+    force: cli.Force = False,
+    verbose: cli.Verbose = False,
+) -> int:
+    """Collective."""
+
+    def read() -> list[HardCase]:
+        from catenary.cases.hard_cases import hard_cases
+
+        _refuse_to_write(out, force)
+        return hard_cases(names)
+
+    comm, cases, _ = cli.begin(lambda: (read(), []), verbose, lambda cases: cases[0].scene())
+    from mpi4py import MPI
+
+    from catenary.cases.hard_checks import check_case
+    from catenary.postproc.storage import write_all
+    from catenary.solver.parallel import on_root
+
+    found: list[Criterion] = []
+    for number, case in enumerate(cases, start=1):
+        console.say(f"[{number}/{len(cases)}] {case.name}: {case.what}")
+        rows = check_case(case, comm, MPI.COMM_SELF, shortened)
+        console.say("\n".join(_line(row) for row in rows))
+        found += rows
+    failed = [row for row in found if not row.passed]
+    if out is not None:
+        folder = out
+        texts = dict(zip(TABLES, (as_csv(found), as_markdown(cases, found)), strict=True))
+        on_root(comm, lambda: write_all(folder, texts))
+        console.say("\n".join(str(folder / name) for name in TABLES))
+    console.say(
+        f"{len(cases)} hard cases on {comm.size} rank{'s' if comm.size > 1 else ''}: "
+        f"{len(found) - len(failed)} of {len(found)} limits kept"
+    )
+    return console.NOT_ACCEPTED if failed else console.DONE
+
+
+def as_csv(found: list[Criterion]) -> str:
+    """All that was measured, a line each."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["case", "criterion", "value", "limit", "kept", "note"])
+    for row in found:
+        kept = "yes" if row.passed else "no"
+        writer.writerow(
+            [row.case, row.name, f"{row.value:.3g}", f"{row.limit:.3g}", kept, row.note]
+        )
+    return text.getvalue()
+
+
+def as_markdown(cases: list[HardCase], found: list[Criterion]) -> str:
+    """The same as a table with a line for each case."""
+    lines = [
+        "| case | what is hard | a right answer | measured (limit) | kept |",
+        "|---|---|---|---|---|",
+    ]
+    for case in cases:
+        rows = [row for row in found if row.case == case.name]
+        measured = "; ".join(
+            f"{row.name} {row.value:.2g} ({row.limit:.2g})" for row in rows if not _is_plain(row)
+        )
+        kept = "yes" if all(row.passed for row in rows) else "**no**"
+        lines.append(f"| `{case.name}` | {case.what} | {case.right} | {measured} | {kept} |")
+    return "\n".join(lines) + "\n"
+
+
+def _is_plain(row: Criterion) -> bool:
+    """Whether a criterion has no figure that is worth a place in a table."""
+    return row.passed and row.name in ("runs to its end", "everything is finite")
+
+
+def _line(row: Criterion) -> str:
+    mark = "kept  " if row.passed else "BROKEN"
+    note = f"  ({row.note})" if row.note else ""
+    return f"    {mark}  {row.name:48} {row.value:10.3g}  limit {row.limit:9.3g}{note}"
+
+
+def _refuse_to_write(out: Path | None, force: bool) -> None:
+    if out is None:
+        return
+    if out.exists() and not out.is_dir():
+        raise InputError(f"-o {out} is a file; name a folder for the results")
+    if (out / TABLES[0]).exists() and not force:
+        raise InputError(
+            f"{out / TABLES[0]} is there already; name another folder with -o, or give --force"
+        )

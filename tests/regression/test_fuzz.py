@@ -1,0 +1,94 @@
+"""Random scenes: sound ones run 200 steps soundly, broken ones are refused in one sentence.
+
+`make fuzz` runs thousands. FUZZ_SEED and FUZZ_CASES say where seeds begin and how many there are;
+a failure names its seed, and FUZZ_SEED=<that> FUZZ_CASES=1 replays it.
+"""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+from fuzzing import BASE, N_STEPS, broken_scene, sound_scene
+from mpi4py import MPI
+
+from catenary.cases import hard_runs
+from catenary.cases.scene import load_scene
+from catenary.solver.errors import InputError
+from catenary.solver.parallel import on_root
+
+FIRST = int(os.environ.get("FUZZ_SEED", "1"))
+CASES = int(os.environ.get("FUZZ_CASES", "100"))
+# One test is one block of seeds, so that none runs into the limit of a test's time.
+BLOCK = 25
+BLOCKS = [
+    range(first, min(first + BLOCK, FIRST + CASES)) for first in range(FIRST, FIRST + CASES, BLOCK)
+]
+WORLD = MPI.COMM_WORLD
+
+
+def replay(seed: int, assignments: tuple[str, ...]) -> str:
+    return f"FUZZ_SEED={seed} FUZZ_CASES=1 replays it: {' '.join(assignments)}"
+
+
+@pytest.mark.parametrize("seeds", BLOCKS, ids=str)
+def test_sound_scenes_run(seeds: range) -> None:
+    hung = 0
+    for seed in seeds:
+        made = sound_scene(seed)
+        try:
+            hung += check_run(made.assignments)
+        except (Exception, AssertionError) as error:
+            raise AssertionError(replay(seed, made.assignments)) from error
+    print(f"{hung} of {len(seeds)} lines hang on all their droppers and were run")
+    assert hung >= len(seeds) // 2
+
+
+def check_run(assignments: tuple[str, ...]) -> bool:
+    """Everything is finite, and the line holds no more energy than was given to it.
+
+    False if the line is one whose droppers cannot all be tight, which is told as bad input: where
+    they may hang at random, a few in a hundred are.
+    """
+    scene = load_scene(BASE, assignments)
+    try:
+        rest = hard_runs.at_rest(scene, WORLD)
+    except InputError as error:
+        assert "would be slack at rest" in str(error) and "\n" not in str(error)
+        return False
+    run = on_root(WORLD, lambda: hard_runs.run(rest, MPI.COMM_SELF, with_work=True))
+    assert run.outcome == "done"
+    # The run's length has half a step to spare for round-off.
+    assert run.time.size == N_STEPS + 1
+    assert run.all_finite
+    gain = run.energy_gain()
+    if not run.switches().any():
+        # Average acceleration takes from its balance what damping takes, and nothing else; sums
+        # of 200 products of forces with differences of displacements have lost six digits.
+        assert gain < 1e-9
+    if WORLD.size > 1:
+        together = hard_runs.run(rest, WORLD)
+        if WORLD.rank == 0:
+            apart = np.abs(together.force - run.force).max()
+            assert apart <= 1e-6 * max(np.abs(run.force).max(), 1.0)
+    return True
+
+
+@pytest.mark.parametrize("seeds", BLOCKS, ids=str)
+def test_broken_scenes_are_refused(seeds: range) -> None:
+    for seed in seeds:
+        made = broken_scene(seed)
+        try:
+            scene = load_scene(BASE, made.assignments)
+        except InputError as error:
+            sentence = str(error)
+            assert sentence and "\n" not in sentence and len(sentence) < 1500, replay(
+                seed, made.assignments
+            )
+        except Exception as error:
+            raise AssertionError(replay(seed, made.assignments)) from error
+        else:
+            raise AssertionError(
+                f"{made.broken_by} was taken; {replay(seed, made.assignments)}, {scene.case.name}"
+            )

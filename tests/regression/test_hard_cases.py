@@ -1,0 +1,54 @@
+"""The collection of hard cases in its short form, on one rank and some on two."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+from mpi4py import MPI
+from program import MPIRUN, catenary
+
+from catenary.cases.hard_cases import HardCase, hard_cases
+from catenary.cases.hard_checks import check_case
+
+# What the parallel solve and the coupling meet: stiff contact, several heads, switches at a cut.
+IN_PARALLEL = ("speed_1.0", "undamped_line", "rank_boundary", "four", "lost_over_spans")
+
+
+@pytest.mark.parametrize("case", hard_cases(), ids=lambda case: case.name)
+def test_a_hard_case_keeps_its_limits(case: HardCase) -> None:
+    found = check_case(case, MPI.COMM_SELF, MPI.COMM_SELF, short=True)
+    for row in found:
+        print(f"{row.name}: {row.value:.3g}, limit {row.limit:.3g} {row.note}")
+    assert [row.name for row in found if not row.passed] == []
+
+
+def table(folder: Path) -> list[dict[str, str]]:
+    with (folder / "hard.csv").open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
+def test_ranks_agree_on_hard_cases(tmp_path: Path) -> None:
+    done = catenary(
+        "hard", *IN_PARALLEL, "--short", "-o", str(tmp_path / "out"), cwd=tmp_path, ranks=2
+    )
+    assert done.code == 0, done.stdout + done.stderr
+    rows = table(tmp_path / "out")
+    assert {row["kept"] for row in rows} == {"yes"}
+    compared = [row["case"] for row in rows if row["criterion"] == "1 and 2 ranks, relative"]
+    assert compared == list(IN_PARALLEL)
+
+
+def test_names_and_folders_that_cannot_be_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "hard.csv").write_text("mine")
+    for words, said in (
+        (["no_such"], "there is no hard case no_such"),
+        (["undamped_line", "-o", str(tmp_path)], "is there already"),
+    ):
+        done = catenary("hard", *words, cwd=tmp_path)
+        assert done.code == 2
+        (sentence,) = done.sentences
+        assert said in sentence
+    assert (tmp_path / "hard.csv").read_text() == "mine"
