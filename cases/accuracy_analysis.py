@@ -69,7 +69,7 @@ class Row:
     cost : wall time of the march per simulated second, median [s/s]
     timings : how many runs that median is of
     estimate : the run's own estimate of the error of the history [N]
-    iterations : solves a step
+    iterations : rounds a step takes: of its small problem, or corrections (whole solves)
     """
 
     axis: str

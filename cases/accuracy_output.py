@@ -52,7 +52,7 @@ def as_table(row: Row) -> dict[str, Any]:
         table[f"error_{name}_{quantity.unit}"] = row.errors.get(name)
         table[f"error_{name}_percent"] = row.percent.get(name)
     table["estimated_history_N"] = _known(row.estimate)
-    table["solves_per_step"] = _known(row.iterations)
+    table["rounds_per_step"] = _known(row.iterations)
     table["march_s_per_s"] = _known(row.cost)
     table["n_timed"] = row.timings
     return table
@@ -169,7 +169,7 @@ def _axis_text(axis: Axis, reference: str, rows: Sequence[Row]) -> str:
     head = "".join(f"{name:>9}" for name in names)
     lines = [
         f"{axis.title}: {what} {reference} [%]",
-        f"  {'':{width}}{head}{'est/true':>10}{'solves':>8}{'s/s':>9}",
+        f"  {'':{width}}{head}{'est/true':>10}{'rounds':>8}{'s/s':>9}",
     ]
     for row in rows:
         if not row.done:
