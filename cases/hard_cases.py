@@ -33,6 +33,9 @@ class Needs(Table):
 
     switches: int = Field(0, ge=0, description="droppers that slacken or tighten, summed")
     lost_m: float = Field(0, ge=0, description="longest way without contact, regained after it")
+    lost_share_below: float | None = Field(
+        None, gt=0, description="share of the steps without contact in the later half of the run"
+    )
     on_nodes: int = Field(0, ge=0, description="steps that end exactly on a node of the wire")
     crossing: bool = Field(
         False, description="a dropper switches in the step that crosses the boundary of two ranks"

@@ -127,6 +127,9 @@ def _needs(case: HardCase, rest: AtRest, base: Watched) -> list[Criterion]:
         found.append(_reaches(case, "switches of droppers", base.switches().sum(), needs.switches))
     if needs.lost_m:
         found.append(_reaches(case, "way without contact [m]", lost_way(base), needs.lost_m))
+    if needs.lost_share_below is not None:
+        share = float((base.force[base.time.size // 2 :] == 0.0).mean())
+        found.append(_below(case, "share without contact", share, needs.lost_share_below))
     if needs.on_nodes:
         far = np.abs(base.position.reshape(-1, 1) - rest.node_places()).min(axis=1)
         found.append(_reaches(case, "steps on a node", (far < 1e-9).sum(), needs.on_nodes))
