@@ -24,9 +24,9 @@ from catenary.postproc.statistics import covers
 RUNS = "runs"
 # Distance at which histories are compared [m]: 20 Hz are waves of 0.25 m at 18 km/h.
 _SPACING = 0.25
-# Marches of more steps times unknowns than this, some three seconds, are timed once: disturbances
+# Marches of more steps times unknowns than this, some five seconds, are timed once: disturbances
 # are short beside them.
-_LONG = 1.5e8
+_LONG = 2e8
 
 
 @dataclass(frozen=True)
