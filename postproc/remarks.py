@@ -11,6 +11,9 @@ from catenary.postproc.results import Results
 _FELT_HZ = 40.0
 # Phase of the contact's own motion in a step beyond which its hops are not resolved [rad].
 _RESOLVED = 0.5
+# Stiffness of droppers times the step squared [N s2/m] from which their switches feed the line: see
+# docs/hard_cases.md.
+_STIFF_DROPPER = 10.0
 
 
 class _Contact(NamedTuple):
@@ -30,8 +33,25 @@ class _Contact(NamedTuple):
 
 
 def remarks(results: Results) -> list[str]:
-    """Sentences about contact settings that shape the results, none if none do. Not collective."""
+    """Sentences about settings that shape the results, none if none do. Not collective."""
     config = results.attributes["config"]
+    return [*_about_contact(results, config), *_about_droppers(config)]
+
+
+def _about_droppers(config: dict[str, Any]) -> list[str]:
+    dropper = config.get("line", {}).get("dropper", {})
+    stiffness, dt = dropper.get("stiffness_N_per_m"), config["numerics"]["dt_s"]
+    if not stiffness or stiffness * dt**2 <= _STIFF_DROPPER:
+        return []
+    longest = math.sqrt(_STIFF_DROPPER / stiffness)
+    return [
+        f"Droppers of {stiffness:.3g} N/m are stiff for a step of {1e3 * dt:g} ms: when they "
+        "slacken and tighten they give the line energy that it did not have. Take a "
+        f"numerics.dt_s of {1e3 * longest:.2g} ms at most, or numerical damping."
+    ]
+
+
+def _about_contact(results: Results, config: dict[str, Any]) -> list[str]:
     contact = config.get("contact", {})
     if contact.get("law") == "kinematic":
         return ["The contact is kinematic: head and wire do not part, so that loss cannot occur."]
@@ -43,7 +63,7 @@ def remarks(results: Results) -> list[str]:
                 _stiffness(contact, facts["static_force_N"]),
                 config["numerics"]["dt_s"],
             )
-            found |= dict.fromkeys(_about(head))
+            found |= dict.fromkeys(_about_head(head))
     return list(found)
 
 
@@ -58,7 +78,7 @@ def _stiffness(contact: dict[str, Any], static_force: float) -> float:
     return float(1.5 * hertz ** (2 / 3) * static_force ** (1 / 3))
 
 
-def _about(head: _Contact) -> list[str]:
+def _about_head(head: _Contact) -> list[str]:
     said = (
         f"A head of {head.mass:.3g} kg on a contact of {head.stiffness:.3g} N/m swings at "
         f"{head.frequency:.3g} Hz"

@@ -55,6 +55,16 @@ def test_kinematic_contact_says_that_nothing_can_be_lost() -> None:
     assert "loss cannot occur" in sentence
 
 
+def test_droppers_that_are_stiff_for_the_step_are_told() -> None:
+    """1e8 N/m times (1 ms)^2 is ten times the limit, whose step is sqrt(10 / 1e8) s = 0.32 ms."""
+    told = Told(7.2, 1e-3, law="linear", stiffness_N_per_m=1e6)
+    told.attributes["config"]["line"] = {"dropper": {"stiffness_N_per_m": 1e8}}  # type: ignore[index]
+    (sentence,) = remarks(told)  # type: ignore[arg-type]
+    assert "1e+08 N/m" in sentence and "0.32 ms" in sentence
+    told.attributes["config"]["line"] = {"dropper": {"stiffness_N_per_m": 1e6}}  # type: ignore[index]
+    assert remarks(told) == []  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("facts", [[], [{"static_force_N": 120.0}]])
 def test_older_files_without_masses_have_no_remarks(facts: list[dict[str, Any]]) -> None:
     told = Told(7.2, 1e-3, law="linear", stiffness_N_per_m=5e4)
