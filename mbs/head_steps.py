@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+
 import numpy as np
 
 from catenary.mbs import head_kernels
@@ -10,7 +12,7 @@ from catenary.mbs.lateral import LateralPath
 from catenary.mbs.strips import HeadParts
 
 
-class SteppedHead:
+class SteppedHead(ABC):
     """A head's strips on n coordinates, the head's own first, which a step advances together.
 
     Parameters
@@ -71,9 +73,9 @@ class SteppedHead:
         # A start from any other acceleration than what these forces cause loses an order in dt.
         self._state[2 * n :] = self._acceleration(0.0)
 
+    @abstractmethod
     def _acceleration(self, time: float) -> np.ndarray:
         """Accelerations (n,) of the present state without contact."""
-        raise NotImplementedError
 
     def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Heights and velocities (s,) of the strips by Newmark's predictor (paper eq. 2.5)."""
