@@ -7,15 +7,14 @@ enough apart do not see each other, so many columns come from one solve.
 from __future__ import annotations
 
 import heapq
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from catenary.solver.distribution import Ownership
 from catenary.solver.errors import RunBroken
-from catenary.solver.linear import StepSolver
 
 # What may stand outside the windows, relative to the peak: round-off of one solve.
 _LEAK = 1e-13
@@ -29,17 +28,21 @@ class Windows:
     positions : (n_nodes,) ascending positions of the rows of nodes [m]
     block_size : unknowns per node
     reach : half width of a window [m]
+
+    Attributes
+    ----------
+    positions, reach : as given
     """
 
     def __init__(self, positions: np.ndarray, block_size: int, reach: float) -> None:
-        self._positions = positions
+        self.positions = positions
         self._block_size = block_size
         self.reach = reach
 
     def around(self, x_low: float, x_high: float) -> tuple[int, int]:
         """Range of unknowns within reach of [x_low, x_high]."""
         low, high = np.searchsorted(
-            self._positions, [x_low - self.reach - 1e-9, x_high + self.reach + 1e-9]
+            self.positions, [x_low - self.reach - 1e-9, x_high + self.reach + 1e-9]
         )
         return int(low) * self._block_size, int(high) * self._block_size
 
@@ -77,7 +80,7 @@ class PackedColumns(NamedTuple):
 
 def compute(
     comm: Any,
-    solver: StepSolver,
+    solve_for: Callable[[np.ndarray, np.ndarray], np.ndarray],
     ownership: Ownership,
     windows: Windows,
     dofs: np.ndarray,
@@ -86,33 +89,25 @@ def compute(
 ) -> ShortColumns:
     """Columns for the right-hand sides with ``coefficients`` on ``dofs``, both (n, m). Collective.
 
-    ``x`` (n,) [m] is where each of them stands.
+    ``x`` (n,) [m] is where each of them stands; ``solve_for`` that of ``LineOperators``.
     """
     n = x.size
-    right = PETSc.Vec().createMPI((ownership.n_local, None), comm=comm)
-    solution = right.duplicate()
     start = np.zeros(n, dtype=np.int64)
     values: list[np.ndarray] = [np.zeros(0)] * n
     groups = _groups_apart(x, 2.0 * windows.reach)
     largest = np.zeros((2, len(groups)))
     for number, group in enumerate(groups):
-        right.zeroEntries()
-        own = ownership.owned(dofs[group])
-        with right as array:
-            np.add.at(array, dofs[group][own] - ownership.first, coefficients[group][own])
-        solver.solve(right, solution)
-        with solution as array:
-            largest[0, number] = np.abs(array).max(initial=0.0)
-            for column in group:
-                low, high = windows.around(x[column], x[column])
-                low = min(max(low, ownership.first), ownership.last) - ownership.first
-                high = min(max(high, ownership.first), ownership.last) - ownership.first
-                start[column] = low
-                values[column] = array[low:high].copy()
-                array[low:high] = 0.0
-            largest[1, number] = np.abs(array).max(initial=0.0)
-    right.destroy()
-    solution.destroy()
+        array = solve_for(dofs[group].ravel(), coefficients[group].ravel())
+        largest[0, number] = np.abs(array).max(initial=0.0)
+        for column in group:
+            low, high = windows.around(x[column], x[column])
+            low = min(max(low, ownership.first), ownership.last) - ownership.first
+            high = min(max(high, ownership.first), ownership.last) - ownership.first
+            start[column] = low
+            values[column] = array[low:high].copy()
+            array[low:high] = 0.0
+        largest[1, number] = np.abs(array).max(initial=0.0)
+        array[:] = 0.0
     comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
     peak, leak = largest
     if (leak > _LEAK * peak).any():

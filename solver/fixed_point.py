@@ -56,7 +56,7 @@ class FixedPoint:
         line.internal_forces()
         touches = self.pantographs.move_to(time)
         heads = self._heads_everywhere(time)
-        external = self.loads(time)
+        external = self.loads(time) or []
         force = self._force
         for _ in range(self.numerics.max_iterations):
             force, depth, rate = self._contact(touches, heads, force)

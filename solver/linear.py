@@ -1,29 +1,24 @@
-"""Solves with the constant step operator: LU on one rank, one neighbour exchange on many.
+"""Solvers for the constant step operator: factored once, by PETSc.
 
-On several ranks the solver is restricted additive Schwarz whose overlap is the reach of A^-1:
-each rank solves its own run of the line and as much of its neighbours' as can influence it,
-which makes the preconditioner a direct solver. That is verified; where it does not hold, the
-same preconditioner is iterated.
+On several ranks each solves for its own part of the line and as much of its neighbours' as can
+influence it: restricted additive Schwarz with an overlap as wide as the reach of A^-1, which is a
+direct solver. ``LineOperators`` verifies that, and iterates where it does not hold.
 """
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import numpy as np
 from petsc4py import PETSc
 
 from catenary.solver.distribution import Ownership
-from catenary.solver.errors import InputError, RunBroken
+from catenary.solver.errors import InputError
 
-logger = logging.getLogger(__name__)
-
-PREFIX = "march_"
+PREFIX, PART_PREFIX = "march_", "march_sub_"
 # A direct solve of a matrix as well conditioned as A (below 1e6) leaves about 1e-15.
-_DIRECT = 1e-12
+DIRECT = 1e-12
 
 
 @contextmanager
@@ -45,16 +40,66 @@ def refused_options() -> Iterator[None]:
         ) from error
 
 
-class StepSolver:
-    """Factored step operator. Collective to make and to use; the maker calls ``destroy``.
+class PartSolver:
+    """Factors of this rank's part of the step operator, all of it on one rank.
+
+    Not collective. With an overlap as wide as the reach of A^-1 the rank's own unknowns come out
+    exactly, without a word to other ranks; ``residual`` of ``LineOperators`` verifies that.
+
+    Parameters
+    ----------
+    matrix : sequential, in blocks of stations or of nodes; kept by reference
+    in_stations : whether its blocks are stations
+    is_whole : whether it is the whole line, which decides the prefix of its options
+    """
+
+    def __init__(self, matrix: PETSc.Mat, in_stations: bool, is_whole: bool) -> None:
+        self._ksp = PETSc.KSP().create(PETSc.COMM_SELF)
+        self._ksp.setOptionsPrefix(PREFIX if is_whole else PART_PREFIX)
+        self._ksp.setOperators(matrix)
+        _choose_direct(self._ksp, in_stations)
+        # Of an iteration that the options ask for; a direct solver has no tolerance.
+        self._ksp.setTolerances(rtol=DIRECT)
+        with refused_options():
+            self._ksp.setFromOptions()
+            self._ksp.setUp()
+
+    def solve(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
+        """Solve A ``solution`` = ``right`` here."""
+        self._ksp.solve(right, solution)
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether a solve cannot fail to converge: neither options nor ``iterate`` ask for more."""
+        return bool(self._ksp.getType() == PETSc.KSP.Type.PREONLY)
+
+    @property
+    def failure(self) -> int:
+        """PETSc's reason why the last solve did not converge; 0 if it did."""
+        return min(0, self._ksp.getConvergedReason())
+
+    def iterate(self) -> None:
+        """Use the factors as a preconditioner of GMRES from now on."""
+        _use_gmres(self._ksp)
+
+    def destroy(self) -> None:
+        """Free the factors."""
+        self._ksp.destroy()
+
+
+class SchwarzSolver:
+    """PETSc's restricted additive Schwarz on all ranks. Collective to make and to use.
+
+    Takes the place of ``PartSolver`` where that is not exact, or where options ask for another
+    solver: the same overlap, two scatters more.
 
     Parameters
     ----------
     comm : mpi4py communicator
-    matrix : the operator A, kept by reference
+    matrix : the distributed operator A, kept by reference
     ownership : Ownership
-    overlap : range of unknowns [low, high) that influences this rank's own
-    model_block_size : unknowns of a node; the matrix may have blocks of stations
+    overlap : range of unknowns [low, high) that influences this rank's own, in whole blocks
+    in_stations : whether the matrix has blocks of stations
     """
 
     def __init__(
@@ -63,112 +108,75 @@ class StepSolver:
         matrix: PETSc.Mat,
         ownership: Ownership,
         overlap: tuple[int, int],
-        model_block_size: int,
+        in_stations: bool,
     ) -> None:
         self._ksp = PETSc.KSP().create(comm)
         self._ksp.setOptionsPrefix(PREFIX)
         self._ksp.setOperators(matrix)
         self._ksp.setType(PETSc.KSP.Type.PREONLY)
         pc = self._ksp.getPC()
-        # In blocks of stations a line is block tridiagonal: Cholesky's factor in the order along
-        # the track has no more blocks than the matrix, and fewest numbers of all. In blocks of
-        # nodes, where nodes do not pair, nested dissection takes two thirds of the time of that.
-        pairs = matrix.getBlockSize() > model_block_size
-        if comm.size == 1:
-            pc.setType(PETSc.PC.Type.CHOLESKY if pairs else PETSc.PC.Type.LU)
-            pc.setFactorOrdering(_ordering(pairs))
-        else:
-            self._set_up_schwarz(pc, ownership, overlap, matrix.getBlockSize())
-        # Of an iteration that the options ask for; a direct solver has no tolerance.
-        self._ksp.setTolerances(rtol=_DIRECT)
+        pc.setType(PETSc.PC.Type.ASM)
+        pc.setASMType(PETSc.PC.ASMType.RESTRICT)
+        own = PETSc.IS().createStride(ownership.n_local, ownership.first, 1, comm=PETSc.COMM_SELF)
+        low, high = overlap if ownership.n_local else (ownership.first, ownership.first)
+        wide = PETSc.IS().createStride(high - low, low, 1, comm=PETSc.COMM_SELF)
+        pc.setASMLocalSubdomains(1, [wide], [own])
+        self._ksp.setTolerances(rtol=DIRECT)
         with refused_options():
             self._ksp.setFromOptions()
             self._ksp.setUp()
             if pc.getType() == PETSc.PC.Type.ASM:
-                self._set_up_own_solvers(pc, pairs)
+                for solver in pc.getASMSubKSP():
+                    # A rank may own nothing, of which there is no Cholesky factor.
+                    has_any = solver.getOperators()[0].getSize()[0] > 0
+                    _choose_direct(solver, in_stations and has_any)
+                    solver.setFromOptions()
             self._ksp.setUpOnBlocks()
-        self._verify(matrix)
-        self._direct = self.is_direct
 
     def solve(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
-        """Solve A ``solution`` = ``right``. Collective.
-
-        Raises
-        ------
-        RunBroken
-            If an iteration does not converge; a direct solver was verified when it was made.
-        """
+        """Solve A ``solution`` = ``right``. Collective."""
         self._ksp.solve(right, solution)
-        if not self._direct:
-            self.check()
-
-    def check(self) -> None:
-        """Raise RunBroken if the last solve did not converge. Collective only in its effect."""
-        reason = self._ksp.getConvergedReason()
-        if reason < 0:
-            raise RunBroken(
-                f"the linear solver did not converge (PETSc reason {reason}); drop the options "
-                f"under -{PREFIX} or give the scene a smaller numerics.dt_s"
-            )
 
     @property
     def is_direct(self) -> bool:
-        """Whether one application of the preconditioner solves exactly."""
+        """Whether one application of the preconditioner is all of a solve."""
         return bool(self._ksp.getType() == PETSc.KSP.Type.PREONLY)
+
+    @property
+    def failure(self) -> int:
+        """PETSc's reason why the last solve did not converge, the same on all ranks; 0 if it
+        did."""
+        return min(0, self._ksp.getConvergedReason())
+
+    def iterate(self) -> None:
+        """Use what is set up as a preconditioner of GMRES from now on."""
+        _use_gmres(self._ksp)
 
     def destroy(self) -> None:
         """Free the factors. Collective."""
         self._ksp.destroy()
 
-    @staticmethod
-    def _set_up_schwarz(
-        pc: PETSc.PC, ownership: Ownership, overlap: tuple[int, int], block: int
-    ) -> None:
-        pc.setType(PETSc.PC.Type.ASM)
-        pc.setASMType(PETSc.PC.ASMType.RESTRICT)
-        own = PETSc.IS().createStride(ownership.n_local, ownership.first, 1, comm=PETSc.COMM_SELF)
-        low, high = overlap if ownership.n_local else (ownership.first, ownership.first)
-        # Whole blocks; there are no others, and ends of the line are ends of blocks.
-        low, high = low - low % block, high + -high % block
-        wide = PETSc.IS().createStride(high - low, low, 1, comm=PETSc.COMM_SELF)
-        pc.setASMLocalSubdomains(1, [wide], [own])
 
-    @staticmethod
-    def _set_up_own_solvers(pc: PETSc.PC, pairs: bool) -> None:
-        """Make this rank's own solver direct unless options say otherwise."""
-        for solver in pc.getASMSubKSP():
-            own = solver.getPC()
-            # A rank may own nothing, of which there is no Cholesky factor.
-            factors_pairs = pairs and solver.getOperators()[0].getSize()[0] > 0
-            solver.setType(PETSc.KSP.Type.PREONLY)
-            own.setType(PETSc.PC.Type.CHOLESKY if factors_pairs else PETSc.PC.Type.LU)
-            own.setFactorOrdering(_ordering(factors_pairs))
-            solver.setFromOptions()
-
-    def _verify(self, matrix: PETSc.Mat) -> None:
-        """Measure the residual for a load on every unknown; iterate if it is not round-off."""
-        solution, right = matrix.createVecs()
-        residual = right.duplicate()
-        first, last = right.getOwnershipRange()
-        right.setArray(np.cos(1.0 + 3.7 * np.arange(first, last)))
-        right.assemble()
-        self._ksp.solve(right, solution)
-        self.check()
-        matrix.mult(solution, residual)
-        residual.axpy(-1.0, right)
-        relative = residual.norm() / right.norm()
-        if not np.isfinite(relative):
-            raise RunBroken("the step operator cannot be factored: it is singular or not finite")
-        if relative > _DIRECT and self.is_direct:
-            logger.warning(
-                "the solver leaves a residual of %.1e in one application; iterating with GMRES",
-                relative,
-            )
-            self._ksp.setType(PETSc.KSP.Type.GMRES)
-            self._ksp.setTolerances(rtol=1e-14, max_it=200)
-        for vector in (solution, right, residual):
-            vector.destroy()
+def wants_distributed_solver() -> bool:
+    """Whether PETSc's options name a solver for the whole line on all ranks."""
+    given = PETSc.Options().getAll()
+    return any(name.startswith((f"{PREFIX}ksp_", f"{PREFIX}pc_")) for name in given)
 
 
-def _ordering(pairs: bool) -> str:
-    return str(PETSc.Mat.OrderingType.NATURAL if pairs else PETSc.Mat.OrderingType.ND)
+def _choose_direct(ksp: PETSc.KSP, in_stations: bool) -> None:
+    """Make a sequential solver direct, by the factorisation that is fastest here.
+
+    In blocks of stations a line is block tridiagonal: Cholesky's factor in the order along the
+    track has no more blocks than the matrix, and fewest numbers of all. In blocks of nodes, where
+    nodes do not pair, nested dissection takes two thirds of the time of that.
+    """
+    pc, ordering = ksp.getPC(), PETSc.Mat.OrderingType
+    ksp.setType(PETSc.KSP.Type.PREONLY)
+    pc.setType(PETSc.PC.Type.CHOLESKY if in_stations else PETSc.PC.Type.LU)
+    pc.setFactorOrdering(str(ordering.NATURAL if in_stations else ordering.ND))
+
+
+def _use_gmres(ksp: PETSc.KSP) -> None:
+    ksp.setType(PETSc.KSP.Type.GMRES)
+    ksp.setTolerances(rtol=1e-14, max_it=200)
+

@@ -232,8 +232,8 @@ class March:
             mine = self.ownership.owned(load.dofs) & free[load.dofs]
             if mine.any():
                 parts.append((load, mine, load.dofs[mine] - self.ownership.first))
-        if not parts:
-            return lambda time: []
+        if not self._model.step_loads:
+            return lambda time: None
         return lambda time: [(dofs, load.values(time)[mine]) for load, mine, dofs in parts]
 
     @property

@@ -8,7 +8,10 @@ from typing import Protocol
 
 import numpy as np
 
-LoadSource = Callable[[float], list[tuple[np.ndarray, np.ndarray]]]
+from catenary.solver.line_operators import Loads
+
+# Loads at a time [s]; None on all ranks if there never are any.
+LoadSource = Callable[[float], Loads | None]
 
 
 @dataclass

@@ -71,7 +71,7 @@ def test_floor(benchmark: Any, at_rest: tuple[Any, ...]) -> None:
     def solve_and_multiply() -> None:
         for _ in range(N_STEPS):
             line.internal_forces()
-            line.solve([])
+            line.solve()
 
     benchmark.pedantic(solve_and_multiply, rounds=ROUNDS, warmup_rounds=1)
     line.destroy()

@@ -114,7 +114,7 @@ def release(
 def step(line: NewmarkLine) -> None:
     """One step of the line without loads."""
     line.predict()
-    line.free_acceleration([])
+    line.free_acceleration()
     line.correct()
 
 

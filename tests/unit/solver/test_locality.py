@@ -111,7 +111,7 @@ def test_short_columns_are_the_columns_of_full_solves(stepper: NewmarkLine) -> N
     x = model.mesh.x(model.mesh.droppers[:, 1])
     pair = np.broadcast_to(np.array([1.0, -1.0]), ends.shape)
     found = compliance.compute(
-        COMM, stepper.solver, stepper.ownership, stepper.windows, ends, pair, x
+        COMM, stepper.operators.solve_for, stepper.ownership, stepper.windows, ends, pair, x
     )
     coefficients = (1.0, stepper.position_factor, stepper.velocity_factor)
     exact = inverse_columns(model, coefficients, ends[:, 0])
@@ -139,7 +139,7 @@ def test_columns_that_leak_are_refused(stepper: NewmarkLine) -> None:
     too_short = Windows(positions(model)[:: model.block_size], model.block_size, 4.0)
     with pytest.raises(RunBroken, match=r"does not decay within 4 m.*numerics\.dt_s"):
         compliance.compute(
-            COMM, stepper.solver, stepper.ownership, too_short, dofs, np.ones(dofs.shape), x
+            COMM, stepper.operators.solve_for, stepper.ownership, too_short, dofs, np.ones(dofs.shape), x
         )
 
 

@@ -1,0 +1,273 @@
+"""What a step does with a line's operators: a product with K, and a solve with A.
+
+Every rank holds the rows of its own part of the line and of its overlap with the neighbours'. It is
+told what a product reads there, once a step, and then needs no other word: product and solve are
+its own.
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from catenary.solver.compliance import Windows
+from catenary.solver.distribution import Ownership
+from catenary.solver.errors import RunBroken
+from catenary.solver.linear import DIRECT, PREFIX, PartSolver, SchwarzSolver, wants_distributed_solver
+from catenary.solver.model import Model
+from catenary.solver.operators import assemble, assemble_part, columns_of, station_block
+from catenary.solver.subdomain import Halo, Subdomain
+
+logger = logging.getLogger(__name__)
+
+Loads = list[tuple[np.ndarray, np.ndarray]]
+_COEFFICIENTS = {
+    "mass": (1.0, 0.0, 0.0),
+    "stiffness": (0.0, 1.0, 0.0),
+    "damping": (0.0, 0.0, 1.0),
+}
+
+
+class LineOperators:
+    """K, C and the factored A of the distributed line. Collective to make.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+    model : Model, on all ranks
+    ownership : Ownership
+    coefficients : of M, K and C in A
+    windows : Windows, whose reach is that of A^-1
+
+    Attributes
+    ----------
+    factor : (n_local,) what products multiply: this rank's part, to be filled in
+    answer : (n_local,) this rank's part of the last solution
+    domain : Subdomain
+    """
+
+    def __init__(
+        self,
+        comm: Any,
+        model: Model,
+        ownership: Ownership,
+        coefficients: tuple[float, float, float],
+        windows: Windows,
+    ) -> None:
+        self._comm = comm
+        self._model = model
+        self._ownership = ownership
+        self._coefficients = coefficients
+        self._block = station_block(model, ownership)
+        if comm.size > 1 and wants_distributed_solver():
+            self._solve_together(windows)
+            residual = self.residual()
+        else:
+            self._solve_apart(windows)
+            residual = self.residual()
+            if not residual <= DIRECT and comm.size > 1:
+                logger.warning(
+                    "solving on each rank by itself leaves a residual of %.1e; taking PETSc's "
+                    "distributed solver instead",
+                    residual,
+                )
+                self.destroy()
+                self._solve_together(windows)
+                residual = self.residual()
+        if not np.isfinite(residual):
+            raise RunBroken("the step operator cannot be factored: it is singular or not finite")
+        if residual > DIRECT and self._is_direct:
+            logger.warning(
+                "the solver leaves a residual of %.1e in one application; iterating with GMRES",
+                residual,
+            )
+            if self._solver is not None:
+                self._solver.iterate()
+            self._is_direct = False
+
+    def exchange(self) -> None:
+        """Bring ``factor`` up to date where it is others'. Collective."""
+        self._halo.exchange()
+
+    def multiply_stiffness(self) -> None:
+        """Make K ``factor`` the internal force. Right after ``exchange``. Not collective."""
+        if self.domain.size:
+            self._product("stiffness").mult(self._read, self._force)
+
+    def add_damping(self) -> None:
+        """Add C ``factor`` to the internal force. Right after ``exchange``. Not collective."""
+        if self.domain.size:
+            self._product("damping").multAdd(self._read, self._force, self._force)
+
+    def solve(self, loads: Loads | None = None) -> None:
+        """Make ``answer`` that to the internal force and to ``loads``. Collective with loads.
+
+        ``loads`` are pairs of local unknowns and forces [N], perhaps none here; None on all ranks
+        if no rank has any, which saves an exchange.
+
+        Raises
+        ------
+        RunBroken
+            On all ranks, if an iteration does not converge; a direct solver was verified.
+        """
+        right = self._force
+        if loads is not None:
+            right, owned = self._loaded, self.domain.owned
+            self._loaded_array[owned] = self._force_array[owned]
+            for dofs, values in loads:
+                np.add.at(self._loaded_array[owned], dofs, values)
+            self._loaded_halo.exchange()
+        self._solve(right)
+
+    def solve_for(self, dofs: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+        """Answer to forces ``coefficients`` at global unknowns ``dofs``. Collective.
+
+        All ranks pass the same. Returns ``answer``, shape (n_local,).
+        """
+        low, high = self.domain.low, self.domain.high
+        here = (dofs >= low) & (dofs < high)
+        self._loaded_array[:] = 0.0
+        np.add.at(self._loaded_array, dofs[here] - low, coefficients[here])
+        self._solve(self._loaded)
+        return self.answer
+
+    def square(self, name: str) -> float:
+        """x M x or x K x of the whole line for x in ``factor``, by ``name``. Collective."""
+        self.exchange()
+        local = 0.0
+        if self.domain.size:
+            self._product(name).mult(self._read, self._loaded)
+            local = float(self._loaded_array[self.domain.owned] @ self.factor)
+        return float(self._comm.allreduce(local))
+
+    def residual(self) -> float:
+        """Relative residual of a solve with a load on every unknown. Collective.
+
+        Overwrites ``factor`` and ``answer``.
+        """
+        owned = self.domain.owned
+        load = np.cos(1.0 + 3.7 * np.arange(self.domain.low, self.domain.high))
+        self._loaded_array[:] = load
+        self._solve(self._loaded)
+        self.factor[:] = self.answer
+        self.answer[:] = 0.0
+        self.exchange()
+        if self._matrix is not None:
+            self._matrix.mult(self._read_domain, self._loaded)
+        missing = self._loaded_array[owned] - load[owned]
+        squares = np.array([missing @ missing, load[owned] @ load[owned]])
+        self._comm.Allreduce(MPI.IN_PLACE, squares)
+        return float(np.sqrt(squares[0] / squares[1]))
+
+    @property
+    def traffic(self) -> tuple[int, int]:
+        """Messages and bytes that this rank sends at an exchange."""
+        return self._halo.messages, self._halo.bytes_sent
+
+    def destroy(self) -> None:
+        """Free all PETSc objects and messages. Collective."""
+        for halo in (self._halo, self._loaded_halo):
+            halo.destroy()
+        for held in (self._solver, self._matrix, *self._products.values(), *self._vectors):
+            if held is not None:
+                held.destroy()
+
+    def _solve_apart(self, windows: Windows) -> None:
+        """Let each rank solve by itself, for its own part and as much as can influence it."""
+        low, high = self._overlap(windows)
+        self._make_arrays(low, high, PETSc.COMM_SELF)
+        self._matrix, self._solver, is_direct = None, None, True
+        if self.domain.size:
+            rows = (low, high)
+            self._matrix = assemble_part(
+                self._model, rows, rows, self._coefficients, 1.0, self._block
+            )
+            self._solver = PartSolver(self._matrix, self._in_stations, self._comm.size == 1)
+            is_direct = self._solver.is_direct
+        self._is_direct = bool(self._comm.allreduce(int(is_direct), op=MPI.MIN))
+
+    def _solve_together(self, windows: Windows) -> None:
+        """Let PETSc solve for the whole line on all ranks."""
+        first, last = self._ownership.first, self._ownership.last
+        self._make_arrays(first, last, self._comm)
+        self._matrix = assemble(
+            self._comm, self._model, self._ownership, self._coefficients, self._block
+        )
+        self._solver = SchwarzSolver(
+            self._comm, self._matrix, self._ownership, self._overlap(windows), self._in_stations
+        )
+        self._is_direct = self._solver.is_direct
+
+    @property
+    def _in_stations(self) -> bool:
+        return self._block > self._model.block_size
+
+    def _overlap(self, windows: Windows) -> tuple[int, int]:
+        """Range of unknowns that influence this rank's own within a step, in whole blocks."""
+        model, ownership, block = self._model, self._ownership, self._block
+        first, last = ownership.first, ownership.last
+        if first == last:
+            return first, last
+        ends = windows.positions[[first // model.block_size, last // model.block_size - 1]]
+        near, coupled = windows.around(*map(float, ends)), columns_of(model, (first, last))
+        low, high = min(near[0], coupled[0]), max(near[1], coupled[1])
+        # There are none but whole blocks, and ends of the line are ends of blocks.
+        return low - low % block, high + -high % block
+
+    def _make_arrays(self, low: int, high: int, comm: Any) -> None:
+        """Arrays for [low, high) and what products over it read, and vectors that wrap them.
+
+        Nothing in the loop makes or copies arrays. An array asked from a vector would keep it, and
+        the communicator, alive beyond ``destroy``.
+        """
+        own, size = self._ownership, self._model.block_size
+        read_low, read_high = columns_of(self._model, (low, high))
+        read_low, read_high = read_low - read_low % size, read_high + -read_high % size
+        self.domain = domain = Subdomain(own.first, own.last, low, high, read_low, read_high)
+        read, answer = np.zeros(read_high - read_low), np.zeros(domain.size)
+        self._force_array, self._loaded_array = np.zeros(domain.size), np.zeros(domain.size)
+        self._read = PETSc.Vec().createWithArray(read, comm=PETSc.COMM_SELF)
+        self._force, self._loaded, self._solution, self._read_domain = (
+            PETSc.Vec().createWithArray(array, size=(domain.size, None), comm=comm)
+            for array in (
+                self._force_array,
+                self._loaded_array,
+                answer,
+                read[low - read_low : high - read_low],
+            )
+        )
+        self._vectors = (self._read, self._force, self._loaded, self._solution, self._read_domain)
+        self._products: dict[str, PETSc.Mat] = {}
+        self.factor, self.answer = read[domain.owned_of_read], answer[domain.owned]
+        self._halo = Halo(self._comm, own, read_low, read)
+        self._loaded_halo = Halo(self._comm, own, low, self._loaded_array)
+
+    def _product(self, name: str) -> PETSc.Mat:
+        """M, K or C for the rows of the subdomain, made when it is first asked for."""
+        if name not in self._products:
+            domain = self.domain
+            self._products[name] = assemble_part(
+                self._model,
+                (domain.low, domain.high),
+                (domain.read_low, domain.read_high),
+                _COEFFICIENTS[name],
+                0.0,
+                self._model.block_size,
+            )
+        return self._products[name]
+
+    def _solve(self, right: PETSc.Vec) -> None:
+        if self._solver is not None:
+            self._solver.solve(right, self._solution)
+        if not self._is_direct:
+            reason = 0 if self._solver is None else self._solver.failure
+            reason = self._comm.allreduce(reason, op=MPI.MIN)
+            if reason:
+                raise RunBroken(
+                    f"the linear solver did not converge (PETSc reason {reason}); drop the options "
+                    f"under -{PREFIX} or give the scene a smaller numerics.dt_s"
+                )
