@@ -13,6 +13,7 @@ from petsc4py import PETSc
 # Names as -log_view prints them, in the order of a step, and what they hold.
 NAMES = {
     "LineFree": "prediction, product with K, solve and correction of the line",
+    "LineProduct": "product with K, part of LineFree",
     "LineColumns": "answers of the line to unit contact forces",
     "ContactShare": "heights, compliances and tensions that this rank owns",
     "ContactReduce": "shares to rank 0",

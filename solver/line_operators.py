@@ -13,13 +13,16 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy import sparse
 
 from catenary.solver.compliance import Windows
 from catenary.solver.distribution import Ownership
 from catenary.solver.errors import RunBroken
+from catenary.solver.events import event
 from catenary.solver.linear import DIRECT, PREFIX, PartSolver, SchwarzSolver, wants_distributed_solver
 from catenary.solver.model import Model
-from catenary.solver.operators import assemble, assemble_part, columns_of, station_block
+from catenary.solver.operators import as_petsc, columns_of, part_of, station_block
+from catenary.solver.repeated_rows import repeated_rows
 from catenary.solver.subdomain import Halo, Subdomain
 
 logger = logging.getLogger(__name__)
@@ -63,6 +66,7 @@ class LineOperators:
         self._ownership = ownership
         self._coefficients = coefficients
         self._block = station_block(model, ownership)
+        self._product_event = event("LineProduct")
         if comm.size > 1 and wants_distributed_solver():
             self._solve_together(windows)
             residual = self.residual()
@@ -88,6 +92,7 @@ class LineOperators:
             if self._solver is not None:
                 self._solver.iterate()
             self._is_direct = False
+        self._stiffness = repeated_rows(self._rows_of("stiffness"))
 
     def exchange(self) -> None:
         """Bring ``factor`` up to date where it is others'. Collective."""
@@ -95,8 +100,12 @@ class LineOperators:
 
     def multiply_stiffness(self) -> None:
         """Make K ``factor`` the internal force. Right after ``exchange``. Not collective."""
-        if self.domain.size:
+        self._product_event.begin()
+        if self._stiffness is not None:
+            self._stiffness.multiply(self._read_array, self._force_array)
+        elif self.domain.size:
             self._product("stiffness").mult(self._read, self._force)
+        self._product_event.end()
 
     def add_damping(self) -> None:
         """Add C ``factor`` to the internal force. Right after ``exchange``. Not collective."""
@@ -183,9 +192,8 @@ class LineOperators:
         self._matrix, self._solver, is_direct = None, None, True
         if self.domain.size:
             rows = (low, high)
-            self._matrix = assemble_part(
-                self._model, rows, rows, self._coefficients, 1.0, self._block
-            )
+            part = part_of(self._model, rows, rows, self._coefficients, 1.0, self._block)
+            self._matrix = as_petsc(part, PETSc.COMM_SELF)
             self._solver = PartSolver(self._matrix, self._in_stations, self._comm.size == 1)
             is_direct = self._solver.is_direct
         self._is_direct = bool(self._comm.allreduce(int(is_direct), op=MPI.MIN))
@@ -194,9 +202,9 @@ class LineOperators:
         """Let PETSc solve for the whole line on all ranks."""
         first, last = self._ownership.first, self._ownership.last
         self._make_arrays(first, last, self._comm)
-        self._matrix = assemble(
-            self._comm, self._model, self._ownership, self._coefficients, self._block
-        )
+        rows, whole = (first, last), (0, self._model.n_dofs)
+        part = part_of(self._model, rows, whole, self._coefficients, 1.0, self._block)
+        self._matrix = as_petsc(part, self._comm)
         self._solver = SchwarzSolver(
             self._comm, self._matrix, self._ownership, self._overlap(windows), self._in_stations
         )
@@ -229,6 +237,7 @@ class LineOperators:
         read_low, read_high = read_low - read_low % size, read_high + -read_high % size
         self.domain = domain = Subdomain(own.first, own.last, low, high, read_low, read_high)
         read, answer = np.zeros(read_high - read_low), np.zeros(domain.size)
+        self._read_array = read
         self._force_array, self._loaded_array = np.zeros(domain.size), np.zeros(domain.size)
         self._read = PETSc.Vec().createWithArray(read, comm=PETSc.COMM_SELF)
         self._force, self._loaded, self._solution, self._read_domain = (
@@ -249,16 +258,19 @@ class LineOperators:
     def _product(self, name: str) -> PETSc.Mat:
         """M, K or C for the rows of the subdomain, made when it is first asked for."""
         if name not in self._products:
-            domain = self.domain
-            self._products[name] = assemble_part(
-                self._model,
-                (domain.low, domain.high),
-                (domain.read_low, domain.read_high),
-                _COEFFICIENTS[name],
-                0.0,
-                self._model.block_size,
-            )
+            self._products[name] = as_petsc(self._rows_of(name), PETSc.COMM_SELF)
         return self._products[name]
+
+    def _rows_of(self, name: str) -> sparse.bsr_matrix:
+        domain = self.domain
+        return part_of(
+            self._model,
+            (domain.low, domain.high),
+            (domain.read_low, domain.read_high),
+            _COEFFICIENTS[name],
+            0.0,
+            self._model.block_size,
+        )
 
     def _solve(self, right: PETSc.Vec) -> None:
         if self._solver is not None:

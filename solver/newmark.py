@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from catenary.solver import inner_kernels, kernels
+from catenary.solver import inner_kernels, kernels, repeated_rows
 from catenary.solver.compliance import Windows
 from catenary.solver.distribution import Ownership
 from catenary.solver.line_operators import LineOperators, Loads
@@ -37,6 +37,7 @@ class NewmarkLine:
     def __init__(self, comm: Any, model: Model, ownership: Ownership, numerics: Numerics) -> None:
         kernels.warm_up()
         inner_kernels.warm_up()
+        repeated_rows.warm_up()
         dt, beta, gamma = numerics.dt, numerics.beta, numerics.gamma
         self._comm = comm
         self.ownership = ownership

@@ -15,45 +15,47 @@ from catenary.solver.model import Model, iterate_entries
 _SAME_STATION = 1e-6
 
 
-def assemble(
-    comm: Any,
-    model: Model,
-    ownership: Ownership,
-    coefficients: tuple[float, float, float],
-    block_size: int,
-) -> PETSc.Mat:
-    """Sum of M, K and C with ``coefficients``, distributed, in BAIJ format. Collective.
-
-    Rows and columns of held unknowns are zero but for ones on the diagonal. The caller destroys
-    the matrix.
-    """
-    first, last, n = ownership.first, ownership.last, model.n_dofs
-    blocks = _blocks(model, (first, last), (0, n), coefficients, 1.0, block_size)
-    return _finished(
-        PETSc.Mat().createBAIJ(
-            ((last - first, n), (last - first, n)), block_size, csr=_csr(blocks), comm=comm
-        )
-    )
-
-
-def assemble_part(
+def part_of(
     model: Model,
     rows: tuple[int, int],
     columns: tuple[int, int],
     coefficients: tuple[float, float, float],
     held_diagonal: float,
-    block_size: int,
-) -> PETSc.Mat:
-    """The same for a range of rows and of columns, on this rank alone. Not collective.
+    size: int,
+) -> sparse.bsr_matrix:
+    """Ranges of rows and columns of a sum of M, K and C in blocks of ``size``. Not collective.
 
     Both ranges begin and end between blocks. Entries beyond ``columns`` are left out; those of
-    held unknowns are zero but for ``held_diagonal``.
+    held unknowns are zero but for ``held_diagonal``. Indices are sorted.
     """
-    blocks = _blocks(model, rows, columns, coefficients, held_diagonal, block_size)
-    shape = (rows[1] - rows[0], columns[1] - columns[0])
-    return _finished(
-        PETSc.Mat().createBAIJ(shape, block_size, csr=_csr(blocks), comm=PETSc.COMM_SELF)
+    parts = list(iterate_entries(model, *rows, *coefficients))
+    held = model.constrained
+    held = held[(held >= rows[0]) & (held < rows[1])]
+    parts.append((held, held, np.full(held.size, held_diagonal)))
+    row, column, value = (np.concatenate(part) for part in zip(*parts, strict=True))
+    inside = (column >= columns[0]) & (column < columns[1])
+    local = sparse.coo_matrix(
+        (value[inside], (row[inside] - rows[0], column[inside] - columns[0])),
+        shape=(rows[1] - rows[0], columns[1] - columns[0]),
     )
+    blocks = local.tobsr((size, size))
+    blocks.sort_indices()
+    return blocks
+
+
+def as_petsc(part: sparse.bsr_matrix, comm: Any) -> PETSc.Mat:
+    """Rows of a matrix as PETSc's BAIJ: all of them, or this rank's. Collective on ``comm``.
+
+    The caller destroys the matrix.
+    """
+    rows, columns = part.shape
+    csr = (part.indptr.astype(PETSc.IntType), part.indices.astype(PETSc.IntType), part.data)
+    shape = ((rows, None), (rows if comm.size > 1 else columns, None))
+    matrix = PETSc.Mat().createBAIJ(shape, part.blocksize[0], csr=csr, comm=comm)
+    matrix.assemble()
+    if rows == columns or comm.size > 1:
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    return matrix
 
 
 def columns_of(model: Model, rows: tuple[int, int]) -> tuple[int, int]:
@@ -79,39 +81,3 @@ def station_block(model: Model, ownership: Ownership) -> int:
     return 2 * size if (np.abs(x[1::2] - x[::2]) < _SAME_STATION).all() else size
 
 
-def _blocks(
-    model: Model,
-    rows: tuple[int, int],
-    columns: tuple[int, int],
-    coefficients: tuple[float, float, float],
-    held_diagonal: float,
-    size: int,
-) -> sparse.bsr_matrix:
-    parts = list(iterate_entries(model, *rows, *coefficients))
-    held = model.constrained
-    held = held[(held >= rows[0]) & (held < rows[1])]
-    parts.append((held, held, np.full(held.size, held_diagonal)))
-    row, column, value = (np.concatenate(part) for part in zip(*parts, strict=True))
-    inside = (column >= columns[0]) & (column < columns[1])
-    local = sparse.coo_matrix(
-        (value[inside], (row[inside] - rows[0], column[inside] - columns[0])),
-        shape=(rows[1] - rows[0], columns[1] - columns[0]),
-    )
-    blocks = local.tobsr((size, size))
-    blocks.sort_indices()
-    return blocks
-
-
-def _csr(blocks: sparse.bsr_matrix) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return (
-        blocks.indptr.astype(PETSc.IntType),
-        blocks.indices.astype(PETSc.IntType),
-        blocks.data,
-    )
-
-
-def _finished(matrix: PETSc.Mat) -> PETSc.Mat:
-    matrix.assemble()
-    if matrix.getSize()[0] == matrix.getSize()[1]:
-        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    return matrix
