@@ -304,11 +304,17 @@ def _versions() -> dict[str, str]:
 
 def _performance(outcome: Outcome, phases: Phases, n_ranks: int) -> dict[str, Any]:
     """What is known at the end; after a restart, of the last part."""
+    counted: dict[str, float] = dict(outcome.counters)
+    if outcome.traffic is not None:
+        # Of the rank that sends most; a whole number unless droppers of other ranks slacken.
+        counted["messages_per_step"], counted["message_bytes_per_step"] = (
+            round(value, 3) for value in outcome.traffic
+        )
     return {
         "n_ranks": n_ranks,
         "march_wall_s": outcome.wall,
         "phase_wall_s": phases.wall,
-        "inner_iterations": outcome.counters,
+        "inner_iterations": counted,
     }
 
 

@@ -50,6 +50,7 @@ class Exchange:
     Attributes
     ----------
     share : this rank's share of the inner problem, to be filled in before ``to_root``
+    messages, bytes_sent : that this rank sent since it was made; a sum or broadcast counts as one
 
     Parameters
     ----------
@@ -60,6 +61,7 @@ class Exchange:
         self._comm = comm
         self._n = n_contacts
         self._early = early
+        self.messages = self.bytes_sent = 0
         self.enlarge(_FIRST_CAPACITY)
 
     def enlarge(self, capacity: int) -> None:
@@ -77,9 +79,12 @@ class Exchange:
         is_root = comm.rank == 0
         # Two ranks at most own the ends of an element: the order of summing does not matter.
         comm.Reduce(share.summed, merged.summed if is_root else None, op=MPI.SUM, root=0)
+        self._count(share.summed.nbytes)
         if not is_root:
             if share.count:
-                comm.Send(share.rows[: share.count], dest=0, tag=_ROWS)
+                rows = share.rows[: share.count]
+                comm.Send(rows, dest=0, tag=_ROWS)
+                self._count(rows.nbytes)
             return None
         self._receive_rows()
         return self._merged
@@ -99,6 +104,7 @@ class Exchange:
                 answer[_HEAD + n : _HEAD + n + count] = reply.droppers
                 answer[_HEAD + n + count : _HEAD + n + 2 * count] = reply.compensation
         comm.Bcast(answer, root=0)
+        self._count(answer.nbytes)
         count = int(answer[1])
         pairs = answer[_HEAD + n : _HEAD + n + 2 * count]
         if count > room:
@@ -107,6 +113,7 @@ class Exchange:
             if reply is not None:
                 pairs[:count], pairs[count:] = reply.droppers, reply.compensation
             comm.Bcast(pairs, root=0)
+            self._count(pairs.nbytes)
         return Reply(
             Verdict(int(answer[0])),
             answer[_HEAD : _HEAD + n].copy(),
@@ -114,6 +121,10 @@ class Exchange:
             pairs[count : 2 * count].copy(),
             int(answer[2]),
         )
+
+    def _count(self, n_bytes: int) -> None:
+        self.messages += 1
+        self.bytes_sent += n_bytes
 
     def _receive_rows(self) -> None:
         """Rows of all ranks one after the other, rank by rank."""

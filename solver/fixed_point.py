@@ -92,6 +92,11 @@ class FixedPoint:
         self._force = state[:n].copy()
         self.law.restore(state[n:])
 
+    @property
+    def traffic(self) -> None:
+        """Not counted: rounds of messages, many a step."""
+        return None
+
     def _heads_everywhere(self, time: float) -> Heads:
         """Rank 0's prediction on all ranks, which all know if there is none."""
         if self.comm.size == 1:

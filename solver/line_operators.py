@@ -92,6 +92,8 @@ class LineOperators:
             if self._solver is not None:
                 self._solver.iterate()
             self._is_direct = False
+        if isinstance(self._solver, PartSolver):
+            self._solver.hurry()
         self._stiffness = repeated_rows(self._rows_of("stiffness"))
 
     def exchange(self) -> None:

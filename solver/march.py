@@ -15,6 +15,7 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from catenary.solver.contact_laws import KinematicLaw
@@ -43,7 +44,9 @@ class Outcome:
     """How a march ended.
 
     ``outcome`` is "done", "interrupted" or the sentence of what broke; ``wall`` [s] the time of
-    the time loop alone; ``simulated`` [s]; ``n_steps`` taken; ``counters`` of the scheme.
+    the time loop alone; ``simulated`` [s]; ``n_steps`` taken; ``counters`` of the scheme;
+    ``traffic`` is how many messages and bytes a rank sent a step, the one that sent most: to its
+    neighbours, and each sum and broadcast as one; None on one rank, or if not counted.
     """
 
     outcome: str
@@ -51,6 +54,7 @@ class Outcome:
     simulated: float
     n_steps: int
     counters: dict[str, int] = field(default_factory=dict)
+    traffic: tuple[float, float] | None = None
 
 
 class March:
@@ -175,6 +179,7 @@ class March:
             n_steps * self._problem.numerics.dt,
             n_steps,
             self._scheme.counters.as_dict(),
+            self._traffic(max(1, n_steps)),
         )
 
     def destroy(self) -> None:
@@ -193,6 +198,15 @@ class March:
         # Errors of ours reach all ranks; at any other the rest may be waiting elsewhere.
         if error is None or isinstance(error, CatenaryError):
             self.destroy()
+
+    def _traffic(self, n_steps: int) -> tuple[float, float] | None:
+        """Messages and bytes a step of the rank that sent most; None if none. Collective."""
+        scheme = self._scheme.traffic
+        if self._comm.size == 1 or scheme is None:
+            return None
+        sent = np.array(scheme, dtype=float) / n_steps + np.array(self._line.operators.traffic)
+        self._comm.Allreduce(MPI.IN_PLACE, sent, op=MPI.MAX)
+        return float(sent[0]), float(sent[1])
 
     @staticmethod
     def _start(observers: Sequence[Observer], stage: Stage) -> None:

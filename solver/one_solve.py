@@ -99,6 +99,11 @@ class OneSolve:
         """Continue from what ``state`` returned."""
         self.coupling.restore(state)
 
+    @property
+    def traffic(self) -> tuple[int, int]:
+        """Messages and bytes that this rank sent to agree on forces."""
+        return self._exchange.messages, self._exchange.bytes_sent
+
     def _solve_inner(self, time: float, stop: bool, touches: Touches) -> Reply:
         exchange, interaction, events = self._exchange, self.interaction, self._events
         events["ContactInner"].begin()

@@ -12,9 +12,9 @@ from scipy import sparse
 
 from catenary.solver.kernels import compiled
 
-# Rows for each kind below which a stored matrix reads less, and unknowns of a node that the kernel
-# is written for.
-_REPEATED, _BLOCK = 4, 2
+# Rows for each kind below which a stored matrix is no slower, and unknowns of a node that the
+# kernel is written for.
+_REPEATED, _BLOCK = 8, 2
 # Blocks of a row that are multiplied without asking whether they exist: a node's own, and those of
 # the next on either side along its wire.
 _ALWAYS = 3

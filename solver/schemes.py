@@ -50,6 +50,11 @@ class Scheme(Protocol):
             On all ranks, if the step has no solution or holds something that is no number.
         """
 
+    @property
+    def traffic(self) -> tuple[int, int] | None:
+        """Messages and bytes that this rank sent so far, those to neighbours left out; None if
+        they are not counted."""
+
     def state(self) -> np.ndarray:
         """What has to be known of contacts to continue, as one array."""
 
