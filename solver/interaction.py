@@ -111,7 +111,13 @@ class Interaction:
         dofs = self.wire.dofs[first:last].reshape(-1, 1)
         at = np.repeat(self.wire.x[first:last], 2)
         columns = compliance.compute(
-            comm, line.operators.solve_for, line.ownership, line.windows, dofs, np.ones(dofs.shape), at
+            comm,
+            line.operators.solve_for,
+            line.ownership,
+            line.windows,
+            dofs,
+            np.ones(dofs.shape),
+            at,
         )
         # Both unknowns of a node share a window; their columns stand one after the other.
         packed = columns.packed()

@@ -19,7 +19,13 @@ from catenary.solver.compliance import Windows
 from catenary.solver.distribution import Ownership
 from catenary.solver.errors import RunBroken
 from catenary.solver.events import event
-from catenary.solver.linear import DIRECT, PREFIX, PartSolver, SchwarzSolver, wants_distributed_solver
+from catenary.solver.linear import (
+    DIRECT,
+    PREFIX,
+    PartSolver,
+    SchwarzSolver,
+    wants_distributed_solver,
+)
 from catenary.solver.model import Model
 from catenary.solver.operators import as_petsc, columns_of, part_of, station_block
 from catenary.solver.repeated_rows import repeated_rows

@@ -63,8 +63,9 @@ def repeated_rows(matrix: sparse.bsr_matrix) -> RepeatedRows | None:
         return None
     same = (blocks == blocks[first][kinds]).all() and (steps == steps[first][kinds]).all()
     counts = np.maximum(count[first], _ALWAYS)
-    # Different rows of one digest are as good as impossible, and would only cost time.
-    return RepeatedRows(kinds.astype(np.int32), blocks[first], steps[first], counts) if same else None
+    if not same:
+        return None  # different rows of one digest: as good as impossible, and only slower
+    return RepeatedRows(kinds.astype(np.int32), blocks[first], steps[first], counts)
 
 
 def _digests(blocks: np.ndarray, steps: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,18 @@ import numpy as np
 import pytest
 from program import MPIRUN
 
+needs_mpirun = pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
+_first: dict[str, Any] = {}
 DRIVERS = Path(__file__).parent / "drivers"
 # The Makefile says how this machine's MPI takes more ranks than cores, and root.
 MPI_FLAGS = os.environ.get("MPI_FLAGS", "").split()
 SPANS = (10, 25, 100, 1000, 10_000)
 # Steps that take some tenths of a second on each of them.
 STEPS = {10: 6000, 25: 4000, 100: 2000, 1000: 150, 10_000: 15}
+# Spans of which one rank's share of the state fits the fast caches, the shared one, and none.
+SHARES = (100, 300, 1000)
+# Two neighbours, a sum and a broadcast; a rank whose droppers may slacken tells of them besides.
+MOST_MESSAGES = 2 + 2 + 1
 PREDICTED_RANKS = (64, 512, 4096)
 # Numbers of a step's reduction and broadcast with one contact, and of a neighbour's overlap of one
 # span, 90 stations of 4 unknowns; 8 bytes each.
@@ -36,39 +43,76 @@ def driver(name: str, *arguments: object, ranks: int = 1) -> dict[str, Any]:
         assert MPIRUN is not None
         command = [MPIRUN, "-n", str(ranks), *MPI_FLAGS, *command]
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    environment["STARTED_AT"] = str(time.time())
     done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=1200)
     assert done.returncode == 0, done.stderr[-2000:]
     found: dict[str, Any] = json.loads(done.stdout.strip().splitlines()[-1])
     return found
 
 
-def test_growth_with_spans() -> None:
-    print("\n\none rank       unknowns   us a step   us a span   at rest [s]   ready [s]"
-          "   memory [MB]   kB a span")  # fmt: skip
-    first = None
-    for spans in SPANS:
-        found = driver("step_cost.py", spans, STEPS[spans])
-        peak = found["peak_bytes"]
-        first = peak if first is None else first
-        print(
-            f"{spans:6} spans {found['unknowns']:10}{found['us_per_step']:12.1f}"
-            f"{found['us_per_step'] / spans:12.3f}{found['rest_s']:14.2f}{found['ready_s']:12.2f}"
-            f"{peak / 1e6:14.0f}{(peak - first) / 1e3 / spans:12.0f}"
-        )
+def keep(benchmark: Any, found: dict[str, Any]) -> None:
+    """Store what a driver found in the JSON; the clock of this process says nothing."""
+    benchmark.extra_info.update(found)
+    benchmark.pedantic(lambda: None)
 
 
-@pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
-def test_scaling_over_ranks() -> None:
-    one, half = driver("step_cost.py", 1000, 300), driver("step_cost.py", 500, 600)
-    two = driver("step_cost.py", 1000, 300, ranks=2)
+@pytest.mark.parametrize("spans", SPANS)
+def test_growth_with_spans(benchmark: Any, spans: int) -> None:
+    found = driver("step_cost.py", spans, STEPS[spans])
+    if spans == SPANS[0]:
+        print("\n\none rank       unknowns   us a step   us a span   at rest [s]   ready [s]"
+              "   memory [MB]   kB a span")  # fmt: skip
+    peak = found["peak_bytes"]
+    begun = _first.setdefault("peak_bytes", peak)
+    print(
+        f"{spans:6} spans {found['unknowns']:10}{found['us_per_step']:12.1f}"
+        f"{found['us_per_step'] / spans:12.3f}{found['rest_s']:14.2f}{found['ready_s']:12.2f}"
+        f"{peak / 1e6:14.0f}{(peak - begun) / 1e3 / spans:12.0f}"
+    )
+    keep(benchmark, found)
+
+
+@needs_mpirun
+def test_a_line_of_ten_thousand_spans_on_two_ranks(benchmark: Any) -> None:
+    found = driver("step_cost.py", SPANS[-1], STEPS[SPANS[-1]], ranks=2)
+    print(f"\n\n{SPANS[-1]} spans on 2 ranks: {found['us_per_step']:.0f} us a step, ready after "
+          f"{found['ready_s']:.0f} s, {found['peak_bytes'] / 1e9:.1f} GB")  # fmt: skip
+    assert found["peak_bytes"] < 20 * 2**30
+    keep(benchmark, found)
+
+
+@needs_mpirun
+@pytest.mark.parametrize("spans", SHARES)
+def test_scaling_over_ranks(benchmark: Any, spans: int) -> None:
+    """Two ranks against one: with as many spans in all (strong), and with as many each (weak)."""
+    steps = 200_000 // spans
+    one, two, twice = (
+        driver("step_cost.py", count, steps, ranks=ranks)
+        for count, ranks in ((spans, 1), (spans, 2), (2 * spans, 2))
+    )
     strong = one["us_per_step"] / two["us_per_step"] / 2
-    weak = half["us_per_step"] / two["us_per_step"]
-    print("\n\n                       us a step   efficiency")
-    print(f" 500 spans on 1 rank  {half['us_per_step']:10.0f}")
-    print(f"1000 spans on 1 rank  {one['us_per_step']:10.0f}")
-    print(f"1000 spans on 2 ranks {two['us_per_step']:10.0f}   strong {100 * strong:.0f} %, "
-          f"weak {100 * weak:.0f} %")  # fmt: skip
-    predict(one, driver("ping.py", ranks=2))
+    weak = one["us_per_step"] / twice["us_per_step"]
+    print(f"\n\n{spans} spans: {one['us_per_step']:.0f} us a step on 1 rank, "
+          f"{two['us_per_step']:.0f} on 2 (strong {100 * strong:.0f} %), "
+          f"{2 * spans} on 2: {twice['us_per_step']:.0f} (weak {100 * weak:.0f} %)")  # fmt: skip
+    keep(benchmark, {"strong": strong, "weak": weak})
+
+
+@needs_mpirun
+def test_messages_of_a_step(benchmark: Any) -> None:
+    """The rank that sends most, on more and more ranks that share the two cores."""
+    print("\n\nranks   messages a step   bytes a step")
+    for ranks in (2, 3, 5, 8):
+        found = driver("step_cost.py", 100, 500, ranks=ranks)
+        print(f"{ranks:5}{found['messages']:18.2f}{found['message_bytes']:15.0f}")
+        assert found["messages"] < MOST_MESSAGES
+    keep(benchmark, {})
+
+
+@needs_mpirun
+def test_prediction_for_many_ranks(benchmark: Any) -> None:
+    predict(driver("step_cost.py", 1000, STEPS[1000]), driver("ping.py", ranks=2))
+    keep(benchmark, {})
 
 
 def predict(one: dict[str, Any], wire: dict[str, float]) -> None:

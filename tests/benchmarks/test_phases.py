@@ -1,0 +1,47 @@
+"""Where a step's time goes, by the events that ``-log_view`` shows. Run by ``make bench``."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from catenary.cases.meshing import mesh_of
+from catenary.cases.scene import load_scene
+from catenary.solver.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.events import NAMES
+from catenary.solver.march import March
+
+N_STEPS = 5000
+
+
+@pytest.mark.parametrize("pantograph", ["lumped", "seven_body"])
+def test_phases_of_a_step(benchmark: Any, pantograph: str) -> None:
+    """Times of events add up to the step but for what Python does between them."""
+    train = f'train.pantographs=[{{name="{pantograph}"}}]'
+    scene = load_scene("ambrosio2012", ["train.start_m=310", train])
+    problem = scene.to_problem()
+    model, form = find_form(problem, mesh_of(scene))
+    lift = elasticity(model, *middle_span(problem.line))
+    train_of = problem.train
+    length = N_STEPS * problem.numerics.dt * train_of.speed
+    problem = replace(problem, train=replace(train_of, end=train_of.start + length))
+    PETSc.Log.begin()
+    with March(MPI.COMM_SELF, problem, model, form, lift) as march:
+        names = ("TSStep", "MatSolve", *NAMES)
+        before = {name: PETSc.Log.Event(name).getPerfInfo()["time"] for name in names}
+        benchmark.pedantic(lambda: march.run([]), rounds=1)
+        spent = {
+            name: 1e6 * (PETSc.Log.Event(name).getPerfInfo()["time"] - before[name]) / N_STEPS
+            for name in names
+        }
+    print(f"\n\nambrosio2012, {pantograph}, one rank, us a step with logging on")
+    for name, cost in spent.items():
+        print(f"  {name:15}{cost:8.1f}   {NAMES.get(name, '')}")
+    parts = sum(spent[name] for name in NAMES if name not in ("LineProduct", "Show"))
+    print(f"  {'between them':15}{spent['TSStep'] - parts:8.1f}")
+    assert 0.0 < parts < spent["TSStep"]
+    benchmark.extra_info.update(spent)
