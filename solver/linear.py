@@ -189,4 +189,3 @@ def _choose_direct(ksp: PETSc.KSP, in_stations: bool) -> None:
 def _use_gmres(ksp: PETSc.KSP) -> None:
     ksp.setType(PETSc.KSP.Type.GMRES)
     ksp.setTolerances(rtol=1e-14, max_it=200)
-

@@ -79,5 +79,3 @@ def station_block(model: Model, ownership: Ownership) -> int:
         return size
     x[model.row_of_node] = model.mesh.points[:, 0]
     return 2 * size if (np.abs(x[1::2] - x[::2]) < _SAME_STATION).all() else size
-
-
