@@ -172,6 +172,7 @@ def _fine_grid(quick: bool) -> Reference:
 
 # ---- scheme and coupling ------------------------------------------------------------------------
 
+_NEWMARK = ("numerics.integrator=newmark", "numerics.spectral_radius=")
 _ONE_SOLVE = ("numerics.scheme=one_solve",)
 # Corrections are counted by max_iterations, which ends a run that has not settled by then; the
 # tolerances decide how many a step takes. With the loosest ones every step ends after the first.
@@ -181,7 +182,17 @@ _LOOSENESS = ((1e-2, 1.0), (1e-4, 1e-1), (1e-5, 1e-2), (1e-7, 1e-4))
 
 def _newmark(name: str, gamma: float, beta: float, quick: bool = False) -> Level:
     keys = (f"numerics.newmark_gamma={gamma}", f"numerics.newmark_beta={beta}")
-    return Level(name, (*_ONE_SOLVE, *keys), quick=quick)
+    return Level(name, (*_ONE_SOLVE, *_NEWMARK, *keys), quick=quick)
+
+
+def _alpha(integrator: str, radius: float, quick: bool = False) -> Level:
+    keys = (
+        f"numerics.integrator={integrator}",
+        f"numerics.spectral_radius={radius}",
+        "numerics.newmark_gamma=",
+        "numerics.newmark_beta=",
+    )
+    return Level(f"{integrator}_{radius:g}", (*_ONE_SOLVE, *keys), quick=quick)
 
 
 def _schemes(scene: Scene) -> list[Level]:
@@ -189,6 +200,8 @@ def _schemes(scene: Scene) -> list[Level]:
         _newmark("average_acceleration", 0.5, 0.25, True),
         _newmark("newmark_0.55", 0.55, 0.28, True),
         _newmark("newmark_0.6", 0.6, 0.3025),
+        *(_alpha("generalized_alpha", radius, radius == 0.8) for radius in (0.9, 0.8, 0.5, 0.0)),
+        *(_alpha("hht", radius) for radius in (0.9, 0.8)),
     ]
     levels += [
         Level(f"corrected_at_most_{n}", (*_PAPER, f"numerics.max_iterations={n}"))
@@ -241,7 +254,7 @@ def _contacts(scene: Scene) -> list[Level]:
         for law in ("lankarani_nikravesh", "hunt_crossley", "flores", "gonthier")
     ]
     # Without numerical damping the force of a contact that does not give way alternates.
-    damped = ("numerics.newmark_gamma=0.55", "numerics.newmark_beta=0.28")
+    damped = (*_NEWMARK, "numerics.newmark_gamma=0.55", "numerics.newmark_beta=0.28")
     rigid = (*_ELASTIC, "contact.stiffness_N_per_m=", "contact.law=kinematic", *damped)
     return [*levels, Level("kinematic_newmark_0.55", rigid)]
 

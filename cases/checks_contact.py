@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from catenary.cases.messages import refuse
 from catenary.cases.schema_contact import HERTZ, WITH_RESTITUTION
+from catenary.solver.integration import NEWMARK
 
 if TYPE_CHECKING:
     from catenary.cases.scene import Scene
@@ -88,6 +89,14 @@ def _kinematic(scene: Scene) -> None:
             "train.start_below_m",
             scene.train.start_below_m,
             "contact.law kinematic has no gap that a head could rise through: take another law",
+        )
+    if numerics.integrator != NEWMARK:
+        refuse(
+            scene.origin,
+            "numerics.integrator",
+            numerics.integrator,
+            "contact.law kinematic keeps line and pantographs together only if one method steps "
+            f"both: take newmark, with numerics.newmark_gamma of at least {KINEMATIC_GAMMA:g}",
         )
     if numerics.newmark_gamma < KINEMATIC_GAMMA:
         refuse(

@@ -90,6 +90,8 @@ def problem_of(scene: Scene) -> Problem:
             max_iterations=numerics.max_iterations,
             coupling=numerics.coupling or "implicit",
             eps_force=numerics.eps_force_N,
+            integrator=numerics.integrator,
+            spectral_radius=1.0 if numerics.spectral_radius is None else numerics.spectral_radius,
         ),
         evaluation=(scene.evaluation.from_m, scene.evaluation.to_m),
         residual_stiffness_ratio=ratio,

@@ -28,9 +28,9 @@ from catenary.solver.equilibrium import (
     middle_span,
     stiffness_matrix,
 )
+from catenary.solver.line_integrators import make_line
 from catenary.solver.march import March
 from catenary.solver.model import Model, build, iterate_entries
-from catenary.solver.newmark import NewmarkLine
 from catenary.solver.observation import Stage, StepView
 from catenary.solver.parallel import on_root
 from catenary.solver.problem import Problem
@@ -202,9 +202,9 @@ def run_free(rest: AtRest, comm: Any, n_steps: int) -> Watched:
     acceleration = spsolve(_mass_matrix(model), -load)
     ownership = distribute(model, comm.size, comm.rank)
     rows = slice(ownership.first, ownership.last)
-    line = NewmarkLine(comm, model, ownership, numerics)
+    line = make_line(comm, model, ownership, numerics)
     try:
-        line.displacement[:], line.acceleration[:] = shape[rows], acceleration[rows]
+        line.start(shape[rows], np.zeros(ownership.n_local), acceleration[rows])
         energy = [sum(line.energies())]
         every = max(1, n_steps // 100)
         for number in range(1, n_steps + 1):

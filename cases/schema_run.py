@@ -8,6 +8,12 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from catenary.cases.table import TAKE_AWAY, Table
+from catenary.solver.integration import (
+    AVERAGE_ACCELERATION,
+    HHT,
+    LEAST_RADIUS_OF_HHT,
+    NEWMARK,
+)
 
 # Statistics are taken below 20 Hz (EN 50317); its Nyquist limit is the longest step that can do so.
 MAX_DT = 1.0 / 40.0
@@ -75,6 +81,16 @@ class NumericsTable(Table):
         description="one_solve: contact forces implicit through both sides (if absent), exchanged "
         "until they agree, or from the extrapolated motion of both sides",
     )
+    integrator: Literal["newmark", "hht", "generalized_alpha"] = Field(
+        "newmark", description="method that advances the line"
+    )
+    spectral_radius: float | None = Field(
+        None,
+        ge=0,
+        le=1,
+        description="integrators hht (0.5 to 1) and generalized_alpha: what is left of the fastest "
+        "vibrations after a step",
+    )
     newmark_beta: float = Field(0.25, gt=0, le=1, description="Newmark's beta")
     newmark_gamma: float = Field(0.5, ge=0.5, le=2, description="Newmark's gamma")
     eps_d_m: float = Field(
@@ -111,6 +127,32 @@ class NumericsTable(Table):
             raise ValueError(
                 "must have 2 newmark_beta >= newmark_gamma to be stable for every step, but "
                 f"newmark_beta is {self.newmark_beta:g} and newmark_gamma is {self.newmark_gamma:g}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _has_its_spectral_radius(self) -> NumericsTable:
+        radius = self.spectral_radius
+        if self.integrator == NEWMARK:
+            if radius is not None:
+                raise ValueError(
+                    "must not give spectral_radius, which belongs to integrators hht and "
+                    "generalized_alpha, with newmark, whose damping is newmark_gamma" + TAKE_AWAY
+                )
+            return self
+        if radius is None:
+            raise ValueError(
+                f"must give spectral_radius with integrator {self.integrator}, for instance 0.8"
+            )
+        if self.integrator == HHT and radius < LEAST_RADIUS_OF_HHT:
+            raise ValueError(
+                f"must have spectral_radius from {LEAST_RADIUS_OF_HHT:g} to 1 with integrator hht, "
+                f"not {radius:g}: take generalized_alpha for less"
+            )
+        if (self.newmark_beta, self.newmark_gamma) != AVERAGE_ACCELERATION[:2]:
+            raise ValueError(
+                "must not give newmark_beta and newmark_gamma, which belong to integrator newmark, "
+                f"with {self.integrator}, whose parameters follow from spectral_radius" + TAKE_AWAY
             )
         return self
 

@@ -18,6 +18,12 @@ from catenary.postproc.results import Results
 from catenary.postproc.statistics import covers
 from catenary.solver import elements
 from catenary.solver.errors import InputError
+from catenary.solver.integration import (
+    AVERAGE_ACCELERATION,
+    NEWMARK,
+    Integration,
+    integration_of,
+)
 
 # How long an error of phase goes on growing [s]: on the line without damping, where waves run
 # away from the pantograph, and at the pantograph itself, which no damping of the line shortens.
@@ -59,12 +65,11 @@ class Indicators:
 
 class Method(NamedTuple):
     """What the time indicator needs of a run: proportional damping of the contact wire, C = alpha K
-    + beta M ([s], [1/s]), and Newmark's parameters."""
+    + beta M ([s], [1/s]), and the parameters of its integration."""
 
     alpha: float
     beta: float
-    newmark_beta: float = 0.25
-    newmark_gamma: float = 0.5
+    integration: Integration = AVERAGE_ACCELERATION
 
 
 def indicate(results: Results) -> Indicators:
@@ -99,9 +104,9 @@ def indicate(results: Results) -> Indicators:
 def step_error(force: np.ndarray, dt: float, method: Method) -> float:
     """Estimated rms error of a force history due to the time step [N]. Not collective.
 
-    Newmark's method moves what has the frequency w with w (1 - (beta / 2 - 1 / 24) (w dt)^2) and
-    takes (gamma - 1/2) w^2 dt / 2 from its rate of growth. Each component of the force is wrong by
-    the product of both with the time for which what caused it is remembered.
+    The method moves what has the frequency w to w (1 - E (w dt)^2) and takes w D(w dt) from its
+    rate of growth, D being a damping ratio. Each component of the force is wrong by the product of
+    both with the time for which what caused it is remembered.
 
     Parameters
     ----------
@@ -116,8 +121,12 @@ def step_error(force: np.ndarray, dt: float, method: Method) -> float:
     if deviation == 0.0 or power.sum() == 0.0:
         return 0.0
     power = power * deviation**2 / power.sum()
-    shift = (0.5 * method.newmark_beta - 1.0 / 24.0) * omega**3 * dt**2
-    decay = 0.5 * (method.newmark_gamma - 0.5) * omega**2 * dt
+    own = method.integration
+    shift = own.frequency_error * omega**3 * dt**2
+    if own.is_second_order:
+        decay = own.third_order_damping * omega**4 * dt**3
+    else:
+        decay = own.first_order_damping * omega**2 * dt
     phase = memory(omega, method.alpha, method.beta) * np.hypot(shift, decay)
     phase = np.minimum(phase, _LARGEST_PHASE)
     return float(np.sqrt(np.sum(power * (2.0 - 2.0 * np.cos(phase)))))
@@ -198,8 +207,12 @@ def _method(config: dict[str, Any]) -> Method:
     return Method(
         float(own["alpha_s"]),
         float(own["beta_per_s"]),
-        float(numerics.get("newmark_beta", 0.25)),
-        float(numerics.get("newmark_gamma", 0.5)),
+        integration_of(
+            str(numerics.get("integrator") or NEWMARK),
+            float(numerics.get("spectral_radius") or 0.0),
+            float(numerics.get("newmark_beta", 0.25)),
+            float(numerics.get("newmark_gamma", 0.5)),
+        ),
     )
 
 

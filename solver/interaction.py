@@ -9,8 +9,8 @@ import numpy as np
 from catenary.solver import compliance, kernels
 from catenary.solver.contact import ContactWire, Touches
 from catenary.solver.equilibrium import Equilibrium
+from catenary.solver.line_motion import LineMotion
 from catenary.solver.model import Model
-from catenary.solver.newmark import NewmarkLine
 from catenary.solver.response import LineResponse
 
 
@@ -25,7 +25,7 @@ class Droppers:
     latest_tension : (n,) what ``find_tension`` found last [N]
     """
 
-    def __init__(self, model: Model, form: Equilibrium, line: NewmarkLine) -> None:
+    def __init__(self, model: Model, form: Equilibrium, line: LineMotion) -> None:
         ends = model.dofs(model.mesh.droppers)
         mine = line.ownership.owned(ends[:, 0])
         self.numbers = np.flatnonzero(mine)
@@ -93,7 +93,7 @@ class Interaction:
         comm: Any,
         model: Model,
         form: Equilibrium,
-        line: NewmarkLine,
+        line: LineMotion,
         range_of_run: tuple[float, float],
         n_contacts: int,
         train_speed: float,
@@ -277,7 +277,7 @@ class Interaction:
 class SlackCoupling:
     """How the compensation of one dropper changes the tension of another, on rank 0.
 
-    Collective to make. G_de = (k beta dt^2 + c gamma dt)_d L_d^T A^-1 L_e [-].
+    Collective to make. G_de = (k sigma + c tau)_d L_d^T A^-1 L_e [-].
 
     Attributes
     ----------
@@ -291,7 +291,7 @@ class SlackCoupling:
         model: Model,
         droppers: Droppers,
         columns: compliance.ShortColumns,
-        line: NewmarkLine,
+        line: LineMotion,
     ) -> None:
         x = model.mesh.x(model.mesh.droppers[:, 1])
         n = x.size

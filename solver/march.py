@@ -27,9 +27,9 @@ from catenary.solver.events import event
 from catenary.solver.fixed_point import FixedPoint
 from catenary.solver.interaction import Interaction
 from catenary.solver.law_in_steps import law_in_steps
+from catenary.solver.line_integrators import make_line
 from catenary.solver.linear import PREFIX, refused_options
 from catenary.solver.model import Model
-from catenary.solver.newmark import NewmarkLine
 from catenary.solver.observation import Observer, Stage
 from catenary.solver.one_solve import OneSolve
 from catenary.solver.pantographs import Pantographs, nominal_height_rule
@@ -82,7 +82,7 @@ class March:
         self._model = model
         train, numerics = problem.train, problem.numerics
         self.ownership = distribute(model, comm.size, comm.rank)
-        self._line = NewmarkLine(comm, model, self.ownership, numerics)
+        self._line = make_line(comm, model, self.ownership, numerics)
         on = model.terms_of
         trailing = max(placement.behind for placement in train.placements)
         offsets = [x for placement in train.placements for x in placement.data.strip_offsets]
@@ -296,7 +296,8 @@ class March:
         elif ts.getType() != PETSc.TS.Type.PYTHON:
             found = (
                 f"_type is {ts.getType()}; the method is part of the scene: give "
-                "numerics.scheme, numerics.newmark_beta or numerics.newmark_gamma instead"
+                "numerics.scheme, numerics.integrator, numerics.newmark_beta or "
+                "numerics.newmark_gamma instead"
             )
         if found:
             ts.destroy()

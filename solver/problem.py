@@ -58,7 +58,11 @@ class Train:
 
 @dataclass(frozen=True)
 class Numerics:
-    """Time step [s], scheme, Newmark parameters, tolerances of the fixed-point correction.
+    """Time step [s], scheme, integrator, tolerances of the fixed-point correction.
+
+    ``integrator`` of the line is ``newmark`` with ``beta`` and ``gamma``, or ``hht`` or
+    ``generalized_alpha`` with ``spectral_radius``; ``beta`` and ``gamma`` are also those of the
+    pantographs, which step by Newmark's method always.
 
     ``scheme`` is ``one_solve`` or ``fixed_point`` (paper eqs. 2.4-2.7); ``eps_d`` [m] and
     ``eps_v`` [m/s] end the latter's iteration, at most ``max_iterations`` times a step.
@@ -75,6 +79,8 @@ class Numerics:
     max_iterations: int
     coupling: str = "implicit"
     eps_force: float = 1e-6
+    integrator: str = "newmark"
+    spectral_radius: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -100,9 +100,8 @@ class Showing:
         """Continue from a checkpoint, which all ranks pass. Not collective."""
         line, pantographs = self._line, self._pantographs
         rows = slice(line.ownership.first, line.ownership.last)
-        line.displacement[:] = checkpoint["displacement"][rows]
-        line.velocity[:] = checkpoint["velocity"][rows]
-        line.acceleration[:] = checkpoint["acceleration"][rows]
+        for name, values in line.state().items():
+            values[:] = checkpoint[name][rows]
         pantographs.contact_force[:] = checkpoint["contact_force"]
         pantographs.head_height[:] = checkpoint["head_height"]
         pantographs.wire_height[:] = checkpoint["wire_height"]
@@ -127,12 +126,7 @@ class Showing:
         """Everything needed to continue after the step shown last, on rank 0. Collective."""
         line, pantographs = self._line, self._pantographs
         whole = {
-            name: self._comm.gather(values.copy(), root=0)
-            for name, values in (
-                ("displacement", line.displacement),
-                ("velocity", line.velocity),
-                ("acceleration", line.acceleration),
-            )
+            name: self._comm.gather(values.copy(), root=0) for name, values in line.state().items()
         }
         if self._comm.rank != 0:
             return None

@@ -57,4 +57,6 @@ class Stepper:
 
     def view(self, ts: PETSc.TS, viewer: PETSc.Viewer) -> None:
         """Name the scheme in -march_ts_view."""
-        viewer.printfASCII(f"  Newmark step by scheme {type(self._scheme).__name__}\n")
+        viewer.printfASCII(
+            f"  step of the line and its train by scheme {type(self._scheme).__name__}\n"
+        )

@@ -128,6 +128,17 @@ def test_all_ranks_give_the_answer_of_one(case: tuple[Problem, LineMesh], scheme
     assert max(found.values()) < TOLERANCE
 
 
+@pytest.mark.parametrize("integrator", ["hht", "generalized_alpha"])
+def test_methods_with_numerical_damping_in_parallel(
+    case: tuple[Problem, LineMesh], integrator: str
+) -> None:
+    problem, mesh = case
+    numerics = replace(problem.numerics, integrator=integrator, spectral_radius=0.7)
+    train = replace(problem.train, end=problem.train.start + 80.0)
+    found = largest_difference(replace(problem, numerics=numerics, train=train), mesh)
+    assert max(found.values()) < TOLERANCE
+
+
 def test_damping_by_component_in_parallel(case: tuple[Problem, LineMesh]) -> None:
     problem, mesh = case
     damping = replace(problem.damping, per_component={"droppers": (0.0, 0.0)})

@@ -16,9 +16,10 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.solver.distribution import distribute
 from catenary.solver.effects import Effect, register, registry, unregister
 from catenary.solver.equilibrium import Equilibrium, elasticity, find_form, middle_span
+from catenary.solver.line_integrators import make_line
+from catenary.solver.line_motion import LineMotion
 from catenary.solver.march import March, Outcome
 from catenary.solver.model import Model, iterate_entries
-from catenary.solver.newmark import NewmarkLine
 from catenary.solver.observation import Stage, StepView
 from catenary.solver.problem import Numerics, Problem
 
@@ -91,27 +92,24 @@ def solve_free(matrix: sparse.csc_matrix, model: Model, right: np.ndarray) -> np
 
 
 @contextmanager
-def newmark_line(model: Model, numerics: Numerics) -> Iterator[NewmarkLine]:
+def line_alone(model: Model, numerics: Numerics) -> Iterator[LineMotion]:
     """The time stepper of a line alone, all droppers taut."""
-    line = NewmarkLine(COMM, model, distribute(model, COMM.size, COMM.rank), numerics)
+    line = make_line(COMM, model, distribute(model, COMM.size, COMM.rank), numerics)
     try:
         yield line
     finally:
         line.destroy()
 
 
-def release(
-    line: NewmarkLine, displacement: np.ndarray, velocity: np.ndarray, model: Model
-) -> None:
+def release(line: LineMotion, displacement: np.ndarray, velocity: np.ndarray, model: Model) -> None:
     """Start from a state with the acceleration that belongs to it: M a = -K d - C v."""
-    line.displacement[:] = displacement
-    line.velocity[:] = velocity
     force = matrix_of(model, stiffness=1.0) @ displacement
     force += matrix_of(model, damping=1.0) @ velocity
-    line.acceleration[:] = solve_free(matrix_of(model, mass=1.0), model, -force)
+    acceleration = solve_free(matrix_of(model, mass=1.0), model, -force)
+    line.start(displacement, velocity, acceleration)
 
 
-def step(line: NewmarkLine) -> None:
+def step(line: LineMotion) -> None:
     """One step of the line without loads."""
     line.predict()
     line.free_acceleration()

@@ -8,7 +8,7 @@ between sqrt(n) eps and, should they all have one sign, n eps.
 from __future__ import annotations
 
 import numpy as np
-from measuring import check, march, newmark_line, release, step
+from measuring import check, line_alone, march, release, step
 from scipy.sparse import linalg as sparse_linalg
 from small_lines import (
     HANGING,
@@ -34,7 +34,7 @@ def test_energy_stays_over_a_hundred_thousand_steps() -> None:
     load[model.dofs(model.mesh.droppers[4, 1])] = 200.0
     lifted = sparse_linalg.spsolve(stiffness_matrix(model), load)
     n_steps, totals, kinetic_share = 100_000, [], []
-    with newmark_line(model, numerics(1e-3)) as stepper:
+    with line_alone(model, numerics(1e-3)) as stepper:
         release(stepper, lifted, np.zeros_like(lifted), model)
         for number in range(n_steps + 1):
             if number % 1000 == 0:

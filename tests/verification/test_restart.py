@@ -12,8 +12,9 @@ from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, trai
 from catenary.solver.contact_laws import LinearLaw
 
 
+@pytest.mark.parametrize("integrator", ["newmark", "generalized_alpha"])
 @pytest.mark.parametrize("scheme", ["one_solve", "fixed_point"])
-def test_continued_run_equals_the_uninterrupted_one(scheme: str) -> None:
+def test_continued_run_equals_the_uninterrupted_one(scheme: str, integrator: str) -> None:
     line = en50318_line(6)
     mesh = mesh_of(line, 3)
     problem = problem_of(
@@ -21,7 +22,7 @@ def test_continued_run_equals_the_uninterrupted_one(scheme: str) -> None:
         WHOLE | {"contact_damping"},
         contact=LinearLaw(5e4, 50.0),
         train=train(70.0, 120.0, 180.0, behind=(0.0, 31.0), raise_time=0.3),
-        numerics=numerics(1e-3, scheme),
+        numerics=numerics(1e-3, scheme, integrator=integrator, spectral_radius=0.6),
     )
     at = 400
     checkpoints = {}

@@ -11,33 +11,36 @@ from catenary.solver.contact_laws import LinearLaw
 from catenary.solver.problem import Problem
 
 
-def two_pantographs(scheme: str, effects: frozenset[str], damping: float) -> Problem:
+def two_pantographs(
+    scheme: str, effects: frozenset[str], damping: float, integrator: str
+) -> Problem:
     """Two pantographs 31 m apart, fast enough to lose contact now and then."""
     return problem_of(
         en50318_line(8),
         effects,
         contact=LinearLaw(5e4, damping),
         train=train(320 / 3.6, 120.0, 330.0, behind=(0.0, 31.0), raise_time=0.3),
-        numerics=numerics(1e-3, scheme),
+        numerics=numerics(1e-3, scheme, integrator=integrator, spectral_radius=0.8),
         residual_stiffness_ratio=0.01,
     )
 
 
 @pytest.mark.parametrize(
-    ("effects", "damping"),
+    ("effects", "damping", "integrator"),
     [
-        (WHOLE, 0.0),
-        (WHOLE | {"contact_damping", "residual_dropper_stiffness"}, 50.0),
+        (WHOLE, 0.0, "newmark"),
+        (WHOLE | {"contact_damping", "residual_dropper_stiffness"}, 50.0, "newmark"),
+        (WHOLE, 0.0, "generalized_alpha"),
     ],
-    ids=["usual effects", "with contact damping and residual stiffness"],
+    ids=["usual effects", "with contact damping and residual stiffness", "generalized alpha"],
 )
 def test_one_solve_is_the_limit_of_the_fixed_point_correction(
-    effects: frozenset[str], damping: float
+    effects: frozenset[str], damping: float, integrator: str
 ) -> None:
     mesh = mesh_of(en50318_line(8), 4)
     runs: dict[str, History] = {}
     for scheme in ("one_solve", "fixed_point"):
-        problem = two_pantographs(scheme, effects, damping)
+        problem = two_pantographs(scheme, effects, damping, integrator)
         runs[scheme] = march(problem, mesh)
     direct, iterated = runs["one_solve"], runs["fixed_point"]
     force, droppers = direct["contact_force"], direct["dropper_force"]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from measuring import check, newmark_line, release, step
+from measuring import check, line_alone, release, step
 from small_lines import BARE, EN_CONTACT_WIRE, bare_wires, mesh_of, numerics, problem_of
 
 from catenary.meshgen.mesh import CONTACT_WIRE
@@ -33,7 +33,7 @@ def test_standing_waves_oscillate_by_the_dispersion_relation() -> None:
     nodes = model.mesh.wires[CONTACT_WIRE]
     w, theta = model.dofs(nodes), model.dofs(nodes, "theta_y")
     tension, density = EN_CONTACT_WIRE.tension, EN_CONTACT_WIRE.mass_per_length
-    with newmark_line(model, numerics(dt)) as line:
+    with line_alone(model, numerics(dt)) as line:
         for half_waves in (2, 5, 10, 20, 40):
             k = half_waves * np.pi / length
             shape = np.zeros(model.n_dofs)
@@ -88,7 +88,7 @@ def test_a_pulse_arrives_at_two_stations_at_the_wave_speed(rounding: float) -> N
     velocity[w], velocity[theta] = -speed * gauss(x, 1), -speed * gauss(x, 2)
     rows = [w[np.argmin(np.abs(x - station))] for station in stations]
     time, passed = [], []
-    with newmark_line(model, numerics(dt)) as line:
+    with line_alone(model, numerics(dt)) as line:
         release(line, displacement, velocity, model)
         while not time or time[-1] < duration:
             time.append(len(time) * dt)

@@ -164,6 +164,41 @@ ASSIGNMENTS = {
     "step of nothing": (["numerics.dt_s=0"], "at least 1e-06 [s]"),
     "unknown scheme": (["numerics.scheme=newton"], "one_solve or fixed_point"),
     "unstable Newmark": (["numerics.newmark_gamma=0.7"], "2 newmark_beta >= newmark_gamma"),
+    "unknown integrator": (["numerics.integrator=rk4"], "newmark, hht or generalized_alpha"),
+    "spectral radius of Newmark": (
+        ["numerics.spectral_radius=0.8"],
+        "belongs to integrators hht and generalized_alpha",
+    ),
+    "no spectral radius": (
+        ["numerics.integrator=generalized_alpha"],
+        "must give spectral_radius with integrator generalized_alpha",
+    ),
+    "spectral radius above 1": (
+        ["numerics.integrator=generalized_alpha", "numerics.spectral_radius=1.1"],
+        "at most 1",
+    ),
+    "spectral radius below HHT's": (
+        ["numerics.integrator=hht", "numerics.spectral_radius=0.4"],
+        "from 0.5 to 1 with integrator hht",
+    ),
+    "two ways to damp": (
+        [
+            "numerics.integrator=hht",
+            "numerics.spectral_radius=0.8",
+            "numerics.newmark_gamma=0.55",
+            "numerics.newmark_beta=0.28",
+        ],
+        "belong to integrator newmark",
+    ),
+    "kinematic contact by another method": (
+        [
+            "contact.law=kinematic",
+            "contact.stiffness_N_per_m=",
+            "numerics.integrator=generalized_alpha",
+            "numerics.spectral_radius=0.5",
+        ],
+        "only if one method steps both: take newmark",
+    ),
     "negative Newmark damping": (["numerics.newmark_gamma=0.4"], "at least 0.5"),
     "no iterations": (["numerics.max_iterations=0"], "at least 1"),
     "evaluation backwards": (["evaluation.to_m=400"], "must end after it starts"),

@@ -21,6 +21,7 @@ from catenary.postproc.indicators import (
 )
 from catenary.postproc.results import Results
 from catenary.solver import elements
+from catenary.solver.integration import Integration, integration_of
 
 UNDAMPED = Method(0.0, 0.0)
 
@@ -47,7 +48,7 @@ def test_a_single_tone_is_late_by_the_period_elongation_of_the_method(dt: float)
 
 def test_numerical_damping_counts_to_the_first_order_of_the_step() -> None:
     """Damping ratio (gamma - 1/2) w dt / 2: halving the step halves the error."""
-    damped = Method(0.0, 0.0, 0.3025, 0.6)
+    damped = Method(0.0, 0.0, Integration(0.3025, 0.6))
     coarse = step_error(tone(5.0, 1e-3), 1e-3, damped)
     fine = step_error(tone(5.0, 0.5e-3), 0.5e-3, damped)
     expected = 10.0 / np.sqrt(2.0) * (LINE_MEMORY + NEAR_MEMORY)
@@ -55,6 +56,17 @@ def test_numerical_damping_counts_to_the_first_order_of_the_step() -> None:
     # The window's spread, and what the period elongation adds: (0.025)^2 / 2 of it.
     check("rms error [N]", fine, expected, within=0.03 * expected)
     check("ratio", coarse / fine, 2.0, within=0.02)
+
+
+def test_methods_that_damp_with_order_3_are_late_by_their_own_period_elongation() -> None:
+    """HHT with a_f = 1/3: beta = 4/9, E = 2/9 - 1/24 - 1/18; damping ratio 1/54 (w dt)^3."""
+    method, dt = Method(0.0, 0.0, integration_of("hht", 0.5)), 1e-3
+    omega, total = 2.0 * np.pi * 10.0, LINE_MEMORY + NEAR_MEMORY
+    x = omega * dt
+    phase = total * omega * x**2 * np.hypot(2 / 9 - 1 / 24 - 1 / 18, x / 54)
+    expected = np.sqrt(2.0) * 10.0 * np.sin(0.5 * phase)
+    found = step_error(tone(10.0, dt), dt, method)
+    check("rms error [N]", found, expected, within=0.02 * expected)
 
 
 def test_no_error_without_fluctuation() -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from measuring import COMM, matrix_of, newmark_line
+from measuring import COMM, line_alone, matrix_of
 from scipy.sparse import identity
 from scipy.sparse import linalg as sparse_linalg
 from small_lines import (
@@ -25,9 +25,9 @@ from catenary.solver import compliance
 from catenary.solver.compliance import Windows
 from catenary.solver.equilibrium import find_form
 from catenary.solver.errors import RunBroken
+from catenary.solver.line_motion import LineMotion
 from catenary.solver.locality import DECAY, reach
 from catenary.solver.model import Model, build
-from catenary.solver.newmark import NewmarkLine
 from catenary.solver.problem import Damping
 
 DAMPED = HANGING | {"structural_damping"}
@@ -99,12 +99,12 @@ def test_droppers_far_apart_do_not_lengthen_the_reach() -> None:
 
 
 @pytest.fixture(scope="module")
-def stepper() -> Iterator[NewmarkLine]:
-    with newmark_line(line_model(2.75e-3, n_spans=6), numerics(1e-3)) as line:
+def stepper() -> Iterator[LineMotion]:
+    with line_alone(line_model(2.75e-3, n_spans=6), numerics(1e-3)) as line:
         yield line
 
 
-def test_short_columns_are_the_columns_of_full_solves(stepper: NewmarkLine) -> None:
+def test_short_columns_are_the_columns_of_full_solves(stepper: LineMotion) -> None:
     """Many columns come from one solve, and only windows are stored: nothing is lost by that."""
     model = line_model(2.75e-3, n_spans=6)
     ends = model.dofs(model.mesh.droppers)
@@ -132,7 +132,7 @@ def test_short_columns_are_the_columns_of_full_solves(stepper: NewmarkLine) -> N
     assert stored < 0.5
 
 
-def test_columns_that_leak_are_refused(stepper: NewmarkLine) -> None:
+def test_columns_that_leak_are_refused(stepper: LineMotion) -> None:
     model = line_model(2.75e-3, n_spans=6)
     nodes = model.mesh.wires["contact_wire"][40:44]
     dofs, x = model.dofs(nodes)[:, None], model.mesh.x(nodes)

@@ -1,0 +1,150 @@
+"""The line's state and step operator, whichever method of Newmark's family advances it.
+
+The step operator A = M + tau C + sigma K is factored once, sigma and tau being what displacement
+and velocity gain from the step's unknown acceleration. With proportional damping the step's
+right-hand side needs a single product with K: M v is eliminated by A itself.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from catenary.solver import inner_kernels, kernels, repeated_rows
+from catenary.solver.compliance import Windows
+from catenary.solver.distribution import Ownership
+from catenary.solver.line_operators import LineOperators, Loads
+from catenary.solver.locality import reach
+from catenary.solver.model import Model
+
+
+class LineMotion(ABC):
+    """State and step operator of the distributed line, relative to its equilibrium.
+
+    Collective to make; ``destroy`` is collective too. The arrays are this rank's part, shape
+    (n_local,), and stay the same objects for the whole run, so that views of them stay valid. A
+    step is ``predict``, ``free_acceleration`` and ``correct``; forces that are known later only
+    change the acceleration, displacement and velocity by A^-1, sigma A^-1 and tau A^-1.
+
+    Attributes
+    ----------
+    displacement, velocity, acceleration : [m], [m/s], [m/s2] (rad for rotations); the acceleration
+        is the one that balances the forces, M a = f - C v - K d
+    position_factor, velocity_factor : sigma [s2] and tau [s]
+    operators : LineOperators
+    solution : the displacement as a PETSc vector
+    """
+
+    def __init__(
+        self,
+        comm: Any,
+        model: Model,
+        ownership: Ownership,
+        position_factor: float,
+        velocity_factor: float,
+    ) -> None:
+        kernels.warm_up()
+        inner_kernels.warm_up()
+        repeated_rows.warm_up()
+        self._comm = comm
+        self.ownership = ownership
+        self.position_factor = position_factor
+        self.velocity_factor = velocity_factor
+        coefficients = (1.0, self.position_factor, self.velocity_factor)
+        self.windows = Windows(_row_positions(model), model.block_size, reach(model, coefficients))
+        self.operators = LineOperators(comm, model, ownership, coefficients, self.windows)
+        self._proportional = model.damping_is_proportional
+        # What is folded into the product with K, and what is left to do after the solve.
+        self._alpha_share = self._beta_share = 0.0
+        if self._proportional:
+            alpha, beta_damping = (
+                model.damping_of(model.blocks[0].component) if model.blocks else (0.0, 0.0)
+            )
+            stiffness_share = self.position_factor + self.velocity_factor * alpha
+            self._beta_share = beta_damping / (1.0 + self.velocity_factor * beta_damping)
+            self._alpha_share = alpha - self._beta_share * stiffness_share
+        n = ownership.n_local
+        self.displacement, self.velocity = np.zeros(n), np.zeros(n)
+        self.acceleration = self.operators.answer
+        # PETSc's time loop wants the solution as a vector; it wraps our array.
+        self.solution = PETSc.Vec().createWithArray(self.displacement, size=(n, None), comm=comm)
+
+    @abstractmethod
+    def predict(self) -> None:
+        """Turn displacement and velocity into their values at the end of the step without the
+        step's unknown acceleration, and ``operators.factor`` into -(d + ``_alpha_share`` v). Not
+        collective."""
+
+    def start(
+        self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray
+    ) -> None:
+        """Start from a state, (n_local,) each, whose acceleration balances its forces."""
+        self.displacement[:] = displacement
+        self.velocity[:] = velocity
+        self.acceleration[:] = acceleration
+
+    def state(self) -> Mapping[str, np.ndarray]:
+        """All that the next step starts from: this rank's arrays themselves, by name."""
+        return {
+            "displacement": self.displacement,
+            "velocity": self.velocity,
+            "acceleration": self.acceleration,
+        }
+
+    def free_acceleration(self, loads: Loads | None = None) -> None:
+        """Fill the acceleration from the predictions and local loads. Collective.
+
+        ``loads`` are pairs of local unknowns and forces [N], None on all ranks if there are none
+        anywhere; contact and slack droppers are left out, so that ``correct`` must follow.
+        """
+        self.internal_forces()
+        self.solve(loads)
+
+    def internal_forces(self) -> None:
+        """Right-hand side -C v - K d of the step; only right after ``predict``. Collective."""
+        operators = self.operators
+        operators.exchange()
+        operators.multiply_stiffness()
+        if not self._proportional:
+            np.negative(self.velocity, out=operators.factor)
+            operators.exchange()
+            operators.add_damping()
+
+    def solve(self, loads: Loads | None = None) -> None:
+        """Acceleration for the internal forces plus ``loads``, but for its part by damping on mass,
+        which ``correct`` takes off. May be called again for other loads. Collective."""
+        self.operators.solve(loads)
+
+    def correct(self) -> None:
+        """Turn predictions into the new displacement and velocity."""
+        kernels.correct(
+            self.displacement,
+            self.velocity,
+            self.acceleration,
+            self.position_factor,
+            self.velocity_factor,
+            self._beta_share,
+        )
+
+    def energies(self) -> tuple[float, float]:
+        """Kinetic and elastic energy relative to equilibrium, all droppers taut [J]. Collective."""
+        operators = self.operators
+        np.copyto(operators.factor, self.velocity)
+        kinetic = 0.5 * operators.square("mass")
+        np.copyto(operators.factor, self.displacement)
+        return kinetic, 0.5 * operators.square("stiffness")
+
+    def destroy(self) -> None:
+        """Free all PETSc objects. Collective."""
+        self.operators.destroy()
+        self.solution.destroy()
+
+
+def _row_positions(model: Model) -> np.ndarray:
+    positions = np.empty(model.mesh.n_nodes)
+    positions[model.row_of_node] = model.mesh.points[:, 0]
+    return positions
