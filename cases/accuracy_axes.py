@@ -185,14 +185,21 @@ def _newmark(name: str, gamma: float, beta: float, quick: bool = False) -> Level
     return Level(name, (*_ONE_SOLVE, *_NEWMARK, *keys), quick=quick)
 
 
-def _alpha(integrator: str, radius: float, quick: bool = False) -> Level:
+def _alpha(integrator: str, radius: float) -> Level:
     keys = (
         f"numerics.integrator={integrator}",
         f"numerics.spectral_radius={radius}",
         "numerics.newmark_gamma=",
         "numerics.newmark_beta=",
     )
-    return Level(f"{integrator}_{radius:g}", (*_ONE_SOLVE, *keys), quick=quick)
+    return Level(f"{integrator}_{radius:g}", (*_ONE_SOLVE, *keys))
+
+
+def _ts_alpha2(radius: float) -> Level:
+    """PETSc's own stepper, which runs on one rank and knows plain scenes only."""
+    own = _alpha("generalized_alpha", radius).assignments[len(_ONE_SOLVE) :]
+    keys = ("numerics.coupling=", "numerics.scheme=ts_alpha2")
+    return Level(f"ts_alpha2_{radius:g}", (*keys, *own))
 
 
 def _schemes(scene: Scene) -> list[Level]:
@@ -200,8 +207,9 @@ def _schemes(scene: Scene) -> list[Level]:
         _newmark("average_acceleration", 0.5, 0.25, True),
         _newmark("newmark_0.55", 0.55, 0.28, True),
         _newmark("newmark_0.6", 0.6, 0.3025),
-        *(_alpha("generalized_alpha", radius, radius == 0.8) for radius in (0.9, 0.8, 0.5, 0.0)),
+        *(_alpha("generalized_alpha", radius) for radius in (0.9, 0.8, 0.5, 0.0)),
         *(_alpha("hht", radius) for radius in (0.9, 0.8)),
+        _ts_alpha2(0.8),
     ]
     levels += [
         Level(f"corrected_at_most_{n}", (*_PAPER, f"numerics.max_iterations={n}"))

@@ -14,6 +14,7 @@ import numpy as np
 
 from catenary.cases.checks_contact import check_contact
 from catenary.cases.checks_pantograph import check_heights, check_pantographs
+from catenary.cases.checks_scheme import check_scheme
 from catenary.cases.checks_vehicle import check_vehicle
 from catenary.cases.keys import is_known, known_keys
 from catenary.cases.messages import refuse, shown, unknown_key
@@ -45,6 +46,7 @@ def check(scene: Scene) -> None:
     _pantograph_names(scene)
     _separations(scene)
     check_pantographs(scene)
+    check_scheme(scene)
     line = scene.to_line()
     _droppers_inside_spans(scene, line)
     _dropper_lengths(scene, line)

@@ -73,8 +73,10 @@ class NumericsTable(Table):
     """Time stepping."""
 
     dt_s: float = Field(1e-3, ge=1e-6, description="time step")
-    scheme: Literal["one_solve", "fixed_point"] = Field(
-        "one_solve", description="one solve a step, or the paper's fixed-point correction"
+    scheme: Literal["one_solve", "fixed_point", "ts_alpha2"] = Field(
+        "one_solve",
+        description="one solve a step, the paper's fixed-point correction, or PETSc's TSALPHA2 on "
+        "line and pantographs as one system",
     )
     coupling: Literal["implicit", "iterated", "explicit"] | None = Field(
         None,
@@ -133,6 +135,13 @@ class NumericsTable(Table):
     @model_validator(mode="after")
     def _has_its_spectral_radius(self) -> NumericsTable:
         radius = self.spectral_radius
+        own = (self.newmark_beta, self.newmark_gamma)
+        if self.scheme == "ts_alpha2" and own != AVERAGE_ACCELERATION[:2]:
+            raise ValueError(
+                "must not give newmark_beta and newmark_gamma with scheme ts_alpha2, which takes "
+                "average acceleration, or integrators hht and generalized_alpha by their "
+                "spectral_radius" + TAKE_AWAY
+            )
         if self.integrator == NEWMARK:
             if radius is not None:
                 raise ValueError(
@@ -149,7 +158,7 @@ class NumericsTable(Table):
                 f"must have spectral_radius from {LEAST_RADIUS_OF_HHT:g} to 1 with integrator hht, "
                 f"not {radius:g}: take generalized_alpha for less"
             )
-        if (self.newmark_beta, self.newmark_gamma) != AVERAGE_ACCELERATION[:2]:
+        if own != AVERAGE_ACCELERATION[:2]:
             raise ValueError(
                 "must not give newmark_beta and newmark_gamma, which belong to integrator newmark, "
                 f"with {self.integrator}, whose parameters follow from spectral_radius" + TAKE_AWAY

@@ -97,6 +97,9 @@ class FixedPoint:
         """Not counted: rounds of messages, many a step."""
         return None
 
+    def destroy(self) -> None:
+        """Nothing: there are no PETSc objects of its own."""
+
     def _heads_everywhere(self, time: float) -> Heads:
         """Rank 0's prediction on all ranks, which all know if there is none."""
         if self.comm.size == 1:

@@ -33,10 +33,12 @@ from catenary.solver.model import Model
 from catenary.solver.observation import Observer, Stage
 from catenary.solver.one_solve import OneSolve
 from catenary.solver.pantographs import Pantographs, nominal_height_rule
-from catenary.solver.problem import Problem
+from catenary.solver.problem import Placement, Problem
 from catenary.solver.schemes import LoadSource, Scheme
 from catenary.solver.showing import Showing
 from catenary.solver.stepper import Stepper
+from catenary.solver.ts_alpha2 import TSAlpha2
+from catenary.solver.whole_system import WholeSystem
 
 
 @dataclass
@@ -81,6 +83,11 @@ class March:
         self._problem = problem
         self._model = model
         train, numerics = problem.train, problem.numerics
+        if numerics.scheme == "ts_alpha2" and comm.size > 1:
+            raise InputError(
+                f"numerics.scheme is ts_alpha2, which runs on one rank only, not on {comm.size}: "
+                'take "one_solve", or start it without mpirun'
+            )
         self.ownership = distribute(model, comm.size, comm.rank)
         self._line = make_line(comm, model, self.ownership, numerics)
         on = model.terms_of
@@ -101,8 +108,13 @@ class March:
             "dropper_slackening" in on,
         )
         nominal_height = nominal_height_rule(model, form, elasticity)
+        scheme_of: dict[str, Callable[[], Scheme]] = {
+            "one_solve": self._one_solve,
+            "fixed_point": self._fixed_point,
+            "ts_alpha2": lambda: self._ts_alpha2(form, nominal_height),
+        }
         self._pantographs = Pantographs(comm, problem, self._interaction.wire, nominal_height)
-        self._scheme = self._make_scheme(on)
+        self._scheme = scheme_of[numerics.scheme]()
         self._show_event = event("Show")
         self._showing = Showing(
             comm,
@@ -184,6 +196,7 @@ class March:
 
     def destroy(self) -> None:
         """Free all PETSc objects. Collective."""
+        self._scheme.destroy()
         self._line.destroy()
 
     def __enter__(self) -> March:
@@ -217,25 +230,37 @@ class March:
                 _finish(observers[:number], str(error))
                 raise
 
-    def _make_scheme(self, on: dict[str, int]) -> Scheme:
-        numerics, n = self._problem.numerics, self._pantographs.n_contacts
-        self._law = law_in_steps(self._problem, n)
-        if numerics.scheme == "one_solve":
-            slack = self._interaction.slack_coupling
-            band = np.zeros((0, 1)) if slack is None or slack.band is None else slack.band
-            coupling = make_coupling(self._law, self._kept_ratio, band, numerics)
-            return OneSolve(
-                self._comm, self._interaction, self._pantographs, coupling, self._loads()
-            )
+    def _one_solve(self) -> Scheme:
+        slack = self._interaction.slack_coupling
+        band = np.zeros((0, 1)) if slack is None or slack.band is None else slack.band
+        law = law_in_steps(self._problem, self._pantographs.n_contacts)
+        coupling = make_coupling(law, self._kept_ratio, band, self._problem.numerics)
+        return OneSolve(self._comm, self._interaction, self._pantographs, coupling, self._loads())
+
+    def _fixed_point(self) -> Scheme:
         return FixedPoint(
             self._comm,
             self._interaction,
             self._pantographs,
-            numerics,
-            self._law,
+            self._problem.numerics,
+            law_in_steps(self._problem, self._pantographs.n_contacts),
             self._kept_ratio,
-            "dropper_slackening" in on,
+            "dropper_slackening" in self._model.terms_of,
             self._loads(),
+        )
+
+    def _ts_alpha2(self, form: Equilibrium, nominal_height: Callable[[Placement], float]) -> Scheme:
+        slackens = "dropper_slackening" in self._model.terms_of
+        system = WholeSystem(
+            self._problem,
+            self._model,
+            form,
+            self._kept_ratio if slackens else 1.0,
+            nominal_height,
+            self._loads(),
+        )
+        return TSAlpha2(
+            self._comm, self._interaction, self._pantographs, system, self._problem.numerics
         )
 
     def _loads(self) -> LoadSource:

@@ -104,6 +104,9 @@ class OneSolve:
         """Messages and bytes that this rank sent to agree on forces."""
         return self._exchange.messages, self._exchange.bytes_sent
 
+    def destroy(self) -> None:
+        """Nothing: there are no PETSc objects of its own."""
+
     def _solve_inner(self, time: float, stop: bool, touches: Touches) -> Reply:
         exchange, interaction, events = self._exchange, self.interaction, self._events
         events["ContactInner"].begin()

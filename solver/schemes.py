@@ -60,3 +60,6 @@ class Scheme(Protocol):
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
+
+    def destroy(self) -> None:
+        """Free PETSc objects of the scheme's own. Collective."""

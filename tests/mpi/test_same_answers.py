@@ -18,6 +18,7 @@ from catenary.cases.scene import load_scene
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.solver.distribution import distribute
 from catenary.solver.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.errors import InputError
 from catenary.solver.march import March
 from catenary.solver.observation import Stage, StepView
 from catenary.solver.parallel import on_root
@@ -137,6 +138,14 @@ def test_methods_with_numerical_damping_in_parallel(
     train = replace(problem.train, end=problem.train.start + 80.0)
     found = largest_difference(replace(problem, numerics=numerics, train=train), mesh)
     assert max(found.values()) < TOLERANCE
+
+
+@pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="one rank is what the scheme asks for")
+def test_a_scheme_for_one_rank_is_refused_on_all(case: tuple[Problem, LineMesh]) -> None:
+    problem, mesh = case
+    numerics = replace(problem.numerics, scheme="ts_alpha2")
+    with pytest.raises(InputError, match="runs on one rank only"):
+        histories(MPI.COMM_WORLD, replace(problem, numerics=numerics), mesh)
 
 
 def test_damping_by_component_in_parallel(case: tuple[Problem, LineMesh]) -> None:

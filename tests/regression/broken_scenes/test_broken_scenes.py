@@ -162,7 +162,7 @@ ASSIGNMENTS = {
     "no contact stiffness": (["contact.stiffness_N_per_m=0"], "greater than 0 [N/m]"),
     "step above 20 Hz": (["numerics.dt_s=0.03"], "20 Hz"),
     "step of nothing": (["numerics.dt_s=0"], "at least 1e-06 [s]"),
-    "unknown scheme": (["numerics.scheme=newton"], "one_solve or fixed_point"),
+    "unknown scheme": (["numerics.scheme=newton"], "one_solve, fixed_point or ts_alpha2"),
     "unstable Newmark": (["numerics.newmark_gamma=0.7"], "2 newmark_beta >= newmark_gamma"),
     "unknown integrator": (["numerics.integrator=rk4"], "newmark, hht or generalized_alpha"),
     "spectral radius of Newmark": (
@@ -189,6 +189,37 @@ ASSIGNMENTS = {
             "numerics.newmark_beta=0.28",
         ],
         "belong to integrator newmark",
+    ),
+    "TSALPHA2 with another contact law": (
+        ["numerics.scheme=ts_alpha2", "contact.law=hertz"],
+        "ts_alpha2 knows only law linear",
+    ),
+    "TSALPHA2 with a moving base": (
+        [
+            "numerics.scheme=ts_alpha2",
+            "effects.vehicle_motion=true",
+            "vehicle.vertical={amplitude_m=0.01,frequency_hz=1.5}",
+        ],
+        "ts_alpha2 knows only heads and bases that move along a vertical",
+    ),
+    "TSALPHA2 with two strips": (
+        [
+            "numerics.scheme=ts_alpha2",
+            "pantographs.reference.strips={number=2,spacing_m=0.6}",
+        ],
+        "ts_alpha2 knows only one strip",
+    ),
+    "TSALPHA2 by Newmark's parameters": (
+        [
+            "numerics.scheme=ts_alpha2",
+            "numerics.newmark_gamma=0.55",
+            "numerics.newmark_beta=0.28",
+        ],
+        "with scheme ts_alpha2, which takes average acceleration",
+    ),
+    "TSALPHA2 with a coupling": (
+        ["numerics.scheme=ts_alpha2", "numerics.coupling=implicit"],
+        "must not give coupling",
     ),
     "kinematic contact by another method": (
         [
