@@ -178,7 +178,7 @@ class WholeSystem:
         result = self._mass @ a + self._damping @ v + self._stiffness @ u
         grown = raised(time, self._train.raise_time)
         result[self._carriers] -= grown * self._static + self._base
-        for dofs, values in self._loads(time):
+        for dofs, values in self._loads(time) or ():
             np.subtract.at(result, dofs, values)
         force, _, meets = self.contacts(time, u, v)
         for f, (dofs, along, _) in zip(force, meets, strict=True):
