@@ -73,6 +73,9 @@ class LineOperators:
         self._coefficients = coefficients
         self._block = station_block(model, ownership)
         self._product_event = event("LineProduct")
+        self._matrix: PETSc.Mat | None = None
+        self._solver: PartSolver | SchwarzSolver | None = None
+        self._is_direct = True
         if comm.size > 1 and wants_distributed_solver():
             self._solve_together(windows)
             residual = self.residual()
@@ -197,13 +200,13 @@ class LineOperators:
         """Let each rank solve by itself, for its own part and as much as can influence it."""
         low, high = self._overlap(windows)
         self._make_arrays(low, high, PETSc.COMM_SELF)
-        self._matrix, self._solver, is_direct = None, None, True
+        is_direct = True
         if self.domain.size:
             rows = (low, high)
             part = part_of(self._model, rows, rows, self._coefficients, 1.0, self._block)
             self._matrix = as_petsc(part, PETSc.COMM_SELF)
-            self._solver = PartSolver(self._matrix, self._in_stations, self._comm.size == 1)
-            is_direct = self._solver.is_direct
+            solver = PartSolver(self._matrix, self._in_stations, self._comm.size == 1)
+            self._solver, is_direct = solver, solver.is_direct
         self._is_direct = bool(self._comm.allreduce(int(is_direct), op=MPI.MIN))
 
     def _solve_together(self, windows: Windows) -> None:
@@ -213,10 +216,10 @@ class LineOperators:
         rows, whole = (first, last), (0, self._model.n_dofs)
         part = part_of(self._model, rows, whole, self._coefficients, 1.0, self._block)
         self._matrix = as_petsc(part, self._comm)
-        self._solver = SchwarzSolver(
+        solver = SchwarzSolver(
             self._comm, self._matrix, self._ownership, self._overlap(windows), self._in_stations
         )
-        self._is_direct = self._solver.is_direct
+        self._solver, self._is_direct = solver, solver.is_direct
 
     @property
     def _in_stations(self) -> bool:
