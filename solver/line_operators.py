@@ -59,6 +59,11 @@ class LineOperators:
     domain : Subdomain
     """
 
+    # None on a rank that owns nothing.
+    _matrix: PETSc.Mat | None = None
+    _solver: PartSolver | SchwarzSolver | None = None
+    _is_direct = True
+
     def __init__(
         self,
         comm: Any,
@@ -73,9 +78,6 @@ class LineOperators:
         self._coefficients = coefficients
         self._block = station_block(model, ownership)
         self._product_event = event("LineProduct")
-        self._matrix: PETSc.Mat | None = None
-        self._solver: PartSolver | SchwarzSolver | None = None
-        self._is_direct = True
         if comm.size > 1 and wants_distributed_solver():
             self._solve_together(windows)
             residual = self.residual()
