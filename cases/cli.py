@@ -373,7 +373,13 @@ def compare(
 
 
 # The verbs of other files, which take what is above.
-from catenary.cases import cli_accuracy, cli_hard, cli_pantograph, cli_studies  # noqa: E402, F401
+from catenary.cases import (  # noqa: E402
+    cli_accuracy,  # noqa: F401
+    cli_hard,  # noqa: F401
+    cli_pantograph,  # noqa: F401
+    cli_stability,  # noqa: F401
+    cli_studies,  # noqa: F401
+)
 
 
 def main() -> None:

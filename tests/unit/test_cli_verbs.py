@@ -22,7 +22,7 @@ from catenary.solver import effects
 from catenary.solver.errors import RunBroken
 
 VERBS = ["run", "restart", "sweep", "list", "plan", "check", "mesh", "static", "pantograph"]
-VERBS += ["report", "compare", "hard"]
+VERBS += ["report", "compare", "hard", "stability-map"]
 SUMMARY = {
     "case": "en50318_2002",
     "speed_km_h": 250.0,
@@ -322,3 +322,17 @@ def test_the_reader_of_a_pipe_may_leave(tmp_path: Path) -> None:
     )
     assert done.stdout.count("\n") == 1
     assert "Traceback" not in done.stderr
+
+
+def test_a_stability_map_is_refused_where_it_cannot_be_made(tmp_path: Path) -> None:
+    (tmp_path / "stability_map.csv").write_text("mine")
+    for words, said in (
+        (["ambrosio2012", "-o", str(tmp_path / "new")], "is a mechanism"),
+        (["en50318_2002", "-o", str(tmp_path)], "is there already"),
+        (["en50318_2002", "-o", str(tmp_path / "stability_map.csv")], "is a file"),
+    ):
+        result = invoke("stability-map", *words)
+        assert result.exit_code == 2
+        assert said in result.stderr and result.stderr.count("\n") == 1
+    assert (tmp_path / "stability_map.csv").read_text() == "mine"
+    assert not (tmp_path / "new").exists()

@@ -1,0 +1,152 @@
+"""Stability of the couplings: matrices of a step, closed forms and marches of the program agree."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from measuring import check
+from mpi4py import MPI
+from scipy import linalg
+from small_lines import EN_PANTOGRAPH, HANGING, en50318_line, mesh_of, problem_of
+
+from catenary.cases import stability_theory as theory
+from catenary.cases.hard_runs import AtRest
+from catenary.cases.stability_map import RESOLUTION, Grid, as_rows, find, make_map
+from catenary.cases.stability_march import COUPLINGS, Bench
+from catenary.cases.stability_plot import draw
+from catenary.mbs.lumped import LumpedData
+from catenary.solver.contact import ContactWire
+from catenary.solver.distribution import distribute
+from catenary.solver.equilibrium import elasticity, find_form, middle_span
+
+GRID = ((1e5, 0.5), (1e5, 8.0), (1e7, 2.0))
+NEWMARK = (0.25, 0.5)
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    """Three spans with damping, droppers that stay taut, contact that lasts."""
+    problem = problem_of(en50318_line(3), HANGING | {"structural_damping"})
+    model, form = find_form(problem, mesh_of(en50318_line(3), 3))
+    lift = elasticity(model, *middle_span(problem.line))
+    wire = ContactWire(model, form, distribute(model, 1, 0))
+    place = theory.lightest_place(model, wire, 60.0, 120.0)
+    return Bench(AtRest(problem, model, form, lift), EN_PANTOGRAPH, place, MPI.COMM_SELF)
+
+
+def line_at(bench: Bench, n_vectors: int = theory.N_VECTORS) -> theory.PointModel:
+    model = bench.rest.model
+    wire = ContactWire(model, bench.rest.form, distribute(model, 1, 0))
+    return theory.point_model(model, theory.load_at(wire, bench.x, model.n_dofs), n_vectors)
+
+
+def head(mass: float) -> LumpedData:
+    return LumpedData((mass, *EN_PANTOGRAPH.masses[1:]), EN_PANTOGRAPH.stiffnesses,
+                      EN_PANTOGRAPH.dampings)  # fmt: skip
+
+
+@pytest.mark.parametrize("coupling", COUPLINGS)
+def test_theory_and_marches_find_the_same_limits(coupling: str, bench: Bench) -> None:
+    """A march of 400 steps shows growth from where a step multiplies by 1000^(1/400), and 1000
+    exchanges agree to 1e-10 of the first up to a ratio of 1e-10^(1/1000), at a step 1.2 % below
+    the limit; both follow from theory. What is left is the width of the bracket."""
+    line = line_at(bench)
+    for stiffness, mass in GRID:
+        found = find(bench, line, coupling, stiffness, mass)
+        print(
+            f"{coupling} {stiffness:g} N/m {mass:g} kg: theory {found.theory:.4g}, to be seen from "
+            f"{found.visible:.4g} on, marched {found.stable:.4g} to {found.unstable:.4g} s"
+        )
+        assert found.agrees
+        if coupling == "implicit":
+            assert found.stable == 0.025 and np.isinf(found.theory)
+            continue
+        # Both are limits within the range, so that the brackets are ones.
+        assert 1e-5 < found.stable < found.unstable <= (1 + RESOLUTION) * found.stable < 0.025
+        assert found.theory < found.unstable * 1.03
+        # Springs within the step only add to what the masses resist.
+        assert found.closed_form < found.theory * (1 + 1e-4)
+        if coupling == "explicit":
+            check("omega dt = 2", found.theory, found.closed_form, within=1e-3 * found.closed_form)
+
+
+def test_a_tenth_more_than_the_limit_breaks_and_a_tenth_less_does_not(bench: Bench) -> None:
+    """The other way round: a limit that is wrong by a tenth would be noticed."""
+    line = line_at(bench)
+    stiffness, mass = 1e6, 2.0
+    both = theory.couple(line, head(mass))
+    for coupling in COUPLINGS[1:]:
+        limit = theory.largest_step(both, NEWMARK, stiffness, coupling, (1e-5, 0.025))
+        assert bench.is_stable(coupling, stiffness, mass, 0.9 * limit)
+        assert not bench.is_stable(coupling, stiffness, mass, 1.1 * limit)
+
+
+def test_a_line_as_a_point_sees_it_is_the_line(bench: Bench) -> None:
+    """The reduced line has the answer of all unknowns within a step, and the same step matrix's
+    radius beyond the limit, where one eigenvalue of the contact stands out."""
+    model = bench.rest.model
+    wire = ContactWire(model, bench.rest.form, distribute(model, 1, 0))
+    load = theory.load_at(wire, bench.x, model.n_dofs)
+    mass, stiffness, damping = (part.toarray() for part in theory.matrices(model))
+    line = line_at(bench)
+    step = theory.Step(2e-3, *NEWMARK)
+    whole = theory.Coupled(
+        linalg.block_diag(mass, np.diag(EN_PANTOGRAPH.masses)),
+        linalg.block_diag(stiffness, EN_PANTOGRAPH.chain(EN_PANTOGRAPH.stiffnesses)),
+        linalg.block_diag(damping, EN_PANTOGRAPH.chain(EN_PANTOGRAPH.dampings)),
+        np.concatenate([-load, [1.0, 0.0]]),
+    )
+    reduced = theory.couple(line, EN_PANTOGRAPH)
+    check(
+        "effective mass [kg]", line.mass, 1.0 / (load @ np.linalg.solve(mass, load)), within=1e-12
+    )
+    # Round-off of Lanczos's method, orthogonalised twice.
+    ratios = [theory.exchange_ratio(both, step, 1e6) for both in (reduced, whole)]
+    check("ratio of an exchange", ratios[0], ratios[1], within=1e-10)
+    radii = [theory.radius(both, step, 1e6, "explicit") for both in (reduced, whole)]
+    assert radii[1] > 1.1
+    check("radius of an explicit step", radii[0], radii[1], within=1e-8)
+    # And too few vectors are too few: what is compared is not the same by itself.
+    few = theory.exchange_ratio(theory.couple(line_at(bench, 2), EN_PANTOGRAPH), step, 1e6)
+    assert abs(few - ratios[1]) > 1e-6
+
+
+def test_a_light_wire_limits_the_step_under_a_heavy_head(bench: Bench) -> None:
+    """Not dt = 2 sqrt(m_head / k): the wire meets a force with less than a kilogram."""
+    line = line_at(bench)
+    heavy = theory.couple(line, head(30.0))
+    limit = theory.largest_step(heavy, NEWMARK, 1e6, "explicit", (1e-5, 0.025))
+    print(f"m_wire {line.mass:.3f} kg, limit {1e3 * limit:.3f} ms")
+    # Less than the wire of the longest element, 6.5 m / 3: a force moves its neighbourhood alone.
+    assert line.mass < 6.5 / 3 * 1.35
+    assert limit < 0.2 * 2 * np.sqrt(30.0 / 1e6)
+
+
+def test_the_map_of_a_case_is_found_drawn_and_written() -> None:
+    """One point of the reference case, with a limit for all couplings but the implicit one."""
+    grid = Grid((1e6,), (2.0,), (1e6,), (2.0,))
+    said: list[str] = []
+    found = make_map("en50318_2002", [], True, MPI.COMM_SELF, grid, said.append)
+    assert [one.coupling for one in found.limits] == list(COUPLINGS)
+    assert all(one.agrees for one in found.limits)
+    assert len(said) == 1 and "1e+06 N/m, 2 kg" in said[0]
+    rows = {row["coupling"]: row for row in as_rows(found)}
+    assert rows["implicit"]["theory_s"] is None and rows["implicit"]["marched_stable_s"] == 0.025
+    # The rule with the wire: docs/contact.md.
+    rule = 2 / np.sqrt(1e6 * (1 / 2.0 + 1 / found.wire_mass))
+    check("explicit [s]", rows["explicit"]["theory_s"], rule, within=1e-3 * rule)
+    assert found.own == (5e4, 7.2, 1e-3)
+    left, right = draw(found).axes[:2]
+    drawn = {
+        marker: line.get_ydata()
+        for line in left.lines
+        if (marker := line.get_marker()) in ("o", "s", "^")
+    }
+    assert set(drawn) == {"o", "s", "^"}
+    check("drawn [ms]", drawn["o"], 1e3 * rule, within=0.02 * 1e3 * rule)
+    assert right.get_xlabel() == "head mass [kg]"
+    # A march that contradicts theory is told, not hidden.
+    wrong = replace(found.limits[1], stable=2 * rule, unstable=2.1 * rule)
+    assert not wrong.agrees
