@@ -110,14 +110,12 @@ class Interaction:
         self._first_node = first
         dofs = self.wire.dofs[first:last].reshape(-1, 1)
         at = np.repeat(self.wire.x[first:last], 2)
+        # A force on an unknown that is held, at an anchor, moves nothing.
+        free = np.ones(model.n_dofs)
+        free[model.constrained] = 0.0
+        self._free = free[line.ownership.first : line.ownership.last]
         columns = compliance.compute(
-            comm,
-            line.operators.solve_for,
-            line.ownership,
-            line.windows,
-            dofs,
-            np.ones(dofs.shape),
-            at,
+            comm, line.operators.solve_for, line.ownership, line.windows, dofs, free[dofs], at
         )
         # Both unknowns of a node share a window; their columns stand one after the other.
         packed = columns.packed()
@@ -251,7 +249,7 @@ class Interaction:
             return []
         for local, value, force in zip(touches.local, touches.value, contact_force, strict=True):
             if force:
-                result.append((local, force * value))
+                result.append((local, force * value * self._free[local]))
         slack = np.flatnonzero(compensation)
         if slack.size:
             upper, lower = self.droppers.ends[slack].T
