@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catenary.solver import inner
-from catenary.solver.contact_laws import LinearLaw
+from catenary.solver.contact_laws import HertzLaw, LinearLaw
 from catenary.solver.heads import Heads
 from catenary.solver.inner import InnerProblem, InnerSolution
-from catenary.solver.law_in_steps import LinearInSteps
+from catenary.solver.law_in_steps import HertzInSteps, LinearInSteps
 from catenary.solver.response import LineResponse
 
 EPS = np.finfo(float).eps
@@ -185,3 +185,21 @@ def test_one_contact_has_its_closed_form() -> None:
 def test_an_open_gap_has_no_force_unless_contact_is_bilateral() -> None:
     assert one_contact(0.007).contact_force[0] == 0.0
     assert one_contact(0.007, may_lose_contact=False).contact_force[0] < 0.0
+
+
+def test_slow_impacts_with_much_hysteresis_find_their_force() -> None:
+    """The slope on the rate is some 1e8 N s/m here: rates of some m/s, known to their rounding,
+    leave forces of 400 N known to 1e-7 N, less than the 1e-10 of it that tangents agree to."""
+    rng = np.random.default_rng(1)
+    for _ in range(500):
+        law = HertzInSteps(HertzLaw(1.4e8, 1.5, 5.9, rng.uniform(0.01, 0.05)), 1)
+        line, heads = LineResponse(1, 0), Heads(1)
+        line.height[:], line.rate[:] = rng.uniform(4.5, 5.5), rng.uniform(-2.0, 2.0)
+        heads.height[:] = line.height + rng.uniform(0.0, 0.03)
+        heads.velocity[:] = line.rate + rng.uniform(-1.0, 3.0)
+        heads.height_compliance[:], heads.velocity_compliance[:] = 1.1e-5, 5.4e-3
+        found = InnerProblem(law, 0.0, band_of(np.zeros((0, 0)))).solve(line, heads)
+        depth, rate = float(found.depth[0]), float(found.rate[0])
+        push = 1.4e8 * max(depth, 0.0) ** 1.5 * (1.0 + 5.9 * rate / law.state()[0])
+        # A hundred times what the tangents are held to.
+        assert abs(max(push, 0.0) - found.contact_force[0]) < 1e-5 * (1.0 + found.contact_force[0])
