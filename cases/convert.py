@@ -92,6 +92,7 @@ def problem_of(scene: Scene) -> Problem:
             eps_force=numerics.eps_force_N,
             integrator=numerics.integrator,
             spectral_radius=1.0 if numerics.spectral_radius is None else numerics.spectral_radius,
+            iterations=numerics.iterations,
         ),
         evaluation=(scene.evaluation.from_m, scene.evaluation.to_m),
         residual_stiffness_ratio=ratio,

@@ -110,6 +110,13 @@ class NumericsTable(Table):
         le=10000,
         description="most corrections (fixed_point) or exchanges (coupling iterated) a step",
     )
+    iterations: int | None = Field(
+        None,
+        ge=1,
+        le=10000,
+        description="fixed_point: corrections of every step, after which it goes on whatever they "
+        "reached; until changes are below eps_d_m and eps_v_m_per_s if absent",
+    )
 
     @field_validator("dt_s")
     @classmethod
@@ -125,6 +132,16 @@ class NumericsTable(Table):
                 f"must not give coupling, which belongs to scheme one_solve, with {self.scheme}"
                 + TAKE_AWAY
             )
+        if self.iterations is not None:
+            if self.scheme != "fixed_point":
+                raise ValueError(
+                    "must not give iterations, which belongs to scheme fixed_point, with "
+                    f"{self.scheme}{TAKE_AWAY}"
+                )
+            if "max_iterations" in self.model_fields_set:
+                raise ValueError(
+                    f"takes iterations or max_iterations, but both are given{TAKE_AWAY}"
+                )
         if 2 * self.newmark_beta < self.newmark_gamma:
             raise ValueError(
                 "must have 2 newmark_beta >= newmark_gamma to be stable for every step, but "

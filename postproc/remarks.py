@@ -35,7 +35,24 @@ class _Contact(NamedTuple):
 def remarks(results: Results) -> list[str]:
     """Sentences about settings that shape the results, none if none do. Not collective."""
     config = results.attributes["config"]
-    return [*_about_contact(results, config), *_about_droppers(config)]
+    return [
+        *_about_contact(results, config),
+        *_about_droppers(config),
+        *_about_iterations(results, config),
+    ]
+
+
+def _about_iterations(results: Results, config: dict[str, Any]) -> list[str]:
+    """That steps went on above the tolerances, where the scene has a fixed number of iterations."""
+    counted = results.attributes.get("inner_iterations", {})
+    above, fixed = counted.get("unconverged_steps", 0), config["numerics"].get("iterations")
+    if not above or not fixed:
+        return []
+    return [
+        f"{above} of {counted['steps']} steps ended above the tolerances of the fixed-point "
+        f"correction, because numerics.iterations = {fixed} ends each: their forces and motions do "
+        "not belong together. Take more, or leave the key out."
+    ]
 
 
 def _about_droppers(config: dict[str, Any]) -> list[str]:

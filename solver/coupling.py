@@ -15,7 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
-from catenary.solver.errors import RunBroken
+from catenary.solver.errors import NotConverged, RunBroken
 from catenary.solver.heads import Heads
 from catenary.solver.inner import InnerProblem, InnerSolution
 from catenary.solver.law_in_steps import LawInSteps
@@ -23,7 +23,7 @@ from catenary.solver.problem import Numerics
 from catenary.solver.response import LineResponse
 
 # Forces that grow beyond this [N] will not come back.
-_DIVERGED = 1e9
+DIVERGED = 1e9
 
 
 class Coupling(Protocol):
@@ -149,7 +149,7 @@ class Iterated:
                 slack = self._inner.slack_under(line, force)
                 depth, rate = gap.under(force, slack)
                 return InnerSolution(force, slack, depth, rate, number, self._inner.pivoted)
-        raise RunBroken(
+        raise NotConverged(
             f"line and pantographs do not agree on the contact forces within "
             f"{self._max_iterations} exchanges (numerics.max_iterations): these still change by "
             f'{change:.3g} N; take numerics.coupling = "implicit" or a smaller numerics.dt_s'
@@ -170,7 +170,7 @@ def make_coupling(
 
 def _refuse_diverged(force: np.ndarray) -> None:
     # Also true for what is no number.
-    if not (np.abs(force) < _DIVERGED).all():
+    if not (np.abs(force) < DIVERGED).all():
         raise RunBroken(
             "the contact force grows beyond all bounds: the coupling is unstable at this step; "
             'take numerics.coupling = "implicit" or a smaller numerics.dt_s'

@@ -23,3 +23,7 @@ class RunBroken(CatenaryError):
     """
 
     exit_code = 1
+
+
+class NotConverged(RunBroken):
+    """The equations of a step were not solved within the iterations that they are given."""

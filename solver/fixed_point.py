@@ -9,7 +9,8 @@ import numpy as np
 from mpi4py import MPI
 
 from catenary.solver.contact import Touches
-from catenary.solver.errors import RunBroken
+from catenary.solver.coupling import DIVERGED
+from catenary.solver.errors import NotConverged, RunBroken
 from catenary.solver.heads import Heads
 from catenary.solver.interaction import Interaction
 from catenary.solver.law_in_steps import LawInSteps
@@ -24,7 +25,8 @@ class FixedPoint:
     """The paper's correction: eqs. (2.4) to (2.7) repeated until the iterates agree.
 
     Contact forces and the compensation of slack droppers are evaluated from the latest iterate
-    and the whole system is solved again.
+    and the whole system is solved again. With a fixed number of ``numerics.iterations`` a step
+    goes on with what they have reached; those above the tolerances are counted.
     """
 
     comm: Any
@@ -58,7 +60,8 @@ class FixedPoint:
         heads = self._heads_everywhere(time)
         external = self.loads(time) or []
         force = self._force
-        for _ in range(self.numerics.max_iterations):
+        fixed = self.numerics.iterations
+        for number in range(1, (fixed or self.numerics.max_iterations) + 1):
             force, depth, rate = self._contact(touches, heads, force)
             compensation = self._compensation()
             self._latest[0] = line.displacement
@@ -68,11 +71,15 @@ class FixedPoint:
             line.solve(external + self.interaction.loads(touches, force, compensation))
             line.correct()
             self.counters.rounds += 1
-            if self._settled(time):
+            # How far a fixed number of them has come is only asked after the last.
+            if (fixed is None or number == fixed) and self._settled(time):
                 break
         else:
             self.counters.unconverged_steps += 1
-            raise self._broken("does not converge", time)
+            if fixed is None:
+                raise self._broken("does not converge", time)
+        if fixed is not None and not (np.abs(force) < DIVERGED).all():
+            raise self._broken("diverges", time)
         self.counters.steps += 1
         self.counters.solves = self.counters.rounds
         self._force = force
@@ -146,9 +153,12 @@ class FixedPoint:
         return largest < 1.0
 
     def _broken(self, how: str, time: float) -> RunBroken:
-        return RunBroken(
-            f"the fixed-point correction {how} at t = {time:.4f} s (at most "
-            f"{self.numerics.max_iterations} iterations, numerics.max_iterations) with the train "
-            f"at {float(self.pantographs.position[0]):.1f} m; take numerics.scheme = "
+        fixed, most = self.numerics.iterations, self.numerics.max_iterations
+        allowed = f"at most {most} iterations, numerics.max_iterations"
+        if fixed is not None:
+            allowed = f"numerics.iterations is {fixed}"
+        return NotConverged(
+            f"the fixed-point correction {how} at t = {time:.4f} s ({allowed}) with the train at "
+            f"{float(self.pantographs.position[0]):.1f} m; take numerics.scheme = "
             '"one_solve" or a smaller numerics.dt_s'
         )

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.solver import inner_kernels
-from catenary.solver.errors import RunBroken
+from catenary.solver.errors import NotConverged, RunBroken
 from catenary.solver.heads import Heads
 from catenary.solver.law_in_steps import LawInSteps
 from catenary.solver.response import LineResponse
@@ -164,7 +164,10 @@ class InnerProblem:
             law.linearise(depth, rate)
             if law.agrees(force):
                 return InnerSolution(force, slack, depth, rate, rounds, self.pivoted)
-        raise RunBroken("the contact law finds no force; take a smaller numerics.dt_s")
+        raise NotConverged(
+            f"the contact law finds no force within {_MAX_TANGENTS} tangents; take a smaller "
+            "numerics.dt_s"
+        )
 
     def slack_under(self, line: LineResponse, force: np.ndarray) -> np.ndarray:
         """Compensations (m,) [N] under given contact forces (n,) [N]."""
@@ -252,4 +255,7 @@ def _pivot(matrix: np.ndarray, right: np.ndarray, always: np.ndarray, solution: 
             return rounds
         first = int(np.argmax(wrong))
         acts[first] = not acts[first]
-    raise RunBroken("contacts and slack droppers of this step have no common solution")
+    raise NotConverged(
+        "contacts and slack droppers of this step have no common solution; take a smaller "
+        "numerics.dt_s or less contact damping"
+    )

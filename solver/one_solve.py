@@ -10,7 +10,7 @@ import numpy as np
 from catenary.solver import inner_kernels
 from catenary.solver.contact import Touches
 from catenary.solver.coupling import Coupling
-from catenary.solver.errors import RunBroken
+from catenary.solver.errors import NotConverged, RunBroken
 from catenary.solver.events import NAMES, event
 from catenary.solver.exchange import Exchange, Reply, Verdict
 from catenary.solver.heads import Heads
@@ -176,6 +176,7 @@ class OneSolve:
             law.accept(time, found.depth, found.rate, found.contact_force)
         except RunBroken as error:
             self._why = str(error)
+            self.counters.unconverged_steps += isinstance(error, NotConverged)
             return Reply(Verdict.BROKEN, self._none)
         self._found = found
         self.counters.rounds += found.rounds

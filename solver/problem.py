@@ -68,7 +68,8 @@ class Numerics:
     ``fixed_point`` (paper eqs. 2.4-2.7); ``eps_d`` [m] and ``eps_v`` [m/s] end its iteration, at
     most ``max_iterations`` times a step.
     ``coupling`` of ``one_solve`` is ``implicit``, ``iterated`` (until contact forces change by
-    less than ``eps_force`` [N], at most ``max_iterations`` times) or ``explicit``.
+    less than ``eps_force`` [N], at most ``max_iterations`` times) or ``explicit``. ``iterations``
+    of ``fixed_point`` are done in every step whatever they reach; None iterates until it agrees.
     """
 
     dt: float
@@ -82,6 +83,7 @@ class Numerics:
     eps_force: float = 1e-6
     integrator: str = "newmark"
     spectral_radius: float = 1.0
+    iterations: int | None = None
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ class Counters:
     """What the steps of a run needed.
 
     ``repeated_steps``: bounds of what may slacken were too small; ``pivoted_steps``: the active
-    set of contacts and slack droppers cycled, and pivoting found it; ``unconverged_steps``: the
-    fixed-point correction gave up, which ends the run.
+    set of contacts and slack droppers cycled, and pivoting found it; ``unconverged_steps``:
+    iterations ended above their tolerances, which ends the run unless their number is given.
     """
 
     steps: int = 0

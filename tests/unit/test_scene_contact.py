@@ -98,6 +98,15 @@ def test_the_resolved_scene_is_the_same_again(overrides: list[str]) -> None:
         (["contact.restitutoin=0.9"], "did you mean contact.restitution?"),
         (["numerics.coupling=implicit", "numerics.scheme=fixed_point"], "must not give coupling"),
         (["numerics.coupling=loose"], "numerics.coupling is"),
+        (
+            ["numerics.iterations=6"],
+            "must not give iterations, which belongs to scheme fixed_point",
+        ),
+        (
+            ["numerics.scheme=fixed_point", "numerics.iterations=6", "numerics.max_iterations=9"],
+            "takes iterations or max_iterations",
+        ),
+        (["numerics.scheme=fixed_point", "numerics.iterations=0"], "numerics.iterations is 0"),
     ],
 )
 def test_what_does_not_fit_is_refused_in_one_sentence(overrides: list[str], words: str) -> None:

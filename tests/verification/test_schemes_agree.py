@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from measuring import History, check, march
+from measuring import History, check, march, start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
 from catenary.solver.contact_laws import LinearLaw
@@ -64,3 +66,44 @@ def test_one_solve_is_the_limit_of_the_fixed_point_correction(
     # What the default scheme saves.
     assert counters["solves"] == counters["steps"]
     assert iterated.outcome.counters["solves"] > 4 * counters["solves"]
+
+
+def test_a_fixed_number_of_corrections_goes_on_and_comes_nearer_with_each() -> None:
+    """Corrections multiply what is missing by k beta dt^2 (1 / m_head + 1 / m_wire), 0.014 here,
+    with m_wire of 0.97 kg for elements of a third of a gap (test_stability_map); where droppers
+    slacken by k_d beta dt^2 (1 / m_wire + 1 / m_messenger), 0.058 with wires of 1.35 and 1.07 kg/m.
+    Errors of steps add up alike whatever their size, so that they fall by the greater one.
+    """
+    mesh = mesh_of(en50318_line(8), 3)
+    smooth = two_pantographs("fixed_point", WHOLE, 0.0)
+    smooth = replace(smooth, train=train(250 / 3.6, 120.0, 200.0, raise_time=0.3))
+    exact = march(replace(smooth, numerics=numerics(1e-3)), mesh)["contact_force"]
+    errors, above = [], []
+    for iterations in (1, 2, 3):
+        loose = numerics(1e-3, "fixed_point", eps_d=1e-6, eps_v=1e-3, iterations=iterations)
+        found = march(replace(smooth, numerics=loose), mesh)
+        counters = found.outcome.counters
+        assert counters["rounds"] == iterations * counters["steps"]
+        errors.append(float(np.abs(found["contact_force"] - exact).max()))
+        above.append(counters["unconverged_steps"])
+        print(f"{iterations} corrections: {errors[-1]:.2e} N off, {above[-1]} steps not converged")
+    # Before the head presses there is nothing to be corrected.
+    assert above[0] > 0.8 * exact.size > above[1] > above[2]
+    ratio = 1e5 * 0.25e-6 * (1 / 0.97 + 1 / (0.97 * 1.07 / 1.35))
+    assert errors[1] < ratio * errors[0] and errors[2] < ratio * errors[1]
+    assert errors[2] > 0.0
+
+
+def test_a_fixed_number_of_corrections_that_diverge_ends_the_run() -> None:
+    """A contact of 1e7 N/m at 1 ms multiplies by 2.6 a correction: nothing may go on with that."""
+    stiff = replace(
+        two_pantographs("fixed_point", WHOLE - {"contact_loss"}, 0.0),
+        contact=LinearLaw(1e7, 0.0),
+        numerics=numerics(1e-3, "fixed_point", iterations=10),
+    )
+    run, _ = start_march(stiff, mesh_of(en50318_line(8), 3))
+    with run:
+        outcome = run.run([])
+    print(outcome.outcome)
+    assert "diverges at t = " in outcome.outcome and "with the train at 1" in outcome.outcome
+    assert "numerics.iterations is 10" in outcome.outcome and "one_solve" in outcome.outcome

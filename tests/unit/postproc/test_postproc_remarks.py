@@ -65,6 +65,18 @@ def test_droppers_that_are_stiff_for_the_step_are_told() -> None:
     assert remarks(told) == []  # type: ignore[arg-type]
 
 
+def test_steps_that_went_on_above_the_tolerances_are_told() -> None:
+    """Only where the scene says how many iterations there are: otherwise the run ends there."""
+    told = Told(7.2, 1e-3, law="linear", stiffness_N_per_m=1e6)
+    told.attributes["inner_iterations"] = {"steps": 900, "unconverged_steps": 7}  # type: ignore[assignment]
+    assert remarks(told) == []  # type: ignore[arg-type]
+    told.attributes["config"]["numerics"]["iterations"] = 2  # type: ignore[index,call-overload]
+    (sentence,) = remarks(told)  # type: ignore[arg-type]
+    assert "7 of 900 steps" in sentence and "numerics.iterations = 2" in sentence
+    told.attributes["inner_iterations"] = {"steps": 900, "unconverged_steps": 0}  # type: ignore[assignment]
+    assert remarks(told) == []  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("facts", [[], [{"static_force_N": 120.0}]])
 def test_older_files_without_masses_have_no_remarks(facts: list[dict[str, Any]]) -> None:
     told = Told(7.2, 1e-3, law="linear", stiffness_N_per_m=5e4)

@@ -136,6 +136,24 @@ def test_a_correction_that_does_not_settle_breaks_the_run(mesh: LineMesh) -> Non
     assert len(history.time) == outcome.n_steps + 1 < 31
 
 
+def test_exchanges_that_do_not_agree_break_the_run(mesh: LineMesh) -> None:
+    """Four of them do not bring forces of 100 N to 1e-6 N."""
+    bad = problem(numerics=numerics(1e-3, coupling="iterated", max_iterations=4))
+    run, _ = start_march(bad, mesh)
+    history = History()
+    outcome = run.run([history])
+    run.destroy()
+    for words in (
+        f"the step to t = {1e-3 * (outcome.n_steps + 1):.4f} s",
+        "with the train at 7",
+        "within 4 exchanges (numerics.max_iterations)",
+        'take numerics.coupling = "implicit" or a smaller numerics.dt_s',
+    ):
+        assert words in outcome.outcome
+    assert outcome.counters["unconverged_steps"] == 1
+    assert len(history.time) == outcome.n_steps + 1 < 31
+
+
 def test_the_time_step_cannot_be_changed_by_an_option(mesh: LineMesh) -> None:
     options = PETSc.Options()
     options["march_ts_dt"] = 5e-4
