@@ -18,7 +18,7 @@ from catenary.solver.problem import Problem
 # Largest difference between the law and its last tangent, relative to the force.
 _TOLERANCE = 1e-10
 # How well depths [m] and rates [m/s] are known: differences of heights of 5 m and of speeds of some
-# m/s, a few roundings of 4e-16 to 9e-16 each. No force is known better than the law's slope times it.
+# m/s, a few roundings of 4e-16 to 9e-16 each. No force is known better than that times the slope.
 _KNOWN = 5e-15
 
 

@@ -5,21 +5,41 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass
 
+from fuzzing_more import as_assignments, mechanism, put_more
+
 BASE = "en50318_2002"
 N_STEPS = 200
 
 
 @dataclass(frozen=True)
 class RandomScene:
-    """Assignments to the base case, and what breaks them, "" if nothing does."""
+    """Assignments to a base case, and what breaks them, "" if nothing does."""
 
     seed: int
     assignments: tuple[str, ...]
     broken_by: str = ""
+    base: str = BASE
+
+    def says(self, word: str) -> bool:
+        """Whether an assignment begins so."""
+        return any(assignment.startswith(word) for assignment in self.assignments)
 
 
-def sound_scene(seed: int) -> RandomScene:
-    """A scene that is sound by what the documents say, of any seed."""
+def wide_scene(seed: int, n_steps: int = N_STEPS) -> RandomScene:
+    """A sound scene with more of the schema in it; one in twenty has a mechanism."""
+    rng = random.Random(f"wide {seed}")
+    if rng.random() < 0.05:
+        return RandomScene(seed, mechanism(rng, n_steps), base="ambrosio2012")
+    return sound_scene(seed, n_steps, wide=rng)
+
+
+def sound_scene(
+    seed: int, n_steps: int = N_STEPS, wide: random.Random | None = None
+) -> RandomScene:
+    """A scene that is sound by what the documents say, of any seed.
+
+    It runs for ``n_steps``; with ``wide`` it has parts of `fuzzing_more`.
+    """
     rng = random.Random(seed)
     span = rng.uniform(30.0, 70.0)
     n_spans = rng.randint(2, 5)
@@ -30,7 +50,7 @@ def sound_scene(seed: int) -> RandomScene:
     speed = rng.choice([rng.uniform(5.0, 0.98 * wave), rng.uniform(0.3, 1.4) * wave])
     speed = min(max(speed, 2.0), 270.0)
     dt = 10 ** rng.uniform(-4.3, -2.0)
-    way = (N_STEPS + 0.5) * dt * speed
+    way = (n_steps + 0.5) * dt * speed
     if way > 0.8 * length:  # the line is too short for these steps: go slower
         speed *= 0.8 * length / way
         way = 0.8 * length
@@ -48,7 +68,7 @@ def sound_scene(seed: int) -> RandomScene:
     springs.append(rng.choice([0.0, rng.uniform(10.0, 500.0)]))
     dampers = [rng.choice([0.0, rng.uniform(1.0, 150.0)]) for _ in range(n_masses)]
     count = rng.randint(1, 9)
-    words = {
+    words: dict[str, object] = {
         "line.n_spans": n_spans,
         "line.span_m": span,
         "line.encumbrance_m": 2.5,
@@ -87,7 +107,10 @@ def sound_scene(seed: int) -> RandomScene:
     if rear > 0.6 * way:
         behind = []
     words["train.pantographs"] = f"[{','.join(names if behind else names[:1])}]"
-    return RandomScene(seed, tuple(f"{key}={_text(value)}" for key, value in words.items()))
+    if wide is not None:
+        room = min(start - (rear if behind else 0.0), length - way - start)
+        put_more(wide, words, span, room)
+    return RandomScene(seed, as_assignments(words))
 
 
 def _positions(rng: random.Random, span: float, count: int) -> list[float]:
@@ -97,10 +120,6 @@ def _positions(rng: random.Random, span: float, count: int) -> list[float]:
         if not places or place - places[-1] > 0.1:
             places.append(round(place, 3))
     return places
-
-
-def _text(value: object) -> str:
-    return value if isinstance(value, str) else repr(value)
 
 
 _NUMBERS = (

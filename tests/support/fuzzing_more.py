@@ -1,0 +1,231 @@
+"""What random scenes have besides the usual: each part of the schema now and then, from a seed.
+
+Each function puts its keys into the words of a scene that is sound and leaves it sound.
+"""
+
+from __future__ import annotations
+
+import random
+
+Words = dict[str, object]
+# Share of the scenes that have each of these.
+_NOW_AND_THEN = 0.2
+_IMPACTS = ("lankarani_nikravesh", "hunt_crossley", "flores", "gonthier")
+
+
+def put_more(rng: random.Random, words: Words, span: float, room: float) -> None:
+    """Now and then each of the parts below.
+
+    ``span`` [m] of the line; ``room`` [m] before and behind the run that strips may take.
+    """
+    for part in (_wires, _spans, _droppers, _clamps, _arms, _damping, _mesh):
+        if rng.random() < _NOW_AND_THEN:
+            part(rng, words, span)
+    if room > 1.0 and rng.random() < _NOW_AND_THEN:
+        _strips(rng, words)
+    if rng.random() < _NOW_AND_THEN:
+        _vehicle(rng, words)
+    # Droppers must be able to slacken if they are to keep a share of their stiffness then.
+    if words["effects.dropper_slackening"] == "true" and rng.random() < _NOW_AND_THEN:
+        words["line.dropper.residual_stiffness_ratio"] = rng.uniform(1e-3, 0.5)
+        words["effects.residual_dropper_stiffness"] = "true"
+    laws = (_linear, _linear, _damped, _damped, _hertz, _hertz, _impact, _impact, _kinematic)
+    rng.choice(laws)(rng, words)
+    if words.get("contact.law") != "'kinematic'":
+        rng.choice((_implicit, _implicit, _numerically_damped, _exchanging, _correcting))(
+            rng, words
+        )
+
+
+def _wires(rng: random.Random, words: Words, span: float) -> None:
+    words["line.messenger_wire.mass_kg_per_m"] = rng.uniform(0.4, 1.5)
+    words["line.messenger_wire.bending_stiffness_N_m2"] = rng.choice([0.0, rng.uniform(1.0, 300.0)])
+    words["line.contact_height_m"] = rng.uniform(4.5, 7.0)
+
+
+def _spans(rng: random.Random, words: Words, span: float) -> None:
+    """Two lengths in turn, with a pattern of droppers for each; the line gets longer by that."""
+    other = span + rng.uniform(1.0, 10.0)
+    words["line.span_m"] = [span, other]
+    count = rng.randint(2, 6)
+    del words["line.dropper.positions_m"]
+    words["line.dropper.positions_m"] = ""
+    words["line.dropper.patterns"] = "[" + ",".join(
+        f"{{span_m={length!r},positions_m={_even(length, count)!r}}}" for length in (span, other)
+    ) + "]"  # fmt: skip
+
+
+def _droppers(rng: random.Random, words: Words, span: float) -> None:
+    """By their count, with a sag given at mid-span, as strands with a modulus."""
+    if "line.dropper.patterns" in words:
+        return
+    count = rng.randint(2, 9)
+    words["line.dropper.positions_m"] = ""
+    words["line.dropper.count"] = count
+    words["line.dropper.spacing_m"] = span / (count + rng.uniform(0.5, 1.5))
+    words["line.dropper.pre_sag_mid_mm"] = rng.uniform(-5.0, 30.0)
+    words["line.dropper.stiffness_N_per_m"] = ""
+    words["line.dropper.axial_stiffness_N"] = 10 ** rng.uniform(4.0, 6.3)
+
+
+def _clamps(rng: random.Random, words: Words, span: float) -> None:
+    words["line.dropper.mass_kg_per_m"] = rng.uniform(0.0, 0.3)
+    words["line.dropper.messenger_clamp_kg"] = rng.uniform(0.0, 0.4)
+
+
+def _arms(rng: random.Random, words: Words, span: float) -> None:
+    words["line.steady_arm.length_m"] = rng.uniform(0.5, 1.5)
+    words["line.steady_arm.mass_kg_per_m"] = rng.uniform(0.1, 2.0)
+    words["line.steady_arm.clamp_kg"] = rng.uniform(0.0, 0.5)
+    words["line.steady_arm.holds_height"] = rng.choice(["true", "false"])
+    words["line.stagger_m"] = rng.uniform(-0.3, 0.3)
+
+
+def _damping(rng: random.Random, words: Words, span: float) -> None:
+    names = ("contact_wire", "messenger_wire", "droppers", "steady_arms", "supports")
+    for name in rng.sample(names, rng.randint(1, 5)):
+        values = (10 ** rng.uniform(-5, -2), rng.choice([0.0, rng.uniform(0.0, 0.1)]))
+        words[f"line.damping.per_component.{name}"] = (
+            f"{{alpha_s={values[0]!r},beta_per_s={values[1]!r}}}"
+        )
+
+
+def _mesh(rng: random.Random, words: Words, span: float) -> None:
+    words["mesh.support_refinement"] = rng.randint(2, 4)
+
+
+def _strips(rng: random.Random, words: Words) -> None:
+    """Two strips, now and then on springs of their own, and a head that may roll."""
+    table = "pantographs.reference"
+    masses = words[f"{table}.masses_kg"]
+    assert isinstance(masses, list)
+    words[f"{table}.strips.number"] = 2
+    words[f"{table}.strips.length_m"] = 1.2
+    words[f"{table}.strips.spacing_m"] = rng.uniform(0.2, 0.45)
+    if rng.random() < 0.5:
+        words[f"{table}.strips.mass_kg"] = rng.uniform(0.1, 0.4) * masses[0]
+        words[f"{table}.strips.stiffness_N_per_m"] = 10 ** rng.uniform(3.0, 4.5)
+        words[f"{table}.strips.damping_N_s_per_m"] = rng.choice([0.0, rng.uniform(1.0, 50.0)])
+    if len(masses) > 1 and rng.random() < 0.5:
+        words[f"{table}.strips.pitch_inertia_kg_m2"] = rng.uniform(0.05, 1.0)
+        words[f"{table}.strips.pitch_spring_distance_m"] = rng.uniform(0.2, 0.6)
+    if len(masses) > 1 and rng.random() < 0.5:
+        inertia, distance = rng.uniform(0.5, 5.0), rng.uniform(0.5, 1.2)
+        words[f"{table}.roll"] = f"{{inertia_kg_m2={inertia!r},spring_distance_m={distance!r}}}"
+        words["line.stagger_m"] = rng.uniform(-0.3, 0.3)
+        words["effects.head_roll"] = "true"
+
+
+def _vehicle(rng: random.Random, words: Words) -> None:
+    """A base that follows a sine, or an irregular track whose waves the steps resolve."""
+    words["effects.vehicle_motion"] = "true"
+    shortest = max(
+        3.0, 8.5 * float(str(words["train.speed_km_h"])) / 3.6 * float(str(words["numerics.dt_s"]))
+    )
+    if shortest < 50.0 and rng.random() < 0.5:
+        words["vehicle.irregularity.spectrum"] = rng.choice(["'fra_5'", "'german_low'"])
+        words["vehicle.irregularity.shortest_m"] = shortest
+        words["vehicle.irregularity.seed"] = rng.randrange(1000)
+        return
+    words["vehicle.vertical.amplitude_m"] = rng.uniform(1e-3, 0.03)
+    words["vehicle.vertical.frequency_hz"] = rng.uniform(0.3, 5.0)
+    words["vehicle.vertical.phase_deg"] = rng.uniform(-180.0, 180.0)
+
+
+# ---- contact ------------------------------------------------------------------------------------
+
+
+def _linear(rng: random.Random, words: Words) -> None:
+    """As it is."""
+
+
+def _damped(rng: random.Random, words: Words) -> None:
+    words["contact.damping_N_s_per_m"] = rng.uniform(1.0, 300.0)
+    words["effects.contact_damping"] = "true"
+
+
+def _hertz(rng: random.Random, words: Words) -> None:
+    words["contact.law"] = "'hertz'"
+    words["effects.contact_loss"] = "true"
+    if rng.random() < 0.5:
+        words["contact.stiffness_N_per_m"] = ""
+        words["contact.hertz_stiffness_N_per_m1_5"] = 10 ** rng.uniform(5.0, 9.0)
+
+
+def _impact(rng: random.Random, words: Words) -> None:
+    words["contact.law"] = f"'{rng.choice(_IMPACTS)}'"
+    words["contact.restitution"] = rng.uniform(0.1, 0.95)
+    words["contact.least_impact_speed_m_per_s"] = 10 ** rng.uniform(-2.0, 0.0)
+    words["effects.contact_damping"] = words["effects.contact_loss"] = "true"
+
+
+def _kinematic(rng: random.Random, words: Words) -> None:
+    words["contact.law"] = "'kinematic'"
+    words["contact.stiffness_N_per_m"] = ""
+    words["train.start_below_m"] = 0.0
+    words["numerics.newmark_gamma"], words["numerics.newmark_beta"] = 0.55, 0.28
+
+
+# ---- numerics -----------------------------------------------------------------------------------
+
+
+def _implicit(rng: random.Random, words: Words) -> None:
+    """As it is."""
+
+
+def _numerically_damped(rng: random.Random, words: Words) -> None:
+    gamma = rng.uniform(0.5, 0.7)
+    words["numerics.newmark_gamma"] = gamma
+    words["numerics.newmark_beta"] = rng.uniform(1.0, 1.2) * 0.25 * (gamma + 0.5) ** 2
+
+
+def _exchanging(rng: random.Random, words: Words) -> None:
+    words["numerics.coupling"] = rng.choice(["'iterated'", "'explicit'"])
+
+
+def _correcting(rng: random.Random, words: Words) -> None:
+    words["numerics.scheme"] = "'fixed_point'"
+    if rng.random() < 0.5:
+        words["numerics.iterations"] = rng.randint(1, 12)
+
+
+def mechanism(rng: random.Random, n_steps: int) -> tuple[str, ...]:
+    """Assignments to the case with a mechanism of seven bodies, for so many steps of its run."""
+    n_spans = rng.randint(7, 10)
+    speed, dt = rng.uniform(20.0, 85.0), 10 ** rng.uniform(-3.7, -2.7)
+    way = (n_steps + 0.5) * dt * speed
+    start = rng.uniform(110.0, 120.0)
+    words: Words = {
+        "line.n_spans": n_spans,
+        "train.speed_km_h": 3.6 * speed,
+        "train.start_m": start,
+        "train.end_m": start + way,
+        "train.raise_time_s": rng.choice([0.0, 0.3 * way / speed]),
+        "evaluation.from_m": start + 0.35 * way,
+        "evaluation.to_m": start + 0.4 * way,
+        "contact.stiffness_N_per_m": 10 ** rng.uniform(4.0, 6.0),
+        "numerics.dt_s": dt,
+        "mesh.elements_per_gap": rng.randint(2, 5),
+        "pantographs.seven_body.static_force_N": rng.uniform(80.0, 200.0),
+        "train.pantographs.0.reversed": rng.choice(["true", "false"]),
+        "effects.residual_dropper_stiffness": rng.choice(["true", "false"]),
+    }
+    if rng.random() < 0.5:
+        way_kept = rng.choice(["coordinate_partitioning", "augmented_lagrangian", "baumgarte"])
+        words["pantographs.seven_body.motion"] = "'all_bodies'"
+        words["pantographs.seven_body.constraint_handling"] = f"'{way_kept}'"
+        words["pantographs.seven_body.substeps"] = rng.randint(1, 4)
+    rng.choice((_linear, _damped, _hertz, _impact))(rng, words)
+    return as_assignments(words)
+
+
+def as_assignments(words: Words) -> tuple[str, ...]:
+    """``key=value`` each."""
+    return tuple(
+        f"{key}={value if isinstance(value, str) else repr(value)}" for key, value in words.items()
+    )
+
+
+def _even(span: float, count: int) -> list[float]:
+    """Places of droppers, evenly."""
+    return [round(span * (i + 0.5) / count, 3) for i in range(count)]
