@@ -60,11 +60,16 @@ def _about_droppers(config: dict[str, Any]) -> list[str]:
     stiffness, dt = dropper.get("stiffness_N_per_m"), config["numerics"]["dt_s"]
     if not stiffness or stiffness * dt**2 <= _STIFF_DROPPER:
         return []
+    damping = config["line"].get("damping", {})
+    own = (damping.get("per_component") or {}).get("droppers") or damping
+    if own.get("alpha_s", 0.0) >= dt:
+        return []
     longest = math.sqrt(_STIFF_DROPPER / stiffness)
     return [
         f"Droppers of {stiffness:.3g} N/m are stiff for a step of {1e3 * dt:g} ms: when they "
         "slacken and tighten they give the line energy that it did not have. Take a "
-        f"numerics.dt_s of {1e3 * longest:.2g} ms at most, or numerical damping."
+        f"numerics.dt_s of {1e3 * longest:.2g} ms at most, or damp droppers by as much as a step: "
+        f"line.damping.per_component.droppers with alpha_s = {dt:g}, beta_per_s = 0."
     ]
 
 
