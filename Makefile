@@ -57,9 +57,10 @@ bench: setup ## what steps cost: against their floor, by phase, spans and ranks
 	@mkdir -p results
 	MPI_FLAGS="$(MPI_FLAGS)" $(PYTEST) -q -s tests/benchmarks $(LONG_RUNS:%=--ignore=%) --benchmark-json=results/bench.json
 
-fuzz: setup ## 2000 random scenes that run and 2000 that are refused; SEED=... for others
+fuzz: setup ## random scenes: 4000 that run, 2000 refused, 25 killed, 25 on 2 to 4 ranks; SEED=...
 	@echo "seeds from $(SEED); FUZZ_SEED=<seed> FUZZ_CASES=1 $(PYTEST) tests/regression/test_fuzz.py replays one"
 	FUZZ_SEED=$(SEED) FUZZ_CASES=2000 $(PYTEST) -q tests/regression/test_fuzz.py
+	FUZZ_SEED=$(SEED) FUZZ_PROCESSES=25 $(PYTEST) -q tests/regression/test_fuzz_processes.py
 	FUZZ_SEED=$(SEED) FUZZ_CASES=100 timeout 900 mpirun -n 2 $(MPI_FLAGS) $(MPI_PYTEST) -q tests/regression/test_fuzz.py
 
 long-runs: setup ## all bodies of a pantograph over 20 s and ten minutes; some seven minutes

@@ -5,7 +5,14 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    SerializerFunctionWrapHandler,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
 from catenary.cases.table import TAKE_AWAY, Table
 from catenary.solver.integration import (
@@ -181,6 +188,14 @@ class NumericsTable(Table):
                 f"with {self.integrator}, whose parameters follow from spectral_radius" + TAKE_AWAY
             )
         return self
+
+    @model_serializer(mode="wrap")
+    def _acting(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """All keys that act; a table made of them is the same again."""
+        plain: dict[str, Any] = handler(self)
+        if self.iterations is not None:
+            del plain["max_iterations"]
+        return plain
 
 
 class EvaluationTable(Table):

@@ -114,3 +114,15 @@ def test_what_does_not_fit_is_refused_in_one_sentence(overrides: list[str], word
         load_scene(CASE, overrides)
     sentence = str(refused.value)
     assert words in sentence and "\n" not in sentence
+
+
+def test_a_scene_with_a_number_of_iterations_can_be_resolved_and_read_again() -> None:
+    """A restart reads the resolved scene, which holds all defaults."""
+    words = ["numerics.scheme=fixed_point", "numerics.iterations=6"]
+    scene = load_scene("en50318_2002", words)
+    resolved = scene.resolved()
+    assert resolved["numerics"]["iterations"] == 6
+    assert "max_iterations" not in resolved["numerics"]
+    assert type(scene.numerics).model_validate(resolved["numerics"]) == scene.numerics
+    assert scene.to_problem().numerics.iterations == 6
+    assert load_scene("en50318_2002").resolved()["numerics"]["max_iterations"] == 50
