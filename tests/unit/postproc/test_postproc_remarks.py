@@ -62,7 +62,7 @@ def test_droppers_that_are_stiff_for_the_step_are_told() -> None:
     (sentence,) = remarks(told)  # type: ignore[arg-type]
     assert "1e+08 N/m" in sentence and "0.32 ms" in sentence
     assert "alpha_s = 0.001" in sentence
-    # Droppers that are damped by as much as a step do not ring; the line's own 1e-4 s is too little.
+    # Droppers damped by as much as a step do not ring; the line's own 1e-4 s is too little.
     for alpha, said_so in ((1e-4, 1), (1e-3, 0)):
         droppers = {"alpha_s": alpha, "beta_per_s": 0.0}
         for damping in ({"per_component": {"droppers": droppers}}, droppers):
