@@ -28,8 +28,8 @@ from catenary.solver.errors import InputError
 FIRST = int(os.environ.get("FUZZ_SEED", "1"))
 CASES = int(os.environ.get("FUZZ_PROCESSES", "2"))
 SEEDS = range(FIRST, FIRST + CASES)
-# Steps of a run that is killed: a second or two, so that a random moment mostly lies in the march.
-LONG = 6000
+# Steps of a run that is killed: about a second, so that a random moment mostly lies in the march.
+LONG = 4000
 # As long as a process takes to start, at most [s].
 START = 3.0
 # Scenes are compared if round-off leaves this share of the largest force certain.
@@ -74,7 +74,7 @@ def words_for(made: RandomScene, out: Path, *more: str) -> list[str]:
 def check_same(out: Path, run: Watched, sensitive: float) -> None:
     """The force of a result file is that of a run: as well as its scene lets round-off grow.
 
-    1e-6 of the largest is what 6000 steps make of 1e-10 a step; the sensitivity is to one change, a
+    1e-6 of the largest is what 4000 steps make of some 1e-10 a step; the sensitivity is to one change, a
     restart or a sum over ranks makes some at every step: a hundred times as much.
     """
     with Results(out) as results:
