@@ -74,8 +74,8 @@ def words_for(made: RandomScene, out: Path, *more: str) -> list[str]:
 def check_same(out: Path, run: Watched, sensitive: float) -> None:
     """The force of a result file is that of a run: as well as its scene lets round-off grow.
 
-    1e-6 of the largest is what 4000 steps make of some 1e-10 a step; the sensitivity is to one change, a
-    restart or a sum over ranks makes some at every step: a hundred times as much.
+    1e-6 of the largest is what 4000 steps make of some 1e-10 a step; the sensitivity is to one
+    change, a restart or a sum over ranks makes some at every step: a hundred times as much.
     """
     with Results(out) as results:
         assert results.outcome == "done"
