@@ -10,7 +10,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from catenary.cases import sweep_output
+from catenary.cases import accuracy_markdown, sweep_output
 from catenary.cases.accuracy import Measured
 from catenary.cases.accuracy_analysis import (
     HISTORY,
@@ -24,12 +24,13 @@ from catenary.cases.accuracy_axes import DISCRETISATION, Axis
 from catenary.postproc import plots
 from catenary.postproc.storage import plain, write_all
 
-TABLE, RECORD, PICTURE = "accuracy.csv", "accuracy.json", "work_precision.png"
+TABLE, RECORD, PAGE = "accuracy.csv", "accuracy.json", "accuracy.md"
+PICTURE = "work_precision.png"
 _ADVISED = ("std", HISTORY)
 
 
 def write(found: Measured, out_dir: Path, target: float) -> list[Path]:
-    """Write table, record and diagram; returns the files. Not collective.
+    """Write table, record, page and diagram; returns the files. Not collective.
 
     The diagram is left out if no axis of discretisation was varied.
     """
@@ -39,6 +40,12 @@ def write(found: Measured, out_dir: Path, target: float) -> list[Path]:
     }
     if any(row.done for axis in _precise(found) for row in found.rows_of(axis.name)):
         content[PICTURE] = plots.png(draw(found))
+    orders = {
+        planned.axis.name: _order_lines(planned.axis, found.rows_of(planned.axis.name))
+        for planned in found.plan.axes
+    }
+    picture = PICTURE if PICTURE in content else ""
+    content[PAGE] = accuracy_markdown.page(found, advices(found, target), orders, picture)
     return write_all(out_dir, content)
 
 

@@ -90,6 +90,9 @@ def test_what_is_said_is_what_is_written(done: tuple[Path, str]) -> None:
     for sentence in record["advice"]:
         assert sentence in said
     assert any(sentence.startswith("For 3 % in") for sentence in record["advice"])
+    page = (out / "accuracy.md").read_text()
+    assert all(sentence in page for sentence in record["advice"])
+    assert "![work and precision](work_precision.png)" in page
     assert (out / "work_precision.png").read_bytes().startswith(b"\x89PNG")
 
 

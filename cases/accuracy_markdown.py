@@ -1,0 +1,80 @@
+"""The tables of an accuracy study as a page of Markdown."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from catenary.cases.accuracy import Measured
+from catenary.cases.accuracy_analysis import HISTORY, QUANTITIES, Row
+from catenary.cases.accuracy_axes import DISCRETISATION, Axis
+
+_LAST_COLUMNS = ("est/true", "rounds", "s/s")
+
+
+def page(
+    found: Measured, sentences: Sequence[str], orders: dict[str, list[str]], picture: str
+) -> str:
+    """One table an axis, with what the study recommends first.
+
+    Parameters
+    ----------
+    found : what was measured
+    sentences : the recommendations
+    orders : lines on observed orders by axis name
+    picture : file of the work-precision diagram, empty for none
+    """
+    parts = [
+        f"# Accuracy and cost: {found.plan.case}",
+        f"`catenary accuracy {found.plan.case}`; {len(found.rows)} settings, "
+        f"{found.wall / 60.0:.0f} minutes. Errors in percent: of the reference's own value for "
+        "mean, deviations and uplift, of its standard deviation for maximum, minimum and the force "
+        '"history" (rms). "est/true" is the error that a run estimates itself over the true one, '
+        '"rounds" the solves of the small problem a step, "s/s" wall time of the march per '
+        "simulated second.",
+    ]
+    if picture:
+        parts.append(f"![work and precision]({picture})")
+    parts.append("\n".join(f"- {sentence}" for sentence in sentences))
+    for planned in found.plan.axes:
+        axis = planned.axis
+        parts.append(f"## {axis.title[0].upper()}{axis.title[1:]}")
+        if axis.kind == DISCRETISATION:
+            parts.append(_reference(found, planned.reference, planned.check or "", axis.name))
+        else:
+            parts.append("Differences from the case as it is: of models, not errors.")
+        parts.append(_table(axis, found.rows_of(axis.name)))
+        parts += [line.strip()[0].upper() + line.strip()[1:] + "." for line in orders[axis.name]]
+    return "\n\n".join(parts) + "\n"
+
+
+def _reference(found: Measured, reference: str, check: str, name: str) -> str:
+    told = found.converged.get(name, {})
+    if not told:
+        return f"Reference: {reference}; it could not be compared with {check}."
+    differences = ", ".join(f"{what} {_short(value)}" for what, value in told.items())
+    return f"Reference: {reference}. It differs from {check} by [%]: {differences}."
+
+
+def _table(axis: Axis, rows: Sequence[Row]) -> str:
+    names = [*QUANTITIES, *_LAST_COLUMNS]
+    lines = [
+        "| " + " | ".join([axis.name, *names]) + " |",
+        "|" + "---|" * (len(names) + 1),
+    ]
+    for row in rows:
+        cells = _cells(axis, row) if row.done else [row.outcome] + [""] * (len(names) - 1)
+        level = row.level.replace("_", " ")
+        lines.append("| " + " | ".join([level, *cells]) + " |")
+    return "\n".join(lines)
+
+
+def _cells(axis: Axis, row: Row) -> list[str]:
+    true = row.errors.get(HISTORY, math.nan)
+    ratio = row.estimate / true if axis.refined == "dt" and true else math.nan
+    figures = [row.percent.get(name, math.nan) for name in QUANTITIES]
+    return [_short(value) for value in (*figures, ratio, row.iterations, row.cost)]
+
+
+def _short(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.3g}"
