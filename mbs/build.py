@@ -11,6 +11,7 @@ from catenary.mbs.full import FullPantograph
 from catenary.mbs.head_turning import PITCH, ROLL, head_turning
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lateral import LateralPath
+from catenary.mbs.lowering import LoweredPantograph, Lowering
 from catenary.mbs.lumped import LumpedData, LumpedPantograph
 from catenary.mbs.multibody import MultibodyData, head_weight_under_way, reduced, stand
 from catenary.mbs.raising import RaisingData, RaisingPantograph
@@ -26,7 +27,8 @@ class Operation(NamedTuple):
     ``static_force`` [N] on a wire at rest at ``nominal_height`` [m] of the head, raised from zero
     over ``raise_time`` [s]; ``dt`` [s], ``beta`` and ``gamma`` of the line's Newmark step.
     ``lateral`` is where the wire crosses the strips, without which the head does not roll, and
-    ``base`` how the vehicle moves, without which it does not.
+    ``base`` how the vehicle moves, without which it does not. ``lowering`` is how the pantograph is
+    lowered on the way.
     """
 
     static_force: float
@@ -37,18 +39,29 @@ class Operation(NamedTuple):
     gamma: float
     lateral: LateralPath | None = None
     base: BaseMotion | None = None
+    lowering: Lowering | None = None
 
 
 def make_pantograph(data: PantographData, operation: Operation) -> Pantograph:
     """The model that ``data`` describes. Not collective."""
     head_kernels.warm_up()
+    model = _model(data, operation)
+    if operation.lowering is None:
+        return model
+    model.follow(operation.lowering.course(operation.static_force, operation.raise_time))
+    return LoweredPantograph(model, operation.lowering, operation.base)
+
+
+def _model(
+    data: PantographData, operation: Operation
+) -> FullPantograph | RaisingPantograph | LumpedPantograph:
     if isinstance(data, MultibodyData):
         if data.all_bodies is not None:
             way = data.all_bodies
-            return FullPantograph(data, *operation, way.handling, way.substeps)
+            return FullPantograph(data, *operation[:-1], way.handling, way.substeps)
         raising = raising_data(data, operation.static_force, operation.nominal_height)
-        return RaisingPantograph(raising, *operation[2:])
-    return LumpedPantograph(data, *operation)
+        return RaisingPantograph(raising, *operation[2:-1])
+    return LumpedPantograph(data, *operation[:-1])
 
 
 def has_joints(data: PantographData) -> bool:

@@ -7,9 +7,10 @@ axes all bodies weigh more by its acceleration, which is exact for a base that d
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -37,16 +38,19 @@ PLACED = 1e-10
 
 @dataclass
 class _HoldDown:
-    """What holds the arm down until the pantograph is raised: ``force`` [N] less and less."""
+    """What holds the arm down until the pantograph is raised: ``force`` [N] less and less.
+
+    ``part(time)`` of the lift is let act; where it is negative, the arm is pulled down.
+    """
 
     name: str
     arm: str
-    raise_time: float
+    part: Callable[[float], float]
     force: float = 0.0
 
     def generalised(self, motion: Motion, time: float) -> np.ndarray:
         """Generalised forces (6 n,)."""
-        left = self.force * (1.0 - raised(time, self.raise_time))
+        left = self.force * (1.0 - self.part(time))
         return -left * point(motion, self.arm, ORIGIN).jacobian[2]
 
     def energy(self, motion: Motion) -> float:
@@ -118,7 +122,8 @@ class FullPantograph:
         standing = stand(data)
         self._data, self._dt = data, dt
         self._lateral, self._base = lateral, base
-        self._hold_down = _HoldDown("held down until raised", data.arm, raise_time)
+        part = partial(raised, raise_time=raise_time)
+        self._hold_down = _HoldDown("held down until raised", data.arm, part)
         system = without_spins(standing.system, standing.motion)
         system = system.with_forces(*data.wind, self._hold_down)
         if base is not None:
@@ -152,6 +157,10 @@ class FullPantograph:
     def motion(self) -> Motion:
         """Where all bodies are, from the base."""
         return self._stepper.motion
+
+    def follow(self, part: Callable[[float], float]) -> None:
+        """Let the part ``part(time)`` of the lift act."""
+        self._hold_down.part = part
 
     def constraint_violation(self) -> float:
         """Largest error of a row of the joints now [m, cosine]."""

@@ -5,7 +5,9 @@ Source: EN 50318, annex (two masses); the benchmark of ten codes of 2015 (three 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy import linalg
@@ -88,7 +90,7 @@ class LumpedPantograph(SteppedHead):
         n = head.n + data.n_masses - 1
         super().__init__(head, n, dt, beta, gamma, lateral)
         self._lift_full = static_force
-        self._raise_time = raise_time
+        self._part: Callable[[float], float] = partial(raised, raise_time=raise_time)
         self._base = base
         # The lift acts on the last mass, which is the head itself if there is no other.
         self._carrier = n - 1 if data.n_masses > 1 else int(np.flatnonzero(head.level)[-1])
@@ -121,7 +123,11 @@ class LumpedPantograph(SteppedHead):
 
     def lift(self, time: float) -> float:
         """Net lift on the last mass at ``time`` [N]: a half cosine up to the static force."""
-        return self._lift_full * raised(time, self._raise_time)
+        return self._lift_full * self._part(time)
+
+    def follow(self, part: Callable[[float], float]) -> None:
+        """Let the part ``part(time)`` of the lift act."""
+        self._part = part
 
     def predict(self, time: float) -> HeadState:
         """Strips at ``time`` [s] as affine functions of the contact forces in the coming step."""

@@ -14,7 +14,9 @@ not carried along the track, and links between two balls do not spin.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -78,7 +80,7 @@ class RaisingPantograph(SteppedHead):
         head = head_parts(*values, data.strips, data.roll if lateral is not None else None)
         super().__init__(head, head.n + 1, dt, beta, gamma, lateral)
         self._data = data
-        self._raise_time = raise_time
+        self._part: Callable[[float], float] = partial(raised, raise_time=raise_time)
         self._base = base
         self._zero = data.head_offset + data.base_height
         self._masses = np.append(head.masses, 0.0)
@@ -140,13 +142,17 @@ class RaisingPantograph(SteppedHead):
                 break
         return force
 
+    def follow(self, part: Callable[[float], float]) -> None:
+        """Let the part ``part(time)`` of the lift act."""
+        self._part = part
+
     def _frame_at(self, z: float) -> tuple[np.ndarray, np.ndarray]:
         """Mass, lift, damping and their slopes for a height z [m] over a base at rest."""
         return self._data.frame.at(z - self._zero)
 
     def _move_base(self, time: float) -> None:
         """Put lift and base to ``time`` [s]."""
-        self._drive[0] = raised(time, self._raise_time)
+        self._drive[0] = self._part(time)
         if self._base is not None:
             self._drive[3:] = self._base.vertical(time)
 

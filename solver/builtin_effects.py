@@ -6,7 +6,9 @@ from catenary.mbs.build import roll_of
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.contact_laws import KinematicLaw
 from catenary.solver.effects import Effect, register
+from catenary.solver.incidents import DropperBreak, TensionLoss
 from catenary.solver.model import ModelBuilder
+from catenary.solver.problem import slowest_wave_speed
 
 
 def _vertical(builder: ModelBuilder) -> None:
@@ -234,12 +236,45 @@ register(
 )
 register(
     Effect(
+        "dropper_break",
+        "droppers that break during the run",
+        "matrices without the dropper and the balance that it leaves, from its time on",
+        "equation of motion of the line without it; [[incidents]]",
+        default=True,
+        applies=lambda p: any(isinstance(incident, DropperBreak) for incident in p.incidents),
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "tension_loss",
+        "wires that lose tension during the run",
+        "matrices with what is left of the tension and the balance lost, from its time on",
+        "equation of motion of the line with it; [[incidents]]",
+        default=True,
+        applies=lambda p: any(isinstance(incident, TensionLoss) for incident in p.incidents),
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "lowering",
+        "pantographs that are lowered during the run",
+        "a static force that goes over to a lower one, and what catches the head",
+        "the course of the raising, the other way; [[incidents]]",
+        default=True,
+        applies=lambda p: any(place.lowering is not None for place in p.train.placements),
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
         "supercritical_speed",
         "train speed at or above the wave speed of the contact wire",
         "nothing: it lifts the check on the speed",
         "paper eq. (1.1)",
         default=False,
-        applies=lambda p: p.train.speed >= p.line.contact_wire.wave_speed,
+        applies=lambda p: p.train.speed >= slowest_wave_speed(p),
         build=lambda builder: builder.count_term(),
     )
 )

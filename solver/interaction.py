@@ -17,9 +17,12 @@ from catenary.solver.response import LineResponse
 class Droppers:
     """The droppers that this rank owns, with their tension as if they could push.
 
+    Those that are broken take no part; they are only shown, carrying nothing.
+
     Attributes
     ----------
-    numbers : (n,) their numbers in the mesh
+    shown : numbers in the mesh of all that this rank owns, those that are broken included
+    numbers : (n,) numbers in the mesh of those that may carry
     ends : (n, 2) local unknowns of their upper and lower ends
     laws : (n, 4) force at rest [N], stiffness [N/m], damping [N s/m], place along the track [m]
     latest_tension : (n,) what ``find_tension`` found last [N]
@@ -28,15 +31,26 @@ class Droppers:
     def __init__(self, model: Model, form: Equilibrium, line: LineMotion) -> None:
         ends = model.dofs(model.mesh.droppers)
         mine = line.ownership.owned(ends[:, 0])
-        self.numbers = np.flatnonzero(mine)
-        self.x = model.mesh.x(model.mesh.droppers[mine, 1])
-        self.ends = (ends[mine] - line.ownership.first).astype(np.int64)
-        stiffness, damping = model.dropper_stiffness[mine], model.dropper_damping[mine]
-        self.laws = np.column_stack([form.dropper_force[mine], stiffness, damping, self.x])
+        self.shown = np.flatnonzero(mine)
+        intact = ~model.broken[mine]
+        self.numbers = self.shown[intact]
+        x = model.mesh.x(model.mesh.droppers[mine, 1])
+        self._shown_ends = (ends[mine] - line.ownership.first).astype(np.int64)
+        self._shown_laws = np.column_stack(
+            [
+                np.where(intact, form.dropper_force[mine], 0.0),
+                model.dropper_stiffness[mine],
+                model.dropper_damping[mine],
+                x,
+            ]
+        )
+        self.x, self.ends = x[intact], self._shown_ends[intact]
+        self.laws = self._shown_laws[intact]
+        _, stiffness, damping, _ = self.laws.T
         # Change of tension per unit of relative acceleration within the step.
         self.per_acceleration = stiffness * line.position_factor + damping * line.velocity_factor
         self.latest_tension = np.zeros(self.numbers.size)
-        self._carried = np.zeros(self.numbers.size)
+        self._carried = np.zeros(self.shown.size)
         self._line = line
 
     def find_tension(self) -> bool:
@@ -55,10 +69,15 @@ class Droppers:
 
     def carried(self, kept_ratio: float) -> np.ndarray:
         """Tension in the line's present motion, of which droppers keep a share where they would
-        push [N], shape (n,), overwritten by the next call."""
+        push [N], of all that are shown, overwritten by the next call."""
         line = self._line
         kernels.carried(
-            line.displacement, line.velocity, self.ends, self.laws, kept_ratio, self._carried
+            line.displacement,
+            line.velocity,
+            self._shown_ends,
+            self._shown_laws,
+            kept_ratio,
+            self._carried,
         )
         return self._carried
 

@@ -125,6 +125,13 @@ class LineOperators:
         if self.domain.size:
             self._product("damping").multAdd(self._read, self._force, self._force)
 
+    def add_force(self, force: np.ndarray) -> None:
+        """Add a force on all that is solved for, shape (domain.size,) [N], to the internal force.
+
+        Not collective.
+        """
+        self._force_array += force
+
     def solve(self, loads: Loads | None = None) -> None:
         """Make ``answer`` that to the internal force and to ``loads``. Collective with loads.
 

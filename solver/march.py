@@ -2,6 +2,9 @@
 
 The Newmark family runs as a TS of type ``python``: PETSc owns the time loop, its options (prefix
 ``march_``), its monitors and its events; the stepper advances line and pantographs by one step.
+
+Incidents cut a march into parts, each with a TS, matrices and columns of its own: a step of any
+part costs what it costs without incidents. What happens at the end of a step is shown before.
 """
 
 from __future__ import annotations
@@ -18,6 +21,13 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from catenary.solver.changed_line import (
+    ChangedLine,
+    acceleration_jump,
+    changed_line,
+    unchanged,
+)
+from catenary.solver.contact import ContactWire
 from catenary.solver.contact_laws import KinematicLaw
 from catenary.solver.coupling import make_coupling
 from catenary.solver.distribution import distribute
@@ -25,6 +35,7 @@ from catenary.solver.equilibrium import Elasticity, Equilibrium
 from catenary.solver.errors import CatenaryError, InputError, RunBroken
 from catenary.solver.events import event
 from catenary.solver.fixed_point import FixedPoint
+from catenary.solver.incidents import DropperBreak, Happened, in_steps
 from catenary.solver.interaction import Interaction
 from catenary.solver.law_in_steps import law_in_steps
 from catenary.solver.line_integrators import make_line
@@ -33,7 +44,7 @@ from catenary.solver.model import Model
 from catenary.solver.observation import Observer, Stage
 from catenary.solver.one_solve import OneSolve
 from catenary.solver.pantographs import Pantographs, nominal_height_rule
-from catenary.solver.problem import Placement, Problem
+from catenary.solver.problem import Problem
 from catenary.solver.schemes import LoadSource, Scheme
 from catenary.solver.showing import Showing
 from catenary.solver.stepper import Stepper
@@ -46,9 +57,10 @@ class Outcome:
     """How a march ended.
 
     ``outcome`` is "done", "interrupted" or the sentence of what broke; ``wall`` [s] the time of
-    the time loop alone; ``simulated`` [s]; ``n_steps`` taken; ``counters`` of the scheme;
-    ``traffic`` is how many messages and bytes a rank sent a step, the one that sent most: to its
-    neighbours, and each sum and broadcast as one; None on one rank, or if not counted.
+    the time loop alone, changes of the line on the way included; ``simulated`` [s]; ``n_steps``
+    taken; ``counters`` of the scheme; ``traffic`` is how many messages and bytes a rank sent a
+    step since the line changed last, the one that sent most: to its neighbours, and each sum and
+    broadcast as one; None on one rank, or if not counted.
     """
 
     outcome: str
@@ -81,15 +93,28 @@ class March:
     ) -> None:
         self._comm = comm
         self._problem = problem
-        self._model = model
-        train, numerics = problem.train, problem.numerics
-        if numerics.scheme == "ts_alpha2" and comm.size > 1:
+        if problem.numerics.scheme == "ts_alpha2" and comm.size > 1:
             raise InputError(
                 f"numerics.scheme is ts_alpha2, which runs on one rank only, not on {comm.size}: "
                 'take "one_solve", or start it without mpirun'
             )
+        self._first = model
+        self._form = form
         self.ownership = distribute(model, comm.size, comm.rank)
-        self._line = make_line(comm, model, self.ownership, numerics)
+        self._nominal_height = nominal_height_rule(model, form, elasticity)
+        wire = ContactWire(model, form, self.ownership)
+        self._pantographs = Pantographs(comm, problem, wire, self._nominal_height)
+        self._show_event = event("Show")
+        self._set_up(unchanged(model))
+        self._first_step = 0
+        self._ahead = self._happening()
+
+    def _set_up(self, changed: ChangedLine) -> None:
+        """Make all that steps a line and shows it, from a line that is at rest. Collective."""
+        comm, problem, model = self._comm, self._problem, changed.model
+        train = problem.train
+        self._changed, self._model = changed, model
+        self._line = make_line(comm, model, self.ownership, problem.numerics, changed.load)
         on = model.terms_of
         trailing = max(placement.behind for placement in train.placements)
         offsets = [x for placement in train.placements for x in placement.data.strip_offsets]
@@ -99,7 +124,7 @@ class March:
         self._interaction = Interaction(
             comm,
             model,
-            form,
+            self._form,
             self._line,
             (train.start - trailing - reach[0], train.end + reach[1]),
             sum(len(placement.data.strip_offsets) for placement in train.placements),
@@ -107,26 +132,54 @@ class March:
             uses_rate,
             "dropper_slackening" in on,
         )
-        nominal_height = nominal_height_rule(model, form, elasticity)
         scheme_of: dict[str, Callable[[], Scheme]] = {
             "one_solve": self._one_solve,
             "fixed_point": self._fixed_point,
-            "ts_alpha2": lambda: self._ts_alpha2(form, nominal_height),
+            "ts_alpha2": self._ts_alpha2,
         }
-        self._pantographs = Pantographs(comm, problem, self._interaction.wire, nominal_height)
-        self._scheme = scheme_of[numerics.scheme]()
-        self._show_event = event("Show")
+        self._scheme = scheme_of[problem.numerics.scheme]()
         self._showing = Showing(
             comm,
-            model,
-            form,
+            changed,
+            self._form,
             self._interaction,
             self._pantographs,
             self._scheme,
             self._kept_ratio,
         )
-        self._first_step = 0
-        self._start_time = 0.0
+
+    def _happening(self) -> list[Happened]:
+        """What happens to the line, as far as it is simulated, in order of time."""
+        on = self._first.terms_of
+        simulated = [
+            incident
+            for incident in self._problem.incidents
+            if ("dropper_break" if isinstance(incident, DropperBreak) else "tension_loss") in on
+        ]
+        return in_steps(simulated, self._problem.numerics.dt)
+
+    def _happen(self, happened: Happened) -> None:
+        """Change the line under way; motion, contacts and counters go on. Collective."""
+        before, line, scheme = self._changed, self._line, self._scheme
+        after = changed_line(self._first, self._form, happened.incidents)
+        moving = line.displacement, line.velocity
+        slackens = "dropper_slackening" in self._first.terms_of
+        pushed_share = self._kept_ratio if slackens else 1.0
+        jump = acceleration_jump(
+            self._comm, self.ownership, before, after, self._form, moving, pushed_share
+        )
+        try:
+            self._set_up(after)
+            # What the method keeps besides the state moves with the acceleration.
+            nothing = np.zeros_like(jump)
+            self._line.start(nothing, nothing, jump)
+            for name, values in self._line.state().items():
+                values += line.state()[name]
+            self._scheme.restore(scheme.state())
+            self._scheme.counters = scheme.counters
+        finally:
+            scheme.destroy()
+            line.destroy()
 
     @property
     def n_steps(self) -> int:
@@ -141,8 +194,12 @@ class March:
         Collective; every rank passes the same checkpoint.
         """
         self._first_step = int(checkpoint["step"])
-        self._start_time = self._first_step * self._problem.numerics.dt
-        self._pantographs.move_to(self._start_time)
+        past = [happened for happened in self._ahead if happened.step < self._first_step]
+        if past:
+            self.destroy()
+            self._set_up(changed_line(self._first, self._form, past[-1].incidents))
+            self._ahead = self._ahead[len(past) :]
+        self._pantographs.move_to(self._first_step * self._problem.numerics.dt)
         self._showing.restore(checkpoint)
 
     def run(
@@ -162,16 +219,31 @@ class March:
         RunBroken
             If an observer cannot start.
         """
-        ts = self._make_ts(observers, stop_requested)
+        dt, first = self._problem.numerics.dt, self._first_step
+        since = first
+        ahead = [happened for happened in self._ahead if happened.step < self.n_steps]
+        ends = [*(happened.step for happened in ahead), self.n_steps]
+        ts = self._make_ts(observers, stop_requested, first, ends[0], shown=False)
         try:
-            dt = self._problem.numerics.dt
-            self._start(observers, self._showing.stage(dt, self._start_time, self.n_steps))
+            self._start(observers, self._showing.stage(dt, first * dt, self.n_steps))
             begin = clock.perf_counter()
             ts.solve(self._line.solution)
-            wall = clock.perf_counter() - begin
         except RunBroken:
             ts.destroy()
             raise
+        for happened, end in zip(ahead, ends[1:], strict=True):
+            if not self._stepper.goes_on_from(happened.step):
+                break
+            ts.destroy()
+            try:
+                self._happen(happened)
+            except RunBroken as error:
+                self._stepper.broken = str(error)
+                break
+            since = happened.step
+            ts = self._make_ts(observers, stop_requested, since, end, shown=True)
+            ts.solve(self._line.solution)
+        wall = clock.perf_counter() - begin
         if self._stepper.broken:
             # The error's traceback may still hold the TS, which PETSc would then free, with the
             # help of Python, when Python has ended.
@@ -184,14 +256,14 @@ class March:
             # The latter if PETSc was told to end early, for instance by -march_ts_max_steps.
             outcome = "interrupted"
         outcome = _finish(observers, outcome)
-        n_steps = self._stepper.step_number - self._first_step
+        n_steps = self._stepper.step_number - first
         return Outcome(
             outcome,
             wall,
             n_steps * self._problem.numerics.dt,
             n_steps,
             self._scheme.counters.as_dict(),
-            self._traffic(max(1, n_steps)),
+            self._traffic(max(1, self._stepper.step_number - since)),
         )
 
     def destroy(self) -> None:
@@ -249,14 +321,14 @@ class March:
             self._loads(),
         )
 
-    def _ts_alpha2(self, form: Equilibrium, nominal_height: Callable[[Placement], float]) -> Scheme:
+    def _ts_alpha2(self) -> Scheme:
         slackens = "dropper_slackening" in self._model.terms_of
         system = WholeSystem(
             self._problem,
             self._model,
-            form,
+            self._form,
             self._kept_ratio if slackens else 1.0,
-            nominal_height,
+            self._nominal_height,
             self._loads(),
         )
         return TSAlpha2(
@@ -283,29 +355,44 @@ class March:
         return self._problem.residual_stiffness_ratio
 
     def _make_ts(
-        self, observers: Sequence[Observer], stop_requested: Callable[[], bool]
+        self,
+        observers: Sequence[Observer],
+        stop_requested: Callable[[], bool],
+        first: int,
+        end: int,
+        shown: bool,
     ) -> PETSc.TS:
+        """The time loop from step ``first``, ``shown`` or not, to step ``end``. Collective."""
         dt = self._problem.numerics.dt
-        self._stepper = Stepper(self._scheme, self._first_step, dt, stop_requested)
+        self._stepper = Stepper(self._scheme, first, dt, stop_requested)
         ts = PETSc.TS().create(self._comm)
         ts.setOptionsPrefix(PREFIX)
         ts.setProblemType(PETSc.TS.ProblemType.NONLINEAR)
         ts.createPython(self._stepper, comm=self._comm)
         ts.setOptionsPrefix(PREFIX)
-        ts.setTime(self._start_time)
+        ts.setTime(first * dt)
         ts.setTimeStep(dt)
-        ts.setStepNumber(self._first_step)
+        ts.setStepNumber(first)
         ts.setMaxSteps(self.n_steps)
         ts.setMaxTime(2.0 * self.n_steps * dt)
         ts.setExactFinalTime(PETSc.TS.ExactFinalTime.STEPOVER)
-        if observers:
+        if observers and not shown:
             ts.setMonitor(lambda ts, step, time, _u: self._show(ts, observers, step, time))
+        elif observers:
+            # As the end of the part before.
+            ts.setMonitor(
+                lambda ts, step, time, _u: (
+                    self._show(ts, observers, step, time) if step > first else None
+                )
+            )
         with refused_options():
             ts.setFromOptions()
-        self._refuse_what_the_scene_says(ts)
+        self._refuse_what_the_scene_says(ts, first * dt)
+        if end < self.n_steps:
+            ts.setMaxSteps(min(end, ts.getMaxSteps()))
         return ts
 
-    def _refuse_what_the_scene_says(self, ts: PETSc.TS) -> None:
+    def _refuse_what_the_scene_says(self, ts: PETSc.TS, start_time: float) -> None:
         dt = self._problem.numerics.dt
         found = ""
         if abs(ts.getTimeStep() - dt) > 1e-12 * dt:
@@ -313,9 +400,9 @@ class March:
                 f"_dt is {ts.getTimeStep():g}; the time step is part of the scene: give "
                 f"numerics.dt_s instead, which is {dt:g} s"
             )
-        elif ts.getTime() != self._start_time:
+        elif ts.getTime() != start_time:
             found = (
-                f"_init_time is {ts.getTime():g}, but the run starts at {self._start_time:g} s; "
+                f"_init_time is {ts.getTime():g}, but the run starts at {start_time:g} s; "
                 "give train.start_m instead"
             )
         elif ts.getType() != PETSc.TS.Type.PYTHON:

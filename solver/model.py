@@ -52,6 +52,7 @@ class Model:
     weight : (n_dofs,) gravity load [N], [N m]
     dropper_lengths : (n_droppers,) [m]
     dropper_stiffness, dropper_damping : (n_droppers,) [N/m], [N s/m], of the taut dropper
+    broken : (n_droppers,) droppers that carry nothing; what they weigh stays on their clamps
     step_loads : loads that change with time
     terms_of : effect name -> number of terms that it added
     """
@@ -67,6 +68,7 @@ class Model:
     weight: np.ndarray = field(default_factory=lambda: np.zeros(0))
     step_loads: list[StepLoad] = field(default_factory=list)
     terms_of: dict[str, int] = field(default_factory=dict)
+    broken: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     @property
     def block_size(self) -> int:
@@ -84,9 +86,11 @@ class Model:
     def dropper_stiffness(self) -> np.ndarray:
         kind = self.problem.line.dropper
         if kind.stiffness is not None:
-            return np.full(self.mesh.droppers.shape[0], kind.stiffness)
-        assert kind.axial_stiffness is not None
-        return kind.axial_stiffness / self.dropper_lengths
+            stiffness = np.full(self.mesh.droppers.shape[0], kind.stiffness)
+        else:
+            assert kind.axial_stiffness is not None
+            stiffness = kind.axial_stiffness / self.dropper_lengths
+        return np.where(self.broken, 0.0, stiffness)
 
     @property
     def dropper_damping(self) -> np.ndarray:
@@ -221,8 +225,16 @@ class ModelBuilder:
         self._n_terms += dofs.shape[0]
 
 
-def build(problem: Problem, mesh: LineMesh, dropper_lengths: np.ndarray) -> Model:
-    """The model of a problem on a mesh, for given dropper lengths [m]. Not collective."""
+def build(
+    problem: Problem,
+    mesh: LineMesh,
+    dropper_lengths: np.ndarray,
+    broken: np.ndarray | None = None,
+) -> Model:
+    """The model of a problem on a mesh, for given dropper lengths [m]. Not collective.
+
+    ``broken`` (n_droppers,) bool tells which droppers carry nothing; none if not given.
+    """
     active = effects.active(problem)
     order = np.argsort(mesh.points[:, 0], kind="stable")
     row_of_node = np.empty(mesh.n_nodes, dtype=np.int64)
@@ -235,6 +247,7 @@ def build(problem: Problem, mesh: LineMesh, dropper_lengths: np.ndarray) -> Mode
         row_of_node,
         dropper_lengths,
     )
+    model.broken = np.zeros(mesh.droppers.shape[0], dtype=bool) if broken is None else broken
     model.terms_of = {effect.name: 0 for effect in active}
     builder = ModelBuilder(model)
     for effect in active:

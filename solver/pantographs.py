@@ -14,6 +14,7 @@ from catenary.mbs.build import Operation, has_joints, make_pantograph, roll_of
 from catenary.mbs.full import FullPantograph
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lateral import LateralPath
+from catenary.mbs.lowering import LoweredPantograph
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver import inner_kernels
 from catenary.solver.contact import ContactWire, Touches
@@ -144,8 +145,9 @@ class Pantographs:
     def look_at_joints(self) -> None:
         """Note by how much joints are open now. Does nothing where there are no models."""
         for number, model in enumerate(self.models):
-            if isinstance(model, FullPantograph):
-                self.constraint_violation[number] = model.constraint_violation()
+            moved = model.model if isinstance(model, LoweredPantograph) else model
+            if isinstance(moved, FullPantograph):
+                self.constraint_violation[number] = moved.constraint_violation()
 
     def _make_all(self, problem: Problem, nominal_height: Callable[[Placement], float]) -> None:
         """Make and place all models. Rank 0 only."""
@@ -170,6 +172,7 @@ class Pantographs:
             numerics.gamma,
             _lateral_path(problem, placement, base),
             base,
+            placement.lowering if "lowering" in problem.effects else None,
         )
         return make_pantograph(placement.data, operation)
 

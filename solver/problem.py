@@ -7,8 +7,11 @@ from dataclasses import dataclass, field
 
 from catenary.mbs.base_motion import VehicleMotion
 from catenary.mbs.build import PantographData
+from catenary.mbs.lowering import Lowering
 from catenary.meshgen.line import Line
+from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.contact_laws import ContactLaw
+from catenary.solver.incidents import LineIncident, TensionLoss
 
 
 @dataclass(frozen=True)
@@ -31,13 +34,15 @@ class Placement:
 
     ``behind`` [m] is its distance behind the train's reference point (0 for the leading one),
     ``static_force`` [N] the force on the wire at rest at ``nominal_height`` [m] of the head;
-    None stands for the mean height of the wire under the static force.
+    None stands for the mean height of the wire under the static force. ``lowering`` is how it is
+    lowered on the way, with the effect of that name.
     """
 
     data: PantographData
     static_force: float
     behind: float
     nominal_height: float | None = None
+    lowering: Lowering | None = None
 
 
 @dataclass(frozen=True)
@@ -91,7 +96,8 @@ class Problem:
     """One run. ``effects`` holds the names of the effects that are simulated, and no others.
 
     ``evaluation`` (from, to) [m] is the stretch whose statistics are judged;
-    ``residual_stiffness_ratio`` is the share of its stiffness that a compressed dropper keeps.
+    ``residual_stiffness_ratio`` is the share of its stiffness that a compressed dropper keeps;
+    ``incidents`` are what happens to the line on the way.
     """
 
     line: Line
@@ -103,3 +109,11 @@ class Problem:
     residual_stiffness_ratio: float
     effects: frozenset[str]
     gravity: float = 9.81
+    incidents: tuple[LineIncident, ...] = ()
+
+
+def slowest_wave_speed(problem: Problem) -> float:
+    """Least wave speed of the contact wire in a run, losses of its tension included [m/s]."""
+    losses = (i for i in problem.incidents if isinstance(i, TensionLoss) and i.wire == CONTACT_WIRE)
+    share = min((loss.share for loss in losses), default=1.0)
+    return share**0.5 * problem.line.contact_wire.wave_speed

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from catenary.solver.changed_line import ChangedLine
 from catenary.solver.equilibrium import Equilibrium
 from catenary.solver.interaction import Interaction
-from catenary.solver.model import Model
 from catenary.solver.observation import Stage, StepView
 from catenary.solver.pantographs import Pantographs
 from catenary.solver.schemes import Scheme
@@ -20,14 +20,14 @@ class Showing:
     Parameters
     ----------
     comm : mpi4py communicator
-    model, form : of the line
+    line, form : the line as it is now, and its first rest, from which displacements count
     kept_ratio : share of its stiffness that a slack dropper keeps
     """
 
     def __init__(
         self,
         comm: Any,
-        model: Model,
+        line: ChangedLine,
         form: Equilibrium,
         interaction: Interaction,
         pantographs: Pantographs,
@@ -35,7 +35,9 @@ class Showing:
         kept_ratio: float,
     ) -> None:
         self._comm = comm
+        model = line.model
         self._model = model
+        self._changed = line
         self._form = form
         self._interaction = interaction
         self._pantographs = pantographs
@@ -43,6 +45,7 @@ class Showing:
         self._line = interaction.line
         self._slackens = "dropper_slackening" in model.terms_of
         self._kept_ratio = kept_ratio
+        self._unbalanced = bool(line.load.any())
         # Of what a dropper would push: all of it where droppers do not slacken.
         self._pushed_share = kept_ratio if self._slackens else 1.0
         first, owned = self._line.ownership.first, self._line.ownership.owned
@@ -81,7 +84,7 @@ class Showing:
             arm_x=mesh.x(mesh.steady_arms),
             dropper_x=mesh.x(mesh.droppers[:, 1]),
             owned_arms=self._owned_arms,
-            owned_droppers=self._interaction.droppers.numbers,
+            owned_droppers=self._interaction.droppers.shown,
             node_points=points,
             owned_nodes=self._owned_nodes,
             n_strips=self._pantographs.n_strips,
@@ -112,11 +115,15 @@ class Showing:
         pantographs.look_at_joints()
 
     def _energies(self) -> tuple[float, float]:
-        """Kinetic and elastic energy relative to equilibrium, slack droppers as they are [J].
+        """Kinetic and elastic energy relative to the first rest, slack droppers as they are [J].
 
-        Collective.
+        Collective. After an incident it is that of what is left of the line; see `changed_line`.
         """
         kinetic, elastic = self._line.energies()
+        if self._unbalanced:
+            load = self._changed.load[self._line.ownership.first : self._line.ownership.last]
+            elastic -= self._comm.allreduce(float(load @ self._line.displacement))
+            elastic += self._changed.energy
         if self._slackens:
             pushing = self._comm.allreduce(self._interaction.droppers.energy_of_pushing())
             elastic -= (1.0 - self._kept_ratio) * pushing

@@ -49,6 +49,10 @@ class Stepper:
             self.stopped = True
             ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
 
+    def goes_on_from(self, step: int) -> bool:
+        """Whether nothing broke or stopped before the end of this step."""
+        return not (self.broken or self.stopped) and self.step_number == step
+
     def give_up(self, ts: PETSc.TS, why: str) -> None:
         """End the time loop because of an error that the march reports."""
         self.broken = why

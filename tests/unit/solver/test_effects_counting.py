@@ -12,12 +12,14 @@ from small_lines import BARE, EN_PANTOGRAPH, ac_simple_line, mesh_of, problem_of
 from catenary.mbs.base_motion import Harmonic, VehicleMotion
 from catenary.mbs.build import Operation, make_pantograph
 from catenary.mbs.lateral import LateralPath
+from catenary.mbs.lowering import Lowering
 from catenary.mbs.strips import Turning
 from catenary.meshgen.line import Line
-from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.mesh import MESSENGER_WIRE, LineMesh
 from catenary.solver import effects
 from catenary.solver.contact_laws import LinearLaw
 from catenary.solver.equilibrium import find_form
+from catenary.solver.incidents import DropperBreak, TensionLoss
 from catenary.solver.model import Model, build
 from catenary.solver.problem import Damping, Problem
 
@@ -40,13 +42,19 @@ def full_problem(names: frozenset[str]) -> Problem:
     rolling = replace(EN_PANTOGRAPH, roll=Turning(2.0, 470.0, 1.0))
     speed = 1.1 * line.contact_wire.wave_speed
     ours = train(speed, 60.0, 160.0, data=rolling, behind=(0.0, 31.0))
+    lowered = replace(ours.placements[0], lowering=Lowering(0.5, -50.0, 0.2, 0.4))
     return problem_of(
         line,
         names,
         damping=Damping(1e-4, 0.0125),
         contact=LinearLaw(5e4, 50.0),
-        train=replace(ours, vehicle=VehicleMotion((Harmonic(0.01, 1.0),))),
+        train=replace(
+            ours,
+            vehicle=VehicleMotion((Harmonic(0.01, 1.0),)),
+            placements=(lowered, *ours.placements[1:]),
+        ),
         residual_stiffness_ratio=0.01,
+        incidents=(DropperBreak(0.5, 80.0), TensionLoss(0.6, MESSENGER_WIRE, 0.9)),
     )
 
 
@@ -118,6 +126,9 @@ BLOCKS = {
     "several_pantographs": ({}, 1),
     "head_roll": ({}, 1),
     "vehicle_motion": ({}, 1),
+    "dropper_break": ({}, 1),
+    "tension_loss": ({}, 1),
+    "lowering": ({}, 1),
     "supercritical_speed": ({}, 1),
 }
 

@@ -1,0 +1,132 @@
+"""A pantograph that is lowered under way: its lift's course, and what catches it.
+
+The part of the lift that acts goes over to another one by half a cosine, as it does while a
+pantograph is raised; a negative part pulls down. Models have no housing of their own: once the head
+has gone down by a stated way it is caught, gives up its speed at once, and goes with the base.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from catenary.mbs.base_motion import BaseMotion
+from catenary.mbs.head_steps import raised
+from catenary.mbs.interface import HeadState, Pantograph
+
+
+@dataclass(frozen=True)
+class Lowering:
+    """How a pantograph is lowered from ``time`` [s] on.
+
+    The static force goes over to ``force`` [N] over ``within`` [s]; the head is caught ``drop``
+    [m] below where it was at ``time``.
+    """
+
+    time: float
+    force: float
+    within: float
+    drop: float
+
+    def course(self, static_force: float, raise_time: float) -> Callable[[float], float]:
+        """Part of the lift that acts, as a function of time, after a raising."""
+        before = raised(self.time, raise_time)
+        last = self.force / static_force
+
+        def part(time: float) -> float:
+            if time <= self.time:
+                return raised(time, raise_time)
+            return before + (last - before) * raised(time - self.time, self.within)
+
+        return part
+
+
+class LoweredPantograph:
+    """Any pantograph, lowered and caught.
+
+    Parameters
+    ----------
+    model : the pantograph, whose lift follows the lowering already
+    lowering : Lowering
+    base : how the vehicle moves what catches the head; without it that stays
+    """
+
+    def __init__(
+        self, model: Pantograph, lowering: Lowering, base: BaseMotion | None = None
+    ) -> None:
+        s = len(model.strip_offsets)
+        self.model = model
+        self._lowering, self._base = lowering, base
+        # Of the strips' mean over the base: now, and where it is caught, not a number before.
+        self._height, self._catch = np.nan, np.nan
+        self._caught = False
+        self._latest: HeadState | None = None
+        self._time = 0.0
+        self._still = HeadState(np.zeros(s), np.zeros(s), np.zeros((s, s)), np.zeros((s, s)))
+
+    @property
+    def strip_offsets(self) -> tuple[float, ...]:
+        """Places of the strips ahead of the pantograph's own place [m]."""
+        return self.model.strip_offsets
+
+    def place(self, head_height: float, velocity: float = 0.0) -> None:
+        """Put the model without contact to where its head is at this height [m]."""
+        self.model.place(head_height, velocity)
+        self._height = head_height - self._base_at(0.0)[0]
+
+    def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Heights and velocities (s,) of the strips at ``time`` [s] from the motion alone."""
+        if not self._caught:
+            return self.model.extrapolate(time)
+        return self._where_caught(time)[:2]
+
+    def predict(self, time: float) -> HeadState:
+        """Strips at ``time`` [s] as functions of the contact forces in the coming step.
+
+        Forces do not move what is caught.
+        """
+        if self._caught:
+            return self._where_caught(time)
+        if np.isnan(self._catch) and time > self._lowering.time:
+            self._catch = self._height - self._lowering.drop
+        self._time, self._latest = time, self.model.predict(time)
+        return self._latest
+
+    def advance(self, contact_force: np.ndarray) -> None:
+        """Take the step predicted last with these contact forces (s,) [N]."""
+        if self._caught:
+            return
+        assert self._latest is not None
+        height = self._latest.height - self._latest.height_compliance @ contact_force
+        self.model.advance(contact_force)
+        self._height = float(height.mean()) - self._base_at(self._time)[0]
+        self._caught = self._height <= self._catch  # never while that is not a number
+
+    def state(self) -> np.ndarray:
+        """The model's state, its height, where it is caught and whether it is."""
+        return np.append(self.model.state(), [self._height, self._catch, float(self._caught)])
+
+    def restore(self, state: np.ndarray) -> None:
+        """Continue from what ``state`` returned."""
+        self.model.restore(np.asarray(state)[:-3])
+        self._height, self._catch = float(state[-3]), float(state[-2])
+        self._caught = bool(state[-1])
+
+    def energy(self) -> float:
+        """That of the model [J]; what is caught has none."""
+        return 0.0 if self._caught else self.model.energy()
+
+    def _where_caught(self, time: float) -> HeadState:
+        place, velocity = self._base_at(time)
+        self._still.height[:] = self._catch + place
+        self._still.velocity[:] = velocity
+        return self._still
+
+    def _base_at(self, time: float) -> tuple[float, float]:
+        """Height [m] and velocity [m/s] of the base."""
+        if self._base is None:
+            return 0.0, 0.0
+        vertical = self._base.vertical(time)
+        return float(vertical.place), float(vertical.velocity)

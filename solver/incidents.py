@@ -1,0 +1,54 @@
+"""What may happen to a line during a run: droppers that break, wires that lose tension.
+
+Data only; `changed_line` says what becomes of the line, `march` when. What may happen to a
+pantograph stands with its placement (`mbs.lowering`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class DropperBreak:
+    """From ``time`` [s] on the dropper at ``x`` [m] carries nothing."""
+
+    time: float
+    x: float
+
+
+@dataclass(frozen=True)
+class TensionLoss:
+    """From ``time`` [s] on a ``wire`` has only the ``share`` of its first tension.
+
+    ``wire`` is a wire of the mesh, ``contact_wire`` or ``messenger_wire``.
+    """
+
+    time: float
+    wire: str
+    share: float
+
+
+LineIncident = DropperBreak | TensionLoss
+
+
+@dataclass(frozen=True)
+class Happened:
+    """All that has happened to a line by the end of step ``step``, in order of time."""
+
+    step: int
+    incidents: tuple[LineIncident, ...] = field(default=())
+
+
+def in_steps(incidents: Sequence[LineIncident], dt: float) -> list[Happened]:
+    """What has happened after each step in which something happens, by ascending step.
+
+    Times are rounded to the nearest end of a step of ``dt`` [s].
+    """
+    ordered = sorted(incidents, key=lambda incident: incident.time)
+    steps = [round(incident.time / dt) for incident in ordered]
+    return [
+        Happened(step, tuple(ordered[: len(ordered) - steps[::-1].index(step)]))
+        for step in sorted(set(steps))
+    ]

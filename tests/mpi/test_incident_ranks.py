@@ -1,0 +1,203 @@
+"""Incidents on one rank and all: a dropper at the cut breaks, tension goes, a head is lowered.
+
+Run by ``mpirun -n N python -m mpi4py -m pytest tests/mpi``; on one rank it compares a run with
+itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from catenary.cases.meshing import mesh_of
+from catenary.cases.scene import load_scene
+from catenary.mbs.lowering import Lowering
+from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
+from catenary.solver.distribution import distribute
+from catenary.solver.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.incidents import DropperBreak, LineIncident, TensionLoss
+from catenary.solver.march import March
+from catenary.solver.observation import Stage, StepView
+from catenary.solver.parallel import on_root
+from catenary.solver.problem import Problem
+
+WORLD = MPI.COMM_WORLD
+# See test_same_answers.py.
+TOLERANCE = 1e-9
+SCENE = (
+    # An odd number of spans of nine droppers: one of them stands where two ranks are cut apart.
+    "line.n_spans=7",
+    "train.start_m=120",
+    "train.end_m=240",
+    "train.raise_time_s=0.2",
+    "evaluation.from_m=150",
+    "evaluation.to_m=200",
+)
+
+
+class Watching:
+    """Observer that keeps forces and, of each state, the line's energy; and one checkpoint."""
+
+    def __init__(self, kept: int = -1) -> None:
+        self._kept = kept
+        self.checkpoint: dict[str, Any] | None = None
+        self.rows: list[np.ndarray] = []
+        self.droppers: list[np.ndarray] = []
+
+    def start(self, stage: Stage) -> None:
+        self.owned = stage.owned_droppers
+
+    def observe(self, view: StepView) -> None:
+        energies = view.energies()
+        self.rows.append(np.array([*view.contact_force, *energies]))
+        self.droppers.append(view.dropper_force.copy())
+        if view.step == self._kept:
+            self.checkpoint = view.checkpoint()
+
+    def finish(self, outcome: str) -> None:
+        assert outcome == "done"
+
+
+def run(
+    comm: Any, problem: Problem, mesh: LineMesh, kept: int = -1, since: dict[str, Any] | None = None
+) -> Watching:
+    """March on ``comm``, from a checkpoint or from the start. Collective."""
+    model, form = find_form(problem, mesh)
+    watching = Watching(kept)
+    lift = elasticity(model, *middle_span(problem.line))
+    with March(comm, problem, model, form, lift) as march:
+        if since is not None:
+            march.restore(since)
+        march.run([watching])
+    return watching
+
+
+@pytest.fixture(scope="module")
+def case() -> tuple[Problem, LineMesh, float]:
+    """A problem, its mesh, and the dropper next to the cut between the first two ranks [m]."""
+
+    def make() -> tuple[Problem, LineMesh, float]:
+        scene = load_scene("en50318_2002", SCENE)
+        problem, mesh = scene.to_problem(), mesh_of(scene)
+        model, _ = find_form(problem, mesh)
+        x = np.sort(mesh.x(mesh.droppers[:, 1]))
+        nodes = mesh.wires[CONTACT_WIRE]
+        mine = distribute(model, max(2, WORLD.size), 0).owned(model.dofs(nodes))
+        cut = float(mesh.x(nodes[mine]).max())
+        nearest = float(x[np.argmin(np.abs(x - cut))])
+        if WORLD.size == 2:
+            assert abs(nearest - cut) < 1.5  # an element
+        return problem, mesh, nearest
+
+    found: tuple[Problem, LineMesh, float] = on_root(WORLD, make)
+    return found
+
+
+def incidents(at_cut: float) -> tuple[LineIncident, ...]:
+    return (
+        DropperBreak(0.5, at_cut),
+        TensionLoss(0.7, CONTACT_WIRE, 0.8),
+        TensionLoss(0.9, "messenger_wire", 0.9),
+    )
+
+
+@pytest.mark.parametrize("scheme", ["one_solve", "fixed_point"])
+def test_all_ranks_give_the_answer_of_one(
+    case: tuple[Problem, LineMesh, float], scheme: str
+) -> None:
+    problem, mesh, at_cut = case
+    numerics = replace(problem.numerics, scheme=scheme, eps_d=1e-13, eps_v=1e-10)
+    lowering = Lowering(1.1, -60.0, 0.2, 0.3)
+    placement = replace(problem.train.placements[0], lowering=lowering)
+    problem = replace(
+        problem,
+        numerics=numerics,
+        incidents=incidents(at_cut),
+        train=replace(problem.train, placements=(placement,)),
+    )
+    alone = run(MPI.COMM_SELF, problem, mesh)
+    together = run(WORLD, problem, mesh)
+    parts = WORLD.gather((together.owned, np.array(together.droppers)), root=0)
+    found = {}
+    if WORLD.rank == 0:
+        expected, rows = np.array(alone.rows), np.array(together.rows)
+        scale = np.abs(expected).max(axis=0)
+        found = dict(
+            zip(
+                ("force", "kinetic", "elastic"), np.abs(rows - expected).max(axis=0) / scale,
+                strict=True,
+            )
+        )  # fmt: skip
+        whole = np.full((len(rows), mesh.droppers.shape[0]), np.nan)
+        for numbers, values in parts:
+            whole[:, numbers] = values
+        droppers = np.array(alone.droppers)
+        found["droppers"] = np.abs(whole - droppers).max() / np.abs(droppers).max()
+        at = int(np.argmin(np.abs(mesh.x(mesh.droppers[:, 1]) - at_cut)))
+        found["broken carries"] = np.abs(whole[501:, at]).max()
+        found["carried before"] = whole[500, at]
+        found["force after the head has gone"] = np.abs(rows[1400:, 0]).max()
+        print(f"{WORLD.size} ranks, {scheme}: {found}, expected below {TOLERANCE}")
+    found = WORLD.bcast(found, root=0)
+    assert found.pop("carried before") > 10.0
+    assert found.pop("broken carries") == 0.0
+    assert found.pop("force after the head has gone") == 0.0
+    assert max(found.values()) < TOLERANCE
+
+
+@pytest.mark.parametrize("at", [400, 500, 600, 800])
+def test_a_run_goes_on_with_another_number_of_ranks(
+    case: tuple[Problem, LineMesh, float], at: int
+) -> None:
+    """From a checkpoint of one rank, before, at and after incidents."""
+    problem, mesh, at_cut = case
+    problem = replace(problem, incidents=incidents(at_cut))
+    alone = run(MPI.COMM_SELF, problem, mesh, kept=at)
+    together = run(WORLD, problem, mesh, since=alone.checkpoint)
+    apart = 0.0
+    if WORLD.rank == 0:
+        expected = np.array(alone.rows)[at:]
+        apart = float((np.abs(np.array(together.rows) - expected) / np.abs(expected).max(0)).max())
+        print(f"{WORLD.size} ranks from step {at}: {apart:.1e}, expected below {TOLERANCE}")
+    assert WORLD.bcast(apart, root=0) < TOLERANCE
+
+
+def test_a_rank_without_any_station_is_legal(case: tuple[Problem, LineMesh, float]) -> None:
+    """Two bare wires of one element have two stations: on three ranks one owns nothing."""
+    problem, _, _ = case
+    length = 60.0
+    mesh = LineMesh(
+        points=np.array([[0.0, 0.0, 5.0], [length, 0.0, 5.0], [0.0, 0.0, 6.2], [length, 0.0, 6.2]]),
+        wires={CONTACT_WIRE: np.array([0, 1]), "messenger_wire": np.array([2, 3])},
+        droppers=np.zeros((0, 2), dtype=int),
+        steady_arms=np.zeros(0, dtype=int),
+        supports=np.zeros(0, dtype=int),
+        anchors=np.array([0, 1, 2, 3]),
+    )
+    line = replace(
+        problem.line,
+        span_lengths=(length,),
+        dropper_positions=((),),
+        pre_sag=((),),
+        stagger=(0.0, 0.0),
+    )
+    bare = replace(
+        problem,
+        line=line,
+        train=replace(problem.train, start=5.0, end=50.0),
+        incidents=(TensionLoss(0.3, CONTACT_WIRE, 0.8),),
+    )
+    alone, together = run(MPI.COMM_SELF, bare, mesh), run(WORLD, bare, mesh)
+    apart = lost = 0.0
+    if WORLD.rank == 0:
+        expected, rows = np.array(alone.rows), np.array(together.rows)
+        apart = float((np.abs(rows - expected) / np.abs(expected).max(axis=0)).max())
+        sound = np.array(run(MPI.COMM_SELF, replace(bare, incidents=()), mesh).rows)
+        lost = float(np.abs(rows[301:, 1] - sound[301:, 1]).max())
+    apart, lost = WORLD.bcast((apart, lost), root=0)
+    assert lost > 1e-3
+    assert apart < TOLERANCE
