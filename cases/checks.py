@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 
 from catenary.cases.checks_contact import check_contact
+from catenary.cases.checks_incidents import check_incidents
 from catenary.cases.checks_pantograph import check_heights, check_pantographs
 from catenary.cases.checks_scheme import check_scheme
 from catenary.cases.checks_vehicle import check_vehicle
@@ -56,6 +57,7 @@ def check(scene: Scene) -> None:
     check_vehicle(scene, line)
     _evaluation(scene)
     _raising(scene)
+    check_incidents(scene, line)
     _standard(scene)
     _mesh_file(scene)
 

@@ -19,6 +19,9 @@ from catenary.solver.errors import InputError, RunBroken
 if TYPE_CHECKING:
     from catenary.cases.scene import Scene
 
+# By how much the arm may be further down than the head while both fall [m].
+_LEADS = 0.05
+
 
 def check_pantographs(scene: Scene) -> None:
     """Raise ``InputError`` with the first thing that is wrong with a kind of pantograph.
@@ -58,6 +61,17 @@ def check_heights(scene: Scene, line: Line) -> None:
                 f"head would be {height - table.nominal_height_m:+.4g} m away from there, beyond "
                 "the reach of its mechanism",
             )
+
+
+def reaches_below(scene: Scene, name: str, line: Line, drop: float) -> bool:
+    """Whether a kind of pantograph can go down by ``drop`` [m] from wherever the wire is."""
+    table = scene.pantographs[name]
+    if not isinstance(table, MultibodyTable):
+        return True
+    lowest = line.contact_height - max(max(sags, default=0.0) for sags in line.pre_sag)
+    nominal = line.contact_height if table.nominal_height_m is None else table.nominal_height_m
+    data = multibody_of(name, table, scene.train.speed_km_h)
+    return _reaches(data, stand(data).working_height + lowest - nominal - drop - _LEADS)
 
 
 def _reaches(data: MultibodyData, arm: float) -> bool:

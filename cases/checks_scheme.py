@@ -22,6 +22,10 @@ def check_scheme(scene: Scene) -> None:
     if scene.contact.law != "linear":
         refuse(scene.origin, "contact.law", scene.contact.law, f"{knows} law linear")
     switches = scene.switches()
+    for i, incident in enumerate(scene.incidents):
+        if switches[incident.type]:
+            why = f"{knows} lines and pantographs that stay what they are"
+            refuse(scene.origin, f"incidents.{i}.type", incident.type, why)
     for name in ("head_roll", "vehicle_motion"):
         if switches[name]:
             refuse(

@@ -1,6 +1,6 @@
 """From a scene's tables to the line and the problem in SI units.
 
-Conversion is here and, for pantographs, in `convert_pantograph`, and nowhere else.
+Conversion is here and in the other modules `convert_*`, and nowhere else.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catenary.cases.convert_contact import contact_law_of
+from catenary.cases.convert_incidents import line_incidents, lowering_of
 from catenary.cases.convert_pantograph import pantograph_of, static_force
 from catenary.cases.convert_vehicle import vehicle_of
 from catenary.cases.schema_line import LineTable, WireTable
@@ -73,10 +74,10 @@ def line_of(scene: Scene) -> Line:
 
 def problem_of(scene: Scene) -> Problem:
     """The problem of a scene."""
-    numerics, train = scene.numerics, _train(scene)
+    numerics, train, line = scene.numerics, _train(scene), line_of(scene)
     ratio = scene.line.dropper.residual_stiffness_ratio
     return Problem(
-        line=line_of(scene),
+        line=line,
         damping=_damping(scene.line),
         contact=contact_law_of(scene.contact, train.placements[0].static_force),
         train=train,
@@ -97,6 +98,7 @@ def problem_of(scene: Scene) -> Problem:
         evaluation=(scene.evaluation.from_m, scene.evaluation.to_m),
         residual_stiffness_ratio=ratio,
         effects=frozenset(name for name, on in scene.switches().items() if on),
+        incidents=line_incidents(scene.incidents, line, numerics.dt_s),
     )
 
 
@@ -170,7 +172,7 @@ def _damping(table: LineTable) -> Damping:
 
 def _train(scene: Scene) -> Train:
     placements = []
-    for place in scene.train.pantographs:
+    for number, place in enumerate(scene.train.pantographs, start=1):
         kind = scene.pantographs[place.name]
         force = static_force(place.name, kind, scene.train.speed_km_h)
         assert force is not None  # checks_pantograph.py has refused speeds outside the table
@@ -182,6 +184,7 @@ def _train(scene: Scene) -> Train:
                 static_force=force,
                 behind=place.behind_m,
                 nominal_height=kind.nominal_height_m,
+                lowering=lowering_of(scene.incidents, number, scene.numerics.dt_s),
             )
         )
     return Train(

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from catenary.cases.incident_facts import incident_facts
 from catenary.cases.pantograph_facts import kind_lines
 from catenary.cases.scene import Scene
 from catenary.mbs.build import has_joints
@@ -62,6 +63,7 @@ class Plan:
     static_forces : of the pantographs [N]
     kinds : name and description of each kind of pantograph on the train
     start, end, evaluation : stretch that the leading pantograph runs, and that is judged [m]
+    incidents : time [s] and sentence of each, in order of time
     dt, simulated : time step and simulated time [s]
     memory : estimate of the resident memory on one rank [B]
     march : estimate of the wall time of the time loop on one rank [s]
@@ -87,6 +89,7 @@ class Plan:
     start: float
     end: float
     evaluation: tuple[float, float]
+    incidents: tuple[tuple[float, str], ...]
     dt: float
     scheme: str
     simulated: float
@@ -157,6 +160,7 @@ def make_plan(scene: Scene) -> Plan:
         start=train.start,
         end=train.end,
         evaluation=problem.evaluation,
+        incidents=tuple((fact["time_s"], fact["says"]) for fact in incident_facts(scene, problem)),
         dt=dt,
         scheme=problem.numerics.scheme,
         simulated=simulated,
@@ -212,6 +216,7 @@ def plan_text(plan: Plan) -> str:
         ),
         ("runs", f"from {plan.start:g} to {plan.end:g} m (leading pantograph)"),
         ("evaluated", f"from {plan.evaluation[0]:g} to {plan.evaluation[1]:g} m"),
+        *(("incident", f"at {time:.4g} s: {says}") for time, says in plan.incidents),
         (
             "mesh",
             f"{plan.n_nodes} nodes, {plan.n_droppers} droppers, {plan.n_arms} steady arms, "

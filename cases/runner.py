@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
+from catenary.cases.incident_facts import incident_facts
 from catenary.cases.interrupts import StopRequest
 from catenary.cases.meshing import mesh_of
 from catenary.cases.pantograph_facts import header_facts
@@ -276,6 +277,7 @@ def _header(
             "system": scene.evaluation.system,
             "edition": scene.evaluation.edition,
             "pantographs": header_facts(scene, problem),
+            "incidents": incident_facts(scene, problem),
             "versions": _versions(),
             "config": scene.resolved(),
             "petsc_options": list(petsc_options),

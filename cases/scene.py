@@ -18,6 +18,7 @@ from catenary.cases.keys import is_known, known_keys, with_kinds
 from catenary.cases.loading import assign, parse_assignment, read_toml
 from catenary.cases.messages import COMMAND_LINE, Origin, input_error, unknown_key
 from catenary.cases.schema_contact import ContactTable
+from catenary.cases.schema_incidents import Incident
 from catenary.cases.schema_line import LineTable, MeshTable
 from catenary.cases.schema_pantograph import PantographTable
 from catenary.cases.schema_run import (
@@ -57,6 +58,9 @@ class Scene(Table):
     )
     numerics: NumericsTable = Field(default_factory=NumericsTable, description="time stepping")
     evaluation: EvaluationTable = Field(description="the stretch whose statistics are judged")
+    incidents: list[Incident] = Field(
+        default_factory=list, max_length=1000, description="what happens during the run"
+    )
     output: OutputTable = Field(default_factory=OutputTable, description="what is written")
     effects: dict[str, bool] = Field(
         default_factory=dict, description="what is simulated; see `catenary plan`"

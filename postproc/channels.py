@@ -77,6 +77,11 @@ ENERGIES: dict[str, Channel] = {
     for channel in (
         Channel("time", "s", "time of the energies", RUN),
         Channel("kinetic", "J", "kinetic energy of the line", RUN),
-        Channel("elastic", "J", "elastic energy of the line relative to equilibrium", RUN),
+        Channel(
+            "elastic",
+            "J",
+            "elastic energy of the line relative to its equilibrium at the start",
+            RUN,
+        ),
     )
 }

@@ -36,6 +36,7 @@ def remarks(results: Results) -> list[str]:
     """Sentences about settings that shape the results, none if none do. Not collective."""
     config = results.attributes["config"]
     return [
+        *_about_incidents(results),
         *_about_contact(results, config),
         *_about_droppers(config),
         *_about_iterations(results, config),
@@ -52,6 +53,23 @@ def _about_iterations(results: Results, config: dict[str, Any]) -> list[str]:
         f"{above} of {counted['steps']} steps ended above the tolerances of the fixed-point "
         f"correction, because numerics.iterations = {fixed} ends each: their forces and motions do "
         "not belong together. Take more, or leave the key out."
+    ]
+
+
+def _about_incidents(results: Results) -> list[str]:
+    """Incidents after which a pantograph is still within the evaluated stretch."""
+    found = results.attributes.get("incidents", [])
+    if not found:
+        return []
+    start, end = results.evaluation
+    position = results.channel("contact_position")
+    evaluated = ((position >= start) & (position <= end)).any(axis=1)
+    last = float(results.time[evaluated].max(initial=-1.0))
+    return [
+        f"At {fact['time_s']:.4g} s {fact['says']}. The statistics of the evaluated stretch cover "
+        "what comes of it: they are not those of a sound line under sound pantographs."
+        for fact in found
+        if fact["time_s"] < last
     ]
 
 

@@ -262,6 +262,10 @@ def _facts(results: Results) -> list[tuple[str, str]]:
         ("mesh", f"{results.line('node_points').shape[0]} nodes, {n_cells} wire elements"),
         ("unknowns", f"{about['n_dofs']}"),
         ("ranks", f"{about['n_ranks']}"),
+        *(
+            (f"incident at {fact['time_s']:.4g} s", fact["says"])
+            for fact in about.get("incidents", [])
+        ),
         ("time step", f"{1e3 * results.dt:g} ms"),
         ("steps", f"{results.n_steps} of {about['n_steps_planned']}"),
         ("simulated time", f"{results.simulated:.3f} s"),

@@ -17,6 +17,7 @@ from catenary.solver.errors import InputError
 
 RESULT_FILE = "run.h5"
 _JSON_ATTRIBUTES = (
+    "incidents",
     "versions",
     "config",
     "effects_on",

@@ -49,6 +49,7 @@ def summarise(
             )
         ],
         "supports": _supports(statistics),
+        "incidents": attributes.get("incidents", []),
         "droppers": {
             "n_slackened": statistics.droppers.n_slackened,
             "max_force_N": statistics.droppers.maximum,

@@ -10,7 +10,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from program import MPIRUN, assert_sound, catenary, catenary_started, n_rows, python, short_run
+from program import (
+    MPIRUN,
+    assert_same_histories,
+    assert_sound,
+    catenary,
+    catenary_started,
+    n_rows,
+    python,
+    short_run,
+)
 from program import started as program_started
 
 from catenary.postproc.results import Results
@@ -19,8 +28,6 @@ from catenary.postproc.results import Results
 FINE = "numerics.dt_s=5e-4"
 FLUSH = 100
 SHORT_FLUSHES = f"output.flush_every_steps={FLUSH}"
-# Round-off of a solve, 1e-16, over 1e4 steps of a damped line; see tests/mpi/test_same_answers.py.
-SAME = 1e-9
 
 needs_mpirun = pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
 
@@ -31,22 +38,6 @@ def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     done = catenary(*short_run(folder / "out", FINE, SHORT_FLUSHES), cwd=folder)
     assert done.code == 0, done.stderr
     return folder / "out"
-
-
-def assert_same_histories(out: Path, reference: Path) -> None:
-    assert assert_sound(out / "run.h5") == assert_sound(reference / "run.h5")
-    with Results(out) as found, Results(reference) as expected:
-        assert found.outcome == "done"
-        for name in ("contact_position", "contact_force", "arm_uplift", "dropper_force"):
-            values = expected.channel(name)
-            difference = np.abs(found.channel(name) - values).max() / np.abs(values).max()
-            print(f"{name}: relative difference {difference:.1e}, allowed {SAME:.0e}")
-            assert difference < SAME
-        for name, values in expected.energies().items():
-            assert np.abs(found.energies()[name] - values).max() <= SAME * np.abs(values).max()
-    # As many snapshots, each once.
-    times = [(folder / "fields.xdmf").read_text().count("<Time ") for folder in (out, reference)]
-    assert times[0] == times[1] > 0
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

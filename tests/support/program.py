@@ -36,6 +36,8 @@ SHORT_SCENE = (
     "evaluation.to_m=240",
     "output.energy_every_s=0.02",
 )
+# Round-off of a solve, 1e-16, over 1e4 steps of a damped line; see tests/mpi/test_same_answers.py.
+SAME = 1e-9
 _ENTRY = "from catenary.cases.cli import main; main()"
 _MARK = "CATENARY_TEST_MARK"
 _PROC = Path("/proc")
@@ -182,3 +184,20 @@ def _processes(mark: str) -> list[tuple[int, list[bytes]]]:
         if wanted in words:
             found.append((int(place.parent.name), words))
     return found
+
+
+def assert_same_histories(out: Path, reference: Path) -> None:
+    """Fail unless two finished runs in these folders hold the same histories and snapshots."""
+    assert assert_sound(out / "run.h5") == assert_sound(reference / "run.h5")
+    with Results(out) as found, Results(reference) as expected:
+        assert found.outcome == "done"
+        for name in ("contact_position", "contact_force", "arm_uplift", "dropper_force"):
+            values = expected.channel(name)
+            difference = np.abs(found.channel(name) - values).max() / np.abs(values).max()
+            print(f"{name}: relative difference {difference:.1e}, allowed {SAME:.0e}")
+            assert difference < SAME
+        for name, values in expected.energies().items():
+            assert np.abs(found.energies()[name] - values).max() <= SAME * np.abs(values).max()
+    # As many snapshots, each once.
+    times = [(folder / "fields.xdmf").read_text().count("<Time ") for folder in (out, reference)]
+    assert times[0] == times[1] > 0

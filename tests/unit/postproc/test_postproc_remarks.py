@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from catenary.postproc.remarks import remarks
@@ -90,3 +91,26 @@ def test_older_files_without_masses_have_no_remarks(facts: list[dict[str, Any]])
     told = Told(7.2, 1e-3, law="linear", stiffness_N_per_m=5e4)
     told.attributes["pantographs"] = facts
     assert remarks(told) == []  # type: ignore[arg-type]
+
+
+class Running(Told):
+    """A run at 50 m/s from 100 m on, another pantograph 30 m behind; 150 to 200 m evaluated."""
+
+    evaluation = (150.0, 200.0)
+    time = 0.01 * np.arange(401)
+
+    def __init__(self, *incidents: dict[str, Any]) -> None:
+        super().__init__(7.2, 1e-3, law="linear", stiffness_N_per_m=1e6)
+        self.attributes["incidents"] = list(incidents)
+
+    def channel(self, name: str) -> np.ndarray:
+        assert name == "contact_position"
+        return 100.0 + 50.0 * self.time[:, None] - np.array([0.0, 30.0])
+
+
+def test_incidents_that_the_statistics_cover_are_told() -> None:
+    """The trailing pantograph leaves the stretch at (200 + 30 - 100) / 50 = 2.6 s."""
+    early, late = {"time_s": 2.59, "says": "it breaks"}, {"time_s": 2.61, "says": "it falls"}
+    (sentence,) = remarks(Running(early, late))  # type: ignore[arg-type]
+    assert sentence.startswith("At 2.59 s it breaks. ") and "statistics" in sentence
+    assert remarks(Running(late)) == []  # type: ignore[arg-type]

@@ -1,0 +1,112 @@
+"""Whether what is to happen during a run can happen to its line and its pantographs."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NoReturn
+
+from catenary.cases.checks_pantograph import reaches_below
+from catenary.cases.messages import refuse
+from catenary.cases.schema_incidents import (
+    DropperBreakTable,
+    IncidentTable,
+    LoweringTable,
+    TensionLossTable,
+)
+from catenary.meshgen.line import Line
+
+if TYPE_CHECKING:
+    from catenary.cases.scene import Scene
+
+
+def check_incidents(scene: Scene, line: Line) -> None:
+    """Raise ``InputError`` with the first incident that cannot be."""
+    seen: dict[tuple[object, ...], int] = {}
+    for i, table in enumerate(scene.incidents):
+        _time(scene, i, table)
+        if isinstance(table, DropperBreakTable):
+            _dropper(scene, i, table, line)
+            what: tuple[object, ...] = ("dropper", table.span, table.dropper)
+        elif isinstance(table, TensionLossTable):
+            _tension(scene, i, table, line)
+            what = ("tension", table.wire, round(table.at_s / scene.numerics.dt_s))
+        else:
+            assert isinstance(table, LoweringTable)
+            _lowering(scene, i, table, line)
+            what = ("pantograph", table.pantograph)
+        if what in seen:
+            key = {"dropper": "dropper", "tension": "at_s", "pantograph": "pantograph"}[
+                str(what[0])
+            ]
+            _refuse(
+                scene,
+                i,
+                key,
+                getattr(table, key),
+                f"this happens in incidents.{seen[what]} already; take one of them away",
+            )
+        seen[what] = i
+
+
+def _refuse(scene: Scene, i: int, key: str, value: object, why: str) -> NoReturn:
+    refuse(scene.origin, f"incidents.{i}.{key}", value, why)
+
+
+def _time(scene: Scene, i: int, table: IncidentTable) -> None:
+    duration = (scene.end_m - scene.train.start_m) / (scene.train.speed_km_h / 3.6)
+    dt = scene.numerics.dt_s
+    if round(table.at_s / dt) >= math.floor(duration / dt + 1e-9):
+        why = f"it must be less than the {duration:.4g} s that the run lasts"
+        _refuse(scene, i, "at_s", table.at_s, why)
+
+
+def _hangs(scene: Scene, i: int, table: DropperBreakTable | TensionLossTable) -> None:
+    if not scene.switches().get("gravity", True):
+        why = "effects.gravity is off: a line that does not hang has no balance to lose"
+        _refuse(scene, i, "type", table.type, why)
+
+
+def _dropper(scene: Scene, i: int, table: DropperBreakTable, line: Line) -> None:
+    _hangs(scene, i, table)
+    if table.span > line.n_spans:
+        _refuse(scene, i, "span", table.span, f"the line has {line.n_spans} spans")
+    n = len(line.dropper_positions[table.span - 1])
+    if table.dropper > n:
+        why = f"span {table.span} has {n} droppers"
+        _refuse(scene, i, "dropper", table.dropper, why)
+
+
+def _tension(scene: Scene, i: int, table: TensionLossTable, line: Line) -> None:
+    _hangs(scene, i, table)
+    if table.wire != "contact_wire" or scene.switches().get("supercritical_speed", False):
+        return
+    wave = 3.6 * line.contact_wire.wave_speed
+    if scene.train.speed_km_h >= math.sqrt(table.share) * wave:
+        least = (scene.train.speed_km_h / wave) ** 2
+        _refuse(
+            scene,
+            i,
+            "share",
+            table.share,
+            f"the wave speed of the contact wire would fall to {math.sqrt(table.share) * wave:.1f} "
+            f"km/h: it must be greater than {least:.3g} at train.speed_km_h = "
+            f"{scene.train.speed_km_h:g} unless effects.supercritical_speed = true",
+        )
+
+
+def _lowering(scene: Scene, i: int, table: LoweringTable, line: Line) -> None:
+    n = len(scene.train.pantographs)
+    if table.pantograph > n:
+        noun = "1 pantograph" if n == 1 else f"{n} pantographs"
+        _refuse(scene, i, "pantograph", table.pantograph, f"the train has {noun}")
+    why = ""
+    if scene.contact.law == "kinematic":
+        why = 'contact.law is "kinematic", which holds only while contact lasts'
+    elif not scene.switches().get("contact_loss", True):
+        why = "effects.contact_loss is off: the wire would hold the head"
+    if why:
+        _refuse(scene, i, "type", table.type, why)
+    name = scene.train.pantographs[table.pantograph - 1].name
+    if not reaches_below(scene, name, line, table.drop_m):
+        why = f"the mechanism of pantographs.{name} does not reach down so far; take a smaller one"
+        _refuse(scene, i, "drop_m", table.drop_m, why)

@@ -1,0 +1,85 @@
+"""Incidents of scenes: in SI units, told in order of time, left out with their effects."""
+
+from __future__ import annotations
+
+import pytest
+
+from catenary.cases.incident_facts import incident_facts
+from catenary.cases.messages import Origin
+from catenary.cases.plan import make_plan, plan_text
+from catenary.cases.scene import Scene, load_scene, scene_from
+from catenary.mbs.lowering import Lowering
+from catenary.solver.incidents import DropperBreak, TensionLoss
+
+INCIDENTS = (
+    "incidents=[{type='lowering',at_s=3.0004,force_N=-75.0,drop_m=0.25},"
+    "{type='dropper_break',at_s=2.0,span=5,dropper=3},"
+    "{type='tension_loss',at_s=2.5,wire='messenger_wire',share=0.8}]"
+)
+KINDS = ("dropper_break", "tension_loss", "lowering")
+
+
+def scene(*more: str) -> Scene:
+    return load_scene("en50318_2002", [INCIDENTS, *more])
+
+
+def test_incidents_are_converted_and_rounded_to_steps() -> None:
+    problem = scene().to_problem()
+    # Spans of 60 m, the third dropper at 17 m.
+    assert problem.incidents == (
+        DropperBreak(2.0, 4 * 60.0 + 17.0),
+        TensionLoss(2.5, "messenger_wire", 0.8),
+    )
+    assert problem.train.placements[0].lowering == Lowering(3.0, -75.0, 0.2, 0.25)
+    coarse = scene("numerics.dt_s=4e-3").to_problem()
+    assert [incident.time for incident in coarse.incidents] == pytest.approx([2.0, 2.5])
+    assert coarse.train.placements[0].lowering.time == pytest.approx(3.0)
+    rounded = scene("numerics.dt_s=3e-3").to_problem()
+    assert rounded.incidents[0].time == pytest.approx(667 * 3e-3)
+
+
+def test_a_resolved_scene_is_the_same_again() -> None:
+    first = scene()
+    again = scene_from(first.resolved(), Origin("the result file"))
+    assert again.to_problem() == first.to_problem()
+    assert len(again.incidents) == 3
+
+
+def test_one_key_of_an_incident_is_changed() -> None:
+    assert scene("incidents.1.dropper=9").to_problem().incidents[0].x == 4 * 60.0 + 55.0
+
+
+def test_the_plan_tells_incidents_in_order_of_time() -> None:
+    plan = make_plan(scene())
+    assert [time for time, _ in plan.incidents] == pytest.approx([2.0, 2.5, 3.0])
+    text = plan_text(plan)
+    simulated, _ = text.split("Not simulated:")
+    assert all(kind in simulated for kind in KINDS)
+    first, second, third = (line for line in text.splitlines() if line.startswith("  incident"))
+    assert "at 2 s: dropper 3 of span 5, at 257 m, breaks" in first
+    assert "the tension of the messenger wire falls to 12.8 kN, 0.8 of what it was" in second
+    assert "pantograph 1 is lowered" in third and "-75 N within 0.2 s" in third
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_effect_that_is_left_out_is_not_told(kind: str) -> None:
+    found = scene(f"effects.{kind}=false")
+    told = [fact["type"] for fact in incident_facts(found, found.to_problem())]
+    assert sorted([*told, kind]) == sorted(KINDS)
+    plan = make_plan(found)
+    assert kind in [row.name for row in plan.off]
+    assert len(plan.incidents) == 2
+
+
+def test_without_incidents_there_are_no_effects_of_them() -> None:
+    plan = make_plan(load_scene("en50318_2002"))
+    reasons = {row.name: row.reason for row in plan.off}
+    assert {reasons[kind] for kind in KINDS} == {"nothing in the scene calls for it"}
+    assert plan.incidents == ()
+    assert "incident" not in plan_text(plan).split("Simulated:")[0]
+
+
+def test_a_lost_tension_may_make_a_train_supercritical() -> None:
+    words = "incidents=[{type='tension_loss',at_s=2.0,wire='contact_wire',share=0.3}]"
+    found = load_scene("en50318_2002", [words, "effects.supercritical_speed=true"])
+    assert "supercritical_speed" in [row.name for row in make_plan(found).on]
