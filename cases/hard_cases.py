@@ -41,6 +41,18 @@ class Needs(Table):
         False, description="a dropper switches in the step that crosses the boundary of two ranks"
     )
     touches_after_s: float = Field(0, ge=0, description="first contact not before this time")
+    breaks: int = Field(0, ge=0, description="droppers that carry up to an incident, never after")
+    breaks_at_cut: bool = Field(
+        False, description="one of them stands within an element of the boundary of two ranks"
+    )
+    energy_leaves: float | None = Field(
+        None,
+        gt=0,
+        description="most by which the energy that leaves differs from theory, relative",
+    )
+    no_force_after_s: float | None = Field(
+        None, ge=0, description="no pantograph touches the wire after this time"
+    )
     ends_at_m: float | None = Field(None, description="place where the run ends")
 
 

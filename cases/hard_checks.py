@@ -14,7 +14,9 @@ import numpy as np
 
 from catenary.cases import hard_runs
 from catenary.cases.hard_cases import HardCase
+from catenary.cases.hard_energy import energy_that_left
 from catenary.cases.hard_runs import AtRest, Watched
+from catenary.solver.incidents import in_steps
 from catenary.solver.parallel import on_root
 
 FALLS = 0.6
@@ -139,10 +141,36 @@ def _needs(case: HardCase, rest: AtRest, base: Watched) -> list[Criterion]:
     if needs.touches_after_s:
         touched = base.time[np.argmax(base.force[:, 0] > 0.0)]
         found.append(_reaches(case, "first contact [s]", touched, needs.touches_after_s))
+    if needs.breaks:
+        found.append(_reaches(case, "droppers that break", broken(rest, base).size, needs.breaks))
+    if needs.breaks_at_cut:
+        far = float(np.abs(broken(rest, base) - rest.cut()).min(initial=np.inf))
+        longest = float(np.diff(rest.node_places()).max())
+        found.append(_below(case, "broken dropper to the boundary [m]", far, longest))
+    if needs.energy_leaves is not None:
+        left = energy_that_left(rest, base)
+        off = max(abs(one.observed / one.expected - 1.0) for one in left)
+        note = ", ".join(f"{one.expected:.3g} J at step {one.step}" for one in left)
+        name = "energy that leaves, relative"
+        found.append(_below(case, name, off, needs.energy_leaves, note))
+    if needs.no_force_after_s is not None:
+        late = base.force[base.time > needs.no_force_after_s]
+        name = f"force after {needs.no_force_after_s:g} s [N]"
+        found.append(_below(case, name, float(late.max()), 0.0))
     if needs.ends_at_m is not None:
         last = float(base.position[-1, 0])
         found.append(_reaches(case, "end of the run [m]", last, needs.ends_at_m - 0.2))
     return found
+
+
+def broken(rest: AtRest, run: Watched) -> np.ndarray:
+    """Places of the droppers that carry up to an incident and never after [m]."""
+    found = []
+    for happened in in_steps(rest.problem.incidents, rest.problem.numerics.dt):
+        before, after = run.taut[happened.step], run.taut[happened.step + 1 :]
+        found.append(np.flatnonzero(before & ~after.any(axis=0)))
+    mesh = rest.model.mesh
+    return np.asarray(mesh.x(mesh.droppers[np.unique(np.concatenate([*found, []]).astype(int)), 1]))
 
 
 def lost_way(run: Watched) -> float:

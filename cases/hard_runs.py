@@ -8,6 +8,7 @@ damping takes, exactly, as long as no dropper switches.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -28,6 +29,7 @@ from catenary.solver.equilibrium import (
     middle_span,
     stiffness_matrix,
 )
+from catenary.solver.incidents import in_steps
 from catenary.solver.line_integrators import make_line
 from catenary.solver.march import March
 from catenary.solver.model import Model, build, iterate_entries
@@ -51,6 +53,7 @@ class Watched:
     energy : (n,) of the line [J]; work : (n,) of the contact forces on it since the start [J];
         both empty unless asked for
     counters : of the scheme
+    kept : by step, dropper forces [N] and the line's displacement as incidents found them
     """
 
     outcome: str = ""
@@ -63,6 +66,7 @@ class Watched:
     energy: np.ndarray = field(default_factory=lambda: np.zeros(0))
     work: np.ndarray = field(default_factory=lambda: np.zeros(0))
     counters: dict[str, int] = field(default_factory=dict)
+    kept: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
     def energy_gain(self) -> float:
         """The most that energy less work rises above its least value before, of the largest energy.
@@ -85,10 +89,15 @@ class Watched:
 
 
 class Watcher:
-    """Observer that keeps what `Watched` holds. ``wire`` and ``form`` are needed for the work."""
+    """Observer that keeps what `Watched` holds; ``wire`` is needed for the work.
 
-    def __init__(self, wire: ContactWire | None = None) -> None:
+    With the work, dropper forces and displacements are kept after the steps ``keep``.
+    """
+
+    def __init__(self, wire: ContactWire | None = None, keep: Collection[int] = ()) -> None:
         self._wire = wire
+        self._keep = keep
+        self._kept: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         self._rows: dict[str, list[Any]] = {
             name: [] for name in ("time", "position", "force", "height", "wire", "taut")
         }
@@ -122,7 +131,14 @@ class Watcher:
         """All that was seen."""
         rows = {name: np.array(values) for name, values in self._rows.items()}
         energies = np.array(self._energy), np.array(self._work)
-        return Watched(outcome, **rows, energy=energies[0], work=energies[1], counters=counters)
+        return Watched(
+            outcome,
+            **rows,
+            energy=energies[0],
+            work=energies[1],
+            counters=counters,
+            kept=self._kept,
+        )
 
     def _add_work(self, view: StepView, wire: ContactWire) -> None:
         state = view.checkpoint()
@@ -138,6 +154,8 @@ class Watcher:
             for where, values in (*self._pushed, *pushed):
                 done += 0.5 * float(values @ (displacement[where] - self._before[where]))
         self._work.append(done)
+        if view.step in self._keep:
+            self._kept[view.step] = view.dropper_force.copy(), displacement.copy()
         self._before, self._pushed = displacement.copy(), pushed
 
 
@@ -182,7 +200,9 @@ def at_rest(scene: Scene, comm: Any) -> AtRest:
 def run(rest: AtRest, comm: Any, with_work: bool = False) -> Watched:
     """March to the end, or to where it breaks. Collective; ``with_work`` on one rank only."""
     wire = ContactWire(rest.model, rest.form, distribute(rest.model, 1, 0)) if with_work else None
-    watcher = Watcher(wire)
+    problem = rest.problem
+    keep = [happened.step for happened in in_steps(problem.incidents, problem.numerics.dt)]
+    watcher = Watcher(wire, keep)
     with March(comm, rest.problem, rest.model, rest.form, rest.lift) as march:
         ended = march.run([watcher])
     return watcher.watched(ended.outcome, ended.counters)

@@ -12,8 +12,17 @@ from program import MPIRUN, catenary
 from catenary.cases.hard_cases import HardCase, hard_cases
 from catenary.cases.hard_checks import check_case
 
-# What the parallel solve and the coupling meet: stiff contact, several heads, switches at a cut.
-IN_PARALLEL = ("speed_1.0", "undamped_line", "rank_boundary", "four", "lost_over_spans")
+# What the parallel solve and the coupling meet: stiff contact, several heads, switches at a cut,
+# lines that change on the way.
+IN_PARALLEL = (
+    "speed_1.0",
+    "undamped_line",
+    "rank_boundary",
+    "four",
+    "lost_over_spans",
+    "dropper_breaks_at_a_cut",
+    "all_at_once",
+)
 
 
 @pytest.mark.parametrize("case", hard_cases(), ids=lambda case: case.name)
