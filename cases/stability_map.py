@@ -30,8 +30,13 @@ from catenary.solver.distribution import distribute
 from catenary.solver.equilibrium import middle_span
 from catenary.solver.errors import InputError
 
-# A linear problem: one contact that neither parts nor damps, droppers that stay taut.
+# Newmark's method and a linear problem: one contact that neither parts nor damps, droppers that stay taut.
 _LINEAR = (
+    "numerics.iterations=",
+    "numerics.spectral_radius=",
+    "numerics.integrator=newmark",
+    "numerics.coupling=",
+    "numerics.scheme=one_solve",
     "contact.restitution=",
     "contact.hertz_stiffness_N_per_m1_5=",
     "contact.damping_N_s_per_m=",
