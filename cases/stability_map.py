@@ -30,7 +30,7 @@ from catenary.solver.distribution import distribute
 from catenary.solver.equilibrium import middle_span
 from catenary.solver.errors import InputError
 
-# Newmark's method and a linear problem: one contact that neither parts nor damps, droppers that stay taut.
+# Newmark's method and a linear problem: one contact that neither parts nor damps, taut droppers.
 _LINEAR = (
     "numerics.iterations=",
     "numerics.spectral_radius=",

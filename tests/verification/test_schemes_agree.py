@@ -75,7 +75,7 @@ def test_a_fixed_number_of_corrections_goes_on_and_comes_nearer_with_each() -> N
     Errors of steps add up alike whatever their size, so that they fall by the greater one.
     """
     mesh = mesh_of(en50318_line(8), 3)
-    smooth = two_pantographs("fixed_point", WHOLE, 0.0)
+    smooth = two_pantographs("fixed_point", WHOLE, 0.0, "newmark")
     smooth = replace(smooth, train=train(250 / 3.6, 120.0, 200.0, raise_time=0.3))
     exact = march(replace(smooth, numerics=numerics(1e-3)), mesh)["contact_force"]
     errors, above = [], []
@@ -97,7 +97,7 @@ def test_a_fixed_number_of_corrections_goes_on_and_comes_nearer_with_each() -> N
 def test_a_fixed_number_of_corrections_that_diverge_ends_the_run() -> None:
     """A contact of 1e7 N/m at 1 ms multiplies by 2.6 a correction: nothing may go on with that."""
     stiff = replace(
-        two_pantographs("fixed_point", WHOLE - {"contact_loss"}, 0.0),
+        two_pantographs("fixed_point", WHOLE - {"contact_loss"}, 0.0, "newmark"),
         contact=LinearLaw(1e7, 0.0),
         numerics=numerics(1e-3, "fixed_point", iterations=10),
     )
