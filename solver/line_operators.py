@@ -117,13 +117,13 @@ class LineOperators:
         if self._stiffness is not None:
             self._stiffness.multiply(self._read_array, self._force_array)
         elif self.domain.size:
-            self._product("stiffness").mult(self._read, self._force)
+            self._product("stiffness").mult(self._read, self._force_here)
         self._product_event.end()
 
     def add_damping(self) -> None:
         """Add C ``factor`` to the internal force. Right after ``exchange``. Not collective."""
         if self.domain.size:
-            self._product("damping").multAdd(self._read, self._force, self._force)
+            self._product("damping").multAdd(self._read, self._force_here, self._force_here)
 
     def add_force(self, force: np.ndarray) -> None:
         """Add a force on all that is solved for, shape (domain.size,) [N], to the internal force.
@@ -169,7 +169,7 @@ class LineOperators:
         self.exchange()
         local = 0.0
         if self.domain.size:
-            self._product(name).mult(self._read, self._loaded)
+            self._product(name).mult(self._read, self._loaded_here)
             local = float(self._loaded_array[self.domain.owned] @ self.factor)
         return float(self._comm.allreduce(local))
 
@@ -259,7 +259,11 @@ class LineOperators:
         read, answer = np.zeros(read_high - read_low), np.zeros(domain.size)
         self._read_array = read
         self._force_array, self._loaded_array = np.zeros(domain.size), np.zeros(domain.size)
-        self._read = PETSc.Vec().createWithArray(read, comm=PETSc.COMM_SELF)
+        # What products fill is this rank's, what is solved for perhaps the line's: two views.
+        self._read, self._force_here, self._loaded_here = (
+            PETSc.Vec().createWithArray(array, comm=PETSc.COMM_SELF)
+            for array in (read, self._force_array, self._loaded_array)
+        )
         self._force, self._loaded, self._solution, self._read_domain = (
             PETSc.Vec().createWithArray(array, size=(domain.size, None), comm=comm)
             for array in (
@@ -269,7 +273,10 @@ class LineOperators:
                 read[low - read_low : high - read_low],
             )
         )
-        self._vectors = (self._read, self._force, self._loaded, self._solution, self._read_domain)
+        self._vectors = (
+            *(self._read, self._force_here, self._loaded_here),
+            *(self._force, self._loaded, self._solution, self._read_domain),
+        )
         self._products: dict[str, PETSc.Mat] = {}
         self.factor, self.answer = read[domain.owned_of_read], answer[domain.owned]
         self._halo = Halo(self._comm, own, read_low, read)

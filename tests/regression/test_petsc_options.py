@@ -33,7 +33,9 @@ def test_views_show_stepper_solver_and_stages(tmp_path: Path) -> None:
     options = ["-march_ts_view", "-march_ksp_view", "-march_ts_monitor", "-log_view"]
     text = run(out, *options)
     stepper = text.split("TS Object: (march_) 1 MPI process", 1)[1]
-    assert "type: python" in stepper and "Newmark step by scheme OneSolve" in stepper
+    assert (
+        "type: python" in stepper and "step of the line and its train by scheme OneSolve" in stepper
+    )
     solver = text.split("KSP Object: (march_) 1 MPI process", 1)[1]
     assert "type: preonly" in solver and "type: cholesky" in solver
     with Results(out) as results:
