@@ -121,8 +121,7 @@ def draw(found: Measured) -> Figure:
                 xytext=(5, 4),
                 fontsize="x-small",
             )
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    plots.log_log(axes)
     plots.tidy(
         axes,
         "wall time of the march per simulated second [s/s]",

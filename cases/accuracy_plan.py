@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from catenary.cases.accuracy_axes import MODEL, Axis, Level, Reference
+from catenary.cases.catalogue import find_case
 from catenary.cases.jobs import Job
 from catenary.cases.scene import Scene, load_scene
 from catenary.cases.variants import Variant, slug
@@ -115,11 +116,12 @@ def _planned(axis: Axis, scene: Scene, jobs: _Jobs, quick: bool) -> Iterator[Pla
     else:
         reference, check = jobs.add(axis.name, AS_IT_IS), None
     runs, refused = {}, {}
+    file = find_case(jobs.case).absolute()  # a study is read by others, elsewhere
     for level in levels:
         try:
             runs[level.name] = jobs.add(axis.name, level)
         except InputError as error:
-            refused[level.name] = str(error)
+            refused[level.name] = str(error).replace(f" in {file}", "")
     assert axis.kind == MODEL or check is not None
     yield PlannedAxis(axis, levels, runs, refused, reference, check)
 
