@@ -36,7 +36,9 @@ class ColumnGather:
         on_root(comm, lambda: _check_partition(self._parts, n_columns))
         self.n_owned = int(owned.size)
         self.n_columns = n_columns
-        if comm.rank == 0:
+        # One rank's columns need no putting together.
+        self._in_order = comm.size == 1 and np.array_equal(owned, np.arange(n_columns))
+        if comm.rank == 0 and not self._in_order:
             self._received = np.empty(max_rows * n_columns)
             self._whole = np.empty((max_rows, n_columns))
 
@@ -49,16 +51,15 @@ class ColumnGather:
 
         Returns
         -------
-        (rows, n_columns) view that the next call overwrites
+        (rows, n_columns) view that the next call overwrites, or the block itself
         """
         rows = block.shape[0]
         if self._comm.rank != 0:
             self._comm.Gatherv(block, None, root=0)
             return np.empty((rows, 0))
+        if self._in_order:
+            return block
         whole = self._whole[:rows]
-        if self._comm.size == 1:
-            whole[:, self._parts[0]] = block
-            return whole
         counts = [rows * part.size for part in self._parts]
         self._comm.Gatherv(block, [self._received, counts], root=0)
         start = 0

@@ -22,6 +22,8 @@ from catenary.solver.errors import RunBroken
 from catenary.solver.observation import Stage, StepView
 from catenary.solver.parallel import on_root
 
+_OF_PANTOGRAPHS = ("contact_position", "contact_force", "head_height", "wire_height")
+
 
 class Recorder:
     """Observer that writes ``run.h5``.
@@ -60,6 +62,7 @@ class Recorder:
         self._file: ResultFile | None = None
         self._broken = False
         self._view: StepView | None = None
+        self._where: dict[str, slice] = {}
         self._flushed_once = False
         self._rows = 0
         self._energies: list[tuple[float, float, float]] = []
@@ -72,38 +75,28 @@ class Recorder:
         RunBroken
             On all ranks, if the file cannot be written.
         """
-        rows, n_p = self._flush_every, stage.n_pantographs
+        rows = self._flush_every
         self._last_time = stage.start_time
         self._gather_arms = ColumnGather(self._comm, stage.owned_arms, stage.arm_x.size, rows)
         self._gather_droppers = ColumnGather(
             self._comm, stage.owned_droppers, stage.dropper_x.size, rows
         )
         self._time = np.zeros(rows)
-        self._position = np.zeros((rows, n_p))
-        self._arms = np.zeros((rows, self._gather_arms.n_owned))
-        self._droppers = np.zeros((rows, self._gather_droppers.n_owned))
-        self._force = np.zeros((rows, n_p))
-        self._head = np.zeros((rows, n_p))
-        self._wire = np.zeros((rows, n_p))
-        self._strips = np.zeros((rows, sum(stage.n_strips) if stage.several_strips else 0))
-        self._violation = np.zeros((rows, n_p if stage.joints_in_loop else 0))
+        self._names = [*_OF_PANTOGRAPHS]
+        if stage.several_strips:
+            self._names.append(channels.STRIP_FORCE.name)
+        if stage.joints_in_loop:
+            self._names.append(channels.CONSTRAINT_VIOLATION.name)
         self._guarded(lambda: self._open(stage))
 
     def observe(self, view: StepView) -> None:
         """Copy a step into the buffers; collective at the first step and whenever they are full."""
         row = self._rows
+        if not self._where:
+            self._where = view.columns
+            self._kept = np.zeros((self._flush_every, view.row.size))
         self._time[row] = view.time
-        self._position[row] = view.contact_position
-        if self._comm.rank == 0:
-            self._force[row] = view.contact_force
-            self._head[row] = view.head_height
-            self._wire[row] = view.wire_height
-            if self._strips.shape[1]:
-                self._strips[row] = view.strip_force
-            if self._violation.shape[1]:
-                self._violation[row] = view.constraint_violation
-        self._arms[row] = view.arm_uplift
-        self._droppers[row] = view.dropper_force
+        self._kept[row] = view.row
         self._rows = row + 1
         self._view = view
         self._last_time = view.time
@@ -120,7 +113,8 @@ class Recorder:
         """
         if self._broken:
             return
-        self._flush(self._view if outcome in (DONE, INTERRUPTED) else None)
+        if self._where:
+            self._flush(self._view if outcome in (DONE, INTERRUPTED) else None)
         self._guarded(lambda: self._open_file.conclude(outcome))
 
     def close(self, performance: Mapping[str, Any] | None = None) -> None:
@@ -136,14 +130,17 @@ class Recorder:
 
     def _flush(self, view: StepView | None) -> None:
         """Gather the buffers, append them, and store the state of ``view``. Collective."""
-        rows = self._rows
-        arms = self._gather_arms(self._arms[:rows])
-        droppers = self._gather_droppers(self._droppers[:rows])
+        arms = self._gather_arms(self._columns("arm_uplift"))
+        droppers = self._gather_droppers(self._columns("dropper_force"))
         state = view.checkpoint() if view is not None else None
         self._guarded(lambda: self._open_file.append(self._blocks(arms, droppers), state))
         self._rows = 0
         self._energies.clear()
         self._flushed_once = True
+
+    def _columns(self, name: str) -> np.ndarray:
+        """What is kept of a channel here, shape (rows, columns)."""
+        return np.ascontiguousarray(self._kept[: self._rows, self._where[name]])
 
     # ---- rank 0 ------------------------------------------------------------------------------
 
@@ -183,24 +180,12 @@ class Recorder:
 
     def _blocks(self, arms: np.ndarray, droppers: np.ndarray) -> dict[str, np.ndarray]:
         """What a flush appends, the time last: it counts the rows."""
-        rows = self._rows
-        blocks = {
-            "channels/contact_position": self._position[:rows],
-            "channels/contact_force": self._force[:rows],
-            "channels/head_height": self._head[:rows],
-            "channels/wire_height": self._wire[:rows],
-            "channels/arm_uplift": arms,
-            "channels/dropper_force": droppers,
-        }
-        if self._strips.shape[1]:
-            blocks[f"channels/{channels.STRIP_FORCE.name}"] = self._strips[:rows]
-        if self._violation.shape[1]:
-            name = channels.CONSTRAINT_VIOLATION.name
-            blocks[f"channels/{name}"] = self._violation[:rows]
+        blocks = {f"channels/{name}": self._columns(name) for name in self._names}
+        blocks["channels/arm_uplift"], blocks["channels/dropper_force"] = arms, droppers
         if self._energies:
             table = np.array(self._energies)
             blocks.update({f"energy/{n}": table[:, i] for i, n in enumerate(channels.ENERGIES)})
-        return {**blocks, "time": self._time[:rows]}
+        return {**blocks, "time": self._time[: self._rows]}
 
     @property
     def _open_file(self) -> ResultFile:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from catenary.mbs.interface import HeadState
+
 
 class Heads:
     """Arrays over all n contacts of a train; pantographs fill their parts of them.
@@ -26,6 +28,15 @@ class Heads:
     def n(self) -> int:
         """Number of contacts."""
         return int(self.height.size)
+
+    def part(self, strips: slice) -> HeadState:
+        """Views of what concerns some strips."""
+        return HeadState(
+            self.height[strips],
+            self.velocity[strips],
+            self.height_compliance[strips, strips],
+            self.velocity_compliance[strips, strips],
+        )
 
     def pack(self) -> np.ndarray:
         """All numbers as one array, for a message."""

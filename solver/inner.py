@@ -62,12 +62,13 @@ class Gap:
     ----------
     depth, rate : (n,) without forces [m], [m/s]
     depth_by_force, rate_by_force : (n, n) what forces take off them [m/N], [m/(N s)]
+    found : (2, n) depths and rates under the forces looked at last
     """
 
     def __init__(self, n: int) -> None:
         self.depth, self.rate = np.zeros(n), np.zeros(n)
         self.depth_by_force, self.rate_by_force = np.zeros((n, n)), np.zeros((n, n))
-        self._under = np.zeros((2, n))
+        self.found = np.zeros((2, n))
         self._line = LineResponse(n, 0)
 
     def put(self, line: LineResponse, heads: Heads) -> None:
@@ -99,7 +100,7 @@ class Gap:
     def under(self, force: np.ndarray, slack: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Depths [m] and rates [m/s] under forces (n,) and compensations (m,) [N]; overwritten by
         the next call."""
-        depth, rate = self._under
+        depth, rate = self.found
         inner_kernels.under(
             self.depth_by_force,
             self.rate_by_force,
@@ -158,7 +159,7 @@ class InnerProblem:
         for _ in range(_MAX_TANGENTS):
             force, slack, more = self._with_tangents(line)
             rounds += more
-            depth, rate = gap.under(force, slack)
+            depth, rate = gap.found
             if law.is_linear:
                 return InnerSolution(force, slack, depth, rate, rounds, self.pivoted)
             law.linearise(depth, rate)
@@ -189,7 +190,10 @@ class InnerProblem:
         return solution
 
     def _with_tangents(self, line: LineResponse) -> tuple[np.ndarray, np.ndarray, int]:
-        """Contact forces (n,) and compensations (m,) [N] for the law's tangents, and the rounds."""
+        """Contact forces (n,) and compensations (m,) [N] for the law's tangents, and the rounds.
+
+        Depths and rates under them stand in ``gap.found``.
+        """
         gap, n, m = self.gap, self.law.n, line.count
         self._make_room(m)
         rounds, size = inner_kernels.solve(
@@ -206,6 +210,8 @@ class InnerProblem:
             self._matrix,
             self._right,
             self._solution,
+            gap.found[0],
+            gap.found[1],
             _MAX_ROUNDS,
         )
         if rounds <= 0:
@@ -214,11 +220,12 @@ class InnerProblem:
             rounds = _pivot(matrix, right, self._always[:size], self._solution[:size]) - rounds
             force = self._solution[:n]
             if size == n and m and inner_kernels.any_pushed(line.rows, m, n, force):
-                return self._with_all(line, rounds)
+                size, rounds = self._with_all(line, rounds)
+            gap.under(force, self._solution[n:size])
         return self._solution[:n], self._solution[n:size], rounds
 
-    def _with_all(self, line: LineResponse, rounds: int) -> tuple[np.ndarray, np.ndarray, int]:
-        """The same by pivoting, droppers included, where contacts alone needed it already."""
+    def _with_all(self, line: LineResponse, rounds: int) -> tuple[int, int]:
+        """Unknowns and rounds by pivoting, droppers included, where contacts alone needed it."""
         n, size = self.law.n, self.law.n + line.count
         inner_kernels.couple(
             line.rows, line.count, n, self._released, self._band, self.law.tangents[2:],
@@ -226,7 +233,7 @@ class InnerProblem:
         )  # fmt: skip
         matrix, right = self._matrix[:size, :size].copy(), self._right[:size].copy()
         rounds += _pivot(matrix, right, self._always[:size], self._solution[:size])
-        return self._solution[:n], self._solution[n:size], rounds
+        return size, rounds
 
     def _make_room(self, n_droppers: int) -> None:
         n = self.law.n

@@ -170,6 +170,21 @@ def settle(matrix, right, always, solution, max_rounds):
 
 
 @compiled
+def under(by_force, rate_by_force, depth, rate, rows, count, force, slack, at_depth, at_rate):
+    """Depths and rates at the contacts under forces and compensations."""
+    n = depth.size
+    for i in range(n):
+        d, r = depth[i], rate[i]
+        for j in range(n):
+            d -= by_force[i, j] * force[j]
+            r -= rate_by_force[i, j] * force[j]
+        for k in range(count):
+            d += rows[k, COUPLINGS + n + i] * slack[k]
+            r += rows[k, COUPLINGS + 2 * n + i] * slack[k]
+        at_depth[i], at_rate[i] = d, r
+
+
+@compiled
 def solve(
     depth,
     rate,
@@ -184,9 +199,13 @@ def solve(
     matrix,
     right,
     solution,
+    at_depth,
+    at_rate,
     max_rounds,
 ):
     """Contact forces and compensations for a law's tangents: rounds needed, and unknowns used.
+
+    With them depths and rates at the contacts.
 
     ``tangents`` (4, n) holds own, offset, by_depth and by_rate. If no contact force pushes a
     dropper together there are n unknowns, else n + ``count``. Rounds are not positive if the active
@@ -206,27 +225,18 @@ def solve(
         matrix,
     )
     rounds = settle(matrix[:n, :n], right[:n], always[:n], solution[:n], max_rounds)
-    if rounds <= 0 or not any_pushed(rows, count, n, solution):
-        return rounds, n
-    couple(rows, count, n, released, band, tangents[2:], matrix, right)
-    size = n + count
-    rounds = settle(matrix[:size, :size], right[:size], always[:size], solution[:size], max_rounds)
+    size = n
+    if rounds > 0 and any_pushed(rows, count, n, solution):
+        couple(rows, count, n, released, band, tangents[2:], matrix, right)
+        size = n + count
+        rounds = settle(
+            matrix[:size, :size], right[:size], always[:size], solution[:size], max_rounds
+        )
+    under(
+        by_force, rate_by_force, depth, rate, rows, size - n, solution, solution[n:], at_depth,
+        at_rate,
+    )  # fmt: skip
     return rounds, size
-
-
-@compiled
-def under(by_force, rate_by_force, depth, rate, rows, count, force, slack, at_depth, at_rate):
-    """Depths and rates at the contacts under forces and compensations."""
-    n = depth.size
-    for i in range(n):
-        d, r = depth[i], rate[i]
-        for j in range(n):
-            d -= by_force[i, j] * force[j]
-            r -= rate_by_force[i, j] * force[j]
-        for k in range(count):
-            d += rows[k, COUPLINGS + n + i] * slack[k]
-            r += rows[k, COUPLINGS + 2 * n + i] * slack[k]
-        at_depth[i], at_rate[i] = d, r
 
 
 @compiled
@@ -285,7 +295,7 @@ def warm_up() -> None:
     any_pushed(rows, 1, 1, one)
     solve(
         one, one, square, square, np.ones((4, 1)), rows, 1, 1.0, np.zeros((1, 1)),
-        np.zeros(2, dtype=np.bool_), np.eye(2), np.zeros(2), np.zeros(2), 1,
+        np.zeros(2, dtype=np.bool_), np.eye(2), np.zeros(2), np.zeros(2), one, one, 1,
     )  # fmt: skip
     settle(square, one, np.zeros(1, dtype=np.bool_), one, 1)
     solve_on(square, one, np.zeros(1, dtype=np.bool_), one)

@@ -22,10 +22,11 @@ class Droppers:
     Attributes
     ----------
     shown : numbers in the mesh of all that this rank owns, those that are broken included
+    shown_ends, shown_laws : ``ends`` and ``laws`` of those
     numbers : (n,) numbers in the mesh of those that may carry
     ends : (n, 2) local unknowns of their upper and lower ends
     laws : (n, 4) force at rest [N], stiffness [N/m], damping [N s/m], place along the track [m]
-    latest_tension : (n,) what ``find_tension`` found last [N]
+    latest_tension : (n,) what was found last [N]
     """
 
     def __init__(self, model: Model, form: Equilibrium, line: LineMotion) -> None:
@@ -35,8 +36,8 @@ class Droppers:
         intact = ~model.broken[mine]
         self.numbers = self.shown[intact]
         x = model.mesh.x(model.mesh.droppers[mine, 1])
-        self._shown_ends = (ends[mine] - line.ownership.first).astype(np.int64)
-        self._shown_laws = np.column_stack(
+        self.shown_ends = (ends[mine] - line.ownership.first).astype(np.int64)
+        self.shown_laws = np.column_stack(
             [
                 np.where(intact, form.dropper_force[mine], 0.0),
                 model.dropper_stiffness[mine],
@@ -44,42 +45,19 @@ class Droppers:
                 x,
             ]
         )
-        self.x, self.ends = x[intact], self._shown_ends[intact]
-        self.laws = self._shown_laws[intact]
+        self.x, self.ends = x[intact], self.shown_ends[intact]
+        self.laws = self.shown_laws[intact]
         _, stiffness, damping, _ = self.laws.T
         # Change of tension per unit of relative acceleration within the step.
         self.per_acceleration = stiffness * line.position_factor + damping * line.velocity_factor
         self.latest_tension = np.zeros(self.numbers.size)
-        self._carried = np.zeros(self.shown.size)
         self._line = line
-
-    def find_tension(self) -> bool:
-        """Put the tension in the line's present motion; whether all are numbers."""
-        line = self._line
-        return bool(
-            kernels.tension(
-                line.displacement, line.velocity, self.ends, self.laws, self.latest_tension
-            )
-        )
 
     def tension(self) -> np.ndarray:
         """Tension in the line's present motion [N], shape (n,), overwritten by the next call."""
-        self.find_tension()
-        return self.latest_tension
-
-    def carried(self, kept_ratio: float) -> np.ndarray:
-        """Tension in the line's present motion, of which droppers keep a share where they would
-        push [N], of all that are shown, overwritten by the next call."""
         line = self._line
-        kernels.carried(
-            line.displacement,
-            line.velocity,
-            self._shown_ends,
-            self._shown_laws,
-            kept_ratio,
-            self._carried,
-        )
-        return self._carried
+        kernels.tension(line.displacement, line.velocity, self.ends, self.laws, self.latest_tension)
+        return self.latest_tension
 
     def energy_of_pushing(self) -> float:
         """Elastic energy that the owned droppers would hold by pushing, were they springs [J]."""
@@ -196,47 +174,37 @@ class Interaction:
         Droppers are included if their tension may fall below ``margin`` [N] under contact
         forces up to ``force_bound`` (n,) [N].
         """
-        line = self.line
-        finite = kernels.respond(
+        line, droppers = self.line, self.droppers
+        count = kernels.respond(
             line.displacement,
             line.velocity,
             touches.local,
             touches.value,
             touches.slope,
             touches.rest,
+            touches.x,
             self._speed,
             self._answers,
             self._slope_answers,
             self._uses_rate,
             line.position_factor,
             line.velocity_factor,
+            line.windows.reach,
+            force_bound,
+            margin,
+            droppers.numbers,
+            droppers.ends,
+            droppers.laws,
+            self._may_slacken,
+            droppers.latest_tension,
             response.height,
             response.rate,
             response.height_by_force,
             response.rate_by_force,
+            response.rows,
         )
-        # What is no number anywhere is one at the next dropper in the step after.
-        response.is_broken = not (self.droppers.find_tension() and finite)
-        count = 0
-        if self._may_slacken:
-            count = kernels.watch(
-                self.droppers.latest_tension,
-                margin,
-                force_bound,
-                self.droppers.numbers,
-                self.droppers.ends,
-                self.droppers.laws,
-                touches.x,
-                line.windows.reach,
-                self._answers,
-                self._slope_answers,
-                self._uses_rate,
-                self._speed,
-                line.position_factor,
-                line.velocity_factor,
-                response.rows,
-            )
-        response.put_count(count)
+        response.is_broken = count < 0
+        response.put_count(max(count, 0))
 
     def superpose(
         self, contact_force: np.ndarray, droppers: np.ndarray, compensation: np.ndarray

@@ -139,12 +139,15 @@ def tension(displacement, velocity, ends, laws, result):
 
 
 @compiled
-def carried(displacement, velocity, ends, laws, kept, result):
-    """Tension of droppers that keep the share ``kept`` of what they would push [N]."""
-    tension(displacement, velocity, ends, laws, result)
-    for d in range(result.size):
-        if result[d] < 0.0:
-            result[d] *= kept
+def show(displacement, velocity, arms, ends, laws, kept, uplift, force):
+    """Displacement at the unknowns ``arms``, and the tension of droppers that keep the share
+    ``kept`` of what they would push [N]."""
+    for i in range(arms.size):
+        uplift[i] = displacement[arms[i]]
+    tension(displacement, velocity, ends, laws, force)
+    for d in range(force.size):
+        if force[d] < 0.0:
+            force[d] *= kept
 
 
 @compiled
@@ -160,7 +163,7 @@ def influence(answers, local, weights, factor, result):
 
 
 @compiled
-def respond(
+def meet(
     displacement,
     velocity,
     local,
@@ -178,7 +181,7 @@ def respond(
     height_by_force,
     rate_by_force,
 ):
-    """A rank's share of heights, rates and compliances at the touches; see ``LineResponse``.
+    """A rank's share of heights, rates and compliances at the touches.
 
     Returns whether the heights are numbers.
     """
@@ -249,6 +252,54 @@ def watch(
 
 
 @compiled
+def respond(
+    displacement,
+    velocity,
+    local,
+    value,
+    slope,
+    rest,
+    contact_x,
+    train_speed,
+    answers,
+    slope_answers,
+    uses_rate,
+    position_factor,
+    velocity_factor,
+    reach,
+    bound,
+    margin,
+    numbers,
+    ends,
+    laws,
+    may_slacken,
+    force,
+    height,
+    rate,
+    height_by_force,
+    rate_by_force,
+    rows,
+):
+    """A rank's share of the inner problem, see ``LineResponse``, and the tension of its droppers.
+
+    Returns the number of droppers that may slacken, -1 if something is no number.
+    """
+    finite = meet(
+        displacement, velocity, local, value, slope, rest, train_speed, answers, slope_answers,
+        uses_rate, position_factor, velocity_factor, height, rate, height_by_force, rate_by_force,
+    )  # fmt: skip
+    # What is no number anywhere is one at the next dropper in the step after.
+    if not (tension(displacement, velocity, ends, laws, force) and finite):
+        return -1
+    if not may_slacken:
+        return 0
+    return watch(
+        force, margin, bound, numbers, ends, laws, contact_x, reach, answers, slope_answers,
+        uses_rate, train_speed, position_factor, velocity_factor, rows,
+    )  # fmt: skip
+
+
+@compiled
 def superpose(
     force,
     answers,
@@ -316,16 +367,12 @@ def warm_up() -> None:
     bounds = np.zeros(3, dtype=np.int64)
     combine(numbers, table, 0, bounds, bounds, columns, table, range_filled)
     square, none = np.zeros((1, 1)), np.zeros((1, 0))
-    respond(
-        reals, reals, places, table, table, table, 1.0, table, none, False, 1.0, 1.0,
-        one, one, square, square,
-    )  # fmt: skip
     ends, laws = np.zeros((1, 2), dtype=np.int64), np.zeros((1, 4))
     tension(reals, reals, ends, laws, one)
-    carried(reals, reals, ends, laws, 0.0, one)
-    watch(
-        one, 1.0, one, numbers, ends, laws, one, 1.0, table, none, False, 1.0, 1.0, 1.0,
-        np.zeros((1, 5)),
+    show(reals, reals, numbers, ends, laws, 0.0, one, one)
+    respond(
+        reals, reals, places, table, table, table, one, 1.0, table, none, False, 1.0, 1.0, 1.0,
+        one, 1.0, numbers, ends, laws, True, one, one, one, square, square, np.zeros((1, 5)),
     )  # fmt: skip
     superpose(
         one, table, range_filled, numbers, one, numbers, bounds, columns, reals, reals, reals,

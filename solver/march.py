@@ -223,14 +223,20 @@ class March:
         since = first
         ahead = [happened for happened in self._ahead if happened.step < self.n_steps]
         ends = [*(happened.step for happened in ahead), self.n_steps]
-        ts = self._make_ts(observers, stop_requested, first, ends[0], shown=False)
+        show = self._shown_to(observers)
+        ts = self._make_ts(show, stop_requested, first, ends[0])
         try:
             self._start(observers, self._showing.stage(dt, first * dt, self.n_steps))
-            begin = clock.perf_counter()
-            ts.solve(self._line.solution)
         except RunBroken:
             ts.destroy()
             raise
+        begin = clock.perf_counter()
+        try:
+            show(first, first * dt)
+        except RunBroken as error:
+            self._stepper.broken = str(error)
+        else:
+            ts.solve(self._line.solution)
         for happened, end in zip(ahead, ends[1:], strict=True):
             if not self._stepper.goes_on_from(happened.step):
                 break
@@ -241,7 +247,7 @@ class March:
                 self._stepper.broken = str(error)
                 break
             since = happened.step
-            ts = self._make_ts(observers, stop_requested, since, end, shown=True)
+            ts = self._make_ts(show, stop_requested, since, end)
             ts.solve(self._line.solution)
         wall = clock.perf_counter() - begin
         if self._stepper.broken:
@@ -302,6 +308,22 @@ class March:
                 _finish(observers[:number], str(error))
                 raise
 
+    def _shown_to(self, observers: Sequence[Observer]) -> Callable[[int, float], None]:
+        """How observers are shown a state: by number and time of its step."""
+        if not observers:
+            return lambda step, time: None
+
+        def show(step: int, time: float) -> None:
+            self._show_event.begin()
+            try:
+                view = self._showing.view(step, time)
+                for observer in observers:
+                    observer.observe(view)
+            finally:
+                self._show_event.end()
+
+        return show
+
     def _one_solve(self) -> Scheme:
         slack = self._interaction.slack_coupling
         band = np.zeros((0, 1)) if slack is None or slack.band is None else slack.band
@@ -356,15 +378,14 @@ class March:
 
     def _make_ts(
         self,
-        observers: Sequence[Observer],
+        show: Callable[[int, float], None],
         stop_requested: Callable[[], bool],
         first: int,
         end: int,
-        shown: bool,
     ) -> PETSc.TS:
-        """The time loop from step ``first``, ``shown`` or not, to step ``end``. Collective."""
+        """The time loop from step ``first``, shown already, to step ``end``. Collective."""
         dt = self._problem.numerics.dt
-        self._stepper = Stepper(self._scheme, first, dt, stop_requested)
+        self._stepper = Stepper(self._scheme, first, dt, stop_requested, show)
         ts = PETSc.TS().create(self._comm)
         ts.setOptionsPrefix(PREFIX)
         ts.setProblemType(PETSc.TS.ProblemType.NONLINEAR)
@@ -376,15 +397,6 @@ class March:
         ts.setMaxSteps(self.n_steps)
         ts.setMaxTime(2.0 * self.n_steps * dt)
         ts.setExactFinalTime(PETSc.TS.ExactFinalTime.STEPOVER)
-        if observers and not shown:
-            ts.setMonitor(lambda ts, step, time, _u: self._show(ts, observers, step, time))
-        elif observers:
-            # As the end of the part before.
-            ts.setMonitor(
-                lambda ts, step, time, _u: (
-                    self._show(ts, observers, step, time) if step > first else None
-                )
-            )
         with refused_options():
             ts.setFromOptions()
         self._refuse_what_the_scene_says(ts, first * dt)
@@ -414,19 +426,6 @@ class March:
         if found:
             ts.destroy()
             raise InputError(f"the PETSc option -{PREFIX}ts{found}")
-
-    def _show(self, ts: PETSc.TS, observers: Sequence[Observer], step: int, time: float) -> None:
-        if self._stepper.broken:
-            return
-        self._show_event.begin()
-        view = self._showing.view(step, time)
-        try:
-            for observer in observers:
-                observer.observe(view)
-        except RunBroken as error:
-            # An exception must not pass through PETSc; observers raise it on all ranks.
-            self._stepper.give_up(ts, str(error))
-        self._show_event.end()
 
 
 def _finish(observers: Sequence[Observer], outcome: str) -> str:

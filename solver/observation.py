@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
+
+# What the pantographs tell comes first, in the order in which they keep it.
+_IN_A_ROW = (
+    "contact_position",
+    "contact_force",
+    "head_height",
+    "wire_height",
+    "strip_force",
+    "constraint_violation",
+    "arm_uplift",
+    "dropper_force",
+)
 
 
 @dataclass(frozen=True)
@@ -50,6 +63,9 @@ class Stage:
 class StepView:
     """The state after a step; arrays are views that the next step overwrites.
 
+    The arrays it is made of are copied into one, ``row``, whose parts they are from then on, so
+    that keeping all of a step is a single copy.
+
     Attributes
     ----------
     step, time : number of the step (0 is the initial state) and its time [s]
@@ -64,6 +80,8 @@ class StepView:
         pantograph, the leading strip first [N], rank 0 only
     constraint_violation : (n_pantographs,) largest open joint [m], NaN for those without joints in
         the time loop, rank 0 only
+    row : all these arrays one after another
+    columns : where in the row each is, by name
     """
 
     step: int
@@ -79,6 +97,19 @@ class StepView:
     checkpoint: Callable[[], dict[str, Any] | None]
     strip_force: np.ndarray = field(default_factory=lambda: np.zeros(0))
     constraint_violation: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    row: np.ndarray = field(init=False)
+    columns: dict[str, slice] = field(init=False)
+
+    def __post_init__(self) -> None:
+        arrays = [getattr(self, name) for name in _IN_A_ROW]
+        self.row = np.concatenate(arrays)
+        ends = np.cumsum([0, *(array.size for array in arrays)]).tolist()
+        self.columns = {
+            name: slice(*part)
+            for name, part in zip(_IN_A_ROW, itertools.pairwise(ends), strict=True)
+        }
+        for name, part in self.columns.items():
+            setattr(self, name, self.row[part])
 
 
 class Observer(Protocol):

@@ -43,6 +43,7 @@ class Pantographs:
     joints_in_loop : whether a pantograph has joints that may open, all ranks
     constraint_violation : (n,) largest open joint after the latest step [m], NaN for pantographs
         without joints in the loop, rank 0 only
+    told : ``position`` and all these of the latest step one after another
 
     Raises
     ------
@@ -69,15 +70,20 @@ class Pantographs:
         self._contact_start = np.repeat(self._start, counts) + np.concatenate(offsets)
         self._touches = Touches(self.n_contacts)
         self._touches.x[:] = self._contact_start
-        self.position = self._start.copy()
-        self.strip_force = np.zeros(self.n_contacts)
-        self._told = np.zeros((3, self.n))
+        sizes = (self.n, 3 * self.n, self.n_contacts, self.n)
+        self.told = np.zeros(sum(sizes))
+        self.position, forces, self.strip_force, self.constraint_violation = np.split(
+            self.told, np.cumsum(sizes)[:-1]
+        )
+        self.position[:] = self._start
+        self._told = forces.reshape(3, self.n)
         self.contact_force, self.head_height, self.wire_height = self._told
         self.wire_height[:] = wire.rest_height(self._start)
         self.head_height[:] = self.wire_height - train.start_below
         self._heads = Heads(self.n_contacts)
+        self._parts = [self._heads.part(strips) for strips in self._strips]
         self.joints_in_loop = any(has_joints(placement.data) for placement in train.placements)
-        self.constraint_violation = np.full(self.n, np.nan)
+        self.constraint_violation[:] = np.nan
         self.models: list[Pantograph] = []
         on_root(comm, lambda: self._make_all(problem, nominal_height))
 
@@ -112,14 +118,13 @@ class Pantographs:
 
     def predict(self, time: float) -> Heads:
         """Strips at ``time`` as functions of the contact forces. Rank 0 only."""
-        heads = self._heads
-        for model, strips in zip(self.models, self._strips, strict=True):
+        for model, part in zip(self.models, self._parts, strict=True):
             head = model.predict(time)
-            heads.height[strips] = head.height
-            heads.velocity[strips] = head.velocity
-            heads.height_compliance[strips, strips] = head.height_compliance
-            heads.velocity_compliance[strips, strips] = head.velocity_compliance
-        return heads
+            part.height[:] = head.height
+            part.velocity[:] = head.velocity
+            part.height_compliance[:] = head.height_compliance
+            part.velocity_compliance[:] = head.velocity_compliance
+        return self._heads
 
     def advance(self, contact_force: np.ndarray, reported: np.ndarray, depth: np.ndarray) -> None:
         """Take the step with these forces and depths (n_contacts,). Rank 0 only.

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from catenary.solver import kernels
 from catenary.solver.changed_line import ChangedLine
 from catenary.solver.equilibrium import Equilibrium
 from catenary.solver.interaction import Interaction
@@ -51,7 +52,7 @@ class Showing:
         first, owned = self._line.ownership.first, self._line.ownership.owned
         arms = model.dofs(model.mesh.steady_arms)
         self._owned_arms = np.flatnonzero(owned(arms))
-        self._arm_rows = arms[self._owned_arms] - first
+        self._arm_rows = (arms[self._owned_arms] - first).astype(np.int64)
         nodes = np.arange(model.mesh.n_nodes)
         self._owned_nodes = nodes[owned(model.dofs(nodes))]
         self._node_rows = model.dofs(self._owned_nodes) - first
@@ -62,7 +63,7 @@ class Showing:
             contact_force=pantographs.contact_force,
             head_height=pantographs.head_height,
             wire_height=pantographs.wire_height,
-            dropper_force=interaction.droppers.carried(self._pushed_share),
+            dropper_force=np.zeros(interaction.droppers.shown.size),
             arm_uplift=np.zeros(self._arm_rows.size),
             node_uplift=lambda: self._line.displacement[self._node_rows],
             energies=self._energies,
@@ -93,10 +94,20 @@ class Showing:
 
     def view(self, step: int, time: float) -> StepView:
         """The state after a step; the same object each time."""
-        view = self._view
+        view, told = self._view, self._pantographs.told
         view.step, view.time = step, time
-        self._interaction.droppers.carried(self._pushed_share)
-        np.take(self._line.displacement, self._arm_rows, out=view.arm_uplift)
+        view.row[: told.size] = told
+        line, droppers = self._line, self._interaction.droppers
+        kernels.show(
+            line.displacement,
+            line.velocity,
+            self._arm_rows,
+            droppers.shown_ends,
+            droppers.shown_laws,
+            self._pushed_share,
+            view.arm_uplift,
+            view.dropper_force,
+        )
         return view
 
     def restore(self, checkpoint: dict[str, Any]) -> None:

@@ -11,7 +11,12 @@ from catenary.solver.schemes import Scheme
 
 
 class Stepper:
-    """Context of a TS of type ``python`` that advances a scheme.
+    """Context of a TS of type ``python`` that advances a scheme and shows each step.
+
+    Parameters
+    ----------
+    show : called with number and time [s] of each good step; raises RunBroken, on all ranks, if
+        nobody can watch any longer
 
     Attributes
     ----------
@@ -21,29 +26,34 @@ class Stepper:
     """
 
     def __init__(
-        self, scheme: Scheme, first_step: int, dt: float, stop_requested: Callable[[], bool]
+        self,
+        scheme: Scheme,
+        first_step: int,
+        dt: float,
+        stop_requested: Callable[[], bool],
+        show: Callable[[int, float], None],
     ) -> None:
         self._scheme = scheme
         self._dt = dt
         self._stop_requested = stop_requested
+        self._show = show
         self.step_number = first_step
         self.stopped = False
         self.broken = ""
 
     def step(self, ts: PETSc.TS) -> None:
         """Called by PETSc; errors may not pass through it, so they are kept for the march."""
-        if self.broken:
-            # An observer gave up since the last step, and PETSc forgot it on its way here.
-            self.give_up(ts, self.broken)
-            return
         # Times are multiples of dt, not sums, so that a long run does not drift.
         time = (self.step_number + 1) * self._dt
         try:
             goes_on = self._scheme.step(time, self._stop_requested())
+            self.step_number += 1
+            self._show(self.step_number, time)
         except RunBroken as error:
-            self.give_up(ts, str(error))
+            self.broken = str(error)
+            # Not a reason of failure, for which PETSc would raise an error of its own.
+            ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
             return
-        self.step_number += 1
         ts.setTime(time)
         if not goes_on:
             self.stopped = True
@@ -52,12 +62,6 @@ class Stepper:
     def goes_on_from(self, step: int) -> bool:
         """Whether nothing broke or stopped before the end of this step."""
         return not (self.broken or self.stopped) and self.step_number == step
-
-    def give_up(self, ts: PETSc.TS, why: str) -> None:
-        """End the time loop because of an error that the march reports."""
-        self.broken = why
-        # Not a reason of failure, for which PETSc would raise an error of its own.
-        ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
 
     def view(self, ts: PETSc.TS, viewer: PETSc.Viewer) -> None:
         """Name the scheme in -march_ts_view."""

@@ -28,8 +28,7 @@ def with_joints(make_march: Any) -> Any:
 
         def view(self, step: int) -> Any:
             view = super().view(step)
-            view.constraint_violation = np.array([1e-12 * step, np.nan])
-            return view
+            return replace(view, constraint_violation=np.array([1e-12 * step, np.nan]))
 
     return Jointed(n_steps=600)
 

@@ -28,8 +28,7 @@ def with_strips(make_march: Any) -> Any:
         def view(self, step: int) -> Any:
             view = super().view(step)
             leading, trailing = view.contact_force
-            view.strip_force = np.array([leading, 0.6 * trailing, 0.4 * trailing])
-            return view
+            return replace(view, strip_force=np.array([leading, 0.6 * trailing, 0.4 * trailing]))
 
     return Striped(n_steps=600)
 
