@@ -38,6 +38,12 @@ class Heads:
             self.velocity_compliance[strips, strips],
         )
 
+    def adopt(self, head: HeadState) -> None:
+        """Stand for the strips of the only pantograph there is: its arrays themselves."""
+        self.height, self.velocity = head.height, head.velocity
+        self.height_compliance = head.height_compliance
+        self.velocity_compliance = head.velocity_compliance
+
     def pack(self) -> np.ndarray:
         """All numbers as one array, for a message."""
         parts = (self.height, self.velocity, self.height_compliance, self.velocity_compliance)

@@ -203,8 +203,7 @@ class Interaction:
             response.rate_by_force,
             response.rows,
         )
-        response.is_broken = count < 0
-        response.put_count(max(count, 0))
+        response.put_count(count)
 
     def superpose(
         self, contact_force: np.ndarray, droppers: np.ndarray, compensation: np.ndarray

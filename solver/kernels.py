@@ -33,6 +33,13 @@ def correct(displacement, velocity, acceleration, position_factor, velocity_fact
 
     The acceleration still lacks -``damping_share`` v, the part of damping on mass.
     """
+    if damping_share == 0.0:
+        # Long lines wait for memory: what does not change is not written.
+        for i in range(displacement.size):
+            a = acceleration[i]
+            velocity[i] += velocity_factor * a
+            displacement[i] += position_factor * a
+        return
     for i in range(displacement.size):
         # Through locals, so that the loop becomes one of vector instructions.
         v = velocity[i]

@@ -117,12 +117,18 @@ class OneSolve:
             events["ContactShare"].begin()
             interaction.respond(touches, self._bound, self._margin, share)
             events["ContactShare"].end()
-            share.wants_to_stop = stop
+            share.put_stop(stop)
+            events["ContactReduce"].begin()
             merged = exchange.to_root()
+            events["ContactReduce"].end()
             answer = None
             if merged is not None:
+                events["ContactInner"].begin()
                 answer = self._answer(time, merged, heads)
+                events["ContactInner"].end()
+            events["ContactReply"].begin()
             reply = exchange.from_root(answer)
+            events["ContactReply"].end()
             if reply.verdict == Verdict.BROKEN:
                 raise self._broken(time)
             if reply.verdict == Verdict.ENLARGE:
@@ -163,11 +169,12 @@ class OneSolve:
         self._found = None
         if heads is None:
             return Reply(Verdict.BROKEN, self._none)
-        if response.is_broken:
+        _, wants_to_stop, is_broken, missing_room = response.flags
+        if is_broken:
             self._why = NOT_FINITE
             return Reply(Verdict.BROKEN, self._none)
-        if response.missing_room:
-            return Reply(Verdict.ENLARGE, self._none, room=response.missing_room)
+        if missing_room:
+            return Reply(Verdict.ENLARGE, self._none, room=int(missing_room))
         law = self.coupling.law
         try:
             found = self.coupling.solve(response, heads)
@@ -181,7 +188,7 @@ class OneSolve:
         self._found = found
         self.counters.rounds += found.rounds
         self.counters.pivoted_steps += found.pivoted
-        verdict = Verdict.ADVANCE_AND_STOP if response.wants_to_stop else Verdict.ADVANCE
+        verdict = Verdict.ADVANCE_AND_STOP if wants_to_stop else Verdict.ADVANCE
         slack = found.compensation
         if not slack.size:
             return Reply(verdict, found.contact_force)

@@ -43,32 +43,23 @@ class LineResponse:
         return int(self._flags[0])
 
     @property
-    def missing_room(self) -> int:
-        """How many rows would have been needed, if there was no room for them; else 0."""
-        return int(self._flags[3])
+    def flags(self) -> tuple[float, float, float, float]:
+        """The number of droppers with a row, whether a rank wants this step to be the last, whether
+        one holds something that is no number, and for how many droppers one had no room."""
+        count, stop, broken, missing = self._flags.tolist()
+        return count, stop, broken, missing
 
     def put_count(self, count: int) -> None:
-        """Say how many droppers may slacken; beyond ``capacity`` they have no row."""
-        self._flags[0] = min(count, self.capacity)
-        self._flags[3] = count if count > self.capacity else 0
+        """Say how many droppers may slacken, -1 if something is no number here.
 
-    @property
-    def wants_to_stop(self) -> bool:
-        """Whether a rank wants this step to be the last."""
-        return bool(self._flags[1])
+        Beyond ``capacity`` they have no row.
+        """
+        missing = count if count > self.capacity else 0
+        self._flags[0], self._flags[2:] = min(max(count, 0), self.capacity), (count < 0, missing)
 
-    @wants_to_stop.setter
-    def wants_to_stop(self, stop: bool) -> None:
+    def put_stop(self, stop: bool) -> None:
+        """Say whether this rank wants this step to be the last."""
         self._flags[1] = stop
-
-    @property
-    def is_broken(self) -> bool:
-        """Whether a rank holds something that is no number."""
-        return bool(self._flags[2])
-
-    @is_broken.setter
-    def is_broken(self, broken: bool) -> None:
-        self._flags[2] = broken
 
     @property
     def droppers(self) -> np.ndarray:

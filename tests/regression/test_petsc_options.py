@@ -9,6 +9,7 @@ import pytest
 from program import MPIRUN, assert_sound, catenary, short_run
 
 from catenary.postproc.results import Results
+from catenary.solver.events import NAMES
 
 STAGES = ["mesh", "equilibrium", "distribute", "march", "report"]
 
@@ -47,6 +48,9 @@ def test_views_show_stepper_solver_and_stages(tmp_path: Path) -> None:
     found = [line.rsplit(": ", 1)[1] for line in log]
     # Twice: a table of times and one of memory.
     assert [name for name in found if name in STAGES] == [*STAGES, *STAGES]
+    # Events that were never begun are not listed.
+    listed = {line.split()[0] for line in text.splitlines() if line.strip()}
+    assert set(NAMES) <= listed
 
 
 @pytest.mark.parametrize(
