@@ -83,6 +83,13 @@ def _kinematic(scene: Scene) -> None:
                 value,
                 f"contact.law kinematic has no force before the motion is known: take {needed}",
             )
+    if numerics.adaptive_tolerance_N is not None:
+        refuse(
+            scene.origin,
+            "numerics.adaptive_tolerance_N",
+            numerics.adaptive_tolerance_N,
+            "contact.law kinematic has no stiffness to estimate an error with: take another law",
+        )
     if scene.train.start_below_m:
         refuse(
             scene.origin,

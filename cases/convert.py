@@ -94,6 +94,8 @@ def problem_of(scene: Scene) -> Problem:
             integrator=numerics.integrator,
             spectral_radius=1.0 if numerics.spectral_radius is None else numerics.spectral_radius,
             iterations=numerics.iterations,
+            adaptive_tolerance=numerics.adaptive_tolerance_N,
+            smallest_dt=numerics.smallest_dt_s,
         ),
         evaluation=(scene.evaluation.from_m, scene.evaluation.to_m),
         residual_stiffness_ratio=ratio,

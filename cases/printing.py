@@ -111,6 +111,7 @@ def summary_text(summary: Mapping[str, Any], folder: Path) -> str:
         f"{droppers['n_slackened']} droppers slackened",
         f"  {summary['n_steps']} steps, {summary['n_dofs']} unknowns, {summary['n_ranks']} ranks, "
         f"real-time factor {_number(summary['real_time_factor'], 2)}",
+        *_sizes_of_steps(summary.get("inner_iterations", {})),
         "",
     ]
     words = {True: "passed", False: "FAILED", None: "not judged"}
@@ -123,6 +124,22 @@ def summary_text(summary: Mapping[str, Any], folder: Path) -> str:
     lines += ["", *(f"  WARNING     {text}" for text in warnings)]
     lines += [""] * bool(warnings) + [f"Results: {folder}"]
     return "\n".join(lines)
+
+
+def _sizes_of_steps(counted: Mapping[str, Any]) -> list[str]:
+    """How many steps of which size were taken, where steps adapt."""
+    if "rejected_steps" not in counted:
+        return []
+    sizes = [
+        f"{count} of {name.removeprefix('steps_of_').replace('_', ' ')}"
+        for name, count in counted.items()
+        if name.startswith("steps_of_") and count
+    ]
+    again = counted["rejected_steps"] + counted["failed_steps"]
+    return [
+        f"  adaptive steps: {', '.join(sizes)}; {again} repeated, "
+        f"{counted['failed_steps']} of them without a solution"
+    ]
 
 
 def _number(value: float | None, digits: int = 1) -> str:

@@ -24,6 +24,8 @@ from catenary.solver.integration import (
 
 # Statistics are taken below 20 Hz (EN 50317); its Nyquist limit is the longest step that can do so.
 MAX_DT = 1.0 / 40.0
+# Each halving has matrices and columns of its own.
+MOST_DIVIDED = 4096
 
 
 class CaseTable(Table):
@@ -125,6 +127,20 @@ class NumericsTable(Table):
         "reached; until changes are below eps_d_m and eps_v_m_per_s if absent",
     )
 
+    adaptive_tolerance_N: float | None = Field(
+        None,
+        gt=0,
+        le=1e6,
+        description="error of a contact force accepted in one step: steps with a larger one, or "
+        "without a solution, are halved, while the record keeps dt_s; none are halved if absent",
+    )
+    smallest_dt_s: float | None = Field(
+        None,
+        ge=1e-7,
+        description="adaptive_tolerance_N: step below which none is halved; a 32nd of dt_s if "
+        "absent",
+    )
+
     @field_validator("dt_s")
     @classmethod
     def _resolves_20_hz(cls, dt: float) -> float:
@@ -153,6 +169,28 @@ class NumericsTable(Table):
             raise ValueError(
                 "must have 2 newmark_beta >= newmark_gamma to be stable for every step, but "
                 f"newmark_beta is {self.newmark_beta:g} and newmark_gamma is {self.newmark_gamma:g}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _can_halve(self) -> NumericsTable:
+        smallest = self.smallest_dt_s
+        if self.adaptive_tolerance_N is None:
+            if smallest is not None:
+                raise ValueError(
+                    "must not give smallest_dt_s without adaptive_tolerance_N, which halves steps"
+                    + TAKE_AWAY
+                )
+            return self
+        if self.scheme == "ts_alpha2":
+            raise ValueError(
+                "must not give adaptive_tolerance_N with scheme ts_alpha2, in which PETSc keeps a "
+                "part of the state to itself, so that no step can be repeated" + TAKE_AWAY
+            )
+        if smallest is not None and not self.dt_s / MOST_DIVIDED <= smallest <= 0.5 * self.dt_s:
+            raise ValueError(
+                f"must have smallest_dt_s from dt_s / {MOST_DIVIDED} to dt_s / 2, which is from "
+                f"{self.dt_s / MOST_DIVIDED:g} to {0.5 * self.dt_s:g} s, not {smallest:g}"
             )
         return self
 

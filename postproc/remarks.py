@@ -6,6 +6,7 @@ import math
 from typing import Any, NamedTuple
 
 from catenary.postproc.results import Results
+from catenary.solver.problem import n_halvings
 
 # Statistics are taken below 20 Hz; a resonance below twice that still shows in them.
 _FELT_HZ = 40.0
@@ -40,6 +41,7 @@ def remarks(results: Results) -> list[str]:
         *_about_contact(results, config),
         *_about_droppers(config),
         *_about_iterations(results, config),
+        *_about_sizes(results, config),
     ]
 
 
@@ -53,6 +55,20 @@ def _about_iterations(results: Results, config: dict[str, Any]) -> list[str]:
         f"{above} of {counted['steps']} steps ended above the tolerances of the fixed-point "
         f"correction, because numerics.iterations = {fixed} ends each: their forces and motions do "
         "not belong together. Take more, or leave the key out."
+    ]
+
+
+def _about_sizes(results: Results, config: dict[str, Any]) -> list[str]:
+    """That steps could not be made as short as their estimated error asks for."""
+    numerics = config["numerics"]
+    counted = results.attributes.get("inner_iterations", {})
+    above = counted.get("steps_above_tolerance", 0)
+    if not above:
+        return []
+    return [
+        f"{above} of {counted['steps']} steps were taken with an estimated error of the contact "
+        f"force above numerics.adaptive_tolerance_N = {numerics['adaptive_tolerance_N']:g}, being "
+        "the shortest: take a smaller numerics.smallest_dt_s, or a larger tolerance."
     ]
 
 
@@ -101,10 +117,18 @@ def _about_contact(results: Results, config: dict[str, Any]) -> list[str]:
             head = _Contact(
                 facts["touching_mass_kg"],
                 _stiffness(contact, facts["static_force_N"]),
-                config["numerics"]["dt_s"],
+                _step(config["numerics"]),
             )
             found |= dict.fromkeys(_about_head(head))
     return list(found)
+
+
+def _step(numerics: dict[str, Any]) -> float:
+    """The shortest step that a run may take [s]."""
+    if not numerics.get("adaptive_tolerance_N"):
+        return float(numerics["dt_s"])
+    dt: float = numerics["dt_s"]
+    return dt / 2 ** n_halvings(dt, numerics.get("smallest_dt_s"))
 
 
 def _stiffness(contact: dict[str, Any], static_force: float) -> float:

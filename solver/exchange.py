@@ -17,7 +17,7 @@ from catenary.solver.response import LineResponse
 
 _FIRST_CAPACITY = 32
 # Numbers before the forces in a reply, and the tag of rows.
-_HEAD, _ROWS = 3, 7
+_HEAD, _ROWS = 4, 7
 _NO_NUMBERS, _NO_FORCES = np.zeros(0, dtype=np.int64), np.zeros(0)
 
 
@@ -29,12 +29,14 @@ class Verdict(IntEnum):
     REPEAT = 2
     ENLARGE = 3
     BROKEN = 4
+    REJECT = 5
 
 
 class Reply(NamedTuple):
     """Rank 0's answer: verdict, contact forces (n,) [N], slack droppers and compensations [N].
 
-    ``room`` is how many droppers a rank needs room for, with the verdict ``ENLARGE``.
+    ``room`` is how many droppers a rank needs room for, with the verdict ``ENLARGE``; ``level`` is
+    that of the next step, where steps adapt.
     """
 
     verdict: Verdict
@@ -42,6 +44,7 @@ class Reply(NamedTuple):
     droppers: np.ndarray = _NO_NUMBERS
     compensation: np.ndarray = _NO_FORCES
     room: int = 0
+    level: int = 0
 
 
 class Exchange:
@@ -98,7 +101,7 @@ class Exchange:
         room = (answer.size - _HEAD - n) // 2
         if reply is not None:
             count = reply.droppers.size
-            answer[:_HEAD] = reply.verdict, count, reply.room
+            answer[:_HEAD] = reply.verdict, count, reply.room, reply.level
             answer[_HEAD : _HEAD + n] = reply.contact_force
             if count <= room:
                 answer[_HEAD + n : _HEAD + n + count] = reply.droppers
@@ -120,6 +123,7 @@ class Exchange:
             pairs[:count].astype(np.int64),
             pairs[count : 2 * count].copy(),
             int(answer[2]),
+            int(answer[3]),
         )
 
     def _count(self, n_bytes: int) -> None:

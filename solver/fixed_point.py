@@ -17,7 +17,7 @@ from catenary.solver.law_in_steps import LawInSteps
 from catenary.solver.pantographs import Pantographs
 from catenary.solver.parallel import on_root
 from catenary.solver.problem import Numerics
-from catenary.solver.schemes import Counters, LoadSource
+from catenary.solver.schemes import Counters, Judge, LoadSource, StepRejected
 
 
 @dataclass
@@ -38,6 +38,7 @@ class FixedPoint:
     may_slacken: bool
     loads: LoadSource
     counters: Counters = field(default_factory=Counters)
+    judge: Judge | None = None
 
     def __post_init__(self) -> None:
         n = self.interaction.line.ownership.n_local
@@ -80,6 +81,8 @@ class FixedPoint:
                 raise self._broken("does not converge", time)
         if fixed is not None and not (np.abs(force) < DIVERGED).all():
             raise self._broken("diverges", time)
+        if self.judge is not None:
+            self._ask(self.judge, time, depth, force)
         self.counters.steps += 1
         self.counters.solves = self.counters.rounds
         self._force = force
@@ -88,6 +91,14 @@ class FixedPoint:
         moved = self.pantographs
         on_root(self.comm, lambda: moved.advance(force, self.law.reported(force), depth))
         return not stop
+
+    def _ask(self, judge: Judge, time: float, depth: np.ndarray, force: np.ndarray) -> None:
+        """Raise StepRejected on all ranks if the step is not to be taken. Collective."""
+        stiffness = self.law.tangents[2]
+        decision = on_root(self.comm, lambda: judge.look(time, depth, force, stiffness))
+        judge.hear(decision.level)
+        if not decision.accepted:
+            raise StepRejected
 
     def state(self) -> np.ndarray:
         """The latest forces, and what the law remembers, as one array."""

@@ -13,7 +13,7 @@ import gc
 import math
 import time as clock
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import Any
 
@@ -28,28 +28,21 @@ from catenary.solver.changed_line import (
     unchanged,
 )
 from catenary.solver.contact import ContactWire
-from catenary.solver.contact_laws import KinematicLaw
-from catenary.solver.coupling import make_coupling
 from catenary.solver.distribution import distribute
 from catenary.solver.equilibrium import Elasticity, Equilibrium
 from catenary.solver.errors import CatenaryError, InputError, RunBroken
 from catenary.solver.events import event
-from catenary.solver.fixed_point import FixedPoint
 from catenary.solver.incidents import DropperBreak, Happened, in_steps
-from catenary.solver.interaction import Interaction
-from catenary.solver.law_in_steps import law_in_steps
-from catenary.solver.line_integrators import make_line
 from catenary.solver.linear import PREFIX, refused_options
 from catenary.solver.model import Model
 from catenary.solver.observation import Observer, Stage
-from catenary.solver.one_solve import OneSolve
 from catenary.solver.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.problem import Problem
-from catenary.solver.schemes import LoadSource, Scheme
+from catenary.solver.schemes import Scheme
+from catenary.solver.set_up import Parts, SetUp, kept_ratio
 from catenary.solver.showing import Showing
+from catenary.solver.step_levels import StepLevels
 from catenary.solver.stepper import Stepper
-from catenary.solver.ts_alpha2 import TSAlpha2
-from catenary.solver.whole_system import WholeSystem
 
 
 @dataclass
@@ -102,8 +95,9 @@ class March:
         self._form = form
         self.ownership = distribute(model, comm.size, comm.rank)
         self._nominal_height = nominal_height_rule(model, form, elasticity)
-        wire = ContactWire(model, form, self.ownership)
-        self._pantographs = Pantographs(comm, problem, wire, self._nominal_height)
+        self._wire = ContactWire(model, form, self.ownership)
+        self._pantographs = Pantographs(comm, problem, self._wire, self._nominal_height)
+        self._set_ups = SetUp(comm, form, self.ownership, self._nominal_height)
         self._show_event = event("Show")
         self._set_up(unchanged(model))
         self._first_step = 0
@@ -111,42 +105,32 @@ class March:
 
     def _set_up(self, changed: ChangedLine) -> None:
         """Make all that steps a line and shows it, from a line that is at rest. Collective."""
-        comm, problem, model = self._comm, self._problem, changed.model
-        train = problem.train
-        self._changed, self._model = changed, model
-        self._line = make_line(comm, model, self.ownership, problem.numerics, changed.load)
-        on = model.terms_of
-        trailing = max(placement.behind for placement in train.placements)
-        offsets = [x for placement in train.placements for x in placement.data.strip_offsets]
-        reach = (max(0.0, -min(offsets)), max(0.0, max(offsets)))
-        # A kinematic contact ends depths through their rates.
-        uses_rate = "contact_damping" in on or isinstance(problem.contact, KinematicLaw)
-        self._interaction = Interaction(
-            comm,
-            model,
-            self._form,
-            self._line,
-            (train.start - trailing - reach[0], train.end + reach[1]),
-            sum(len(placement.data.strip_offsets) for placement in train.placements),
-            train.speed,
-            uses_rate,
-            "dropper_slackening" in on,
-        )
-        scheme_of: dict[str, Callable[[], Scheme]] = {
-            "one_solve": self._one_solve,
-            "fixed_point": self._fixed_point,
-            "ts_alpha2": self._ts_alpha2,
-        }
-        self._scheme = scheme_of[problem.numerics.scheme]()
+        self._changed = changed
+        parts = self._set_ups.make(self._problem, changed, self._pantographs)
+        self._line, self._scheme = parts.line, parts.scheme
+        if self._problem.numerics.adaptive_tolerance is not None:
+            self._scheme = self._in_levels(changed, parts)
         self._showing = Showing(
-            comm,
+            self._comm,
             changed,
             self._form,
-            self._interaction,
+            parts.interaction,
             self._pantographs,
             self._scheme,
-            self._kept_ratio,
+            kept_ratio(self._problem, changed.model),
         )
+
+    def _in_levels(self, changed: ChangedLine, whole: Parts) -> Scheme:
+        """The scheme of ``whole`` steps, with shorter ones where they are needed. Collective."""
+        problem = self._problem
+
+        def finer(level: int) -> Parts:
+            numerics = replace(problem.numerics, dt=problem.numerics.dt / 2**level)
+            finer_problem = replace(problem, numerics=numerics)
+            pantographs = Pantographs(self._comm, finer_problem, self._wire, self._nominal_height)
+            return self._set_ups.make(finer_problem, changed, pantographs)
+
+        return StepLevels(self._comm, problem.numerics, whole, finer)
 
     def _happening(self) -> list[Happened]:
         """What happens to the line, as far as it is simulated, in order of time."""
@@ -164,7 +148,8 @@ class March:
         after = changed_line(self._first, self._form, happened.incidents)
         moving = line.displacement, line.velocity
         slackens = "dropper_slackening" in self._first.terms_of
-        pushed_share = self._kept_ratio if slackens else 1.0
+        kept = kept_ratio(self._problem, self._changed.model)
+        pushed_share = kept if slackens else 1.0
         jump = acceleration_jump(
             self._comm, self.ownership, before, after, self._form, moving, pushed_share
         )
@@ -323,58 +308,6 @@ class March:
                 self._show_event.end()
 
         return show
-
-    def _one_solve(self) -> Scheme:
-        slack = self._interaction.slack_coupling
-        band = np.zeros((0, 1)) if slack is None or slack.band is None else slack.band
-        law = law_in_steps(self._problem, self._pantographs.n_contacts)
-        coupling = make_coupling(law, self._kept_ratio, band, self._problem.numerics)
-        return OneSolve(self._comm, self._interaction, self._pantographs, coupling, self._loads())
-
-    def _fixed_point(self) -> Scheme:
-        return FixedPoint(
-            self._comm,
-            self._interaction,
-            self._pantographs,
-            self._problem.numerics,
-            law_in_steps(self._problem, self._pantographs.n_contacts),
-            self._kept_ratio,
-            "dropper_slackening" in self._model.terms_of,
-            self._loads(),
-        )
-
-    def _ts_alpha2(self) -> Scheme:
-        slackens = "dropper_slackening" in self._model.terms_of
-        system = WholeSystem(
-            self._problem,
-            self._model,
-            self._form,
-            self._kept_ratio if slackens else 1.0,
-            self._nominal_height,
-            self._loads(),
-        )
-        return TSAlpha2(
-            self._comm, self._interaction, self._pantographs, system, self._problem.numerics
-        )
-
-    def _loads(self) -> LoadSource:
-        """This rank's part of the loads that change with time; without any, no calls are made."""
-        free = ~np.isin(np.arange(self._model.n_dofs), self._model.constrained)
-        parts = []
-        for load in self._model.step_loads:
-            mine = self.ownership.owned(load.dofs) & free[load.dofs]
-            if mine.any():
-                parts.append((load, mine, load.dofs[mine] - self.ownership.first))
-        if not self._model.step_loads:
-            return lambda time: None
-        return lambda time: [(dofs, load.values(time)[mine]) for load, mine, dofs in parts]
-
-    @property
-    def _kept_ratio(self) -> float:
-        """Share of its stiffness that a slack dropper keeps."""
-        if "residual_dropper_stiffness" not in self._model.terms_of:
-            return 0.0
-        return self._problem.residual_stiffness_ratio
 
     def _make_ts(
         self,

@@ -19,7 +19,7 @@ from catenary.solver.interaction import Interaction
 from catenary.solver.pantographs import Pantographs
 from catenary.solver.parallel import on_root
 from catenary.solver.response import LineResponse
-from catenary.solver.schemes import Counters, LoadSource
+from catenary.solver.schemes import Counters, Judge, LoadSource, StepRejected
 
 # First guesses of what droppers elsewhere may lose [N] and of contact forces [N]; both grow when
 # a step shows that they were too small, and that step is repeated.
@@ -32,7 +32,7 @@ class OneSolve:
     """One solve for the free response, then the exact small problem of contacts and slack droppers.
 
     The columns of A^-1 that the forces act through are tabulated, so that superposition needs no
-    second solve.
+    second solve. Steps are taken as they come, unless a ``judge`` is put in.
     """
 
     comm: Any
@@ -41,6 +41,7 @@ class OneSolve:
     coupling: Coupling
     loads: LoadSource
     counters: Counters = field(default_factory=Counters)
+    judge: Judge | None = None
 
     def __post_init__(self) -> None:
         n = self.pantographs.n_contacts
@@ -71,6 +72,10 @@ class OneSolve:
         interaction.place(touches)
         events["LineColumns"].end()
         reply = self._solve_inner(time, stop, touches)
+        if self.judge is not None:
+            self.judge.hear(reply.level)
+            if reply.verdict == Verdict.REJECT:
+                raise StepRejected
         events["LineSuperpose"].begin()
         interaction.superpose(reply.contact_force, reply.droppers, reply.compensation)
         events["LineSuperpose"].end()
@@ -175,11 +180,16 @@ class OneSolve:
             return Reply(Verdict.BROKEN, self._none)
         if missing_room:
             return Reply(Verdict.ENLARGE, self._none, room=int(missing_room))
-        law = self.coupling.law
+        law, level = self.coupling.law, 0
         try:
             found = self.coupling.solve(response, heads)
             if self._left_out(response, found):
                 return Reply(Verdict.REPEAT, self._none)
+            if self.judge is not None:
+                stiffness = law.tangents[2]
+                accepted, level = self.judge.look(time, found.depth, found.contact_force, stiffness)
+                if not accepted:
+                    return Reply(Verdict.REJECT, self._none, level=level)
             law.accept(time, found.depth, found.rate, found.contact_force)
         except RunBroken as error:
             self._why = str(error)
@@ -191,10 +201,11 @@ class OneSolve:
         verdict = Verdict.ADVANCE_AND_STOP if wants_to_stop else Verdict.ADVANCE
         slack = found.compensation
         if not slack.size:
-            return Reply(verdict, found.contact_force)
+            return Reply(verdict, found.contact_force, level=level)
         pushed = slack != 0.0
         self.counters.slack_dropper_steps += int(pushed.sum())
-        return Reply(verdict, found.contact_force, response.droppers[pushed], slack[pushed])
+        droppers = response.droppers[pushed]
+        return Reply(verdict, found.contact_force, droppers, slack[pushed], level=level)
 
     def _left_out(self, response: LineResponse, found: InnerSolution) -> bool:
         """Whether a dropper without a row may have gone slack: margin or bound were too small."""

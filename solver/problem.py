@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -12,6 +13,9 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.contact_laws import ContactLaw
 from catenary.solver.incidents import LineIncident, TensionLoss
+
+# Halvings of a step where the scene names no smallest one.
+DEFAULT_HALVINGS = 5
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,9 @@ class Numerics:
     ``coupling`` of ``one_solve`` is ``implicit``, ``iterated`` (until contact forces change by
     less than ``eps_force`` [N], at most ``max_iterations`` times) or ``explicit``. ``iterations``
     of ``fixed_point`` are done in every step whatever they reach; None iterates until it agrees.
+
+    ``adaptive_tolerance`` [N] is the error of a contact force accepted in one step: steps are
+    halved where they need it, down to ``smallest_dt`` [s]. None leaves all steps as they are.
     """
 
     dt: float
@@ -89,6 +96,8 @@ class Numerics:
     integrator: str = "newmark"
     spectral_radius: float = 1.0
     iterations: int | None = None
+    adaptive_tolerance: float | None = None
+    smallest_dt: float | None = None
 
 
 @dataclass(frozen=True)
@@ -110,6 +119,13 @@ class Problem:
     effects: frozenset[str]
     gravity: float = 9.81
     incidents: tuple[LineIncident, ...] = ()
+
+
+def n_halvings(dt: float, smallest: float | None) -> int:
+    """How often a step of ``dt`` may be halved if it is to be no shorter than ``smallest`` [s]."""
+    if smallest is None:
+        return DEFAULT_HALVINGS
+    return math.floor(math.log2(dt / smallest) + 1e-9)
 
 
 def slowest_wave_speed(problem: Problem) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -34,6 +34,30 @@ class Counters:
     def as_dict(self) -> dict[str, int]:
         """Names and counts, for the result file."""
         return dict(self.__dict__)
+
+
+class Decision(NamedTuple):
+    """Whether a step is taken, and the level of the next, or of its repetition."""
+
+    accepted: bool
+    level: int
+
+
+class Judge(Protocol):
+    """Decides on steps whose forces are found, where steps adapt (`step_levels`)."""
+
+    def look(
+        self, time: float, depth: np.ndarray, force: np.ndarray, stiffness: np.ndarray
+    ) -> Decision:
+        """Decide on a step to ``time`` [s] with depths [m], forces [N] and stiffnesses [N/m] at its
+        contacts (n,). Rank 0 only."""
+
+    def hear(self, level: int) -> None:
+        """Learn the level of what was decided. All ranks."""
+
+
+class StepRejected(Exception):
+    """The judge wants the step repeated: nothing but the line has moved. On all ranks."""
 
 
 class Scheme(Protocol):
