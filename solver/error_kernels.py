@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from catenary.solver.kernels import compiled
 
 
 @compiled
-def largest(time, depth, force, stiffness, times, depths, touched):
+def largest(time, depth, force, stiffness, compliance, times, depths, forces):
     """Largest error of a force; arguments as those of ``StepError.of`` and its own arrays."""
     largest = 0.0
     for i in range(depth.size):
-        if touched[i] or force[i] > 0.0:
+        touched = forces[i] > 0.0
+        if touched or force[i] > 0.0:
             first = (depth[i] - depths[2, i]) / (time - times[2])
             second = (depths[2, i] - depths[1, i]) / (times[2] - times[1])
             third = (depths[1, i] - depths[0, i]) / (times[1] - times[0])
@@ -18,11 +21,14 @@ def largest(time, depth, force, stiffness, times, depths, touched):
             change -= (second - third) / (times[2] - times[0])
             missed = (time - times[2]) ** 2 / 6.0 * abs(change)
             largest = max(largest, stiffness[i] * missed)
+        if touched != (force[i] > 0.0):
+            turned = np.sqrt(stiffness[i] * compliance[i])
+            largest = max(largest, turned * max(forces[i], force[i]))
     return largest
 
 
 @compiled
-def remember(time, depth, force, times, depths, touched):
+def remember(time, depth, force, times, depths, forces):
     """Put a step behind those of the past, of which the oldest is forgotten."""
     for row in range(times.size - 1):
         times[row] = times[row + 1]
@@ -30,4 +36,4 @@ def remember(time, depth, force, times, depths, touched):
     times[-1] = time
     depths[-1] = depth
     for i in range(depth.size):
-        touched[i] = force[i] > 0.0
+        forces[i] = force[i]

@@ -82,7 +82,7 @@ class FixedPoint:
         if fixed is not None and not (np.abs(force) < DIVERGED).all():
             raise self._broken("diverges", time)
         if self.judge is not None:
-            self._ask(self.judge, time, depth, force)
+            self._ask(self.judge, time, depth, force, heads)
         self.counters.steps += 1
         self.counters.solves = self.counters.rounds
         self._force = force
@@ -92,10 +92,14 @@ class FixedPoint:
         on_root(self.comm, lambda: moved.advance(force, self.law.reported(force), depth))
         return not stop
 
-    def _ask(self, judge: Judge, time: float, depth: np.ndarray, force: np.ndarray) -> None:
+    def _ask(
+        self, judge: Judge, time: float, depth: np.ndarray, force: np.ndarray, heads: Heads
+    ) -> None:
         """Raise StepRejected on all ranks if the step is not to be taken. Collective."""
         stiffness = self.law.tangents[2]
-        decision = on_root(self.comm, lambda: judge.look(time, depth, force, stiffness))
+        # Of the line's compliance this scheme knows nothing.
+        yielding = heads.height_compliance.diagonal()
+        decision = on_root(self.comm, lambda: judge.look(time, depth, force, stiffness, yielding))
         judge.hear(decision.level)
         if not decision.accepted:
             raise StepRejected

@@ -186,8 +186,10 @@ class OneSolve:
             if self._left_out(response, found):
                 return Reply(Verdict.REPEAT, self._none)
             if self.judge is not None:
-                stiffness = law.tangents[2]
-                accepted, level = self.judge.look(time, found.depth, found.contact_force, stiffness)
+                yielding = heads.height_compliance.diagonal() + response.height_by_force.diagonal()
+                accepted, level = self.judge.look(
+                    time, found.depth, found.contact_force, law.tangents[2], yielding
+                )
                 if not accepted:
                     return Reply(Verdict.REJECT, self._none, level=level)
             law.accept(time, found.depth, found.rate, found.contact_force)

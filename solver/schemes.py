@@ -47,10 +47,18 @@ class Judge(Protocol):
     """Decides on steps whose forces are found, where steps adapt (`step_levels`)."""
 
     def look(
-        self, time: float, depth: np.ndarray, force: np.ndarray, stiffness: np.ndarray
+        self,
+        time: float,
+        depth: np.ndarray,
+        force: np.ndarray,
+        stiffness: np.ndarray,
+        compliance: np.ndarray,
     ) -> Decision:
-        """Decide on a step to ``time`` [s] with depths [m], forces [N] and stiffnesses [N/m] at its
-        contacts (n,). Rank 0 only."""
+        """Decide on a step to ``time`` [s]. Rank 0 only.
+
+        At its contacts (n,) it has found depths [m], forces [N], stiffnesses [N/m] of the law's
+        tangent, and ``compliance`` is what a force takes off the depth within the step [m/N].
+        """
 
     def hear(self, level: int) -> None:
         """Learn the level of what was decided. All ranks."""

@@ -125,11 +125,16 @@ class StepLevels:
         return goes_on
 
     def look(
-        self, time: float, depth: np.ndarray, force: np.ndarray, stiffness: np.ndarray
+        self,
+        time: float,
+        depth: np.ndarray,
+        force: np.ndarray,
+        stiffness: np.ndarray,
+        compliance: np.ndarray,
     ) -> Decision:
         """Decide on a step. Rank 0 only; see `schemes.Judge`."""
         level, size = self._tried, self._dt / 2**self._tried
-        error = self._error.of(time, depth, force, stiffness)
+        error = self._error.of(time, depth, force, stiffness, compliance)
         decision = Decision(True, level)
         if error is not None:
             assert self._control is not None  # on rank 0

@@ -140,6 +140,20 @@ def test_methods_with_numerical_damping_in_parallel(
     assert max(found.values()) < TOLERANCE
 
 
+@pytest.mark.parametrize("scheme", ["one_solve", "fixed_point"])
+def test_steps_that_adapt_do_so_on_all_ranks(case: tuple[Problem, LineMesh], scheme: str) -> None:
+    """Decisions are rank 0's. A size that round-off decides would show as an error of the order of
+    the tolerance, far above what is allowed."""
+    problem, mesh = case
+    numerics = replace(
+        problem.numerics, scheme=scheme, eps_d=1e-13, eps_v=1e-10,
+        adaptive_tolerance=0.02, smallest_dt=2.5e-4,
+    )  # fmt: skip
+    train = replace(problem.train, end=problem.train.start + 40.0)
+    found = largest_difference(replace(problem, numerics=numerics, train=train), mesh)
+    assert max(found.values()) < TOLERANCE
+
+
 @pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="one rank is what the scheme asks for")
 def test_a_scheme_for_one_rank_is_refused_on_all(case: tuple[Problem, LineMesh]) -> None:
     problem, mesh = case

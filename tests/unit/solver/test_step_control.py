@@ -1,0 +1,125 @@
+"""PETSc's controller of step sizes, and the estimate that it is given."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from measuring import check
+from petsc4py import PETSc
+
+from catenary.solver.errors import InputError
+from catenary.solver.problem import n_halvings
+from catenary.solver.step_control import StepControl
+from catenary.solver.step_error import StepError
+
+
+@pytest.fixture
+def option():
+    """Sets an option under -march_ until the test ends."""
+    options, given = PETSc.Options("march_"), []
+
+    def put(name: str, value: object) -> None:
+        options.setValue(name, value)
+        given.append(name)
+
+    yield put
+    for name in given:
+        options.delValue(name)
+
+
+def test_the_next_size_is_that_of_petscs_basic_controller() -> None:
+    """PETSc manual, TSADAPTBASIC: h 0.9 e^(-1/3), within a tenth and ten times h."""
+    control = StepControl(0.5, 1e-3, 1e-5)
+    for error in (0.1, 0.4, 0.6, 4.0):
+        accepted, size = control.choose(error, 1.0, 1e-4)
+        assert accepted == (error <= 0.5)
+        check(
+            f"next size after {error} N [s]", size, 0.9e-4 * (error / 0.5) ** (-1 / 3), within=1e-12
+        )
+        control.choose(0.1, 1.0, 1e-4)  # a step that is taken: PETSc is stricter after a rejection
+    assert control.choose(0.0, 1.0, 1e-3).size == 1e-3
+    assert control.choose(1e9, 1.0, 1e-5) == (True, 1e-5)  # the smallest is taken whatever happens
+    check("size after a failure [s]", control.after_failure(1.0, 8e-4), 2e-4, within=1e-16)
+    control.destroy()
+
+
+def test_petscs_options_reach_it(option) -> None:
+    option("ts_adapt_safety", 0.5)
+    option("ts_adapt_scale_solve_failed", 0.125)
+    control = StepControl(1.0, 1e-3, 1e-5)
+    check("next size [s]", control.choose(1.0, 1.0, 1e-4).size, 0.5e-4, within=1e-16)
+    check("size after a failure [s]", control.after_failure(1.0, 8e-4), 1e-4, within=1e-16)
+    control.destroy()
+
+
+@pytest.mark.parametrize("name", ["ts_atol", "ts_rtol", "ts_adapt_dt_min", "ts_adapt_dt_max"])
+def test_options_that_the_scene_says_are_refused(name: str, option) -> None:
+    option(name, 2e-4)
+    with pytest.raises(InputError, match=f"-march_{name} is 0.0002; the scene says it"):
+        StepControl(1.0, 1e-3, 1e-5)
+
+
+def test_the_estimate_is_what_average_acceleration_misses() -> None:
+    """One step of x" = -w^2 x from an exact state against its exact end.
+
+    The step misses h^3 / 12 times the third derivative in its middle. The estimate takes it h
+    earlier, from an exact past and an end that is wrong by what is missed, which is 1 / 12 of the
+    third difference: w h and 1 / 12 are how far both may differ.
+    """
+    omega, k, one = 30.0, np.array([1e5]), np.ones(1)
+    for h in (2e-3, 1e-3):
+        for phase in (0.3, 1.1, 2.0):
+            estimate = StepError(1)
+            for back in (2, 1, 0):
+                estimate.accept(1.0 - back * h, one * np.cos(phase - omega * h * back), one)
+            x, v, a = np.cos(phase), -omega * np.sin(phase), -(omega**2) * np.cos(phase)
+            ahead = x + h * v + h**2 / 4 * a
+            new_a = -(omega**2) * ahead / (1 + (omega * h) ** 2 / 4)
+            found = one * (ahead + h**2 / 4 * new_a)
+            missed = k[0] * abs(found[0] - np.cos(phase + omega * h))
+            told = estimate.of(1.0 + h, found, one, k, 1e-9 * one)
+            scale = k[0] * (omega * h) ** 3 / 12
+            check("error of the step [N]", told, missed, within=(1.5 * omega * h + 1 / 12) * scale)
+
+
+def test_a_landing_within_a_step_is_told() -> None:
+    """A mass that hits a spring amid a step of average acceleration: by energy, it is pressed back
+    with v sqrt(k m) at most. The estimate bounds what the step makes of that, for h -> 0."""
+    mass, k, v, one = 2.0, 8e4, 0.3, np.ones(1)
+    omega = np.sqrt(k / mass)
+    for h in (5e-4, 2.5e-4):
+        compliance = one * h**2 / (4 * mass)
+        for share in (0.25, 0.5, 0.75):
+            estimate = StepError(1)
+            for number in (0, 1, 2):
+                estimate.accept(h * number, one * v * h * (number - 2 - share), 0 * one)
+            ahead = v * h * (1 - share)
+            acceleration = -k * ahead / mass / (1 + k * compliance[0])
+            depth, speed = ahead + h**2 / 4 * acceleration, v + h / 2 * acceleration
+            told = estimate.of(3 * h, one * depth, one * k * depth, one * k, compliance)
+            missed = abs(np.hypot(speed * np.sqrt(k * mass), k * depth) - v * np.sqrt(k * mass))
+            print(f"h {h:g} share {share}: told {told:.3g} N, wrong by {missed:.3g} N")
+            assert missed <= told * (1 + omega * h)
+
+
+def test_no_estimate_without_a_past_or_a_contact() -> None:
+    estimate, one, none = StepError(1), np.ones(1), np.zeros(1)
+    for number in range(3):
+        assert estimate.of(number, -one, none, one, one) is None
+        estimate.accept(number, -one * number**3, none)
+    assert estimate.of(3.0, -27 * one, none, one, one) == 0.0
+    # A 12th of the third derivative, which is 6; no compliance that could swing.
+    assert estimate.of(3.0, -27 * one, one, one, none) == pytest.approx(0.5)
+    again = StepError(1)
+    again.restore(estimate.state())
+    assert again.of(3.0, -27 * one, one, one, none) == pytest.approx(0.5)
+
+
+def test_halvings() -> None:
+    assert [n_halvings(1e-3, s) for s in (None, 5e-4, 2.6e-4, 2.5e-4, 1e-3 / 4096)] == [
+        5,
+        1,
+        1,
+        2,
+        12,
+    ]
