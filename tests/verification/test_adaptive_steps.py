@@ -110,9 +110,9 @@ def test_a_continued_run_is_the_uninterrupted_one(scheme: str, mesh: LineMesh) -
 
 
 def test_incidents_under_short_steps(mesh: LineMesh) -> None:
-    """A dropper breaks ahead of the head. With a tolerance that is never kept all steps with contact
-    are the shortest: the run is that of fixed short steps but for the time without a force, which
-    must leave far less of an error than long steps do."""
+    """A dropper breaks ahead of the head. With a tolerance that is never kept all steps with a
+    contact are the shortest: the run is that of fixed short steps but for the time without a force,
+    which must leave far less of an error than long steps do."""
     changes = {
         "contact": LinearLaw(5e4, 0.0),
         "train": train(60.0, 70.0, 94.0, raise_time=0.3),
