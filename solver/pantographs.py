@@ -159,10 +159,7 @@ class Pantographs:
 
     def take_over(self, other: Pantographs) -> None:
         """Go on from where ``other`` are, the same train made for another step. Not collective."""
-        self.position[:] = other.position
-        self._told[:] = other._told
-        self.strip_force[:] = other.strip_force
-        self.constraint_violation[:] = other.constraint_violation
+        self.told[:] = other.told
         for mine, theirs in zip(self.models, other.models, strict=True):
             mine.restore(theirs.state())
 
