@@ -198,6 +198,43 @@ def _kinematic(rng: random.Random, words: Words) -> None:
     words["numerics.newmark_gamma"], words["numerics.newmark_beta"] = 0.55, 0.28
 
 
+_KEYS_OF_LAWS = (
+    "law",
+    "damping_N_s_per_m",
+    "hertz_stiffness_N_per_m1_5",
+    "restitution",
+    "least_impact_speed_m_per_s",
+)
+_LAWS = {
+    "linear": _linear,
+    "damped": _damped,
+    "hertz": _hertz,
+    **dict.fromkeys(_IMPACTS, _impact),
+    "kinematic": _kinematic,
+}
+
+
+def law_variants(rng: random.Random) -> dict[str, list[str]]:
+    """Assignments that give a scene each of the contact laws in turn, by the law's name.
+
+    They take away what the scene says of another law and, for the kinematic one, of numerics.
+    """
+    cleared: Words = {f"contact.{key}": "" for key in _KEYS_OF_LAWS}
+    cleared |= {"contact.stiffness_N_per_m": "", "effects.contact_damping": ""}
+    cleared |= {"effects.contact_loss": "true"}
+    found = {}
+    for name, law in _LAWS.items():
+        words = dict(cleared)
+        law(rng, words)
+        if name in _IMPACTS:
+            words["contact.law"] = f"'{name}'"
+        if name == "kinematic":
+            of_numerics = ("scheme", "coupling", "integrator", "spectral_radius", "iterations")
+            words = {**{f"numerics.{key}": "" for key in of_numerics}, **words}
+        found[name] = list(as_assignments(words))
+    return found
+
+
 def mechanism(rng: random.Random, n_steps: int) -> tuple[str, ...]:
     """Assignments to the case with a mechanism of seven bodies, for so many steps of its run."""
     n_spans = rng.randint(7, 10)
