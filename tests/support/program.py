@@ -25,7 +25,7 @@ from catenary.postproc.results import Results
 
 MPIRUN = shutil.which("mpirun")
 LIMIT = 120.0  # for anything that is to end by itself [s]; a loaded machine takes ten times as long
-# The same with several ranks. One that waits keeps its core busy: if others want the cores too, each
+# The same with several ranks. One that waits keeps its core busy: if others want cores too, each
 # message waits for a turn, and the longest test of 18 s took 120. Below the limit of a pytest test,
 # so that what hangs is killed and told.
 LIMIT_OF_RANKS = 280.0
