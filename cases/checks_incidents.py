@@ -46,6 +46,31 @@ def check_incidents(scene: Scene, line: Line) -> None:
                 f"this happens in incidents.{seen[what]} already; take one of them away",
             )
         seen[what] = i
+    _tensions_fall(scene)
+
+
+def _tensions_fall(scene: Scene) -> None:
+    """Refuse a loss of tension that would give a wire back some of it, or change nothing.
+
+    Shares are those of the first tension, which is easily taken for the one before.
+    """
+    latest: dict[str, int] = {}
+    losses = [
+        (round(table.at_s / scene.numerics.dt_s), i, table)
+        for i, table in enumerate(scene.incidents)
+        if isinstance(table, TensionLossTable)
+    ]
+    for _, i, table in sorted(losses, key=lambda loss: loss[:2]):
+        if table.wire in latest:
+            before = scene.incidents[latest[table.wire]]
+            assert isinstance(before, TensionLossTable)
+            if table.share >= before.share:
+                why = (
+                    f"it must be less than the {before.share:g} that incidents.{latest[table.wire]}"
+                    f" leaves at {before.at_s:g} s: both are shares of the tension at the start"
+                )
+                _refuse(scene, i, "share", table.share, why)
+        latest[table.wire] = i
 
 
 def _refuse(scene: Scene, i: int, key: str, value: object, why: str) -> NoReturn:

@@ -71,11 +71,12 @@ class Watched:
     def energy_gain(self) -> float:
         """The most that energy less work rises above its least value before, of the largest energy.
 
-        Damping lets it fall; what rises was given by nothing.
+        Damping lets it fall; what rises was given by nothing. After incidents the energy, which
+        counts from the first rest, may be negative.
         """
         balance = self.energy - self.work
         rise = (balance - np.minimum.accumulate(balance)).max()
-        return float(rise / max(self.energy.max(), np.abs(self.work).max(), 1e-300))
+        return float(rise / max(np.abs(self.energy).max(), np.abs(self.work).max(), 1e-300))
 
     @property
     def all_finite(self) -> bool:

@@ -8,6 +8,10 @@ from pydantic import Field
 
 from catenary.cases.table import Table
 
+# With less a wire sags by more than a hundred times as much: as much as a span is long, which is
+# no small displacement of a stretched wire any longer.
+LEAST_SHARE = 0.01
+
 
 class IncidentTable(Table):
     """What all incidents have in common."""
@@ -31,7 +35,9 @@ class TensionLossTable(IncidentTable):
     type: Literal["tension_loss"] = Field(description="kind of incident")
     wire: Literal["contact_wire", "messenger_wire"] = Field(description="which wire")
     share: float = Field(
-        gt=0, lt=1, description="what is left of the tension that it had at the start, as a share"
+        ge=LEAST_SHARE,
+        lt=1,
+        description="what is left of the tension that it had at the start, as a share",
     )
 
 

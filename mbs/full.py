@@ -278,7 +278,7 @@ class FullPantograph:
         try:
             yield
         except RunBroken as error:
-            raise RunBroken(f"Pantograph {self._data.name!r}: {error}") from error
+            raise type(error)(f"Pantograph {self._data.name!r}: {error}") from error
 
     def _beyond_reach(self, head_height: float) -> RunBroken:
         return RunBroken(

@@ -9,8 +9,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy import linalg
 
+from catenary.mbs.dense import least_squares
 from catenary.mbs.forces import Characteristic, SpringDamper
 from catenary.mbs.multibody import MultibodyData, stand
 from catenary.mbs.strips import Turning
@@ -39,7 +39,7 @@ def head_turning(data: MultibodyData, about: int) -> Turning | None:
     jacobian = np.vstack([system.constraints(motion, 0.0).jacobian[:, own], turn])
     root = np.sqrt(system.inverse_mass[own])
     wanted = np.append(np.zeros(len(jacobian) - 1), 1.0)
-    way = root * linalg.lstsq(jacobian * root, wanted, cond=1e-8)[0]
+    way = root * least_squares(jacobian * root, wanted, 1e-8)
     if np.abs(jacobian @ way - wanted).max() > _MISSED:
         return None
     stiffness = damping = 0.0

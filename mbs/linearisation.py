@@ -14,6 +14,7 @@ import numpy as np
 from scipy import linalg
 
 from catenary.mbs.bodies import Motion, Vector
+from catenary.mbs.dense import least_squares, null_space
 from catenary.mbs.joints import ORIGIN, unit
 from catenary.mbs.kinematics import point
 from catenary.mbs.lumped import LumpedData
@@ -182,7 +183,7 @@ def linearise(
         The system is not at rest there, or its joints do not let the point move that way.
     """
     rest = motion.with_velocities(np.zeros(6 * motion.n_bodies))
-    free = linalg.null_space(system.constraints(rest, time).jacobian, rcond=1e-8)
+    free = null_space(system.constraints(rest, time).jacobian)
     push = unit(along) @ point(rest, body, at).jacobian @ free
     if np.abs(push).max(initial=0.0) < 1e-9:
         raise InputError(f"The joints do not let body {body!r} move along {tuple(along)}.")
@@ -230,7 +231,7 @@ def _force_on(system: System, motion: Motion, ways: np.ndarray, time: float) -> 
     # The least change that makes them allowed: smooth, unlike another null space.
     basis = ways
     if len(jacobian):
-        basis = ways - linalg.lstsq(jacobian, jacobian @ ways, cond=1e-8)[0]
+        basis = ways - least_squares(jacobian, jacobian @ ways, 1e-8)
     return basis.T @ system.generalised_forces(there, time)
 
 
@@ -259,7 +260,7 @@ def _separated(
         size = np.abs(matrix).max()
         if size > 0.0:
             acting.append(matrix / size)
-    left, sizes, right = linalg.svd(np.vstack(acting))
+    left, sizes, right = linalg.svd(np.vstack(acting), lapack_driver="gesvd")
     n_kept = int(np.sum(sizes > NEUTRAL * sizes[0]))
     return right[:n_kept].T, right[n_kept:].T
 

@@ -27,6 +27,7 @@ from catenary.mbs.interface import HeadState
 from catenary.mbs.lateral import LateralPath
 from catenary.mbs.reduction import ReducedMechanism
 from catenary.mbs.strips import ONE_STRIP, Strips, Turning, head_parts
+from catenary.solver.errors import RunBroken
 
 
 @dataclass(frozen=True)
@@ -131,6 +132,11 @@ class RaisingPantograph(SteppedHead):
         """Force on a wire that holds the strips at this height at rest, fully raised [N].
 
         The head's springs give way under it.
+
+        Raises
+        ------
+        RunBroken
+            There is none: they give way faster than the lift falls.
         """
         data, force = self._data, 0.0
         for _ in range(50):
@@ -139,8 +145,11 @@ class RaisingPantograph(SteppedHead):
             (_, lift, _), _ = self._frame_at(head_height + pressed)
             force = float(lift) - data.head_weight
             if abs(force - previous) <= 1e-10 * abs(force):
-                break
-        return force
+                return force
+        raise RunBroken(
+            f"The force of the pantograph on a wire at {head_height:g} m is not found: its head's "
+            "springs give way faster than its lift falls; make them stiffer."
+        )
 
     def follow(self, part: Callable[[float], float]) -> None:
         """Let the part ``part(time)`` of the lift act."""

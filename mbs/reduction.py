@@ -12,10 +12,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
 from scipy.interpolate import CubicSpline
 
 from catenary.mbs.bodies import Motion, Vector
+from catenary.mbs.dense import least_squares
 from catenary.mbs.joints import ORIGIN, PrescribedPoint, constant
 from catenary.mbs.kinematics import point
 from catenary.mbs.statics import equilibrium
@@ -202,7 +202,7 @@ def _at_height(system: System, body: str, at: Vector, near: Motion, height: floa
     # Of all velocities with unit speed of the point those of least kinetic energy.
     root = np.sqrt(system.inverse_mass)
     unit_speed = np.append(np.zeros(len(jacobian) - 1), 1.0)
-    way = root * linalg.lstsq(jacobian * root, unit_speed, cond=1e-8)[0]
+    way = root * least_squares(jacobian * root, unit_speed, 1e-8)
     lift = way @ system.generalised_forces(motion, 0.0)
     damping = lift - way @ system.generalised_forces(motion.with_velocities(way), 0.0)
     # Where the third of the six numbers of a body is its velocity upward.

@@ -12,6 +12,7 @@ import numpy as np
 from scipy import linalg
 
 from catenary.mbs.bodies import Motion, Vector
+from catenary.mbs.dense import least_squares, null_space
 from catenary.mbs.forces import Actuator
 from catenary.mbs.joints import ORIGIN, Joint, unit
 from catenary.mbs.kinematics import point
@@ -61,7 +62,7 @@ def equilibrium(
     size = float(np.abs(system.generalised_forces(motion, time)).max())
     left = np.inf
     for _ in range(max_iterations):
-        free = linalg.null_space(system.constraints(motion, time).jacobian, rcond=1e-8)
+        free = null_space(system.constraints(motion, time).jacobian)
         unbalanced = free.T @ system.generalised_forces(motion, time)
         left = float(np.abs(unbalanced).max(initial=0.0))
         if left <= tolerance * size:
@@ -73,7 +74,7 @@ def equilibrium(
                 for sign in (1.0, -1.0)
             )
             tangent[:, k] = (ahead - behind) / (2.0 * STEP)
-        step = free @ linalg.lstsq(tangent, -unbalanced, cond=NEUTRAL)[0]
+        step = free @ least_squares(tangent, -unbalanced, NEUTRAL)
         longest = float(np.abs(step).max())
         if longest == 0.0:
             break  # nothing resists what is left over
@@ -92,7 +93,7 @@ def _unbalanced(
     there = system.assemble(motion.moved(displacement), time).motion
     jacobian = system.constraints(there, time).jacobian
     # The same motions as the joints allow them there: a smooth basis, unlike a new null space.
-    basis = free - linalg.lstsq(jacobian, jacobian @ free, cond=1e-8)[0]
+    basis = free - least_squares(jacobian, jacobian @ free, 1e-8)
     return basis.T @ system.generalised_forces(there, time)
 
 
@@ -100,13 +101,13 @@ def _multipliers(system: System, motion: Motion, time: float) -> np.ndarray:
     """Multipliers that balance the forces, shape (m,), the smallest of redundant rows."""
     jacobian = system.constraints(motion, time).jacobian
     force = system.generalised_forces(motion, time)
-    return linalg.lstsq(jacobian.T, force, cond=1e-8)[0]
+    return least_squares(jacobian.T, force, 1e-8)
 
 
 def unheld_force(system: System, motion: Motion, time: float = 0.0) -> float:
     """Size of the forces on all free motions together [N], zero where a system is at rest."""
     jacobian = system.constraints(motion, time).jacobian
-    free = linalg.null_space(jacobian, rcond=1e-8)
+    free = null_space(jacobian)
     return float(np.linalg.norm(free.T @ system.generalised_forces(motion, time)))
 
 
@@ -189,7 +190,7 @@ def equivalent_mass(
     Bodies behind springs that the joints do not move along stand still and do not count.
     """
     jacobian = system.constraints(motion, time).jacobian
-    free = linalg.null_space(jacobian, rcond=1e-8)
+    free = null_space(jacobian)
     # Velocities of the point per velocity of each free motion.
     way = unit(along) @ point(motion, body, at).jacobian @ free
     if np.abs(way).max(initial=0.0) < 1e-9:

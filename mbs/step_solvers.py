@@ -27,7 +27,7 @@ import numpy as np
 from scipy import linalg
 
 from catenary.mbs.system import independent_rows
-from catenary.solver.errors import InputError, RunBroken
+from catenary.solver.errors import InputError, NotConverged
 
 # A pivot of dependent coordinates below this part of the largest one: others are chosen.
 WORN = 1e-4
@@ -136,7 +136,13 @@ class Augmented:
             self._schur = linalg.cho_factor(schur, check_finite=False)
 
     def solve(self, right: np.ndarray, closing: np.ndarray) -> np.ndarray:
-        """Unconstrained changes, then multipliers until they close."""
+        """Unconstrained changes, then multipliers until they close.
+
+        Raises
+        ------
+        NotConverged
+            They do not close.
+        """
         return self._closed(linalg.cho_solve(self._operator, right, check_finite=False), closing)
 
     def removal(self, errors: np.ndarray) -> np.ndarray:
@@ -154,7 +160,7 @@ class Augmented:
             size = np.abs(change).max(axis=0)
             if (np.abs(step).max(axis=0) <= self.tolerance * size).all():
                 return change
-        raise RunBroken(
+        raise NotConverged(
             "The augmented Lagrangian does not converge within a step: choose another penalty "
             f"than {self.penalty:g}."
         )

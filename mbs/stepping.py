@@ -32,7 +32,7 @@ from catenary.mbs.bodies import Motion
 from catenary.mbs.kinematics import Quantity
 from catenary.mbs.step_solvers import StepSolver, step_solver
 from catenary.mbs.system import System
-from catenary.solver.errors import InputError, RunBroken
+from catenary.solver.errors import InputError, NotConverged, RunBroken
 
 # Generalised forces (6 n, s) of unit forces at a motion.
 Ways = Callable[[Motion], np.ndarray]
@@ -263,6 +263,12 @@ class Stepper:
                 step = self._solver.removal(error)
                 velocities = velocities + step
                 error = error + rows.jacobian @ step
+            else:
+                raise NotConverged(
+                    f"The velocities of the multibody system cannot be kept to its joints at "
+                    f"{time:g} s: they miss by {float(np.abs(error).max()):.2g} m/s or 1/s; take "
+                    "shorter steps."
+                )
         return motion.with_velocities(velocities)
 
     def _closed(self, motion: Motion, time: float) -> Motion:
@@ -273,7 +279,7 @@ class Stepper:
             if np.abs(errors).max() <= limit:
                 return motion
             motion = motion.moved(self._solver.removal(errors))
-        raise RunBroken(
+        raise NotConverged(
             f"The joints of the multibody system cannot be kept closed at {time:g} s: they are "
             f"open by {float(np.abs(errors).max()):.2g} m; take shorter steps."
         )

@@ -21,6 +21,7 @@ from scipy import linalg
 
 from catenary.mbs import kernels
 from catenary.mbs.bodies import Body, Motion, initial_motion
+from catenary.mbs.dense import least_squares
 from catenary.mbs.flat import FlatLines, FlatRows, line_of
 from catenary.mbs.forces import Force
 from catenary.mbs.joints import Joint
@@ -268,7 +269,7 @@ class System:
             rows = self.constraints(motion, time)
             if np.abs(rows.value).max() <= limit:
                 return Assembly(motion, missed, number)
-            step = linalg.lstsq(rows.jacobian, -rows.value, cond=DEPENDENT)[0]
+            step = least_squares(rows.jacobian, -rows.value, DEPENDENT)
             # Newton's method must not turn bodies around on its way.
             motion = motion.moved(step / max(1.0, float(np.abs(step).max())))
         worst = max(self.misses(motion, time), key=lambda miss: max(miss.gap, miss.tilt))
@@ -289,7 +290,7 @@ class System:
             return motion
         rows = self.constraints(motion, time)
         scale = np.sqrt(self.inverse_mass)
-        step = scale * linalg.lstsq(rows.jacobian * scale, -rows.rate, cond=DEPENDENT)[0]
+        step = scale * least_squares(rows.jacobian * scale, -rows.rate, DEPENDENT)
         velocities = motion.velocities + step
         left = np.abs(rows.rate + rows.jacobian @ step).max()
         if left > 1e-8 * (1.0 + np.abs(velocities).max()):

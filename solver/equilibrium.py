@@ -58,7 +58,7 @@ def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
     Raises
     ------
     InputError
-        If a dropper would be slack at rest or would have no length.
+        If a dropper would be slack at rest or would have no length, or if lengths do not settle.
     """
     length = mesh.points[mesh.droppers[:, 0], 2] - mesh.points[mesh.droppers[:, 1], 2]
     for _ in range(_MAX_PASSES):
@@ -69,8 +69,12 @@ def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
         change = np.abs(geometric - length).max(initial=0.0)
         length = geometric
         if change < _LENGTH_TOLERANCE:
-            break
-    return model, form
+            return model, form
+    raise InputError(
+        f"the lengths of the droppers do not settle: they still change by {1e3 * change:.2g} mm "
+        f"after {_MAX_PASSES} passes, as each stretches the line by its own weight; make "
+        "line.dropper.mass_kg_per_m smaller, or the tensions greater"
+    )
 
 
 def _form(model: Model) -> Equilibrium:

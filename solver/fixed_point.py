@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from catenary.solver.contact import Touches
 from catenary.solver.coupling import DIVERGED
-from catenary.solver.errors import NotConverged, RunBroken
+from catenary.solver.errors import NotConverged
 from catenary.solver.heads import Heads
 from catenary.solver.interaction import Interaction
 from catenary.solver.law_in_steps import LawInSteps
@@ -73,14 +73,14 @@ class FixedPoint:
             line.correct()
             self.counters.rounds += 1
             # How far a fixed number of them has come is only asked after the last.
-            if (fixed is None or number == fixed) and self._settled(time):
+            if (fixed is None or number == fixed) and self._settled():
                 break
         else:
-            self.counters.unconverged_steps += 1
             if fixed is None:
-                raise self._broken("does not converge", time)
+                raise self._broken("does not converge")
+            self.counters.unconverged_steps += 1
         if fixed is not None and not (np.abs(force) < DIVERGED).all():
-            raise self._broken("diverges", time)
+            raise self._broken("diverges")
         if self.judge is not None:
             self._ask(self.judge, time, depth, force, heads)
         self.counters.steps += 1
@@ -152,7 +152,7 @@ class FixedPoint:
         tension = self.interaction.droppers.tension()
         return np.asarray((1.0 - self.kept_ratio) * np.maximum(0.0, -tension))
 
-    def _settled(self, time: float) -> bool:
+    def _settled(self) -> bool:
         line, numerics = self.interaction.line, self.numerics
         change = np.array(
             [
@@ -164,16 +164,15 @@ class FixedPoint:
         if self.comm.size > 1:
             largest = self.comm.allreduce(largest, op=MPI.MAX)
         if not np.isfinite(largest):
-            raise self._broken("diverges", time)
+            raise self._broken("diverges")
         return largest < 1.0
 
-    def _broken(self, how: str, time: float) -> RunBroken:
+    def _broken(self, how: str) -> NotConverged:
         fixed, most = self.numerics.iterations, self.numerics.max_iterations
         allowed = f"at most {most} iterations, numerics.max_iterations"
         if fixed is not None:
             allowed = f"numerics.iterations is {fixed}"
         return NotConverged(
-            f"the fixed-point correction {how} at t = {time:.4f} s ({allowed}) with the train at "
-            f"{float(self.pantographs.position[0]):.1f} m; take numerics.scheme = "
-            '"one_solve" or a smaller numerics.dt_s'
+            f'the fixed-point correction {how} ({allowed}); take numerics.scheme = "one_solve" '
+            "or a smaller numerics.dt_s"
         )

@@ -32,6 +32,10 @@ from catenary.solver.response import LineResponse
 _MAX_ROUNDS = 30
 # Newton's method on a law doubles its digits with each tangent.
 _MAX_TANGENTS = 50
+# Where so many do not do, round-off is looked at: large terms may cancel in depths and rates.
+_USUAL_TANGENTS = 12
+# A term of a sum is known to some roundings of itself.
+_ROUNDING = 8.0 * np.finfo(float).eps
 # What there is to say of a step that holds something that is no number.
 NOT_FINITE = "it has no finite solution; try a smaller numerics.dt_s"
 # Droppers that the arrays have room for at first.
@@ -99,9 +103,15 @@ class Gap:
 
     def under(self, force: np.ndarray, slack: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Depths [m] and rates [m/s] under forces (n,) and compensations (m,) [N]; overwritten by
-        the next call."""
+        the next call.
+
+        Raises
+        ------
+        RunBroken
+            If one of them is no number: what was to give the forces has no solution.
+        """
         depth, rate = self.found
-        inner_kernels.under(
+        finite = inner_kernels.under(
             self.depth_by_force,
             self.rate_by_force,
             self.depth,
@@ -113,7 +123,19 @@ class Gap:
             depth,
             rate,
         )
+        if not finite:
+            raise RunBroken(NOT_FINITE)
         return depth, rate
+
+    def rounding(self, force: np.ndarray, slack: np.ndarray) -> np.ndarray:
+        """What depths [m] and rates [m/s] of ``under`` may be wrong by, (2, n)."""
+        pushed, line = np.abs(force), self._line
+        depth = np.abs(self.depth) + np.abs(self.depth_by_force) @ pushed
+        rate = np.abs(self.rate) + np.abs(self.rate_by_force) @ pushed
+        if slack.size:
+            depth += np.abs(line.couplings(1)).T @ np.abs(slack)
+            rate += np.abs(line.couplings(2)).T @ np.abs(slack)
+        return _ROUNDING * np.stack([depth, rate])
 
 
 class InnerProblem:
@@ -156,14 +178,17 @@ class InnerProblem:
         # Without a force heads stand highest: from there Newton's method comes from one side.
         law.linearise(gap.depth, gap.rate)
         rounds = 0
-        for _ in range(_MAX_TANGENTS):
+        rounding = np.zeros((2, law.n))
+        for number in range(_MAX_TANGENTS):
             force, slack, more = self._with_tangents(line)
             rounds += more
             depth, rate = gap.found
             if law.is_linear:
                 return InnerSolution(force, slack, depth, rate, rounds, self.pivoted)
             law.linearise(depth, rate)
-            if law.agrees(force):
+            if number >= _USUAL_TANGENTS:
+                rounding = gap.rounding(force, slack)
+            if law.agrees(force, rounding):
                 return InnerSolution(force, slack, depth, rate, rounds, self.pivoted)
         raise NotConverged(
             f"the contact law finds no force within {_MAX_TANGENTS} tangents; take a smaller "
@@ -196,7 +221,7 @@ class InnerProblem:
         """
         gap, n, m = self.gap, self.law.n, line.count
         self._make_room(m)
-        rounds, size = inner_kernels.solve(
+        rounds, size, finite = inner_kernels.solve(
             gap.depth,
             gap.rate,
             gap.depth_by_force,
@@ -222,6 +247,8 @@ class InnerProblem:
             if size == n and m and inner_kernels.any_pushed(line.rows, m, n, force):
                 size, rounds = self._with_all(line, rounds)
             gap.under(force, self._solution[n:size])
+        elif not finite:
+            raise RunBroken(NOT_FINITE)
         return self._solution[:n], self._solution[n:size], rounds
 
     def _with_all(self, line: LineResponse, rounds: int) -> tuple[int, int]:

@@ -44,9 +44,13 @@ class LawInSteps(Protocol):
     def force(self, depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """The law itself without the cut at zero (n,) [N]."""
 
-    def agrees(self, force: np.ndarray) -> bool:
+    def agrees(self, force: np.ndarray, rounding: np.ndarray) -> bool:
         """Whether forces (n,) found with tangents are those of the law where it was linearised
-        last."""
+        last.
+
+        ``rounding`` (2, n) is what depths [m] and rates [m/s] may be wrong by because terms much
+        larger than heights of some metres and speeds of some m/s cancel in them.
+        """
 
     def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
         """Remember a step to ``time`` [s]: depths, rates and forces (n,) at its end.
@@ -86,7 +90,7 @@ class _Tangents:
         """Spring and damper (n,) [N]."""
         return np.asarray(self.tangents[2] * depth + self.tangents[3] * rate)
 
-    def agrees(self, force: np.ndarray) -> bool:
+    def agrees(self, force: np.ndarray, rounding: np.ndarray) -> bool:
         """Always."""
         return True
 
@@ -147,10 +151,11 @@ class HertzInSteps(_Tangents):
         self.linearise(depth, rate)
         return self._force
 
-    def agrees(self, force: np.ndarray) -> bool:
+    def agrees(self, force: np.ndarray, rounding: np.ndarray) -> bool:
         """Whether law and tangents give the same forces."""
         law = np.maximum(self._force, 0.0)
-        within = _TOLERANCE * (1.0 + law) + _KNOWN * (self.tangents[2] + self.tangents[3])
+        within = _TOLERANCE * (1.0 + law)
+        within += ((_KNOWN + rounding) * self.tangents[2:]).sum(axis=0)
         return bool((np.abs(law - force) <= within).all())
 
     def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:

@@ -17,7 +17,7 @@ from scipy import sparse
 
 from catenary.solver.compliance import Windows
 from catenary.solver.distribution import Ownership
-from catenary.solver.errors import RunBroken
+from catenary.solver.errors import NotConverged, RunBroken
 from catenary.solver.events import event
 from catenary.solver.linear import (
     DIRECT,
@@ -306,7 +306,7 @@ class LineOperators:
             reason = 0 if self._solver is None else self._solver.failure
             reason = self._comm.allreduce(reason, op=MPI.MIN)
             if reason:
-                raise RunBroken(
+                raise NotConverged(
                     f"the linear solver did not converge (PETSc reason {reason}); drop the options "
                     f"under -{PREFIX} or give the scene a smaller numerics.dt_s"
                 )

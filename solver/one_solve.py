@@ -10,7 +10,7 @@ import numpy as np
 from catenary.solver import inner_kernels
 from catenary.solver.contact import Touches
 from catenary.solver.coupling import Coupling
-from catenary.solver.errors import NotConverged, RunBroken
+from catenary.solver.errors import RunBroken
 from catenary.solver.events import NAMES, event
 from catenary.solver.exchange import Exchange, Reply, Verdict
 from catenary.solver.heads import Heads
@@ -53,7 +53,7 @@ class OneSolve:
         if self.interaction.slack_coupling is not None:
             self._drop = np.zeros(self.interaction.slack_coupling.n_droppers)
         self._found: InnerSolution | None = None
-        self._why = ""
+        self._why: RunBroken | None = None
         self._events = {name: event(name) for name in NAMES}
 
     def step(self, time: float, stop: bool) -> bool:
@@ -135,7 +135,7 @@ class OneSolve:
             reply = exchange.from_root(answer)
             events["ContactReply"].end()
             if reply.verdict == Verdict.BROKEN:
-                raise self._broken(time)
+                raise self._broken()
             if reply.verdict == Verdict.ENLARGE:
                 early = share.early_height.copy(), share.early_rate.copy()
                 exchange.enlarge(2 * reply.room)
@@ -155,19 +155,17 @@ class OneSolve:
                 heads.early_height[:], heads.early_velocity[:] = self.pantographs.extrapolate(time)
         except RunBroken as error:
             # Told with the answer: the other ranks wait for that.
-            self._why = str(error)
+            self._why = error
             return None
         return heads
 
-    def _broken(self, time: float) -> RunBroken:
+    def _broken(self) -> RunBroken:
         """Why the step has no solution, which rank 0 knows, on all ranks. Collective."""
         why = self._why
         if self.comm.size > 1:
             why = self.comm.bcast(why, root=0)
-        return RunBroken(
-            f"the step to t = {time:.4f} s with the train at "
-            f"{float(self.pantographs.position[0]):.1f} m: {why}"
-        )
+        assert why is not None
+        return why
 
     def _answer(self, time: float, response: LineResponse, heads: Heads | None) -> Reply:
         """What rank 0 makes of all shares."""
@@ -176,7 +174,7 @@ class OneSolve:
             return Reply(Verdict.BROKEN, self._none)
         _, wants_to_stop, is_broken, missing_room = response.flags
         if is_broken:
-            self._why = NOT_FINITE
+            self._why = RunBroken(NOT_FINITE)
             return Reply(Verdict.BROKEN, self._none)
         if missing_room:
             return Reply(Verdict.ENLARGE, self._none, room=int(missing_room))
@@ -194,8 +192,7 @@ class OneSolve:
                     return Reply(Verdict.REJECT, self._none, level=level)
             law.accept(time, found.depth, found.rate, found.contact_force)
         except RunBroken as error:
-            self._why = str(error)
-            self.counters.unconverged_steps += isinstance(error, NotConverged)
+            self._why = error
             return Reply(Verdict.BROKEN, self._none)
         self._found = found
         self.counters.rounds += found.rounds

@@ -9,6 +9,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from catenary.solver.line_operators import Loads
+from catenary.solver.pantographs import Pantographs
 
 # Loads at a time [s]; None on all ranks if there never are any.
 LoadSource = Callable[[float], Loads | None]
@@ -20,7 +21,8 @@ class Counters:
 
     ``repeated_steps``: bounds of what may slacken were too small; ``pivoted_steps``: the active
     set of contacts and slack droppers cycled, and pivoting found it; ``unconverged_steps``:
-    iterations ended above their tolerances, which ends the run unless their number is given.
+    iterations ended above their tolerances, which ends the run (``Stepper`` counts that step)
+    unless their number is given.
     """
 
     steps: int = 0
@@ -72,6 +74,7 @@ class Scheme(Protocol):
     """Advances line and pantographs by one step."""
 
     counters: Counters
+    pantographs: Pantographs
 
     def step(self, time: float, stop: bool) -> bool:
         """Advance to ``time`` [s]; False if any rank wants this step to be the last. Collective.
@@ -79,7 +82,9 @@ class Scheme(Protocol):
         Raises
         ------
         RunBroken
-            On all ranks, if the step has no solution or holds something that is no number.
+            On all ranks, if the step has no solution or holds something that is no number;
+            NotConverged if iterations ended before they were there. What it says needs no time and
+            no place: ``Stepper`` adds them.
         """
 
     @property

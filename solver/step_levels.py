@@ -60,6 +60,10 @@ class LevelCounters(Counters):
 class StepLevels:
     """A scheme that takes the interval of the record in steps of another one. Collective.
 
+    Attributes
+    ----------
+    pantographs : those of the level that was stepped last
+
     Parameters
     ----------
     comm : mpi4py communicator
@@ -83,6 +87,7 @@ class StepLevels:
             sizes=[self._dt / 2**level for level in range(self._finest + 1)],
         )
         self._error = StepError(whole.pantographs.n_contacts)
+        self.pantographs = whole.pantographs
         self._active = self._wanted = self._tried = 0
         self._before: dict[int, dict[str, np.ndarray]] = {}
         smallest = self._dt / 2**self._finest
@@ -217,7 +222,7 @@ class StepLevels:
             self._take_in(level, self._finer(level))
         if level != self._active:
             _hand_over(self._levels[self._active], self._levels[level])
-            self._active = level
+            self._active, self.pantographs = level, self._levels[level].pantographs
         return self._levels[level]
 
     def _take_in(self, level: int, parts: Parts) -> None:

@@ -6,12 +6,15 @@ from collections.abc import Callable
 
 from petsc4py import PETSc
 
-from catenary.solver.errors import RunBroken
+from catenary.solver.errors import NotConverged, RunBroken
 from catenary.solver.schemes import Scheme
 
 
 class Stepper:
     """Context of a TS of type ``python`` that advances a scheme and shows each step.
+
+    A step that breaks is told with its time and place, whatever broke in it, and counted if its
+    equations were not solved.
 
     Parameters
     ----------
@@ -47,12 +50,18 @@ class Stepper:
         time = (self.step_number + 1) * self._dt
         try:
             goes_on = self._scheme.step(time, self._stop_requested())
-            self.step_number += 1
+        except RunBroken as error:
+            scheme = self._scheme
+            scheme.counters.unconverged_steps += isinstance(error, NotConverged)
+            place = float(scheme.pantographs.position[0])
+            step = f"the step to t = {time:.4f} s with the train at {place:.1f} m"
+            self._give_up(ts, f"{step}: {error}")
+            return
+        self.step_number += 1
+        try:
             self._show(self.step_number, time)
         except RunBroken as error:
-            self.broken = str(error)
-            # Not a reason of failure, for which PETSc would raise an error of its own.
-            ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
+            self._give_up(ts, str(error))
             return
         ts.setTime(time)
         if not goes_on:
@@ -62,6 +71,12 @@ class Stepper:
     def goes_on_from(self, step: int) -> bool:
         """Whether nothing broke or stopped before the end of this step."""
         return not (self.broken or self.stopped) and self.step_number == step
+
+    def _give_up(self, ts: PETSc.TS, why: str) -> None:
+        """End the time loop because of an error that the march reports."""
+        self.broken = why
+        # Not a reason of failure, for which PETSc would raise an error of its own.
+        ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
 
     def view(self, ts: PETSc.TS, viewer: PETSc.Viewer) -> None:
         """Name the scheme in -march_ts_view."""

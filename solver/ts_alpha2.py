@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from catenary.solver.errors import InputError, RunBroken
+from catenary.solver.errors import InputError, NotConverged
 from catenary.solver.integration import GENERALIZED_ALPHA, NEWMARK, integration_of
 from catenary.solver.interaction import Interaction
 from catenary.solver.linear import PREFIX
@@ -102,20 +102,20 @@ class TSAlpha2:
         except PETSc.Error as error:
             if self._ts.getSNES().getConvergedReason() >= 0:
                 raise  # not for want of a solution
-            raise self._broken(time) from error
+            raise self._broken() from error
         if not np.isfinite(self._u).all():
-            raise self._broken(time)
+            raise self._broken()
         # Its own times are sums of steps, which drift.
         self._ts.setTime(time)
         self._tell(time)
         return not stop
 
-    def _broken(self, time: float) -> RunBroken:
-        return RunBroken(
-            f"PETSc's TSALPHA2 finds no solution of the step to t = {time:.4f} s within "
-            f"{_MOST_ITERATIONS} iterations of Newton's method with the train at "
-            f"{float(self.pantographs.position[0]):.1f} m; take numerics.scheme = "
-            '"one_solve" or a smaller numerics.dt_s'
+    def _broken(self) -> NotConverged:
+        most = self._ts.getSNES().getTolerances()[3]  # which an option may have set
+        often = "1 iteration" if most == 1 else f"{most} iterations"
+        return NotConverged(
+            f"PETSc's TSALPHA2 finds no solution within {often} of Newton's method; take "
+            'numerics.scheme = "one_solve" or a smaller numerics.dt_s'
         )
 
     def state(self) -> np.ndarray:

@@ -16,7 +16,7 @@ from catenary.cases.meshing import mesh_of
 from catenary.cases.scene import load_scene
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.equilibrium import elasticity, find_form, middle_span
-from catenary.solver.errors import RunBroken
+from catenary.solver.errors import NotConverged, RunBroken
 from catenary.solver.march import March
 from catenary.solver.observation import Stage, StepView
 from catenary.solver.parallel import on_root
@@ -132,11 +132,13 @@ def test_joints_that_do_not_close_end_the_run_on_all_ranks(
     problem, mesh = case
 
     def stuck(self: Any, contact_force: np.ndarray) -> None:
-        raise RunBroken("joints cannot be kept closed")
+        raise NotConverged("joints cannot be kept closed")
 
     monkeypatch.setattr(FullPantograph, "advance", stuck)
     outcome, _ = marched(MPI.COMM_WORLD, problem, mesh)
-    assert outcome == "joints cannot be kept closed"
+    place = problem.train.start + problem.train.speed * problem.numerics.dt
+    step = f"the step to t = {problem.numerics.dt:.4f} s with the train at {place:.1f} m"
+    assert outcome == f"{step}: joints cannot be kept closed"
 
 
 def test_a_wire_out_of_reach_is_told_on_all_ranks(case: tuple[Problem, LineMesh]) -> None:

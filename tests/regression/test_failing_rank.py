@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 from program import MPIRUN, Done, python, short_run, started
 
-# From the failure on; a rank that waits for another would wait for ever.
-AT_ONCE = 20.0
+# From the failure on; a rank that waits for another would wait for ever. It takes a second where
+# cores are free.
+AT_ONCE = 60.0
 # Raises what nobody expects and leaves a word that it did.
 FAIL = """
 def fail():

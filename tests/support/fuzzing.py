@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass
 
+from fuzzing_broken import INCIDENTS, a_way
 from fuzzing_more import as_assignments, mechanism, put_more
 
 BASE = "en50318_2002"
@@ -13,12 +14,14 @@ N_STEPS = 200
 
 @dataclass(frozen=True)
 class RandomScene:
-    """Assignments to a base case, and what breaks them, "" if nothing does."""
+    """Assignments to a base case, what breaks them, "" if nothing does, and the key that the
+    sentence about it has to name."""
 
     seed: int
     assignments: tuple[str, ...]
     broken_by: str = ""
     base: str = BASE
+    names: str = ""
 
     def says(self, word: str) -> bool:
         """Whether an assignment begins so."""
@@ -109,7 +112,7 @@ def sound_scene(
     words["train.pantographs"] = f"[{','.join(names if behind else names[:1])}]"
     if wide is not None:
         room = min(start - (rear if behind else 0.0), length - way - start)
-        put_more(wide, words, span, room)
+        put_more(wide, words, span, room, n_steps)
     return RandomScene(seed, as_assignments(words))
 
 
@@ -178,6 +181,24 @@ def broken_scene(seed: int) -> RandomScene:
     )
     word = rng.choice(ways)()
     return RandomScene(seed, (*sound.assignments, word), word)
+
+
+def broken_happening(seed: int) -> RandomScene:
+    """A sound scene with incidents, in which one of these or of the numerics cannot be."""
+    rng = random.Random(f"happening {seed}")
+    sound = sound_scene(seed)
+    given = dict(word.split("=", 1) for word in sound.assignments)
+    dt = float(given["numerics.dt_s"])
+    incidents = INCIDENTS.format(rng.uniform(0.0, 9.0) * dt, 20 * dt, rng.randint(0, 99) * dt)
+    way = a_way(rng, N_STEPS, dt, given["train.pantographs"])
+    kept = (
+        "effects.contact_loss=true",
+        "effects.dropper_slackening=true",
+        "train.start_below_m=0.0",
+        incidents,
+    )
+    words = (*sound.assignments, *kept, *way.assignments)
+    return RandomScene(seed, words, " ".join(way.assignments), names=way.key)
 
 
 def _word(rng: random.Random) -> str:

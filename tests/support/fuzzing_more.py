@@ -7,18 +7,24 @@ from __future__ import annotations
 
 import random
 
+from fuzzing_incidents import put_incidents
+from fuzzing_numerics import is_second_opinion, put_numerics
+
 Words = dict[str, object]
 # Share of the scenes that have each of these.
 _NOW_AND_THEN = 0.2
+# Droppers in each span of the case with a mechanism.
+_DROPPERS_OF_MECHANISM = 8
 _IMPACTS = ("lankarani_nikravesh", "hunt_crossley", "flores", "gonthier")
 
 
-def put_more(rng: random.Random, words: Words, span: float, room: float) -> None:
+def put_more(rng: random.Random, words: Words, span: float, room: float, n_steps: int) -> None:
     """Now and then each of the parts below.
 
-    ``span`` [m] of the line; ``room`` [m] before and behind the run that strips may take.
+    ``span`` [m] of the line; ``room`` [m] before and behind the run that strips may take;
+    ``n_steps`` of the run.
     """
-    for part in (_wires, _spans, _droppers, _clamps, _arms, _damping, _mesh):
+    for part in (_wires, _spans, _droppers, _clamps, _arms, _damping, _mesh, _second_kind):
         if rng.random() < _NOW_AND_THEN:
             part(rng, words, span)
     if room > 1.0 and rng.random() < _NOW_AND_THEN:
@@ -31,10 +37,12 @@ def put_more(rng: random.Random, words: Words, span: float, room: float) -> None
         words["effects.residual_dropper_stiffness"] = "true"
     laws = (_linear, _linear, _damped, _damped, _hertz, _hertz, _impact, _impact, _kinematic)
     rng.choice(laws)(rng, words)
-    if words.get("contact.law") != "'kinematic'":
-        rng.choice((_implicit, _implicit, _numerically_damped, _exchanging, _correcting))(
-            rng, words
-        )
+    put_numerics(rng, words)
+    if rng.random() < _NOW_AND_THEN and words.get("contact.law") != "'kinematic'":
+        words["train.start_below_m"] = 5.0 * rng.random() ** 3
+    if rng.random() < 2 * _NOW_AND_THEN and not is_second_opinion(words):
+        placed = str(words["train.pantographs"]).count("name=")
+        put_incidents(rng, words, n_steps, _droppers_by_span(words), placed)
 
 
 def _wires(rng: random.Random, words: Words, span: float) -> None:
@@ -92,6 +100,30 @@ def _damping(rng: random.Random, words: Words, span: float) -> None:
 
 def _mesh(rng: random.Random, words: Words, span: float) -> None:
     words["mesh.support_refinement"] = rng.randint(2, 4)
+
+
+def _second_kind(rng: random.Random, words: Words, span: float) -> None:
+    """A train of two kinds of pantographs, if there are several."""
+    placed = str(words["train.pantographs"])
+    if placed.count("name=") < 2:
+        return
+    first, others = placed.split(",{", 1)
+    words["train.pantographs"] = f"{first},{{{others.replace('reference', 'other', 1)}"
+    table = "pantographs.other"
+    words[f"{table}.masses_kg"] = [10 ** rng.uniform(-0.3, 1.3), 10 ** rng.uniform(-0.3, 1.3)]
+    words[f"{table}.stiffnesses_N_per_m"] = [10 ** rng.uniform(2.5, 4.3), rng.uniform(0.0, 500.0)]
+    words[f"{table}.dampings_N_s_per_m"] = [rng.uniform(0.0, 150.0), rng.uniform(0.0, 150.0)]
+    words[f"{table}.static_force_N"] = rng.uniform(20.0, 300.0)
+
+
+def _droppers_by_span(words: Words) -> list[int]:
+    """How many droppers stand in each span."""
+    count = words.get("line.dropper.count")
+    if count is None:
+        # Of patterns the last: they have as many each.
+        places = words.get("line.dropper.patterns", words["line.dropper.positions_m"])
+        count = str(places).rpartition("[")[2].count(",") + 1
+    return [int(str(count))] * int(str(words["line.n_spans"]))
 
 
 def _strips(rng: random.Random, words: Words) -> None:
@@ -166,27 +198,41 @@ def _kinematic(rng: random.Random, words: Words) -> None:
     words["numerics.newmark_gamma"], words["numerics.newmark_beta"] = 0.55, 0.28
 
 
-# ---- numerics -----------------------------------------------------------------------------------
+_KEYS_OF_LAWS = (
+    "law",
+    "damping_N_s_per_m",
+    "hertz_stiffness_N_per_m1_5",
+    "restitution",
+    "least_impact_speed_m_per_s",
+)
+_LAWS = {
+    "linear": _linear,
+    "damped": _damped,
+    "hertz": _hertz,
+    **dict.fromkeys(_IMPACTS, _impact),
+    "kinematic": _kinematic,
+}
 
 
-def _implicit(rng: random.Random, words: Words) -> None:
-    """As it is."""
+def law_variants(rng: random.Random) -> dict[str, list[str]]:
+    """Assignments that give a scene each of the contact laws in turn, by the law's name.
 
-
-def _numerically_damped(rng: random.Random, words: Words) -> None:
-    gamma = rng.uniform(0.5, 0.7)
-    words["numerics.newmark_gamma"] = gamma
-    words["numerics.newmark_beta"] = rng.uniform(1.0, 1.2) * 0.25 * (gamma + 0.5) ** 2
-
-
-def _exchanging(rng: random.Random, words: Words) -> None:
-    words["numerics.coupling"] = rng.choice(["'iterated'", "'explicit'"])
-
-
-def _correcting(rng: random.Random, words: Words) -> None:
-    words["numerics.scheme"] = "'fixed_point'"
-    if rng.random() < 0.5:
-        words["numerics.iterations"] = rng.randint(1, 12)
+    They take away what the scene says of another law and, for the kinematic one, of numerics.
+    """
+    cleared: Words = {f"contact.{key}": "" for key in _KEYS_OF_LAWS}
+    cleared |= {"contact.stiffness_N_per_m": "", "effects.contact_damping": ""}
+    cleared |= {"effects.contact_loss": "true"}
+    found = {}
+    for name, law in _LAWS.items():
+        words = dict(cleared)
+        law(rng, words)
+        if name in _IMPACTS:
+            words["contact.law"] = f"'{name}'"
+        if name == "kinematic":
+            of_numerics = ("scheme", "coupling", "integrator", "spectral_radius", "iterations")
+            words = {**{f"numerics.{key}": "" for key in of_numerics}, **words}
+        found[name] = list(as_assignments(words))
+    return found
 
 
 def mechanism(rng: random.Random, n_steps: int) -> tuple[str, ...]:
@@ -210,12 +256,17 @@ def mechanism(rng: random.Random, n_steps: int) -> tuple[str, ...]:
         "train.pantographs.0.reversed": rng.choice(["true", "false"]),
         "effects.residual_dropper_stiffness": rng.choice(["true", "false"]),
     }
+    if rng.random() < _NOW_AND_THEN:
+        words["train.start_below_m"] = rng.uniform(0.0, 0.3)
     if rng.random() < 0.5:
         way_kept = rng.choice(["coordinate_partitioning", "augmented_lagrangian", "baumgarte"])
         words["pantographs.seven_body.motion"] = "'all_bodies'"
         words["pantographs.seven_body.constraint_handling"] = f"'{way_kept}'"
         words["pantographs.seven_body.substeps"] = rng.randint(1, 4)
     rng.choice((_linear, _damped, _hertz, _impact))(rng, words)
+    put_numerics(rng, words, with_second_opinion=False)
+    if rng.random() < 2 * _NOW_AND_THEN:
+        put_incidents(rng, words, n_steps, [_DROPPERS_OF_MECHANISM] * n_spans, 1, deepest_m=0.3)
     return as_assignments(words)
 
 

@@ -152,7 +152,7 @@ def rest(push: float, wire: float) -> np.ndarray:
     return fsolve(
         lambda q: acceleration(q[0], q[1], 0.0, 0.0, push, wire, MASSES, INERTIAS),
         start,
-        xtol=1e-14,
+        xtol=1e-13,  # some hundred roundings: less may be out of reach, which is a warning
     )
 
 

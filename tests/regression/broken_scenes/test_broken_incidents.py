@@ -51,8 +51,17 @@ ASSIGNMENTS = {
     "at no time": (["incidents.1.at_s=nan"], "a finite number [s]"),
     "no such wire": (["incidents.1.wire=third_rail"], "contact_wire or messenger_wire"),
     "share of one": (["incidents.1.share=1"], "must be less than 1"),
-    "share of nothing": (["incidents.1.share=0"], "must be greater than 0"),
-    "negative share": (["incidents.1.share=-0.5"], "must be greater than 0"),
+    "share of nothing": (["incidents.1.share=0"], "must be at least 0.01"),
+    "negative share": (["incidents.1.share=-0.5"], "must be at least 0.01"),
+    "tension that comes back": (
+        ["incidents.3={type='tension_loss',at_s=4.0,wire='contact_wire',share=0.9}"],
+        "incidents.3.share is 0.9 on the command line (--set); it must be less than the 0.8 that "
+        "incidents.1 leaves at 2.5 s",
+    ),
+    "tension that comes back, told first": (
+        ["incidents.3={type='tension_loss',at_s=1.0,wire='contact_wire',share=0.7}"],
+        "it must be less than the 0.7 that incidents.3 leaves at 1 s",
+    ),
     "two tensions at a time": (
         ["incidents.3={type='tension_loss',at_s=2.5,wire='contact_wire',share=0.7}"],
         "incidents.3.at_s is 2.5 s on the command line (--set); this happens in incidents.1",
