@@ -155,13 +155,13 @@ class OneSolve:
                 heads.early_height[:], heads.early_velocity[:] = self.pantographs.extrapolate(time)
         except RunBroken as error:
             # Told with the answer: the other ranks wait for that.
-            self._why = error
+            self._why = _alone(error)
             return None
         return heads
 
     def _broken(self) -> RunBroken:
         """Why the step has no solution, which rank 0 knows, on all ranks. Collective."""
-        why = self._why
+        why, self._why = self._why, None
         if self.comm.size > 1:
             why = self.comm.bcast(why, root=0)
         assert why is not None
@@ -192,7 +192,7 @@ class OneSolve:
                     return Reply(Verdict.REJECT, self._none, level=level)
             law.accept(time, found.depth, found.rate, found.contact_force)
         except RunBroken as error:
-            self._why = error
+            self._why = _alone(error)
             return Reply(Verdict.BROKEN, self._none)
         self._found = found
         self.counters.rounds += found.rounds
@@ -223,3 +223,10 @@ class OneSolve:
                 self._drop,
             )
         )
+
+
+def _alone(error: RunBroken) -> RunBroken:
+    """The error without its traceback, whose frames would keep PETSc's objects alive on this rank
+    alone: PETSc then frees its communicator on the others only, and the next object made hangs."""
+    error.__cause__ = error.__context__ = None
+    return error.with_traceback(None)
