@@ -19,6 +19,9 @@ from catenary.solver.parallel import on_root
 from catenary.solver.problem import Numerics
 from catenary.solver.schemes import Counters, Judge, LoadSource, StepRejected
 
+# A correction that moves any of the line by more than this [m] will not come back.
+_FAR = 10.0
+
 
 @dataclass
 class FixedPoint:
@@ -154,13 +157,11 @@ class FixedPoint:
 
     def _settled(self) -> bool:
         line, numerics = self.interaction.line, self.numerics
-        change = np.array(
-            [
-                np.abs(line.displacement - self._latest[0]).max(initial=0.0) / numerics.eps_d,
-                np.abs(line.velocity - self._latest[1]).max(initial=0.0) / numerics.eps_v,
-            ]
-        )
-        largest = float(np.nan_to_num(change, nan=np.inf, posinf=np.inf).max())
+        moved = np.abs(line.displacement - self._latest[0]).max(initial=0.0)
+        sped = np.abs(line.velocity - self._latest[1]).max(initial=0.0)
+        largest = float(max(moved / numerics.eps_d, sped / numerics.eps_v))
+        if not (moved < _FAR and np.isfinite(sped)):  # also true for what is no number
+            largest = np.inf
         if self.comm.size > 1:
             largest = self.comm.allreduce(largest, op=MPI.MAX)
         if not np.isfinite(largest):

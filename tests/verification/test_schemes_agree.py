@@ -9,7 +9,7 @@ import pytest
 from measuring import History, check, march, start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.solver.contact_laws import LinearLaw
+from catenary.solver.contact_laws import HertzLaw, LinearLaw
 from catenary.solver.problem import Problem
 
 
@@ -108,3 +108,24 @@ def test_a_fixed_number_of_corrections_that_diverge_ends_the_run() -> None:
     assert "the step to t = " in outcome.outcome and "with the train at 1" in outcome.outcome
     assert "diverges" in outcome.outcome
     assert "numerics.iterations is 10" in outcome.outcome and "one_solve" in outcome.outcome
+
+
+def test_corrections_that_throw_the_line_away_end_the_run_without_contact() -> None:
+    """Every first correction presses as a Hertz contact of 2e7 N/m does at a prediction, and
+    every second one finds no contact: the force stays zero while the line is thrown kilometres."""
+    line = en50318_line(3)
+    thrown = problem_of(
+        line,
+        contact=HertzLaw(8.2e9, 1.5, 0.0, 0.1),
+        train=train(250 / 3.6, 30.0, 130.0, raise_time=0.0),
+        numerics=numerics(6e-3, "fixed_point", eps_d=1e-6, eps_v=1e-3, iterations=2),
+    )
+    history = History()
+    run, _ = start_march(thrown, mesh_of(line, 5))
+    with run:
+        outcome = run.run([history])
+    print(outcome.outcome)
+    assert "diverges" in outcome.outcome and "numerics.iterations is 2" in outcome.outcome
+    assert outcome.counters["unconverged_steps"] >= 1
+    # Up to there the heads may have lifted it, from 5.5 m, by what a correction of 10 m can.
+    assert np.abs(history["wire_height"]).max() < 5.5 + 10.0
