@@ -14,6 +14,7 @@ from petsc4py import PETSc
 NAMES = {
     "LineFree": "prediction, product with K, solve and correction of the line",
     "LineProduct": "product with K, part of LineFree",
+    "LineSolve": "solve with A, part of LineFree",
     "LineColumns": "answers of the line to unit contact forces",
     "ContactShare": "heights, compliances and tensions that this rank owns",
     "ContactReduce": "shares to rank 0",

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from catenary.solver import inner_kernels, kernels, repeated_rows
+from catenary.solver import inner_kernels, kernels, repeated_rows, station_blocks, station_factors
 from catenary.solver.compliance import Windows
 from catenary.solver.distribution import Ownership
 from catenary.solver.line_operators import LineOperators, Loads
@@ -50,6 +50,8 @@ class LineMotion(ABC):
         kernels.warm_up()
         inner_kernels.warm_up()
         repeated_rows.warm_up()
+        station_blocks.warm_up()
+        station_factors.warm_up()
         self._comm = comm
         self.ownership = ownership
         self.position_factor = position_factor

@@ -24,11 +24,13 @@ from catenary.solver.linear import (
     PREFIX,
     PartSolver,
     SchwarzSolver,
+    Wrapped,
     wants_distributed_solver,
 )
 from catenary.solver.model import Model
 from catenary.solver.operators import as_petsc, columns_of, part_of, station_block
-from catenary.solver.repeated_rows import repeated_rows
+from catenary.solver.repeated_rows import RepeatedRows, repeated_rows
+from catenary.solver.station_blocks import StationProduct, station_product
 from catenary.solver.subdomain import Halo, Subdomain
 
 logger = logging.getLogger(__name__)
@@ -60,7 +62,6 @@ class LineOperators:
     """
 
     # None on a rank that owns nothing.
-    _matrix: PETSc.Mat | None = None
     _solver: PartSolver | SchwarzSolver | None = None
     _is_direct = True
 
@@ -77,7 +78,7 @@ class LineOperators:
         self._ownership = ownership
         self._coefficients = coefficients
         self._block = station_block(model, ownership)
-        self._product_event = event("LineProduct")
+        self._product_event, self._solve_event = event("LineProduct"), event("LineSolve")
         if comm.size > 1 and wants_distributed_solver():
             self._solve_together(windows)
             residual = self.residual()
@@ -105,7 +106,7 @@ class LineOperators:
             self._is_direct = False
         if isinstance(self._solver, PartSolver):
             self._solver.hurry()
-        self._stiffness = repeated_rows(self._rows_of("stiffness"))
+        self._stiffness = self._product_by_kinds()
 
     def exchange(self) -> None:
         """Bring ``factor`` up to date where it is others'. Collective."""
@@ -115,7 +116,7 @@ class LineOperators:
         """Make K ``factor`` the internal force. Right after ``exchange``. Not collective."""
         self._product_event.begin()
         if self._stiffness is not None:
-            self._stiffness.multiply(self._read_array, self._force_array)
+            self._stiffness.multiply(self._read_array, self._force.array)
         elif self.domain.size:
             self._product("stiffness").mult(self._read, self._force_here)
         self._product_event.end()
@@ -130,7 +131,7 @@ class LineOperators:
 
         Not collective.
         """
-        self._force_array += force
+        self._force.array[:] += force
 
     def solve(self, loads: Loads | None = None) -> None:
         """Make ``answer`` that to the internal force and to ``loads``. Collective with loads.
@@ -146,11 +147,13 @@ class LineOperators:
         right = self._force
         if loads is not None:
             right, owned = self._loaded, self.domain.owned
-            self._loaded_array[owned] = self._force_array[owned]
+            right.array[owned] = self._force.array[owned]
             for dofs, values in loads:
-                np.add.at(self._loaded_array[owned], dofs, values)
+                np.add.at(right.array[owned], dofs, values)
             self._loaded_halo.exchange()
+        self._solve_event.begin()
         self._solve(right)
+        self._solve_event.end()
 
     def solve_for(self, dofs: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
         """Answer to forces ``coefficients`` at global unknowns ``dofs``. Collective.
@@ -159,8 +162,8 @@ class LineOperators:
         """
         low, high = self.domain.low, self.domain.high
         here = (dofs >= low) & (dofs < high)
-        self._loaded_array[:] = 0.0
-        np.add.at(self._loaded_array, dofs[here] - low, coefficients[here])
+        self._loaded.array[:] = 0.0
+        np.add.at(self._loaded.array, dofs[here] - low, coefficients[here])
         self._solve(self._loaded)
         return self.answer
 
@@ -170,7 +173,7 @@ class LineOperators:
         local = 0.0
         if self.domain.size:
             self._product(name).mult(self._read, self._loaded_here)
-            local = float(self._loaded_array[self.domain.owned] @ self.factor)
+            local = float(self._loaded.array[self.domain.owned] @ self.factor)
         return float(self._comm.allreduce(local))
 
     def residual(self) -> float:
@@ -180,14 +183,14 @@ class LineOperators:
         """
         owned = self.domain.owned
         load = np.cos(1.0 + 3.7 * np.arange(self.domain.low, self.domain.high))
-        self._loaded_array[:] = load
+        self._loaded.array[:] = load
         self._solve(self._loaded)
         self.factor[:] = self.answer
         self.answer[:] = 0.0
         self.exchange()
-        if self._matrix is not None:
-            self._matrix.mult(self._read_domain, self._loaded)
-        missing = self._loaded_array[owned] - load[owned]
+        if self._solver is not None:
+            self._solver.matrix.mult(self._read_domain, self._loaded.vector)
+        missing = self._loaded.array[owned] - load[owned]
         squares = np.array([missing @ missing, load[owned] @ load[owned]])
         self._comm.Allreduce(MPI.IN_PLACE, squares)
         return float(np.sqrt(squares[0] / squares[1]))
@@ -201,7 +204,7 @@ class LineOperators:
         """Free all PETSc objects and messages. Collective."""
         for halo in (self._halo, self._loaded_halo):
             halo.destroy()
-        for held in (self._solver, self._matrix, *self._products.values(), *self._vectors):
+        for held in (self._solver, *self._products.values(), *self._vectors):
             if held is not None:
                 held.destroy()
 
@@ -213,8 +216,7 @@ class LineOperators:
         if self.domain.size:
             rows = (low, high)
             part = part_of(self._model, rows, rows, self._coefficients, 1.0, self._block)
-            self._matrix = as_petsc(part, PETSc.COMM_SELF)
-            solver = PartSolver(self._matrix, self._in_stations, self._comm.size == 1)
+            solver = PartSolver(part, self._in_stations, self._comm.size == 1)
             self._solver, is_direct = solver, solver.is_direct
         self._is_direct = bool(self._comm.allreduce(int(is_direct), op=MPI.MIN))
 
@@ -224,9 +226,8 @@ class LineOperators:
         self._make_arrays(first, last, self._comm)
         rows, whole = (first, last), (0, self._model.n_dofs)
         part = part_of(self._model, rows, whole, self._coefficients, 1.0, self._block)
-        self._matrix = as_petsc(part, self._comm)
         solver = SchwarzSolver(
-            self._comm, self._matrix, self._ownership, self._overlap(windows), self._in_stations
+            self._comm, part, self._ownership, self._overlap(windows), self._in_stations
         )
         self._solver, self._is_direct = solver, solver.is_direct
 
@@ -252,43 +253,44 @@ class LineOperators:
         Nothing in the loop makes or copies arrays. An array asked from a vector would keep it, and
         the communicator, alive beyond ``destroy``.
         """
-        own, size = self._ownership, self._model.block_size
+        own, block = self._ownership, self._block
         read_low, read_high = columns_of(self._model, (low, high))
-        read_low, read_high = read_low - read_low % size, read_high + -read_high % size
+        read_low, read_high = read_low - read_low % block, read_high + -read_high % block
         self.domain = domain = Subdomain(own.first, own.last, low, high, read_low, read_high)
-        read, answer = np.zeros(read_high - read_low), np.zeros(domain.size)
-        self._read_array = read
-        self._force_array, self._loaded_array = np.zeros(domain.size), np.zeros(domain.size)
+        self._read_array = read = np.zeros(read_high - read_low)
+        force, loaded, answer = (np.zeros(domain.size) for _ in range(3))
         # What products fill is this rank's, what is solved for perhaps the line's: two views.
-        self._read, self._force_here, self._loaded_here = (
+        self._read, self._force_here, self._loaded_here = here = [
             PETSc.Vec().createWithArray(array, comm=PETSc.COMM_SELF)
-            for array in (read, self._force_array, self._loaded_array)
-        )
-        self._force, self._loaded, self._solution, self._read_domain = (
-            PETSc.Vec().createWithArray(array, size=(domain.size, None), comm=comm)
-            for array in (
-                self._force_array,
-                self._loaded_array,
-                answer,
-                read[low - read_low : high - read_low],
-            )
-        )
-        self._vectors = (
-            *(self._read, self._force_here, self._loaded_here),
-            *(self._force, self._loaded, self._solution, self._read_domain),
-        )
+            for array in (read, force, loaded)
+        ]
+        self._force, self._loaded, self._solution, read_domain = solved = [
+            Wrapped(array, PETSc.Vec().createWithArray(array, size=(domain.size, None), comm=comm))
+            for array in (force, loaded, answer, read[low - read_low : high - read_low])
+        ]
+        self._read_domain = read_domain.vector
+        self._vectors = (*here, *(pair.vector for pair in solved))
         self._products: dict[str, PETSc.Mat] = {}
         self.factor, self.answer = read[domain.owned_of_read], answer[domain.owned]
         self._halo = Halo(self._comm, own, read_low, read)
-        self._loaded_halo = Halo(self._comm, own, low, self._loaded_array)
+        self._loaded_halo = Halo(self._comm, own, low, loaded)
 
     def _product(self, name: str) -> PETSc.Mat:
         """M, K or C for the rows of the subdomain, made when it is first asked for."""
         if name not in self._products:
-            self._products[name] = as_petsc(self._rows_of(name), PETSc.COMM_SELF)
+            rows = self._rows_of(name, self._model.block_size)
+            self._products[name] = as_petsc(rows, PETSc.COMM_SELF)
         return self._products[name]
 
-    def _rows_of(self, name: str) -> sparse.bsr_matrix:
+    def _product_by_kinds(self) -> StationProduct | RepeatedRows | None:
+        """Products with K that read each kind of rows once, by the fastest way that it allows."""
+        domain, product = self.domain, None
+        if self._in_stations and domain.size:
+            first = (domain.low - domain.read_low) // self._block
+            product = station_product(self._rows_of("stiffness", self._block), first)
+        return product or repeated_rows(self._rows_of("stiffness", self._model.block_size))
+
+    def _rows_of(self, name: str, block: int) -> sparse.bsr_matrix:
         domain = self.domain
         return part_of(
             self._model,
@@ -296,10 +298,10 @@ class LineOperators:
             (domain.read_low, domain.read_high),
             _COEFFICIENTS[name],
             0.0,
-            self._model.block_size,
+            block,
         )
 
-    def _solve(self, right: PETSc.Vec) -> None:
+    def _solve(self, right: Wrapped) -> None:
         if self._solver is not None:
             self._solver.solve(right, self._solution)
         if not self._is_direct:

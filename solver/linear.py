@@ -9,12 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
 from petsc4py import PETSc
+from scipy import sparse
 
 from catenary.solver.distribution import Ownership
 from catenary.solver.errors import InputError
+from catenary.solver.operators import as_petsc
+from catenary.solver.station_factors import StationFactors, station_factors
 
 PREFIX, PART_PREFIX = "march_", "march_sub_"
 # A direct solve of a matrix as well conditioned as A (below 1e6) leaves about 1e-15.
@@ -40,6 +44,13 @@ def refused_options() -> Iterator[None]:
         ) from error
 
 
+class Wrapped(NamedTuple):
+    """An array and the PETSc vector that wraps it: the same numbers for both."""
+
+    array: np.ndarray
+    vector: PETSc.Vec
+
+
 class PartSolver:
     """Factors of this rank's part of the step operator, all of it on one rank.
 
@@ -48,26 +59,41 @@ class PartSolver:
 
     Parameters
     ----------
-    matrix : sequential, in blocks of stations or of nodes; kept by reference
+    part : rows and columns of what it solves for, in blocks of stations or of nodes
     in_stations : whether its blocks are stations
     is_whole : whether it is the whole line, which decides the prefix of its options
+
+    Attributes
+    ----------
+    matrix : ``part`` as a sequential PETSc matrix
     """
 
-    def __init__(self, matrix: PETSc.Mat, in_stations: bool, is_whole: bool) -> None:
+    def __init__(self, part: sparse.bsr_matrix, in_stations: bool, is_whole: bool) -> None:
+        prefix = PREFIX if is_whole else PART_PREFIX
+        self.matrix = as_petsc(part, PETSc.COMM_SELF)
         self._ksp = PETSc.KSP().create(PETSc.COMM_SELF)
-        self._ksp.setOptionsPrefix(PREFIX if is_whole else PART_PREFIX)
-        self._ksp.setOperators(matrix)
+        self._ksp.setOptionsPrefix(prefix)
+        self._ksp.setOperators(self.matrix)
         _choose_direct(self._ksp, in_stations)
+        self._factors: StationFactors | None = None
+        if in_stations and not _is_given(f"{prefix}pc_"):
+            self._factors = station_factors(part)
+        if self._factors is not None:
+            self._ksp.getPC().setType(PETSc.PC.Type.PYTHON)
+            self._ksp.getPC().setPythonContext(self._factors)
         # Of an iteration that the options ask for; a direct solver has no tolerance.
         self._ksp.setTolerances(rtol=DIRECT)
         with refused_options():
             self._ksp.setFromOptions()
             self._ksp.setUp()
-        self._solve = self._ksp.solve
+        self._solve = self._solve_by_petsc
 
-    def solve(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
+    def solve(self, right: Wrapped, solution: Wrapped) -> None:
         """Solve A ``solution`` = ``right`` here."""
         self._solve(right, solution)
+
+    def _solve_by_petsc(self, right: Wrapped, solution: Wrapped) -> None:
+        self._ksp.solve(right.vector, solution.vector)
 
     @property
     def is_direct(self) -> bool:
@@ -85,16 +111,23 @@ class PartSolver:
         What PETSc does around them is a tenth of a solve with a short line.
         """
         pc = self._ksp.getPC()
-        if self.is_direct and pc.getType() in (PETSc.PC.Type.CHOLESKY, PETSc.PC.Type.LU):
-            self._solve = pc.getFactorMatrix().solve
+        if not self.is_direct:
+            return
+        if self._factors is not None:
+            solve_with = self._factors.solve
+            self._solve = lambda right, solution: solve_with(right.array, solution.array)
+        elif pc.getType() in (PETSc.PC.Type.CHOLESKY, PETSc.PC.Type.LU):
+            factored = pc.getFactorMatrix().solve
+            self._solve = lambda right, solution: factored(right.vector, solution.vector)
 
     def iterate(self) -> None:
         """Use the factors as a preconditioner of GMRES from now on."""
         _use_gmres(self._ksp)
 
     def destroy(self) -> None:
-        """Free the factors."""
+        """Free matrix and factors."""
         self._ksp.destroy()
+        self.matrix.destroy()
 
 
 class SchwarzSolver:
@@ -106,23 +139,28 @@ class SchwarzSolver:
     Parameters
     ----------
     comm : mpi4py communicator
-    matrix : the distributed operator A, kept by reference
+    part : this rank's rows of the operator A
     ownership : Ownership
     overlap : range of unknowns [low, high) that influences this rank's own, in whole blocks
     in_stations : whether the matrix has blocks of stations
+
+    Attributes
+    ----------
+    matrix : A as PETSc's distributed matrix
     """
 
     def __init__(
         self,
         comm: Any,
-        matrix: PETSc.Mat,
+        part: sparse.bsr_matrix,
         ownership: Ownership,
         overlap: tuple[int, int],
         in_stations: bool,
     ) -> None:
+        self.matrix = as_petsc(part, comm)
         self._ksp = PETSc.KSP().create(comm)
         self._ksp.setOptionsPrefix(PREFIX)
-        self._ksp.setOperators(matrix)
+        self._ksp.setOperators(self.matrix)
         self._ksp.setType(PETSc.KSP.Type.PREONLY)
         pc = self._ksp.getPC()
         pc.setType(PETSc.PC.Type.ASM)
@@ -143,9 +181,9 @@ class SchwarzSolver:
                     solver.setFromOptions()
             self._ksp.setUpOnBlocks()
 
-    def solve(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
+    def solve(self, right: Wrapped, solution: Wrapped) -> None:
         """Solve A ``solution`` = ``right``. Collective."""
-        self._ksp.solve(right, solution)
+        self._ksp.solve(right.vector, solution.vector)
 
     @property
     def is_direct(self) -> bool:
@@ -163,18 +201,22 @@ class SchwarzSolver:
         _use_gmres(self._ksp)
 
     def destroy(self) -> None:
-        """Free the factors. Collective."""
+        """Free matrix and factors. Collective."""
         self._ksp.destroy()
+        self.matrix.destroy()
 
 
 def wants_distributed_solver() -> bool:
     """Whether PETSc's options name a solver for the whole line on all ranks."""
-    given = PETSc.Options().getAll()
-    return any(name.startswith((f"{PREFIX}ksp_", f"{PREFIX}pc_")) for name in given)
+    return _is_given(f"{PREFIX}ksp_", f"{PREFIX}pc_")
+
+
+def _is_given(*prefixes: str) -> bool:
+    return any(name.startswith(prefixes) for name in PETSc.Options().getAll())
 
 
 def _choose_direct(ksp: PETSc.KSP, in_stations: bool) -> None:
-    """Make a sequential solver direct, by the factorisation that is fastest here.
+    """Make a sequential solver direct, by PETSc's factorisation that is fastest here.
 
     In blocks of stations a line is block tridiagonal: Cholesky's factor in the order along the
     track has no more blocks than the matrix, and fewest numbers of all. In blocks of nodes, where

@@ -58,22 +58,27 @@ def repeated_rows(matrix: sparse.bsr_matrix) -> RepeatedRows | None:
     blocks = np.zeros((n, width, 4))
     blocks[row, place] = matrix.data.reshape(-1, 4)
     blocks = blocks.reshape(n, 4 * width)
-    _, first, kinds = np.unique(_digests(blocks, steps), return_index=True, return_inverse=True)
+    first, kinds = kinds_of(np.hstack([blocks, steps]))
     if first.size * _REPEATED > n:
         return None
-    same = (blocks == blocks[first][kinds]).all() and (steps == steps[first][kinds]).all()
     counts = np.maximum(count[first], _ALWAYS)
-    if not same:
-        return None  # different rows of one digest: as good as impossible, and only slower
-    return RepeatedRows(kinds.astype(np.int32), blocks[first], steps[first], counts)
+    return RepeatedRows(kinds, blocks[first], steps[first], counts)
 
 
-def _digests(blocks: np.ndarray, steps: np.ndarray) -> np.ndarray:
+def kinds_of(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where each kind of ``rows`` (n, k) is met first, and the kind of each row (n,)."""
+    _, first, kinds = np.unique(_digests(rows), return_index=True, return_inverse=True)
+    if not (rows == rows[first][kinds]).all():
+        # Two different rows of one digest, as good as impossible, or what is no number.
+        return np.arange(rows.shape[0]), np.arange(rows.shape[0], dtype=np.int32)
+    return first, kinds.astype(np.int32)
+
+
+def _digests(rows: np.ndarray) -> np.ndarray:
     """A number for each row, the same for the same rows, shape (n,)."""
     factors = np.random.default_rng(0).integers(0, 2**63, 64, dtype=np.uint64) * np.uint64(2) + 1
-    result = np.zeros(steps.shape[0], dtype=np.uint64)
-    columns = (*(blocks + 0.0).view(np.uint64).T, *steps.astype(np.uint64).T)
-    for number, column in enumerate(columns):
+    result = np.zeros(rows.shape[0], dtype=np.uint64)
+    for number, column in enumerate((rows + 0.0).view(np.uint64).T):
         result = (result + column * factors[number % 64]) * factors[(7 * number + 1) % 64]
         result ^= result >> np.uint64(29)
     return result

@@ -1,0 +1,99 @@
+"""Four numbers at once for Numba's kernels: the unknowns of a station.
+
+Numba leaves arithmetic on a few numbers to one after the other. These functions, for use in
+compiled ones only, become single instructions where the processor has them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic, models, register_model
+
+# Numba's own annotations know nothing of the calls.
+inlined: Any = intrinsic
+
+_VECTOR = ir.VectorType(ir.DoubleType(), 4)
+_LANES = ir.VectorType(ir.IntType(32), 4)
+# A product and a sum may become one instruction, which rounds once instead of twice.
+_FUSED = ("contract",)
+
+
+class Four(types.Type):
+    """Numba's type of four numbers."""
+
+    def __init__(self) -> None:
+        super().__init__(name="Four")
+
+
+@register_model(Four)
+class FourModel(models.PrimitiveModel):
+    """Four numbers as LLVM's vector."""
+
+    def __init__(self, manager: Any, front_end_type: types.Type) -> None:
+        super().__init__(manager, front_end_type, _VECTOR)
+
+
+_four = Four()
+
+
+@inlined
+def zero(typing_context):
+    """0, 0, 0, 0."""
+
+    def generate(context, builder, signature, arguments):
+        return ir.Constant(_VECTOR, [0.0] * 4)
+
+    return _four(), generate
+
+
+@inlined
+def load(typing_context, array, at):
+    """``array[at]`` to ``array[at + 3]``, ``array`` being contiguous."""
+
+    def generate(context, builder, signature, arguments):
+        place = _place(context, builder, signature.args[0], *arguments)
+        return builder.load(place, align=8)
+
+    return _four(array, at), generate
+
+
+@inlined
+def store(typing_context, array, at, x):
+    """Write x to ``array[at]`` and on."""
+
+    def generate(context, builder, signature, arguments):
+        place = _place(context, builder, signature.args[0], *arguments[:2])
+        builder.store(arguments[2], place, align=8)
+        return context.get_dummy_value()
+
+    return types.void(array, at, x), generate
+
+
+@inlined
+def add_product(typing_context, total, array, at, x):
+    """``total`` plus a 4 x 4 block times x; the block is stored by columns from ``at`` on."""
+
+    def generate(context, builder, signature, arguments):
+        total, array, at, x = arguments
+        # In two sums, of which the second need not wait for ``total``.
+        sums = [total, None]
+        for column in range(4):
+            start = builder.add(at, ir.Constant(at.type, 4 * column))
+            place = _place(context, builder, signature.args[1], array, start)
+            lane = ir.Constant(_LANES, [column] * 4)
+            factor = builder.shuffle_vector(x, ir.Constant(_VECTOR, ir.Undefined), lane)
+            product = builder.fmul(builder.load(place, align=8), factor, flags=_FUSED)
+            old = sums[column // 2]
+            sums[column // 2] = product if old is None else builder.fadd(old, product, flags=_FUSED)
+        return builder.fadd(*sums)
+
+    return _four(total, array, at, x), generate
+
+
+def _place(context: Any, builder: Any, kind: types.Type, array: Any, at: Any) -> Any:
+    """Pointer to four numbers of an array."""
+    data = context.make_array(kind)(context, builder, array).data
+    return builder.bitcast(builder.gep(data, [at]), _VECTOR.as_pointer())
