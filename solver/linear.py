@@ -1,4 +1,4 @@
-"""Solvers for the constant step operator: factored once, by PETSc.
+"""Solvers for the constant step operator: factored once, by stations or by PETSc.
 
 On several ranks each solves for its own part of the line and as much of its neighbours' as can
 influence it: restricted additive Schwarz with an overlap as wide as the reach of A^-1, which is a
@@ -7,6 +7,7 @@ direct solver. ``LineOperators`` verifies that, and iterates where it does not h
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
@@ -72,6 +73,9 @@ class PartSolver:
         prefix = PREFIX if is_whole else PART_PREFIX
         self.matrix = as_petsc(part, PETSc.COMM_SELF)
         self._ksp = PETSc.KSP().create(PETSc.COMM_SELF)
+        # PETSc cannot free a PC in Python when Python has ended, so that it is freed before,
+        # whatever error kept ``destroy`` from being called. No other rank takes part.
+        self._free = weakref.finalize(self, _destroy, self._ksp, self.matrix)
         self._ksp.setOptionsPrefix(prefix)
         self._ksp.setOperators(self.matrix)
         _choose_direct(self._ksp, in_stations)
@@ -126,8 +130,7 @@ class PartSolver:
 
     def destroy(self) -> None:
         """Free matrix and factors."""
-        self._ksp.destroy()
-        self.matrix.destroy()
+        self._free()
 
 
 class SchwarzSolver:
@@ -209,6 +212,11 @@ class SchwarzSolver:
 def wants_distributed_solver() -> bool:
     """Whether PETSc's options name a solver for the whole line on all ranks."""
     return _is_given(f"{PREFIX}ksp_", f"{PREFIX}pc_")
+
+
+def _destroy(*objects: PETSc.Object) -> None:
+    for held in objects:
+        held.destroy()
 
 
 def _is_given(*prefixes: str) -> bool:

@@ -1,25 +1,32 @@
 """What a step costs: against its floor, and against the paper's correction. Run by ``make bench``.
 
-The floor is what no implicit step of this model can do without: one solve with the factored
-operator and one product with K, measured in the same process. Figures are medians of rounds; read
-them as ratios, absolute times depend on the machine and on what else it does.
+The floor is what no implicit step of this model can do without, measured in the same process: one
+solve with the factored operator, the fastest that PETSc or LAPACK offers, and one product with K.
+Figures are medians of rounds; read them as ratios, absolute times depend on the machine and on what
+else it does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
+import numpy as np
 import pytest
 from mpi4py import MPI
+from petsc4py import PETSc
+from scipy import linalg
 
 from catenary.cases.meshing import mesh_of
 from catenary.cases.scene import load_scene
 from catenary.solver.distribution import distribute
 from catenary.solver.equilibrium import elasticity, find_form, middle_span
 from catenary.solver.march import March
+from catenary.solver.model import Model
 from catenary.solver.newmark import NewmarkLine
+from catenary.solver.operators import as_petsc, part_of
 
 CASE = "ambrosio2012"
 TRAINS = {
@@ -29,6 +36,7 @@ TRAINS = {
 }
 N_STEPS = 3000
 ROUNDS = 5
+OWN, PRODUCT = "own solve", "product with K"
 _median_us: dict[str, float] = {}
 
 
@@ -49,13 +57,14 @@ def rest(train: str) -> tuple[Any, ...]:
 def table() -> Iterator[None]:
     """Print the ratios when all is measured."""
     yield
-    floor = _median_us["floor"]
+    floor = min(_median_us[name] for name in LIBRARIES) + _median_us[PRODUCT]
+    parts = (*LIBRARIES, OWN, PRODUCT, "floor")
     print(f"\n{CASE}, one rank, median of {ROUNDS} rounds\n")
-    print(f"{'':20}{'us a step':>10}{'x floor':>9}{'x real time':>13}")
+    print(f"{'':44}{'us a step':>10}{'x floor':>9}{'x real time':>13}")
     dt = load_scene(CASE).numerics.dt_s
-    for name, cost in _median_us.items():
-        factor = "" if name == "floor" else f"{1e6 * dt / cost:13.1f}"
-        print(f"{name:20}{cost:10.1f}{cost / floor:9.2f}{factor}")
+    for name, cost in (*_median_us.items(), ("floor", floor)):
+        factor = "" if name in parts else f"{1e6 * dt / cost:13.1f}"
+        print(f"{name:44}{cost:10.1f}{cost / floor:9.2f}{factor}")
 
 
 def keep(name: str, benchmark: Any, per_call: int) -> None:
@@ -64,18 +73,62 @@ def keep(name: str, benchmark: Any, per_call: int) -> None:
     benchmark.extra_info["us_per_step"] = _median_us[name]
 
 
-def test_floor(benchmark: Any, at_rest: tuple[Any, ...]) -> None:
+def by_petsc(line: NewmarkLine, model: Model, block: int, kind: str, order: str) -> Callable:
+    """A solve with PETSc's factors of the step operator."""
+    whole, coefficients = (0, model.n_dofs), (1.0, line.position_factor, line.velocity_factor)
+    matrix = as_petsc(part_of(model, whole, whole, coefficients, 1.0, block), PETSc.COMM_SELF)
+    pc = PETSc.PC().create(PETSc.COMM_SELF)
+    pc.setOperators(matrix)
+    pc.setType(kind)
+    pc.setFactorOrdering(order)
+    pc.setUp()
+    answer, right = matrix.createVecs()
+    right.set(1.0)
+    solve = pc.getFactorMatrix().solve
+    return lambda: solve(right, answer)
+
+
+def by_lapack(line: NewmarkLine, model: Model) -> Callable:
+    """A solve with LAPACK's Cholesky factor of the step operator's band."""
+    whole, coefficients = (0, model.n_dofs), (1.0, line.position_factor, line.velocity_factor)
+    matrix = part_of(model, whole, whole, coefficients, 1.0, 1).tocoo()
+    below = matrix.row - matrix.col
+    band = np.zeros((below.max() + 1, model.n_dofs))
+    kept = below >= 0
+    band[below[kept], matrix.col[kept]] = matrix.data[kept]
+    factor = linalg.cholesky_banded(band, lower=True)
+    solve = linalg.get_lapack_funcs("pbtrs", (factor,))
+    right = np.ones(model.n_dofs)
+    return lambda: solve(factor, right, lower=1)
+
+
+LIBRARIES: dict[str, Callable[[NewmarkLine, Model], Callable]] = {
+    "PETSc, Cholesky in blocks of stations": partial(
+        by_petsc, block=4, kind="cholesky", order="natural"
+    ),
+    "PETSc, LU of nodes in nested dissection": partial(by_petsc, block=2, kind="lu", order="nd"),
+    "LAPACK, Cholesky of the band": by_lapack,
+}
+PARTS: dict[str, Callable[[NewmarkLine, Model], Callable]] = {
+    **LIBRARIES,
+    OWN: lambda line, model: line.solve,
+    PRODUCT: lambda line, model: line.internal_forces,
+}
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_parts_of_the_floor(benchmark: Any, at_rest: tuple[Any, ...], part: str) -> None:
     problem, model, _, _ = at_rest
     line = NewmarkLine(MPI.COMM_SELF, model, distribute(model, 1, 0), problem.numerics)
+    call = PARTS[part](line, model)
 
-    def solve_and_multiply() -> None:
+    def repeat() -> None:
         for _ in range(N_STEPS):
-            line.internal_forces()
-            line.solve()
+            call()
 
-    benchmark.pedantic(solve_and_multiply, rounds=ROUNDS, warmup_rounds=1)
+    benchmark.pedantic(repeat, rounds=ROUNDS, warmup_rounds=1)
     line.destroy()
-    keep("floor", benchmark, N_STEPS)
+    keep(part, benchmark, N_STEPS)
 
 
 @pytest.mark.parametrize("pantographs", TRAINS)
