@@ -235,6 +235,21 @@ def _couplings(scene: Scene) -> list[Level]:
     ]
 
 
+# Steps that adapt: longest step [s], and how wrong a contact force may be in one step [N].
+_ADAPTED = ((1e-3, 1.0), (1e-3, 0.1), (4e-3, 10.0), (4e-3, 1.0), (4e-3, 0.1))
+
+
+def _adaptive(scene: Scene) -> list[Level]:
+    return [
+        Level(
+            f"{1e3 * dt:g}_ms_{tolerance:g}_N",
+            (*_ONE_SOLVE, f"numerics.dt_s={dt:g}", f"numerics.adaptive_tolerance_N={tolerance:g}"),
+            quick=tolerance == 10.0,
+        )
+        for dt, tolerance in _ADAPTED
+    ]
+
+
 # ---- models -------------------------------------------------------------------------------------
 
 _NO_LAW = ("contact.restitution=", "contact.hertz_stiffness_N_per_m1_5=",
@@ -320,6 +335,7 @@ _ALL = (
     Axis("grid", "time step and elements per gap", DISCRETISATION, _grid, _fine_grid),
     Axis("scheme", "scheme, at the case's step", DISCRETISATION, _schemes, _fine_step),
     Axis("coupling", "coupling, at the case's step", DISCRETISATION, _couplings, _fine_step),
+    Axis("adaptive", "steps halved where a force is wrong", DISCRETISATION, _adaptive, _fine_step),
     Axis("contact", "contact law and stiffness", MODEL, _contacts),
     Axis("dropper", "dropper model", MODEL, _droppers),
     Axis("pantograph", "pantograph model", MODEL, _pantographs),

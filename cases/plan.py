@@ -12,7 +12,7 @@ from catenary.cases.scene import Scene
 from catenary.mbs.build import has_joints
 from catenary.mbs.multibody import MultibodyData
 from catenary.solver import effects
-from catenary.solver.problem import Problem
+from catenary.solver.problem import Numerics, Problem, n_halvings
 
 # Cost model of the march on one rank, records included: overhead of a step, and time per unknown.
 # Runs of the case ambrosio2012 on 25, 100 and 1000 spans, 4.5e3 to 1.8e5 unknowns, on a two-core
@@ -65,6 +65,7 @@ class Plan:
     start, end, evaluation : stretch that the leading pantograph runs, and that is judged [m]
     incidents : time [s] and sentence of each, in order of time
     dt, simulated : time step and simulated time [s]
+    halved : what is said of steps that adapt, empty if none do
     memory : estimate of the resident memory on one rank [B]
     march : estimate of the wall time of the time loop on one rank [s]
     file_size : size of the channels in the result file [B]
@@ -92,6 +93,7 @@ class Plan:
     incidents: tuple[tuple[float, str], ...]
     dt: float
     scheme: str
+    halved: str
     simulated: float
     memory: float
     march: float
@@ -163,6 +165,7 @@ def make_plan(scene: Scene) -> Plan:
         incidents=tuple((fact["time_s"], fact["says"]) for fact in incident_facts(scene, problem)),
         dt=dt,
         scheme=problem.numerics.scheme,
+        halved=_halved(problem.numerics),
         simulated=simulated,
         memory=estimate_memory(n_dofs),
         march=estimate_march(n_dofs, n_steps, problem.numerics.scheme, _substeps(problem)),
@@ -183,6 +186,17 @@ def estimate_march(n_dofs: int, n_steps: int, scheme: str, n_substeps: int = 0) 
     step = STEP_OVERHEAD + STEP_PER_UNKNOWN * n_dofs
     step *= SCHEME_FACTOR[scheme]
     return n_steps * (step + ALL_BODIES_SUBSTEP * n_substeps)
+
+
+def _halved(numerics: Numerics) -> str:
+    tolerance = numerics.adaptive_tolerance
+    if tolerance is None:
+        return ""
+    shortest = numerics.dt / 2 ** n_halvings(numerics.dt, numerics.smallest_dt)
+    return (
+        f"steps with a contact force wrong by more than {tolerance:g} N, or without a solution, "
+        f"are halved, down to {1e3 * shortest:g} ms (not in the estimates)"
+    )
 
 
 def _substeps(problem: Problem) -> int:
@@ -232,6 +246,7 @@ def plan_text(plan: Plan) -> str:
             f"{plan.simulated:.2f} s in {plan.n_steps} steps of {1e3 * plan.dt:g} ms, scheme "
             f"{plan.scheme}",
         ),
+        *([("adapted", plan.halved)] if plan.halved else []),
         ("memory", f"about {plan.memory / 1e6:.0f} MB on one rank (estimate)"),
         (
             "march",

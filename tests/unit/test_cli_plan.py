@@ -60,3 +60,11 @@ def test_long_estimates_are_told_in_minutes() -> None:
     scene = load_scene("en50318_2002", ["numerics.dt_s=1e-6"])
     text = plan_text(make_plan(scene))
     assert " min on one rank" in text
+
+
+def test_steps_that_adapt_are_told_with_their_shortest() -> None:
+    adapted = ["numerics.adaptive_tolerance_N=2", "numerics.smallest_dt_s=2e-4"]
+    # 1 ms halved twice is 0.25 ms; a third time would be below the smallest.
+    told = plan_text(make_plan(load_scene("en50318_2002", adapted)))
+    assert "wrong by more than 2 N" in told and "down to 0.25 ms" in told
+    assert "adapted" not in plan_text(make_plan(load_scene("en50318_2002", [])))
