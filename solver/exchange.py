@@ -117,6 +117,8 @@ class Exchange:
                 pairs[:count], pairs[count:] = reply.droppers, reply.compensation
             comm.Bcast(pairs, root=0)
             self._count(pairs.nbytes)
+        if reply is not None:
+            return reply
         return Reply(
             Verdict(int(answer[0])),
             answer[_HEAD : _HEAD + n].copy(),
@@ -138,8 +140,11 @@ class Exchange:
             larger = LineResponse(self._n, 2 * total, self._early)
             larger.summed[:] = merged.summed
             self._merged = merged = larger
-        merged.rows[: share.count] = share.rows[: share.count]
-        missing = total - share.count
+        end = share.count
+        merged.rows[:end] = share.rows[:end]
+        missing = total - end
+        if not missing:
+            return
         parts, status = {}, MPI.Status()
         while missing > 0:
             comm.Probe(source=MPI.ANY_SOURCE, tag=_ROWS, status=status)
@@ -149,7 +154,6 @@ class Exchange:
             comm.Recv(rows, source=status.Get_source(), tag=_ROWS)
             parts[status.Get_source()] = rows
             missing -= len(rows)
-        end = share.count
         for source in sorted(parts):
             merged.rows[end : end + len(parts[source])] = parts[source]
             end += len(parts[source])

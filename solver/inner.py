@@ -178,7 +178,6 @@ class InnerProblem:
         # Without a force heads stand highest: from there Newton's method comes from one side.
         law.linearise(gap.depth, gap.rate)
         rounds = 0
-        rounding = np.zeros((2, law.n))
         for number in range(_MAX_TANGENTS):
             force, slack, more = self._with_tangents(line)
             rounds += more
@@ -186,8 +185,8 @@ class InnerProblem:
             if law.is_linear:
                 return InnerSolution(force, slack, depth, rate, rounds, self.pivoted)
             law.linearise(depth, rate)
-            if number >= _USUAL_TANGENTS:
-                rounding = gap.rounding(force, slack)
+            looks = number >= _USUAL_TANGENTS
+            rounding = gap.rounding(force, slack) if looks else np.zeros((2, law.n))
             if law.agrees(force, rounding):
                 return InnerSolution(force, slack, depth, rate, rounds, self.pivoted)
         raise NotConverged(
