@@ -19,10 +19,10 @@ from catenary.solver.problem import Numerics, Problem, n_halvings
 # machine of 2026 (Debian 12, PETSc 3.18) lie within 40 % of it, and machines differ by a factor of
 # two; the plan calls it an estimate.
 STEP_OVERHEAD = 4.0e-5  # [s]
-STEP_PER_UNKNOWN = 1.1e-8  # [s]
+STEP_PER_UNKNOWN = 6.5e-9  # [s]
 # The fixed-point scheme repeats the solve; 3 times the time of one_solve was measured.
-# PETSc's TSALPHA2 factors anew in every iteration; 13 times was measured.
-SCHEME_FACTOR = {"one_solve": 1.0, "fixed_point": 3.0, "ts_alpha2": 13.0}
+# PETSc's TSALPHA2 factors anew in every iteration; 24 times was measured.
+SCHEME_FACTOR = {"one_solve": 1.0, "fixed_point": 3.0, "ts_alpha2": 24.0}
 # A substep of a pantograph with all its bodies: 0.21 to 0.38 ms were measured with the paper's
 # seven, by the way of keeping joints.
 ALL_BODIES_SUBSTEP = 3.0e-4  # [s]
