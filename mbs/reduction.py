@@ -87,7 +87,8 @@ class ReducedMechanism:
         return RunBroken(
             f"{begin} arm {who}is at {height:.4g} m above its base, but its mechanism moves "
             f"between {self.heights[0]:.4g} m and {self.heights[-1]:.4g} m only: it was thrown "
-            "off the wire, or the line's heights are beyond its reach."
+            "off the wire, or the line's heights are beyond its reach; take a smaller "
+            "numerics.dt_s or a mechanism that reaches"
         )
 
     def acceleration(self, height: float, speed: float, push: float = 0.0) -> float:

@@ -56,6 +56,7 @@ MAY_STOP = (
     "the fixed-point correction does not converge",
     "the fixed-point correction diverges",
     "would have to pull",
+    "it was thrown off the wire",
     "finds no solution within",
 )
 
