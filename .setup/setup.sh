@@ -208,6 +208,18 @@ CODE
         --no-deps --no-build-isolation --editable . >&2
 }
 
+# Numba compiles anew what stands in a changed file, but not what calls that from another file.
+forget_outdated_loops() {
+    local file newest=""
+    while read -r file; do
+        if [[ -z "$newest" || "$file" -nt "$newest" ]]; then
+            newest=$file
+        fi
+    done < <(grep -rlE --include='*.py' '^@(compiled|njit|inlined)' solver mbs)
+    find solver mbs -name '*.nb[ic]' ! -newer "$newest" -delete
+}
+
+forget_outdated_loops
 if is_current; then
     exit 0
 fi
