@@ -241,6 +241,9 @@ def mechanism(rng: random.Random, n_steps: int) -> tuple[str, ...]:
     speed, dt = rng.uniform(20.0, 85.0), 10 ** rng.uniform(-3.7, -2.7)
     way = (n_steps + 0.5) * dt * speed
     start = rng.uniform(110.0, 120.0)
+    room = 54.0 * n_spans - 291.0  # from any start to where the line's last spans begin
+    if way > room:  # the line is too short for these steps: go slower
+        speed, way = speed * room / way, room
     words: Words = {
         "line.n_spans": n_spans,
         "train.speed_km_h": 3.6 * speed,
