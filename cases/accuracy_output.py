@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from catenary.cases import accuracy_markdown, sweep_output
@@ -27,6 +29,8 @@ from catenary.postproc.storage import plain, write_all
 TABLE, RECORD, PAGE = "accuracy.csv", "accuracy.json", "accuracy.md"
 PICTURE = "work_precision.png"
 _ADVISED = ("std", HISTORY)
+# Width and height that a name takes in the diagram, in its pixels.
+_ROOM = np.array([50.0, 12.0])
 
 
 def write(found: Measured, out_dir: Path, target: float) -> list[Path]:
@@ -91,6 +95,7 @@ def draw(found: Measured) -> Figure:
     """Error of the force history over the time of the march, with the Pareto front."""
     figure = plots.new_figure(4.8)
     axes = figure.subplots()
+    fronts = []
     for number, axis in enumerate(_precise(found)):
         rows = [row for row in found.rows_of(axis.name) if row.done and row.percent[HISTORY] > 0]
         colour = plots.colour(number)
@@ -112,16 +117,9 @@ def draw(found: Measured) -> Figure:
             color=colour,
             label="Pareto front",
         )
-        for row in front:
-            text = row.level.replace("_elements", "").replace("_ms_", " ms, ").replace("_", " ")
-            axes.annotate(
-                text,
-                (row.cost, row.percent[HISTORY]),
-                textcoords="offset points",
-                xytext=(5, 4),
-                fontsize="x-small",
-            )
+        fronts += front
     plots.log_log(axes)
+    _name(axes, fronts)
     plots.tidy(
         axes,
         "wall time of the march per simulated second [s/s]",
@@ -130,6 +128,19 @@ def draw(found: Measured) -> Figure:
     )
     plots.legend_above(axes, columns=4)
     return figure
+
+
+def _name(axes: Axes, rows: Sequence[Row]) -> None:
+    """Name settings beside their points, the most costly first, where there is room."""
+    named: list[np.ndarray] = []
+    for row in sorted(rows, key=lambda row: -row.cost):
+        point = row.cost, row.percent[HISTORY]
+        place = axes.transData.transform(point)
+        if any((np.abs(place - other) < _ROOM).all() for other in named):
+            continue
+        named.append(place)
+        text = row.level.replace("_elements", "").replace("_ms_", " ms, ").replace("_", " ")
+        axes.annotate(text, point, textcoords="offset points", xytext=(5, 4), fontsize="x-small")
 
 
 def _precise(found: Measured) -> list[Axis]:
