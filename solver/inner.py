@@ -158,6 +158,7 @@ class InnerProblem:
     def __init__(self, law: LawInSteps, kept_ratio: float, band: np.ndarray) -> None:
         self.law = law
         self.gap = Gap(law.n)
+        self._no_rounding = np.zeros((2, law.n))
         self._released = 1.0 - kept_ratio
         self._band = band
         self.pivoted = False
@@ -186,7 +187,7 @@ class InnerProblem:
                 return InnerSolution(force, slack, depth, rate, rounds, self.pivoted)
             law.linearise(depth, rate)
             looks = number >= _USUAL_TANGENTS
-            rounding = gap.rounding(force, slack) if looks else np.zeros((2, law.n))
+            rounding = gap.rounding(force, slack) if looks else self._no_rounding
             if law.agrees(force, rounding):
                 return InnerSolution(force, slack, depth, rate, rounds, self.pivoted)
         raise NotConverged(
