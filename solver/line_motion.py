@@ -14,7 +14,14 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from catenary.solver import inner_kernels, kernels, repeated_rows, station_blocks, station_factors
+from catenary.solver import (
+    aligned,
+    inner_kernels,
+    kernels,
+    repeated_rows,
+    station_blocks,
+    station_factors,
+)
 from catenary.solver.compliance import Windows
 from catenary.solver.distribution import Ownership
 from catenary.solver.line_operators import LineOperators, Loads
@@ -70,7 +77,7 @@ class LineMotion(ABC):
             self._beta_share = beta_damping / (1.0 + self.velocity_factor * beta_damping)
             self._alpha_share = alpha - self._beta_share * stiffness_share
         n = ownership.n_local
-        self.displacement, self.velocity = np.zeros(n), np.zeros(n)
+        self.displacement, self.velocity = aligned.zeros(n, 2), aligned.zeros(n, 3)
         self.acceleration = self.operators.answer
         # PETSc's time loop wants the solution as a vector; it wraps our array.
         self.solution = PETSc.Vec().createWithArray(self.displacement, size=(n, None), comm=comm)

@@ -15,6 +15,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
+from catenary.solver import aligned
 from catenary.solver.compliance import Windows
 from catenary.solver.distribution import Ownership
 from catenary.solver.errors import NotConverged, RunBroken
@@ -257,8 +258,9 @@ class LineOperators:
         read_low, read_high = columns_of(self._model, (low, high))
         read_low, read_high = read_low - read_low % block, read_high + -read_high % block
         self.domain = domain = Subdomain(own.first, own.last, low, high, read_low, read_high)
-        self._read_array = read = np.zeros(read_high - read_low)
-        force, loaded, answer = (np.zeros(domain.size) for _ in range(3))
+        self._read_array = read = aligned.zeros(read_high - read_low, 0)
+        answer, force = aligned.zeros(domain.size, 1), aligned.zeros(domain.size, 2)
+        loaded = aligned.zeros(domain.size, 3)
         # What products fill is this rank's, what is solved for perhaps the line's: two views.
         self._read, self._force_here, self._loaded_here = here = [
             PETSc.Vec().createWithArray(array, comm=PETSc.COMM_SELF)

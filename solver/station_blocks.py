@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from catenary.solver import aligned
 from catenary.solver.fours import add_product, load, store, zero
 from catenary.solver.kernels import compiled
 from catenary.solver.repeated_rows import kinds_of
@@ -46,7 +47,7 @@ def by_kinds(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """
     numbers = blocks.transpose(0, 1, 3, 2).reshape(-1, SIZE)
     first, kinds = kinds_of(numbers)
-    return None if first.size > MOST_KINDS else (kinds, numbers[first].ravel())
+    return None if first.size > MOST_KINDS else (kinds, aligned.copy(numbers[first]))
 
 
 class StationProduct:
