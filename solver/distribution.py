@@ -6,10 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.solver.model import Model
-
-# Nodes closer than this along the track belong to one station [m].
-_SAME_STATION = 1e-6
+from catenary.solver.model import SAME_STATION, Model
 
 
 @dataclass(frozen=True)
@@ -52,7 +49,7 @@ def distribute(model: Model, n_ranks: int, rank: int) -> Ownership:
     x = np.empty(n_nodes)
     x[model.row_of_node] = model.mesh.points[:, 0]
     can_cut = np.ones(n_nodes + 1, dtype=bool)
-    can_cut[1:-1] = np.diff(x) > _SAME_STATION
+    can_cut[1:-1] = np.diff(x) > SAME_STATION
     ends = np.sort(model.row_of_node[model.mesh.droppers], axis=1)
     # +1 where a dropper's range of rows begins to forbid cuts, -1 where it ends.
     steps = np.zeros(n_nodes + 2)

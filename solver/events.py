@@ -13,8 +13,10 @@ from petsc4py import PETSc
 # Names as -log_view prints them, in the order of a step, and what they hold.
 NAMES = {
     "LineFree": "prediction, product with K, solve and correction of the line",
-    "LineProduct": "product with K, part of LineFree",
-    "LineSolve": "solve with A, part of LineFree",
+    "LineForth": "prediction, product with K and elimination, part of LineFree",
+    "LineBack": "substitution and correction, part of LineFree",
+    "LineProduct": "product with K where it is on its own, part of LineFree",
+    "LineSolve": "solve with A where it is on its own, part of LineFree",
     "LineColumns": "answers of the line to unit contact forces",
     "ContactShare": "heights, compliances and tensions that this rank owns",
     "ContactReduce": "shares to rank 0",

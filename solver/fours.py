@@ -73,6 +73,20 @@ def store(typing_context, array, at, x):
 
 
 @inlined
+def add_scaled(typing_context, total, factor, x):
+    """``total`` plus the number ``factor`` times x."""
+
+    def generate(context, builder, signature, arguments):
+        total, factor, x = arguments
+        undefined = ir.Constant(_VECTOR, ir.Undefined)
+        first = builder.insert_element(undefined, factor, ir.Constant(ir.IntType(32), 0))
+        product = builder.fmul(_spread(builder, first, (0, 0, 0, 0)), x, flags=_FUSED)
+        return builder.fadd(total, product, flags=_FUSED)
+
+    return _four(total, factor, x), generate
+
+
+@inlined
 def add_product(typing_context, total, array, at, x):
     """``total`` plus a 4 x 4 block times x; the block is stored by columns from ``at`` on."""
 
@@ -83,14 +97,38 @@ def add_product(typing_context, total, array, at, x):
         for column in range(4):
             start = builder.add(at, ir.Constant(at.type, 4 * column))
             place = _place(context, builder, signature.args[1], array, start)
-            lane = ir.Constant(_LANES, [column] * 4)
-            factor = builder.shuffle_vector(x, ir.Constant(_VECTOR, ir.Undefined), lane)
+            factor = _spread(builder, x, (column,) * 4)
             product = builder.fmul(builder.load(place, align=8), factor, flags=_FUSED)
             old = sums[column // 2]
             sums[column // 2] = product if old is None else builder.fadd(old, product, flags=_FUSED)
         return builder.fadd(*sums)
 
     return _four(total, array, at, x), generate
+
+
+@inlined
+def add_pairs(typing_context, total, array, at, x):
+    """``total`` plus two 2 x 2 blocks times the first and the last two of x.
+
+    The first columns of both are stored from ``at`` on, then the second ones.
+    """
+
+    def generate(context, builder, signature, arguments):
+        total, array, at, x = arguments
+        for column in range(2):
+            start = builder.add(at, ir.Constant(at.type, 4 * column))
+            place = _place(context, builder, signature.args[1], array, start)
+            factor = _spread(builder, x, (column, column, column + 2, column + 2))
+            product = builder.fmul(builder.load(place, align=8), factor, flags=_FUSED)
+            total = builder.fadd(total, product, flags=_FUSED)
+        return total
+
+    return _four(total, array, at, x), generate
+
+
+def _spread(builder: Any, x: Any, lanes: tuple[int, ...]) -> Any:
+    """Numbers of x by their places in it."""
+    return builder.shuffle_vector(x, ir.Constant(_VECTOR, ir.Undefined), ir.Constant(_LANES, lanes))
 
 
 def _place(context: Any, builder: Any, kind: types.Type, array: Any, at: Any) -> Any:

@@ -14,6 +14,8 @@ from catenary.solver.elements import shape_slopes, shape_values
 # Cancellation-free arithmetic matters more than the last per cent: no fastmath, same answer as
 # the formulas and on every rank.
 compiled = njit(cache=True, error_model="numpy")
+# For the few lines that a loop is made of: no call is left of them.
+in_line = njit(cache=True, error_model="numpy", forceinline=True)
 
 
 @compiled

@@ -21,6 +21,7 @@ from catenary.solver import (
     repeated_rows,
     station_blocks,
     station_factors,
+    station_passes,
 )
 from catenary.solver.compliance import Windows
 from catenary.solver.distribution import Ownership
@@ -34,8 +35,8 @@ class LineMotion(ABC):
 
     Collective to make; ``destroy`` is collective too. The arrays are this rank's part, shape
     (n_local,), and stay the same objects for the whole run, so that views of them stay valid. A
-    step is ``predict``, ``free_acceleration`` and ``correct``; forces that are known later only
-    change the acceleration, displacement and velocity by A^-1, sigma A^-1 and tau A^-1.
+    step is ``free_step``, or the three parts of that; forces that are known later only change the
+    acceleration, displacement and velocity by A^-1, sigma A^-1 and tau A^-1.
 
     Attributes
     ----------
@@ -59,6 +60,7 @@ class LineMotion(ABC):
         repeated_rows.warm_up()
         station_blocks.warm_up()
         station_factors.warm_up()
+        station_passes.warm_up()
         self._comm = comm
         self.ownership = ownership
         self.position_factor = position_factor
@@ -103,6 +105,13 @@ class LineMotion(ABC):
             "velocity": self.velocity,
             "acceleration": self.acceleration,
         }
+
+    def free_step(self, loads: Loads | None = None) -> None:
+        """Take the step without contacts and slack droppers: ``predict``, ``free_acceleration``
+        and ``correct``. Collective."""
+        self.predict()
+        self.free_acceleration(loads)
+        self.correct()
 
     def free_acceleration(self, loads: Loads | None = None) -> None:
         """Fill the acceleration from the predictions and local loads. Collective.

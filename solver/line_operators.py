@@ -32,6 +32,7 @@ from catenary.solver.model import Model
 from catenary.solver.operators import as_petsc, columns_of, part_of, station_block
 from catenary.solver.repeated_rows import RepeatedRows, repeated_rows
 from catenary.solver.station_blocks import StationProduct, station_product
+from catenary.solver.station_passes import StationPasses, Steps
 from catenary.solver.subdomain import Halo, Subdomain
 
 logger = logging.getLogger(__name__)
@@ -109,6 +110,30 @@ class LineOperators:
             self._solver.hurry()
         self._stiffness = self._product_by_kinds()
 
+    def passes(
+        self, displacement: np.ndarray, velocity: np.ndarray, steps: Steps
+    ) -> StationPasses | None:
+        """Free steps of Newmark's method in two passes over a state (n_local,), if they can be.
+
+        For that the operator is to be factored and multiplied by stations. Not collective.
+        """
+        stiffness, solver = self._stiffness, self._solver
+        if not (isinstance(stiffness, StationProduct) and isinstance(solver, PartSolver)):
+            return None
+        if solver.factors is None or not self._is_direct:
+            return None
+        first, last = self._halo.told
+        return StationPasses(
+            stiffness,
+            solver.factors,
+            self._read_padded,
+            self._solution.array,
+            (first // self._block, last // self._block),
+            displacement,
+            velocity,
+            steps,
+        )
+
     def exchange(self) -> None:
         """Bring ``factor`` up to date where it is others'. Collective."""
         self._halo.exchange()
@@ -116,8 +141,11 @@ class LineOperators:
     def multiply_stiffness(self) -> None:
         """Make K ``factor`` the internal force. Right after ``exchange``. Not collective."""
         self._product_event.begin()
-        if self._stiffness is not None:
-            self._stiffness.multiply(self._read_array, self._force.array)
+        stiffness = self._stiffness
+        if isinstance(stiffness, StationProduct):
+            stiffness.multiply(self._read_padded, self._force.array)
+        elif stiffness is not None:
+            stiffness.multiply(self._read_array, self._force.array)
         elif self.domain.size:
             self._product("stiffness").mult(self._read, self._force_here)
         self._product_event.end()
@@ -217,7 +245,9 @@ class LineOperators:
         if self.domain.size:
             rows = (low, high)
             part = part_of(self._model, rows, rows, self._coefficients, 1.0, self._block)
-            solver = PartSolver(part, self._in_stations, self._comm.size == 1)
+            owned = self.domain.owned
+            own = slice(owned.start // self._block, owned.stop // self._block)
+            solver = PartSolver(part, own, self._in_stations, self._comm.size == 1)
             self._solver, is_direct = solver, solver.is_direct
         self._is_direct = bool(self._comm.allreduce(int(is_direct), op=MPI.MIN))
 
@@ -258,7 +288,9 @@ class LineOperators:
         read_low, read_high = columns_of(self._model, (low, high))
         read_low, read_high = read_low - read_low % block, read_high + -read_high % block
         self.domain = domain = Subdomain(own.first, own.last, low, high, read_low, read_high)
-        self._read_array = read = aligned.zeros(read_high - read_low, 0)
+        # Products by stations read one more at both ends, which is zero where the line ends.
+        self._read_padded = aligned.zeros(read_high - read_low + 2 * block, 0)
+        self._read_array = read = self._read_padded[block : block + read_high - read_low]
         answer, force = aligned.zeros(domain.size, 1), aligned.zeros(domain.size, 2)
         loaded = aligned.zeros(domain.size, 3)
         # What products fill is this rank's, what is solved for perhaps the line's: two views.

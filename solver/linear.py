@@ -61,15 +61,19 @@ class PartSolver:
     Parameters
     ----------
     part : rows and columns of what it solves for, in blocks of stations or of nodes
+    own : the rank's own among them, in blocks
     in_stations : whether its blocks are stations
     is_whole : whether it is the whole line, which decides the prefix of its options
 
     Attributes
     ----------
     matrix : ``part`` as a sequential PETSc matrix
+    factors : our own, None if PETSc's are used
     """
 
-    def __init__(self, part: sparse.bsr_matrix, in_stations: bool, is_whole: bool) -> None:
+    def __init__(
+        self, part: sparse.bsr_matrix, own: slice, in_stations: bool, is_whole: bool
+    ) -> None:
         prefix = PREFIX if is_whole else PART_PREFIX
         self.matrix = as_petsc(part, PETSc.COMM_SELF)
         self._ksp = PETSc.KSP().create(PETSc.COMM_SELF)
@@ -79,12 +83,12 @@ class PartSolver:
         self._ksp.setOptionsPrefix(prefix)
         self._ksp.setOperators(self.matrix)
         _choose_direct(self._ksp, in_stations)
-        self._factors: StationFactors | None = None
+        self.factors: StationFactors | None = None
         if in_stations and not _is_given(f"{prefix}pc_"):
-            self._factors = station_factors(part)
-        if self._factors is not None:
+            self.factors = station_factors(part, own.start, own.stop)
+        if self.factors is not None:
             self._ksp.getPC().setType(PETSc.PC.Type.PYTHON)
-            self._ksp.getPC().setPythonContext(self._factors)
+            self._ksp.getPC().setPythonContext(self.factors)
         # Of an iteration that the options ask for; a direct solver has no tolerance.
         self._ksp.setTolerances(rtol=DIRECT)
         with refused_options():
@@ -117,8 +121,8 @@ class PartSolver:
         pc = self._ksp.getPC()
         if not self.is_direct:
             return
-        if self._factors is not None:
-            solve_with = self._factors.solve
+        if self.factors is not None:
+            solve_with = self.factors.solve
             self._solve = lambda right, solution: solve_with(right.array, solution.array)
         elif pc.getType() in (PETSc.PC.Type.CHOLESKY, PETSc.PC.Type.LU):
             factored = pc.getFactorMatrix().solve

@@ -16,6 +16,9 @@ from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.solver import effects, elements
 from catenary.solver.problem import Problem
 
+# Nodes closer than this along the track belong to one station [m].
+SAME_STATION = 1e-6
+
 
 class StepLoad(Protocol):
     """A load that changes with time: ``values(time)`` [N] or [N m] on the unknowns ``dofs``."""
@@ -225,6 +228,17 @@ class ModelBuilder:
         self._n_terms += dofs.shape[0]
 
 
+def _along_the_track(mesh: LineMesh) -> np.ndarray:
+    """Nodes in the order along the track, those of a station in the order of the wires."""
+    wire = np.zeros(mesh.n_nodes, dtype=np.int64)
+    for number, nodes in enumerate(mesh.wires.values()):
+        wire[nodes] = number
+    x = mesh.points[:, 0]
+    order = np.argsort(x, kind="stable")
+    station = np.cumsum(np.diff(x[order], prepend=x[order[:1]]) > SAME_STATION)
+    return order[np.lexsort((wire[order], station))]
+
+
 def build(
     problem: Problem,
     mesh: LineMesh,
@@ -236,9 +250,8 @@ def build(
     ``broken`` (n_droppers,) bool tells which droppers carry nothing; none if not given.
     """
     active = effects.active(problem)
-    order = np.argsort(mesh.points[:, 0], kind="stable")
     row_of_node = np.empty(mesh.n_nodes, dtype=np.int64)
-    row_of_node[order] = np.arange(mesh.n_nodes)
+    row_of_node[_along_the_track(mesh)] = np.arange(mesh.n_nodes)
     model = Model(
         problem,
         mesh,

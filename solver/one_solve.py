@@ -59,14 +59,16 @@ class OneSolve:
     def step(self, time: float, stop: bool) -> bool:
         line, interaction, events = self.interaction.line, self.interaction, self._events
         events["LineFree"].begin()
-        line.predict()
         touches = self.pantographs.move_to(time)
         if self.coupling.extrapolates:
+            line.predict()
             share = self._exchange.share
             interaction.heights(touches, share.early_height, share.early_rate)
-        line.free_acceleration(self.loads(time))
+            line.free_acceleration(self.loads(time))
+            line.correct()
+        else:
+            line.free_step(self.loads(time))
         # From here on the line holds the end of the step without contacts and slack droppers.
-        line.correct()
         events["LineFree"].end()
         events["LineColumns"].begin()
         interaction.place(touches)

@@ -9,10 +9,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from catenary.solver.distribution import Ownership
-from catenary.solver.model import Model, iterate_entries
-
-# Nodes closer than this along the track belong to one station [m].
-_SAME_STATION = 1e-6
+from catenary.solver.model import SAME_STATION, Model, iterate_entries
 
 
 def part_of(
@@ -78,4 +75,4 @@ def station_block(model: Model, ownership: Ownership) -> int:
     if x.size % 2 or (ownership.bounds % (2 * size)).any():
         return size
     x[model.row_of_node] = model.mesh.points[:, 0]
-    return 2 * size if (np.abs(x[1::2] - x[::2]) < _SAME_STATION).all() else size
+    return 2 * size if (np.abs(x[1::2] - x[::2]) < SAME_STATION).all() else size

@@ -11,13 +11,12 @@ import numpy as np
 from scipy import sparse
 
 from catenary.solver import aligned
-from catenary.solver.fours import add_product, load, store, zero
-from catenary.solver.kernels import compiled
+from catenary.solver.fours import add_pairs, add_product, load, store, zero
+from catenary.solver.kernels import compiled, in_line
 from catenary.solver.repeated_rows import kinds_of
 
-# Unknowns of a station that the kernels are written for, and numbers of its three blocks.
+# Unknowns of a station that the kernels are written for.
 BLOCK = 4
-SIZE = 3 * BLOCK**2
 # Kinds of stations whose blocks stay in the caches next to a processor, 1.5 MB.
 MOST_KINDS = 4096
 
@@ -40,12 +39,11 @@ def neighbours(matrix: sparse.bsr_matrix, first: int = 0) -> np.ndarray | None:
     return blocks
 
 
-def by_kinds(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Kind (n,) of each of ``blocks`` (n, 3, 4, 4), and the kinds' blocks as kernels read them.
+def by_kinds(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Kind (n,) of each station of whose ``numbers`` (n, m), and those of the kinds in a row.
 
-    Those are by columns, one after the other. None if there are too many kinds.
+    None if there are too many kinds.
     """
-    numbers = blocks.transpose(0, 1, 3, 2).reshape(-1, SIZE)
     first, kinds = kinds_of(numbers)
     return None if first.size > MOST_KINDS else (kinds, aligned.copy(numbers[first]))
 
@@ -53,51 +51,72 @@ def by_kinds(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
 class StationProduct:
     """Products with rows of a matrix.
 
-    Parameters
+    Attributes
     ----------
-    kinds, blocks : what ``by_kinds`` returned
-    first : station in the factor of the first row
+    kinds : (n,) of its rows
+    blocks : (32 n_kinds,) of each kind its diagonal block by columns, then what it reads of the
+        stations before and after it: as ``fours.add_pairs`` reads two blocks
+    first : station in the factor of the first row; the factor has one before and one after all
+        rows, which is zero where the line ends
     """
 
     def __init__(self, kinds: np.ndarray, blocks: np.ndarray, first: int) -> None:
-        self._parts = kinds, blocks, first
+        self.kinds, self.blocks, self.first = kinds, blocks, first
 
     def multiply(self, factor: np.ndarray, result: np.ndarray) -> None:
         """Make ``result`` the product with ``factor``. Not collective."""
-        multiply(*self._parts, factor, result)
+        multiply(self.kinds, self.blocks, self.first, factor, result)
 
 
 def station_product(matrix: sparse.bsr_matrix, first: int) -> StationProduct | None:
-    """Products with a matrix in sorted blocks; None if it is not of the kind, or hardly repeats."""
+    """Products with a matrix in sorted blocks, whose first row is that of column ``first``.
+
+    The factor has a station more at both ends than the matrix has columns. None if a station is
+    not joined to its neighbours by each wire for itself, or if the matrix hardly repeats.
+    """
     blocks = neighbours(matrix, first)
-    kinds = None if blocks is None else by_kinds(blocks.transpose(1, 0, 2, 3))
-    return None if kinds is None else StationProduct(*kinds, first)
+    if blocks is None or blocks[0::2, :, :2, 2:].any() or blocks[0::2, :, 2:, :2].any():
+        return None
+    before, own, after = blocks.transpose(0, 1, 3, 2)
+    numbers = [own.reshape(-1, BLOCK**2), _pairs(before), _pairs(after)]
+    kinds = by_kinds(np.concatenate(numbers, axis=1))
+    return None if kinds is None else StationProduct(*kinds, first + 1)
+
+
+def _pairs(columns: np.ndarray) -> np.ndarray:
+    """Two blocks of each of (n, 4, 4) by columns, as ``fours.add_pairs`` reads them, (n, 8)."""
+    return np.concatenate(
+        [columns[:, 0, :2], columns[:, 2, 2:], columns[:, 1, :2], columns[:, 3, 2:]], axis=1
+    )
 
 
 # Indices are unsigned, so that none is asked whether it counts from the end.
-_SIZE, _BLOCK = np.uint64(SIZE), np.uint64(BLOCK)
-OWN, TO_END = np.uint64(BLOCK**2), np.uint64(2 * BLOCK**2)
+_BLOCK, _SIZE = np.uint64(BLOCK), np.uint64(2 * BLOCK**2)
+_BEFORE, _AFTER = np.uint64(BLOCK**2), np.uint64(BLOCK**2 + 2 * BLOCK)
+
+
+@in_line
+def multiply_rows(kinds, blocks, first, factor, begin, end, result):
+    """Rows from ``begin`` to ``end`` of a product; see ``StationProduct``."""
+    at = _BLOCK * np.uint64(first + begin)
+    before, here = load(factor, at - _BLOCK), load(factor, at)
+    for i in range(begin, end):
+        after = load(factor, _BLOCK * np.uint64(first + i + 1))
+        at = _SIZE * np.uint64(kinds[i])
+        total = add_product(zero(), blocks, at, here)
+        total = add_pairs(total, blocks, at + _BEFORE, before)
+        total = add_pairs(total, blocks, at + _AFTER, after)
+        store(result, _BLOCK * np.uint64(i), total)
+        before, here = here, after
 
 
 @compiled
 def multiply(kinds, blocks, first, factor, result):
     """``result`` = matrix times ``factor``; see ``StationProduct``."""
-    n_read = factor.size // BLOCK
-    before, here = zero(), load(factor, np.uint64(BLOCK * first))
-    if first > 0:
-        before = load(factor, np.uint64(BLOCK * (first - 1)))
-    for i in range(kinds.size):
-        after = zero()
-        if first + i + 1 < n_read:
-            after = load(factor, np.uint64(BLOCK * (first + i + 1)))
-        at = _SIZE * np.uint64(kinds[i])
-        total = add_product(zero(), blocks, at, before)
-        total = add_product(total, blocks, at + OWN, here)
-        store(result, _BLOCK * np.uint64(i), add_product(total, blocks, at + TO_END, after))
-        before, here = here, after
+    multiply_rows(kinds, blocks, first, factor, 0, kinds.size, result)
 
 
 def warm_up() -> None:
     """Compile the kernel, or load it from Numba's cache, before the clock of a march starts."""
-    station = np.zeros(BLOCK)
-    multiply(np.zeros(1, dtype=np.int32), np.zeros(SIZE), 0, station, station)
+    kinds, blocks = np.zeros(1, dtype=np.int32), np.zeros(2 * BLOCK**2)
+    multiply(kinds, blocks, 1, np.zeros(3 * BLOCK), np.zeros(BLOCK))

@@ -14,8 +14,8 @@ from scipy import sparse
 
 from catenary.solver import station_blocks
 from catenary.solver.fours import add_product, load, store, zero
-from catenary.solver.kernels import compiled
-from catenary.solver.station_blocks import BLOCK, SIZE
+from catenary.solver.kernels import compiled, in_line
+from catenary.solver.station_blocks import BLOCK
 
 
 class StationFactors:
@@ -23,23 +23,21 @@ class StationFactors:
 
     Attributes
     ----------
-    n_stations, n_kinds : in the matrix, and how many have different factors
-
-    Parameters
-    ----------
     kinds : (n,) kind of each station
-    factors : of each kind S^-1, -S^-1 times its block towards the end of the line that elimination
-        starts from, and -S^-1 times that towards the middle, each by columns; S is its diagonal
-        block after elimination
+    blocks : (48 n_kinds,) of each kind S^-1, -S^-1 times its block towards the end of the line that
+        elimination starts from, and -S^-1 times that towards the middle, each by columns; S is its
+        diagonal block after elimination
+    low, high : range of stations in whose middle elimination ends
+    n_stations, n_kinds : in the matrix, and how many have different factors
     """
 
-    def __init__(self, kinds: np.ndarray, factors: np.ndarray) -> None:
-        self._kinds, self._factors = kinds, factors
-        self.n_stations, self.n_kinds = kinds.size, factors.size // SIZE
+    def __init__(self, kinds: np.ndarray, blocks: np.ndarray, low: int, high: int) -> None:
+        self.kinds, self.blocks, self.low, self.high = kinds, blocks, low, high
+        self.n_stations, self.n_kinds = kinds.size, blocks.size // (3 * BLOCK**2)
 
     def solve(self, right: np.ndarray, answer: np.ndarray) -> None:
-        """Make ``answer`` that to ``right``, both (4 n,)."""
-        solve(self._kinds, self._factors, right, answer)
+        """Make ``answer`` that to ``right``, both (4 n,), perhaps the same array."""
+        solve(self.kinds, self.blocks, self.low, self.high, right, answer)
 
     def apply(self, pc: PETSc.PC, right: PETSc.Vec, answer: PETSc.Vec) -> None:
         """Called by PETSc."""
@@ -53,8 +51,11 @@ class StationFactors:
         )
 
 
-def station_factors(matrix: sparse.bsr_matrix) -> StationFactors | None:
-    """Factors of a positive definite matrix in sorted blocks.
+def station_factors(
+    matrix: sparse.bsr_matrix, low: int = 0, high: int | None = None
+) -> StationFactors | None:
+    """Factors of a positive definite matrix in sorted blocks, eliminated towards the middle of the
+    stations from ``low`` to ``high``, all by default.
 
     None if it is not block tridiagonal by stations, or hardly repeats, so that PETSc's factors are
     faster, being smaller. A matrix that is not positive definite gives wrong answers or none that
@@ -63,19 +64,20 @@ def station_factors(matrix: sparse.bsr_matrix) -> StationFactors | None:
     blocks = station_blocks.neighbours(matrix)
     if blocks is None:
         return None
-    factors = np.zeros((blocks.shape[1], 3, BLOCK, BLOCK))
-    factorise(blocks, factors)
-    kinds = station_blocks.by_kinds(factors)
-    return None if kinds is None else StationFactors(*kinds)
+    n = blocks.shape[1]
+    high = n if high is None else high
+    factors = np.zeros((n, 3, BLOCK, BLOCK))
+    factorise(blocks, (low + high) // 2, factors)
+    kinds = station_blocks.by_kinds(factors.transpose(0, 1, 3, 2).reshape(n, -1))
+    return None if kinds is None else StationFactors(*kinds, low, high)
 
 
 @compiled
-def factorise(blocks, factors):
+def factorise(blocks, middle, factors):
     """Fill ``factors`` (n, 3, 4, 4), by rows, of ``blocks`` (3, n, 4, 4); see ``StationFactors``
     and ``station_blocks.neighbours``."""
     to_start, own, to_end = blocks[0], blocks[1], blocks[2]
     n = own.shape[0]
-    middle = n // 2
     for i in range(middle):
         pivot = own[i].copy()
         if i > 0:
@@ -114,54 +116,63 @@ def put_factors(pivot, outward, inward, factors):
 
 
 # Indices are unsigned, so that none is asked whether it counts from the end.
-_SIZE, _BLOCK = np.uint64(SIZE), np.uint64(BLOCK)
+_SIZE, _BLOCK = np.uint64(3 * BLOCK**2), np.uint64(BLOCK)
 _OUTWARD, _INWARD = np.uint64(BLOCK**2), np.uint64(2 * BLOCK**2)
 
 
-@compiled
-def eliminate(kinds, factors, right, station, outward):
-    """What is left of a station's unknowns after those ``outward`` of it."""
-    at = _SIZE * np.uint64(kinds[station])
-    own = add_product(zero(), factors, at, load(right, _BLOCK * np.uint64(station)))
-    return add_product(own, factors, at + _OUTWARD, outward)
+@in_line
+def eliminate(kinds, blocks, right, station, outward, answer):
+    """Leave in ``answer`` what is left of a station's unknowns after those ``outward`` of it."""
+    at, here = _SIZE * np.uint64(kinds[station]), _BLOCK * np.uint64(station)
+    own = add_product(zero(), blocks, at, load(right, here))
+    own = add_product(own, blocks, at + _OUTWARD, outward)
+    store(answer, here, own)
+    return own
+
+
+@in_line
+def substitute(kinds, blocks, station, inward, answer):
+    """Unknowns of a station from what ``answer`` holds of them and those ``inward`` of it."""
+    at, here = _SIZE * np.uint64(kinds[station]) + _INWARD, _BLOCK * np.uint64(station)
+    own = add_product(load(answer, here), blocks, at, inward)
+    store(answer, here, own)
+    return own
 
 
 @compiled
-def substitute(kinds, factors, answer, station, inward):
-    """Unknowns of a station from what is left of them and those ``inward`` of it."""
-    at = _SIZE * np.uint64(kinds[station]) + _INWARD
-    return add_product(load(answer, _BLOCK * np.uint64(station)), factors, at, inward)
-
-
-@compiled
-def solve(kinds, factors, right, answer):
+def solve(kinds, blocks, low, high, right, answer):
     """Fill ``answer`` from ``right``; see ``StationFactors``."""
-    n = kinds.size
-    middle = n // 2
+    middle, pairs = (low + high) // 2, (high - low - 1) // 2
     x, y = zero(), zero()
-    for i in range(middle):
-        x = eliminate(kinds, factors, right, i, x)
-        store(answer, _BLOCK * np.uint64(i), x)
-        j = n - 1 - i
-        if j > middle:
-            y = eliminate(kinds, factors, right, j, y)
-            store(answer, _BLOCK * np.uint64(j), y)
-    x = eliminate(kinds, factors, right, middle, x)
-    store(answer, _BLOCK * np.uint64(middle), x)
-    x = substitute(kinds, factors, answer, middle, y)
-    store(answer, _BLOCK * np.uint64(middle), x)
-    y = x
-    for k in range(1, middle + 1):
-        i, j = middle - k, middle + k
-        x = substitute(kinds, factors, answer, i, x)
-        store(answer, _BLOCK * np.uint64(i), x)
-        if j < n:
-            y = substitute(kinds, factors, answer, j, y)
-            store(answer, _BLOCK * np.uint64(j), y)
+    for i in range(low):
+        x = eliminate(kinds, blocks, right, i, x, answer)
+    for j in range(kinds.size - 1, high - 1, -1):
+        y = eliminate(kinds, blocks, right, j, y, answer)
+    for k in range(pairs):
+        x = eliminate(kinds, blocks, right, low + k, x, answer)
+        y = eliminate(kinds, blocks, right, high - 1 - k, y, answer)
+    # One more towards the start of the line, if there is an even number of them.
+    for i in range(low + pairs, middle + 1):
+        x = eliminate(kinds, blocks, right, i, x, answer)
+    x = y = substitute(kinds, blocks, middle, y, answer)
+    for k in range(1, pairs + 1):
+        x = substitute(kinds, blocks, middle - k, x, answer)
+        y = substitute(kinds, blocks, middle + k, y, answer)
+    substitute_outside(kinds, blocks, middle - pairs, high, x, y, answer)
+
+
+@in_line
+def substitute_outside(kinds, blocks, low, high, x, y, answer):
+    """Unknowns of stations before ``low`` and from ``high`` on, from those beside these, x and
+    y."""
+    for i in range(low - 1, -1, -1):
+        x = substitute(kinds, blocks, i, x, answer)
+    for j in range(high, kinds.size):
+        y = substitute(kinds, blocks, j, y, answer)
 
 
 def warm_up() -> None:
     """Compile the kernels, or load them from Numba's cache, before the clock of a march starts."""
-    factorise(np.ones((3, 1, BLOCK, BLOCK)), np.zeros((1, 3, BLOCK, BLOCK)))
-    station = np.zeros(BLOCK)
-    solve(np.zeros(1, dtype=np.int32), np.zeros(SIZE), station, station)
+    factorise(np.ones((3, 1, BLOCK, BLOCK)), 0, np.zeros((1, 3, BLOCK, BLOCK)))
+    kinds, blocks, station = np.zeros(1, dtype=np.int32), np.zeros(3 * BLOCK**2), np.zeros(BLOCK)
+    solve(kinds, blocks, 0, 1, station, station)

@@ -6,6 +6,7 @@ import numpy as np
 
 from catenary.solver.generalized_alpha import GeneralizedAlphaLine
 from catenary.solver.line_motion import LineMotion
+from catenary.solver.line_operators import Loads
 from catenary.solver.newmark import NewmarkLine
 
 
@@ -19,6 +20,10 @@ class _Unbalanced(LineMotion):
         """Step under ``load`` (n_dofs,) [N], [N m], which all ranks pass, from now on."""
         domain = self.operators.domain
         self._lost = load[domain.low : domain.high].copy()
+
+    def free_step(self, loads: Loads | None = None) -> None:
+        """Take the step without contacts and slack droppers, part by part. Collective."""
+        LineMotion.free_step(self, loads)
 
     def internal_forces(self) -> None:
         """Right-hand side g - C v - K d of the step; only right after ``predict``. Collective."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from repeating_line import line
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
@@ -14,32 +15,23 @@ from catenary.solver.station_factors import station_factors
 RNG = np.random.default_rng(7)
 # Sums of a dozen products of numbers of order one; solves lose a few digits to the condition, 1e2.
 ROUND_OFF = 1e-14
+LENGTHS = [1, 2, 3, 4, 5, 40, 301]
 
 
-def line(n_stations: int, period: int = 7, size: int = 4) -> sparse.bsr_matrix:
-    """A positive definite block tridiagonal matrix that repeats but at its ends."""
-    own = RNG.standard_normal((period, size, size))
-    own = own @ own.transpose(0, 2, 1) + 8.0 * size * np.eye(size)
-    beside = RNG.standard_normal((period, size, size))
-    data, indices, indptr = [], [], [0]
-    for i in range(n_stations):
-        if i > 0:
-            data.append(beside[(i - 1) % period].T)
-            indices.append(i - 1)
-        data.append(own[i % period])
-        indices.append(i)
-        if i + 1 < n_stations:
-            data.append(beside[i % period])
-            indices.append(i + 1)
-        indptr.append(len(indices))
-    shape = (size * n_stations, size * n_stations)
-    return sparse.bsr_matrix((np.array(data), indices, indptr), shape=shape)
-
-
-@pytest.mark.parametrize("n_stations", [1, 2, 3, 4, 5, 40, 301])
+@pytest.mark.parametrize("n_stations", LENGTHS)
 def test_factors_solve_lines_of_any_length(n_stations: int) -> None:
-    matrix = line(n_stations)
-    factors = station_factors(matrix)
+    compare_factors(n_stations, 0, n_stations)
+
+
+@pytest.mark.parametrize("n_own", LENGTHS)
+@pytest.mark.parametrize("ends", [(1, 0), (0, 1), (3, 12), (20, 9)])
+def test_factors_solve_parts_of_lines(n_own: int, ends: tuple[int, int]) -> None:
+    compare_factors(ends[0] + n_own + ends[1], ends[0], ends[0] + n_own)
+
+
+def compare_factors(n_stations: int, low: int, high: int) -> None:
+    matrix = line(n_stations, joined=True)
+    factors = station_factors(matrix, low, high)
     assert factors is not None
     right, answer = RNG.standard_normal(4 * n_stations), np.zeros(4 * n_stations)
     factors.solve(right, answer)
@@ -89,8 +81,12 @@ def test_products_with_part_of_a_line(low: int, high: int) -> None:
     product = station_product(rows, low - read_low)
     assert product is not None
     factor, result = RNG.standard_normal(rows.shape[1]), np.zeros(rows.shape[0])
-    product.multiply(factor, result)
+    product.multiply(np.pad(factor, 4), result)
     assert np.abs(result - rows @ factor).max() < ROUND_OFF * np.abs(factor).max() * 100.0
+
+
+def test_wires_joined_between_stations_are_left_to_other_products() -> None:
+    assert station_product(line(10, joined=True), 0) is None
 
 
 def test_a_product_by_rows_where_stations_do_not_pair() -> None:

@@ -1,0 +1,50 @@
+"""Two passes over the state against prediction, product, solve and correction one by one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from repeating_line import line
+
+from catenary.solver import kernels
+from catenary.solver.station_blocks import station_product
+from catenary.solver.station_factors import station_factors
+from catenary.solver.station_passes import StationPasses, Steps
+
+RNG = np.random.default_rng(11)
+STEPS = Steps(0.1, 0.002, 0.05, 0.3, 0.0025, 0.05, 0.4)
+# Numbers of order one; the order of a sum differs.
+ROUND_OFF = 1e-13
+
+
+@pytest.mark.parametrize("n_own", [1, 2, 3, 7, 40, 513, 1200])
+@pytest.mark.parametrize("before", [0, 1, 30])
+@pytest.mark.parametrize("after", [0, 2, 25])
+def test_passes_take_the_steps_of_their_parts(n_own: int, before: int, after: int) -> None:
+    """A rank's own stations with some of its neighbours', which it is told of."""
+    n = before + n_own + after
+    low, high = before, before + n_own
+    product = station_product(line(n), 0)
+    factors = station_factors(line(n), low, high)
+    assert product is not None and factors is not None
+    displacement, velocity = RNG.standard_normal((2, 4 * n_own))
+    answer = RNG.standard_normal(4 * n)
+    others = np.pad(RNG.standard_normal(4 * n), 4)
+    own = slice(4 * low, 4 * high)
+
+    read, force, solution = others.copy(), np.zeros(4 * n), answer.copy()
+    expected = displacement.copy(), velocity.copy(), solution[own]
+    kernels.predict(*expected, read[4:-4][own], *STEPS[:4])
+    product.multiply(read, force)
+    factors.solve(force, solution)
+    kernels.correct(*expected, *STEPS[4:])
+
+    # It tells as much as it is told, or all that it has.
+    told = min(before, n_own), min(after, n_own)
+    read = others.copy()
+    passes = StationPasses(product, factors, read, answer, told, displacement, velocity, STEPS)
+    passes.tell()
+    passes.forth()
+    passes.back()
+    for found, right in zip((displacement, velocity, answer[own]), expected, strict=True):
+        assert np.abs(found - right).max() < ROUND_OFF * np.abs(right).max()
