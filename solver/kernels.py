@@ -226,14 +226,18 @@ def watch(
 ):
     """Number of droppers whose tension may fall below ``margin``; a row each, as far as they fit.
 
-    ``force`` (n,) is their tension if they could push; contact i may press with up to
-    ``bound[i]`` and touches those within ``reach`` of it.
+    ``force`` (n,) is their tension if they could push; they stand in the order along the track.
+    Contact i may press with up to ``bound[i]`` and touches those within ``reach`` of it.
     """
     count, n = 0, contact_x.size
+    first = np.searchsorted(laws[:, 3], contact_x.min() - reach)
+    last = np.searchsorted(laws[:, 3], contact_x.max() + reach, side="right")
     for d in range(force.size):
+        candidate = force[d] < margin
+        if not (candidate or first <= d < last):
+            continue
         per_acceleration = laws[d, 1] * position_factor + laws[d, 2] * velocity_factor
         upper, lower = ends[d, 0], ends[d, 1]
-        candidate = force[d] < margin
         if not candidate:
             for i in range(n):
                 if abs(laws[d, 3] - contact_x[i]) <= reach:

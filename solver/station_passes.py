@@ -22,8 +22,9 @@ from catenary.solver.station_factors import (
     substitute_outside,
 )
 
-# Stations of a stretch: large beside what it costs to begin one, small beside a cache of 1 MB.
-_STRETCH = 256
+# Stations of a stretch: large enough for memory to be read ahead, 32 kB of each array, of which a
+# cache next to a processor, of 1 MB, holds eight.
+_STRETCH = 1024
 
 
 class Steps(NamedTuple):
