@@ -141,7 +141,7 @@ class FullPantograph:
         self._stepper = Stepper(system, dt, handling, self._pushed_down, substeps, beta, gamma)
         self._stepper.begin(standing.motion, 0.0)
         self._early = np.zeros((2, s))
-        self._head = HeadState(np.zeros(s), np.zeros(s), np.zeros((s, s)), np.zeros((s, s)))
+        self._head = HeadState(s)
 
     @property
     def strip_offsets(self) -> tuple[float, ...]:

@@ -47,10 +47,8 @@ class SteppedHead(ABC):
         self._state, self._free = np.zeros((2, 3 * n))
         self._by_force = np.zeros((3 * n, s))
         self._early = np.zeros((2, s))
-        self._out = np.zeros(2 * s + 2 * s**2)
-        compliances = self._out[2 * s :].reshape(2, s, s)
-        # Views of what a step finds.
-        self._head = HeadState(self._out[:s], self._out[s : 2 * s], *compliances)
+        self._head = HeadState(s)
+        self._out = self._head.numbers
 
     @property
     def position(self) -> np.ndarray:

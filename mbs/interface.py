@@ -7,23 +7,30 @@ is never called elsewhere.
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
 
-class HeadState(NamedTuple):
+class HeadState:
     """Strips at the end of the coming step as affine functions of the contact forces f (s,) [N].
 
     height = ``height`` - ``height_compliance`` f [m], velocity = ``velocity`` -
     ``velocity_compliance`` f [m/s]; shapes (s,) and (s, s). Velocities are those of the points
     that touch the wire, also where these move along a tilted strip.
+
+    ``numbers`` (2 s + 2 s^2,) holds these four one after the other; they are its views.
     """
 
-    height: np.ndarray
-    velocity: np.ndarray
-    height_compliance: np.ndarray
-    velocity_compliance: np.ndarray
+    def __init__(self, n_strips: int) -> None:
+        self.take(np.zeros(2 * n_strips * (1 + n_strips)), n_strips)
+
+    def take(self, numbers: np.ndarray, n_strips: int) -> None:
+        """Stand for these numbers."""
+        s, self.numbers = n_strips, numbers
+        self.height, self.velocity = numbers[:s], numbers[s : 2 * s]
+        self.height_compliance = numbers[2 * s : s * (2 + s)].reshape(s, s)
+        self.velocity_compliance = numbers[s * (2 + s) :].reshape(s, s)
 
 
 class Pantograph(Protocol):

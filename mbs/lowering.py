@@ -64,7 +64,7 @@ class LoweredPantograph:
         self._caught = False
         self._latest: HeadState | None = None
         self._time = 0.0
-        self._still = HeadState(np.zeros(s), np.zeros(s), np.zeros((s, s)), np.zeros((s, s)))
+        self._still = HeadState(s)
 
     @property
     def strip_offsets(self) -> tuple[float, ...]:
@@ -80,7 +80,8 @@ class LoweredPantograph:
         """Heights and velocities (s,) of the strips at ``time`` [s] from the motion alone."""
         if not self._caught:
             return self.model.extrapolate(time)
-        return self._where_caught(time)[:2]
+        still = self._where_caught(time)
+        return still.height, still.velocity
 
     def predict(self, time: float) -> HeadState:
         """Strips at ``time`` [s] as functions of the contact forces in the coming step.

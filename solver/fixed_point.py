@@ -130,7 +130,7 @@ class FixedPoint:
         if self.comm.size == 1:
             return self.pantographs.predict(time)
         heads = self._heads
-        heads.unpack(on_root(self.comm, lambda: self.pantographs.predict(time).pack()))
+        heads.numbers[:] = on_root(self.comm, lambda: self.pantographs.predict(time).numbers)
         return heads
 
     def _contact(

@@ -66,12 +66,16 @@ class Gap:
     ----------
     depth, rate : (n,) without forces [m], [m/s]
     depth_by_force, rate_by_force : (n, n) what forces take off them [m/N], [m/(N s)]
+    numbers : (2 n + 2 n^2,) these four one after the other
     found : (2, n) depths and rates under the forces looked at last
     """
 
     def __init__(self, n: int) -> None:
-        self.depth, self.rate = np.zeros(n), np.zeros(n)
-        self.depth_by_force, self.rate_by_force = np.zeros((n, n)), np.zeros((n, n))
+        self._n = n
+        self.numbers = np.zeros(2 * n * (1 + n))
+        self.depth, self.rate = self.numbers[:n], self.numbers[n : 2 * n]
+        compliances = self.numbers[2 * n :].reshape(2, n, n)
+        self.depth_by_force, self.rate_by_force = compliances
         self.found = np.zeros((2, n))
         self._line = LineResponse(n, 0)
 
@@ -84,21 +88,7 @@ class Gap:
             If one of them is no number; it would compare as out of contact and go unnoticed.
         """
         self._line = line
-        finite = inner_kernels.gap(
-            heads.height,
-            heads.velocity,
-            heads.height_compliance,
-            heads.velocity_compliance,
-            line.height,
-            line.rate,
-            line.height_by_force,
-            line.rate_by_force,
-            self.depth,
-            self.rate,
-            self.depth_by_force,
-            self.rate_by_force,
-        )
-        if not finite:
+        if not inner_kernels.gap(heads.numbers, line.answers, self._n, self.numbers):
             raise RunBroken(NOT_FINITE)
 
     def under(self, force: np.ndarray, slack: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -110,22 +100,10 @@ class Gap:
         RunBroken
             If one of them is no number: what was to give the forces has no solution.
         """
-        depth, rate = self.found
-        finite = inner_kernels.under(
-            self.depth_by_force,
-            self.rate_by_force,
-            self.depth,
-            self.rate,
-            self._line.rows,
-            slack.size,
-            force,
-            slack,
-            depth,
-            rate,
-        )
-        if not finite:
+        rows, found = self._line.rows, self.found
+        if not inner_kernels.under(self.numbers, rows, slack.size, force, slack, found):
             raise RunBroken(NOT_FINITE)
-        return depth, rate
+        return found[0], found[1]
 
     def rounding(self, force: np.ndarray, slack: np.ndarray) -> np.ndarray:
         """What depths [m] and rates [m/s] of ``under`` may be wrong by, (2, n)."""
@@ -222,10 +200,7 @@ class InnerProblem:
         gap, n, m = self.gap, self.law.n, line.count
         self._make_room(m)
         rounds, size, finite = inner_kernels.solve(
-            gap.depth,
-            gap.rate,
-            gap.depth_by_force,
-            gap.rate_by_force,
+            gap.numbers,
             self.law.tangents,
             line.rows,
             m,
@@ -235,8 +210,7 @@ class InnerProblem:
             self._matrix,
             self._right,
             self._solution,
-            gap.found[0],
-            gap.found[1],
+            gap.found,
             _MAX_ROUNDS,
         )
         if rounds <= 0:

@@ -14,43 +14,35 @@ NUMBER, TENSION, COUPLINGS = 0, 1, 2
 
 
 @compiled
-def gap(
-    head_height,
-    head_velocity,
-    head_compliance,
-    head_velocity_compliance,
-    height,
-    rate,
-    height_by_force,
-    rate_by_force,
-    depth,
-    depth_rate,
-    depth_by_force,
-    depth_rate_by_force,
-):
-    """Depths and rates at the contacts without forces, and what forces take off them.
+def gap(heads, line, n, numbers):
+    """Depths and rates at n contacts without forces, and what forces take off them.
 
-    Returns whether all of them are numbers.
+    Three arrays (2 n + 2 n^2,) of heights, rates, and what forces change of both: of ``heads``,
+    ``line``, and of the gap between them. Returns whether all of it are numbers.
     """
     total = 0.0
-    for i in range(depth.size):
-        depth[i] = head_height[i] - height[i]
-        depth_rate[i] = head_velocity[i] - rate[i]
-        total += depth[i] + depth_rate[i]
-        for j in range(depth.size):
-            depth_by_force[i, j] = head_compliance[i, j] + height_by_force[i, j]
-            depth_rate_by_force[i, j] = head_velocity_compliance[i, j] + rate_by_force[i, j]
-            total += depth_by_force[i, j] + depth_rate_by_force[i, j]
+    for i in range(numbers.size):
+        numbers[i] = heads[i] - line[i] if i < 2 * n else heads[i] + line[i]
+        total += numbers[i]
     return np.isfinite(total)
 
 
 @compiled
-def press(depth, rate, by_force, rate_by_force, own, offset, by_depth, by_rate, push, softness):
+def parts(numbers, n):
+    """Depth, rate, by_force and rate_by_force of n contacts from what ``gap`` filled."""
+    compliances = numbers[2 * n :].reshape((2, n, n))
+    return numbers[:n], numbers[n : 2 * n], compliances[0], compliances[1]
+
+
+@compiled
+def press(numbers, tangents, push, softness):
     """Right-hand side and matrix of the contact forces when no dropper is slack.
 
-    ``own`` f = ``offset`` + ``by_depth`` d + ``by_rate`` d' at each contact, with depth d and rate
-    d' that are ``depth`` - ``by_force`` f and ``rate`` - ``rate_by_force`` f.
+    ``tangents`` (4, n) are own f = offset + by_depth d + by_rate d' at each contact, with depth d
+    and rate d' of the gap under forces f.
     """
+    own, offset, by_depth, by_rate = tangents
+    depth, rate, by_force, rate_by_force = parts(numbers, own.size)
     for i in range(depth.size):
         push[i] = offset[i] + by_depth[i] * depth[i] + by_rate[i] * rate[i]
         for j in range(depth.size):
@@ -188,12 +180,13 @@ def settle(matrix, right, always, solution, max_rounds):
 
 
 @compiled
-def under(by_force, rate_by_force, depth, rate, rows, count, force, slack, at_depth, at_rate):
-    """Depths and rates at the contacts under forces and compensations.
+def under(numbers, rows, count, force, slack, found):
+    """Fill ``found`` (2, n): depths and rates at the contacts under forces and compensations.
 
     Returns whether all of them are numbers.
     """
-    n, total = depth.size, 0.0
+    n, total = found.shape[1], 0.0
+    depth, rate, by_force, rate_by_force = parts(numbers, n)
     for i in range(n):
         d, r = depth[i], rate[i]
         for j in range(n):
@@ -202,17 +195,14 @@ def under(by_force, rate_by_force, depth, rate, rows, count, force, slack, at_de
         for k in range(count):
             d += rows[k, COUPLINGS + n + i] * slack[k]
             r += rows[k, COUPLINGS + 2 * n + i] * slack[k]
-        at_depth[i], at_rate[i] = d, r
+        found[0, i], found[1, i] = d, r
         total += d + r
     return np.isfinite(total)
 
 
 @compiled
 def solve(
-    depth,
-    rate,
-    by_force,
-    rate_by_force,
+    numbers,
     tangents,
     rows,
     count,
@@ -222,31 +212,20 @@ def solve(
     matrix,
     right,
     solution,
-    at_depth,
-    at_rate,
+    found,
     max_rounds,
 ):
     """Contact forces and compensations for a law's tangents: rounds needed, and unknowns used.
 
-    With them depths and rates at the contacts, and whether all of these are numbers.
+    ``found`` (2, n) becomes depths and rates at the contacts; told last is whether all of these are
+    numbers.
 
-    ``tangents`` (4, n) holds own, offset, by_depth and by_rate. If no contact force pushes a
-    dropper together there are n unknowns, else n + ``count``. Rounds are not positive if the active
-    set did not settle; the problem then stands in ``matrix`` and ``right``.
+    If no contact force pushes a dropper together there are n unknowns, else n + ``count``. Rounds
+    are not positive if the active set did not settle; the problem then stands in ``matrix`` and
+    ``right``.
     """
-    n = depth.size
-    press(
-        depth,
-        rate,
-        by_force,
-        rate_by_force,
-        tangents[0],
-        tangents[1],
-        tangents[2],
-        tangents[3],
-        right,
-        matrix,
-    )
+    n = tangents.shape[1]
+    press(numbers, tangents, right, matrix)
     rounds = settle(matrix[:n, :n], right[:n], always[:n], solution[:n], max_rounds)
     size = n
     if rounds > 0 and any_pushed(rows, count, n, solution):
@@ -255,10 +234,7 @@ def solve(
         rounds = settle(
             matrix[:size, :size], right[:size], always[:size], solution[:size], max_rounds
         )
-    finite = under(
-        by_force, rate_by_force, depth, rate, rows, size - n, solution, solution[n:], at_depth,
-        at_rate,
-    )  # fmt: skip
+    finite = under(numbers, rows, size - n, solution, solution[n:], found)
     return rounds, size, finite
 
 
@@ -313,15 +289,16 @@ def tell(force, reported, head_height, compliance, depth, ends, told):
 def warm_up() -> None:
     """Compile all of them, or load them from Numba's cache."""
     one, square, rows = np.zeros(1), np.eye(1), np.zeros((1, 5))
-    gap(one, one, square, square, one, one, square, square, one, one, square, square)
+    numbers, found = np.zeros(4), np.zeros((2, 1))
+    gap(numbers, numbers, 1, numbers)
     hertz(one, one, one, 1.0, 1.5, 0.0, one, one, one, one)
     any_pushed(rows, 1, 1, one)
     solve(
-        one, one, square, square, np.ones((4, 1)), rows, 1, 1.0, np.zeros((1, 1)),
-        np.zeros(2, dtype=np.bool_), np.eye(2), np.zeros(2), np.zeros(2), one, one, 1,
+        numbers, np.ones((4, 1)), rows, 1, 1.0, np.zeros((1, 1)), np.zeros(2, dtype=np.bool_),
+        np.eye(2), np.zeros(2), np.zeros(2), found, 1,
     )  # fmt: skip
     settle(square, one, np.zeros(1, dtype=np.bool_), one, 1)
     solve_on(square, one, np.zeros(1, dtype=np.bool_), one)
-    under(square, square, one, one, rows, 1, one, one, one, one)
+    under(numbers, rows, 1, one, one, found)
     leaves_out(one, one, rows, 1, one, np.zeros((1, 1)), 1.0, one)
     tell(one, one, one, square, one, np.array([0, 1]), np.zeros((3, 1)))

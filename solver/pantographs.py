@@ -81,7 +81,6 @@ class Pantographs:
         self.wire_height[:] = wire.rest_height(self._start)
         self.head_height[:] = self.wire_height - train.start_below
         self._heads = Heads(self.n_contacts)
-        self._parts = [self._heads.part(strips) for strips in self._strips]
         self.joints_in_loop = any(has_joints(placement.data) for placement in train.placements)
         self.constraint_violation[:] = np.nan
         self.models: list[Pantograph] = []
@@ -121,12 +120,8 @@ class Pantographs:
         if len(self.models) == 1:
             self._heads.adopt(self.models[0].predict(time))
             return self._heads
-        for model, part in zip(self.models, self._parts, strict=True):
-            head = model.predict(time)
-            part.height[:] = head.height
-            part.velocity[:] = head.velocity
-            part.height_compliance[:] = head.height_compliance
-            part.velocity_compliance[:] = head.velocity_compliance
+        for model, strips in zip(self.models, self._strips, strict=True):
+            self._heads.put(strips, model.predict(time))
         return self._heads
 
     def advance(self, contact_force: np.ndarray, reported: np.ndarray, depth: np.ndarray) -> None:

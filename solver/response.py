@@ -15,6 +15,7 @@ class LineResponse:
     summed : everything that adds up over ranks, in one array; the others but ``rows`` are its views
     height, rate : (n,) free wire height [m] and its total rate [m/s] at the contacts
     height_by_force, rate_by_force : (n, n) B [m/N] and its rate [m/(N s)]
+    answers : (2 n + 2 n^2,) these four one after the other
     early_height, early_rate : (n,) what the line's motion extrapolates to, or (0,) if not asked
     rows : (capacity, 2 + 3 n): number of a dropper, tension T0 [N], and for the contacts Q [-], P
         [m/N] and the rate of P [m/(N s)]
@@ -34,6 +35,7 @@ class LineResponse:
         self._flags, self.height, self.rate = parts[:3]
         self.height_by_force = parts[3].reshape(n, n)
         self.rate_by_force = parts[4].reshape(n, n)
+        self.answers = self.summed[4 : 4 + 2 * n * (1 + n)]
         self.early_height, self.early_rate = parts[5:]
         self.rows = np.zeros((capacity, COUPLINGS + 3 * n))
 
