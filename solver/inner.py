@@ -18,7 +18,7 @@ found: Newton's method, which for a convex spring comes from one side and cannot
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,8 +42,7 @@ NOT_FINITE = "it has no finite solution; try a smaller numerics.dt_s"
 _FIRST_ROOM = 32
 
 
-@dataclass
-class InnerSolution:
+class InnerSolution(NamedTuple):
     """What a step's forces are; the arrays are overwritten by the next step.
 
     ``contact_force`` (n,) [N]; ``compensation`` (m,) [N] of the droppers with a row; ``depth`` (n,)
@@ -68,6 +67,7 @@ class Gap:
     depth_by_force, rate_by_force : (n, n) what forces take off them [m/N], [m/(N s)]
     numbers : (2 n + 2 n^2,) these four one after the other
     found : (2, n) depths and rates under the forces looked at last
+    found_depth, found_rate : (n,) its rows
     """
 
     def __init__(self, n: int) -> None:
@@ -77,6 +77,7 @@ class Gap:
         compliances = self.numbers[2 * n :].reshape(2, n, n)
         self.depth_by_force, self.rate_by_force = compliances
         self.found = np.zeros((2, n))
+        self.found_depth, self.found_rate = self.found
         self._line = LineResponse(n, 0)
 
     def put(self, line: LineResponse, heads: Heads) -> None:
@@ -103,7 +104,7 @@ class Gap:
         rows, found = self._line.rows, self.found
         if not inner_kernels.under(self.numbers, rows, slack.size, force, slack, found):
             raise RunBroken(NOT_FINITE)
-        return found[0], found[1]
+        return self.found_depth, self.found_rate
 
     def rounding(self, force: np.ndarray, slack: np.ndarray) -> np.ndarray:
         """What depths [m] and rates [m/s] of ``under`` may be wrong by, (2, n)."""
@@ -160,7 +161,7 @@ class InnerProblem:
         for number in range(_MAX_TANGENTS):
             force, slack, more = self._with_tangents(line)
             rounds += more
-            depth, rate = gap.found
+            depth, rate = gap.found_depth, gap.found_rate
             if law.is_linear:
                 return InnerSolution(force, slack, depth, rate, rounds, self.pivoted)
             law.linearise(depth, rate)
@@ -178,7 +179,8 @@ class InnerProblem:
         n, m = self.law.n, line.count
         if not m or not inner_kernels.any_pushed(line.rows, m, n, force):
             return np.zeros(m)
-        self._make_room(m)
+        if m > self._room:
+            self._make_room(m)
         push = np.zeros((2, n))
         inner_kernels.couple(
             line.rows, m, n, self._released, self._band, push, self._matrix, self._right
@@ -198,7 +200,8 @@ class InnerProblem:
         Depths and rates under them stand in ``gap.found``.
         """
         gap, n, m = self.gap, self.law.n, line.count
-        self._make_room(m)
+        if m > self._room:
+            self._make_room(m)
         rounds, size, finite = inner_kernels.solve(
             gap.numbers,
             self.law.tangents,
@@ -223,7 +226,7 @@ class InnerProblem:
             gap.under(force, self._solution[n:size])
         elif not finite:
             raise RunBroken(NOT_FINITE)
-        return self._solution[:n], self._solution[n:size], rounds
+        return self._force, self._solution[n:size] if size > n else self._no_slack, rounds
 
     def _with_all(self, line: LineResponse, rounds: int) -> tuple[int, int]:
         """Unknowns and rounds by pivoting, droppers included, where contacts alone needed it."""
@@ -238,12 +241,11 @@ class InnerProblem:
 
     def _make_room(self, n_droppers: int) -> None:
         n = self.law.n
-        if n_droppers <= self._room:
-            return
         self._room = max(n_droppers, 2 * self._room)
         size = n + self._room
         self._matrix, self._right = np.zeros((size, size)), np.zeros(size)
         self._solution = np.zeros(size)
+        self._force, self._no_slack = self._solution[:n], self._solution[:0]
         self._always = np.zeros(size, dtype=bool)
         self._always[:n] = self.law.pulls
 
