@@ -334,8 +334,11 @@ def test_what_happens_far_away_is_not_felt(way: dict[str, Any]) -> None:
     number = int(np.argmin(np.abs(mesh.x(mesh.droppers[:, 1]) - 595.0)))
     assert not seen["dropper_force"][301:, number].any()
     assert expected["contact_force"][301:].std() > 5.0
+    # A line under a constant load takes its steps in another order of sums. Without a depth, forces
+    # are heights of 5 m, known to 1e-15 m, over what they move within a step, 1e-6 m/N.
+    digits = 1e-10 if isinstance(problem.contact, KinematicLaw) else 1e-12
     for channel in ("contact_force", "head_height", "wire_height"):
-        within = 1e-12 * np.abs(expected[channel]).max()
+        within = digits * np.abs(expected[channel]).max()
         check(channel, seen[channel], expected[channel], within=within)
 
 
