@@ -9,6 +9,7 @@ import numpy as np
 from catenary.solver import kernels
 from catenary.solver.changed_line import ChangedLine
 from catenary.solver.equilibrium import Equilibrium
+from catenary.solver.errors import InputError
 from catenary.solver.interaction import Interaction
 from catenary.solver.observation import Stage, StepView
 from catenary.solver.pantographs import Pantographs
@@ -111,11 +112,25 @@ class Showing:
         return view
 
     def restore(self, checkpoint: dict[str, Any]) -> None:
-        """Continue from a checkpoint, which all ranks pass. Not collective."""
-        line, pantographs = self._line, self._pantographs
+        """Continue from a checkpoint, which all ranks pass. Not collective.
+
+        Raises
+        ------
+        InputError
+            If it does not say which node its unknowns belong to.
+        """
+        line, pantographs, model = self._line, self._pantographs, self._model
+        if "row_of_node" not in checkpoint:
+            raise InputError(
+                "the state to continue from was written by an earlier version of Catenary, which "
+                "this one cannot continue; start the run anew"
+            )
+        then = np.empty(model.mesh.n_nodes, dtype=np.int64)
+        then[model.row_of_node] = checkpoint["row_of_node"]
         rows = slice(line.ownership.first, line.ownership.last)
         for name, values in line.state().items():
-            values[:] = checkpoint[name][rows]
+            by_node = np.reshape(checkpoint[name], (-1, model.block_size))
+            values[:] = by_node[then].ravel()[rows]
         pantographs.contact_force[:] = checkpoint["contact_force"]
         pantographs.head_height[:] = checkpoint["head_height"]
         pantographs.wire_height[:] = checkpoint["wire_height"]
@@ -149,6 +164,7 @@ class Showing:
         if self._comm.rank != 0:
             return None
         result: dict[str, Any] = {k: np.concatenate(parts) for k, parts in whole.items() if parts}
+        result["row_of_node"] = self._model.row_of_node
         result["step"] = self._view.step
         result["contact_force"] = pantographs.contact_force.copy()
         result["head_height"] = pantographs.head_height.copy()

@@ -8,6 +8,7 @@ import signal
 import subprocess
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from program import (
@@ -69,6 +70,23 @@ def test_a_signal_closes_the_file_and_restart_finishes_the_run(
     refused = catenary("restart", str(out), cwd=tmp_path)
     assert refused.code == 2
     assert "is done; there is nothing to continue" in refused.stderr
+
+
+@needs_mpirun
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_state_of_an_earlier_version_is_refused(ranks: int, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = [*short_run(out, FINE, SHORT_FLUSHES), "--", "-march_ts_max_steps", "150"]
+    assert catenary(*words, cwd=tmp_path).code == 1
+    with h5py.File(out / "run.h5", "a") as file:
+        for slot in file["checkpoint"].values():
+            del slot["row_of_node"]
+    before = (out / "run.h5").read_bytes()
+    refused = catenary("restart", str(out), cwd=tmp_path, ranks=ranks)
+    assert refused.code == 2
+    (sentence,) = refused.sentences
+    assert "earlier version" in sentence and "start the run anew" in sentence
+    assert (out / "run.h5").read_bytes() == before
 
 
 @needs_mpirun
