@@ -89,14 +89,20 @@ def test_scaling_over_ranks(benchmark: Any, spans: int) -> None:
 
     Means tell what a run takes on the machine as it is. What else that does keeps two cores longer
     than one, since each waits for the other at every step: half of the steps, and the fastest
-    tenth, tell more of the program. Medians over turns.
+    tenth, tell more of the program. So do two marches side by side, of half the spans each, that
+    do not talk: what two ranks lose against them they lose by being two. Medians over turns.
     """
     steps = 200_000 // spans
     # In turns, so that a machine that is slower for a while is so for all three.
     turns = [
         [
-            driver("step_cost.py", count, steps, ranks=ranks)
-            for count, ranks in ((spans, 1), (spans, 2), (2 * spans, 2))
+            driver("step_cost.py", count, steps, *apart, ranks=ranks)
+            for count, ranks, *apart in (
+                (spans, 1),
+                (spans, 2),
+                (2 * spans, 2),
+                (spans // 2, 2, "apart"),
+            )
         ]
         for _ in range(TURNS)
     ]
@@ -107,12 +113,15 @@ def test_scaling_over_ranks(benchmark: Any, spans: int) -> None:
         ("half of the steps", "us_half"),
         ("a tenth of the steps", "us_tenth"),
     ):
-        one, two, twice = np.median([[run[key] for run in turn] for turn in turns], axis=0)
+        costs = np.array([[run[key] for run in turn] for turn in turns])
+        one, two, twice, apart = np.median(costs, axis=0)
         strong, weak = one / two / 2, one / twice
         print(f"  {name:22}{one:5.0f} us a step on 1 rank, {two:.0f} on 2 (strong "
               f"{100 * strong:.0f} %), {2 * spans} on 2: {twice:.0f} "
-              f"(weak {100 * weak:.0f} %)")  # fmt: skip
+              f"(weak {100 * weak:.0f} %), two of {spans // 2} apart: {apart:.0f} "
+              f"({100 * apart / two:.0f} % reached)")  # fmt: skip
         found |= {f"strong, {name}": strong, f"weak, {name}": weak}
+        found[f"of two apart, {name}"] = apart / two
     keep(benchmark, found)
 
 

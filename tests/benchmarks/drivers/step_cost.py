@@ -1,6 +1,8 @@
 """Times the march of a long line on the ranks it is started on, and prints a line of JSON.
 
-mpirun -n 2 python -m mpi4py step_cost.py SPANS STEPS
+mpirun -n 2 python -m mpi4py step_cost.py SPANS STEPS [apart]
+
+``apart``: each rank has a line of its own, of that many spans, and does not talk to the others.
 """
 
 from __future__ import annotations
@@ -26,8 +28,8 @@ from catenary.solver.parallel import on_root
 CHUNKS = 5
 
 
-def main(n_spans: int, n_steps: int) -> None:
-    comm = MPI.COMM_WORLD
+def main(n_spans: int, n_steps: int, apart: bool) -> None:
+    comm = MPI.COMM_SELF if apart else MPI.COMM_WORLD
     begin = time.perf_counter()
     # Since the benchmark started this process, on the clock that processes share.
     imported = time.time() - float(os.environ.get("STARTED_AT", time.time()))
@@ -56,6 +58,7 @@ def main(n_spans: int, n_steps: int) -> None:
         )
         if chunk == 0:
             ready = time.perf_counter()
+        MPI.COMM_WORLD.Barrier()
         begun: list[float] = []
         outcome = march.run([], partial(ask, begun))
         walls.append(outcome.wall / outcome.n_steps)
@@ -65,7 +68,7 @@ def main(n_spans: int, n_steps: int) -> None:
     each = np.concatenate(steps[1:])
     traffic = outcome.traffic or (0.0, 0.0)
     peak = comm.reduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024.0, MPI.SUM)
-    if comm.rank == 0:
+    if MPI.COMM_WORLD.rank == 0:
         print(
             json.dumps(
                 {
@@ -104,4 +107,4 @@ def room(n_spans: int) -> list[str]:
 
 
 if __name__ == "__main__":
-    main(*(int(argument) for argument in sys.argv[1:3]))
+    main(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3:] == ["apart"])
