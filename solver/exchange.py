@@ -101,9 +101,11 @@ class Exchange:
         room = (answer.size - _HEAD - n) // 2
         if reply is not None:
             count = reply.droppers.size
-            answer[:_HEAD] = reply.verdict, count, reply.room, reply.level
+            # One by one: numpy takes longer over a tuple than the rest of this.
+            answer[0], answer[1] = reply.verdict, count
+            answer[2], answer[3] = reply.room, reply.level
             answer[_HEAD : _HEAD + n] = reply.contact_force
-            if count <= room:
+            if 0 < count <= room:
                 answer[_HEAD + n : _HEAD + n + count] = reply.droppers
                 answer[_HEAD + n + count : _HEAD + n + 2 * count] = reply.compensation
         comm.Bcast(answer, root=0)
@@ -136,6 +138,8 @@ class Exchange:
         """Rows of all ranks one after the other, rank by rank."""
         comm, share, merged = self._comm, self.share, self._merged
         total = merged.count
+        if total == 0:
+            return
         if total > merged.capacity:
             larger = LineResponse(self._n, 2 * total, self._early)
             larger.summed[:] = merged.summed
