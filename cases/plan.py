@@ -18,8 +18,8 @@ from catenary.solver.problem import Numerics, Problem, n_halvings
 # Runs of the case ambrosio2012 on 25, 100 and 1000 spans, 4.5e3 to 1.8e5 unknowns, on a two-core
 # machine of 2026 (Debian 12, PETSc 3.18) lie within 40 % of it, and machines differ by a factor of
 # two; the plan calls it an estimate.
-STEP_OVERHEAD = 4.0e-5  # [s]
-STEP_PER_UNKNOWN = 6.5e-9  # [s]
+STEP_OVERHEAD = 4.5e-5  # [s]
+STEP_PER_UNKNOWN = 4.8e-9  # [s]
 # The fixed-point scheme repeats the solve; 3 times the time of one_solve was measured.
 # PETSc's TSALPHA2 factors anew in every iteration; 24 times was measured.
 SCHEME_FACTOR = {"one_solve": 1.0, "fixed_point": 3.0, "ts_alpha2": 24.0}
