@@ -229,9 +229,7 @@ def run_free(rest: AtRest, comm: Any, n_steps: int) -> Watched:
         energy = [sum(line.energies())]
         every = max(1, n_steps // 100)
         for number in range(1, n_steps + 1):
-            line.predict()
-            line.free_acceleration()
-            line.correct()
+            line.free_step()
             if number % every == 0:
                 energy.append(sum(line.energies()))
     finally:

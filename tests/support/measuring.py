@@ -111,9 +111,7 @@ def release(line: LineMotion, displacement: np.ndarray, velocity: np.ndarray, mo
 
 def step(line: LineMotion) -> None:
     """One step of the line without loads."""
-    line.predict()
-    line.free_acceleration()
-    line.correct()
+    line.free_step()
 
 
 @dataclass
