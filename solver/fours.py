@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, models, register_model
@@ -88,42 +89,54 @@ def add_scaled(typing_context, total, factor, x):
 
 @inlined
 def add_product(typing_context, total, array, at, x):
-    """``total`` plus a 4 x 4 block times x; the block is stored by columns from ``at`` on."""
+    """``total`` plus a 4 x 4 block times x; the block is stored from ``at`` on.
+
+    A block stands by four diagonals: number i of diagonal d is that of row i and column i ^ d, so
+    that x itself, unmoved, is what the first one takes.
+    """
 
     def generate(context, builder, signature, arguments):
         total, array, at, x = arguments
+        diagonals = [(context, builder, signature.args[1], array, at, x, d) for d in range(4)]
         # In two sums, of which the second need not wait for ``total``.
-        sums = [total, None]
-        for column in range(4):
-            start = builder.add(at, ir.Constant(at.type, 4 * column))
-            place = _place(context, builder, signature.args[1], array, start)
-            factor = _spread(builder, x, (column,) * 4)
-            product = builder.fmul(builder.load(place, align=8), factor, flags=_FUSED)
-            old = sums[column // 2]
-            sums[column // 2] = product if old is None else builder.fadd(old, product, flags=_FUSED)
-        return builder.fadd(*sums)
+        one = _add_diagonal(total, *diagonals[0])
+        two = _add_diagonal(None, *diagonals[2])
+        return builder.fadd(_add_diagonal(one, *diagonals[1]), _add_diagonal(two, *diagonals[3]))
 
     return _four(total, array, at, x), generate
 
 
 @inlined
 def add_pairs(typing_context, total, array, at, x):
-    """``total`` plus two 2 x 2 blocks times the first and the last two of x.
+    """As ``add_product`` with a block that joins the first two of x, and the last two, only.
 
-    The first columns of both are stored from ``at`` on, then the second ones.
+    Its first two diagonals are stored, the others being zero.
     """
 
     def generate(context, builder, signature, arguments):
         total, array, at, x = arguments
-        for column in range(2):
-            start = builder.add(at, ir.Constant(at.type, 4 * column))
-            place = _place(context, builder, signature.args[1], array, start)
-            factor = _spread(builder, x, (column, column, column + 2, column + 2))
-            product = builder.fmul(builder.load(place, align=8), factor, flags=_FUSED)
-            total = builder.fadd(total, product, flags=_FUSED)
+        for d in range(2):
+            total = _add_diagonal(total, context, builder, signature.args[1], array, at, x, d)
         return total
 
     return _four(total, array, at, x), generate
+
+
+def by_diagonals(blocks: np.ndarray) -> np.ndarray:
+    """Blocks (..., 4, 4) as products read them, (..., 16)."""
+    rows = np.arange(4)
+    diagonals = [blocks[..., rows, rows ^ d] for d in range(4)]
+    return np.concatenate(diagonals, axis=-1)
+
+
+def _add_diagonal(
+    total: Any, context: Any, builder: Any, kind: types.Type, array: Any, at: Any, x: Any, d: int
+) -> Any:
+    """``total``, if there is one, plus diagonal d of a block stored from ``at`` on times x."""
+    place = _place(context, builder, kind, array, builder.add(at, ir.Constant(at.type, 4 * d)))
+    factor = _spread(builder, x, (d, 1 ^ d, 2 ^ d, 3 ^ d)) if d else x
+    product = builder.fmul(builder.load(place, align=8), factor, flags=_FUSED)
+    return product if total is None else builder.fadd(total, product, flags=_FUSED)
 
 
 def _spread(builder: Any, x: Any, lanes: tuple[int, ...]) -> Any:

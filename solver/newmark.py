@@ -49,8 +49,8 @@ class NewmarkLine(LineMotion):
             super().free_step(loads)
             return
         self._forth.begin()
+        passes.tell()
         if self._comm.size > 1:
-            passes.tell()
             self.operators.exchange()
         passes.forth()
         self._forth.end()

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 
 from catenary.solver import aligned
-from catenary.solver.fours import add_pairs, add_product, load, store, zero
+from catenary.solver.fours import add_pairs, add_product, by_diagonals, load, store, zero
 from catenary.solver.kernels import compiled, in_line
 from catenary.solver.repeated_rows import kinds_of
 
@@ -54,8 +54,8 @@ class StationProduct:
     Attributes
     ----------
     kinds : (n,) of its rows
-    blocks : (32 n_kinds,) of each kind its diagonal block by columns, then what it reads of the
-        stations before and after it: as ``fours.add_pairs`` reads two blocks
+    blocks : (32 n_kinds,) of each kind its diagonal block, then what joins it to the stations
+        before and after it, wire by wire; all as products read them, see ``fours``
     first : station in the factor of the first row; the factor has one before and one after all
         rows, which is zero where the line ends
     """
@@ -77,22 +77,24 @@ def station_product(matrix: sparse.bsr_matrix, first: int) -> StationProduct | N
     blocks = neighbours(matrix, first)
     if blocks is None or blocks[0::2, :, :2, 2:].any() or blocks[0::2, :, 2:, :2].any():
         return None
-    before, own, after = blocks.transpose(0, 1, 3, 2)
-    numbers = [own.reshape(-1, BLOCK**2), _pairs(before), _pairs(after)]
+    before, own, after = by_diagonals(blocks)
+    numbers = [own, before[:, : 2 * BLOCK], after[:, : 2 * BLOCK]]
     kinds = by_kinds(np.concatenate(numbers, axis=1))
     return None if kinds is None else StationProduct(*kinds, first + 1)
-
-
-def _pairs(columns: np.ndarray) -> np.ndarray:
-    """Two blocks of each of (n, 4, 4) by columns, as ``fours.add_pairs`` reads them, (n, 8)."""
-    return np.concatenate(
-        [columns[:, 0, :2], columns[:, 2, 2:], columns[:, 1, :2], columns[:, 3, 2:]], axis=1
-    )
 
 
 # Indices are unsigned, so that none is asked whether it counts from the end.
 _BLOCK, _SIZE = np.uint64(BLOCK), np.uint64(2 * BLOCK**2)
 _BEFORE, _AFTER = np.uint64(BLOCK**2), np.uint64(BLOCK**2 + 2 * BLOCK)
+
+
+@in_line
+def multiply_row(kinds, blocks, row, before, here, after):
+    """A row of a product with what the factor holds there and beside it; see ``StationProduct``."""
+    at = _SIZE * np.uint64(kinds[row])
+    total = add_product(zero(), blocks, at, here)
+    total = add_pairs(total, blocks, at + _BEFORE, before)
+    return add_pairs(total, blocks, at + _AFTER, after)
 
 
 @in_line
@@ -102,11 +104,7 @@ def multiply_rows(kinds, blocks, first, factor, begin, end, result):
     before, here = load(factor, at - _BLOCK), load(factor, at)
     for i in range(begin, end):
         after = load(factor, _BLOCK * np.uint64(first + i + 1))
-        at = _SIZE * np.uint64(kinds[i])
-        total = add_product(zero(), blocks, at, here)
-        total = add_pairs(total, blocks, at + _BEFORE, before)
-        total = add_pairs(total, blocks, at + _AFTER, after)
-        store(result, _BLOCK * np.uint64(i), total)
+        store(result, _BLOCK * np.uint64(i), multiply_row(kinds, blocks, i, before, here, after))
         before, here = here, after
 
 

@@ -13,7 +13,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from catenary.solver import station_blocks
-from catenary.solver.fours import add_product, load, store, zero
+from catenary.solver.fours import add_product, by_diagonals, load, store, zero
 from catenary.solver.kernels import compiled, in_line
 from catenary.solver.station_blocks import BLOCK
 
@@ -25,8 +25,8 @@ class StationFactors:
     ----------
     kinds : (n,) kind of each station
     blocks : (48 n_kinds,) of each kind S^-1, -S^-1 times its block towards the end of the line that
-        elimination starts from, and -S^-1 times that towards the middle, each by columns; S is its
-        diagonal block after elimination
+        elimination starts from, and -S^-1 times that towards the middle, as ``fours.add_product``
+        reads them; S is its diagonal block after elimination
     low, high : range of stations in whose middle elimination ends
     n_stations, n_kinds : in the matrix, and how many have different factors
     """
@@ -68,7 +68,7 @@ def station_factors(
     high = n if high is None else high
     factors = np.zeros((n, 3, BLOCK, BLOCK))
     factorise(blocks, (low + high) // 2, factors)
-    kinds = station_blocks.by_kinds(factors.transpose(0, 1, 3, 2).reshape(n, -1))
+    kinds = station_blocks.by_kinds(by_diagonals(factors).reshape(n, -1))
     return None if kinds is None else StationFactors(*kinds, low, high)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from catenary.solver.fours import add_scaled, load, store, zero
 from catenary.solver.kernels import compiled, in_line
-from catenary.solver.station_blocks import BLOCK, StationProduct, multiply_rows
+from catenary.solver.station_blocks import BLOCK, StationProduct, multiply_row, multiply_rows
 from catenary.solver.station_factors import (
     StationFactors,
     eliminate,
@@ -22,9 +22,9 @@ from catenary.solver.station_factors import (
     substitute_outside,
 )
 
-# Stations of a stretch: large enough for memory to be read ahead, 32 kB of each array, of which a
-# cache next to a processor, of 1 MB, holds eight.
-_STRETCH = 1024
+# Stations of a stretch: large enough for memory to be read ahead, 64 kB of each array, of which a
+# cache next to a processor, of 1 MB, holds the six that both ends need.
+_STRETCH = 2048
 
 
 class Steps(NamedTuple):
@@ -64,15 +64,15 @@ class StationPasses:
         steps: Steps,
     ) -> None:
         low, high = factors.low, factors.high
-        first = min(told[0], high - low)
-        # What is not to be told is predicted under way.
-        ready = first, max(first, high - low - told[1])
+        n = high - low
+        # As many at both ends, at least one: the others are predicted under way, from there on.
+        told_ahead = min(max(*told, 1), n)
         acceleration, work = answer[BLOCK * low :], read[BLOCK * (product.first + low) :]
         own = displacement, velocity, acceleration, work
         factored = factors.kinds, factors.blocks, low, high
         multiplied = product.kinds, product.blocks, product.first, read
-        self._tell = ready, own, steps[:4]
-        self._forth = multiplied, factored, ready, own, answer, steps[:4]
+        self._tell = n, told_ahead, own, steps[:4]
+        self._forth = multiplied, factored, told_ahead, own, answer, steps[:4]
         self._back = factored, own, answer, steps[4:]
 
     def tell(self) -> None:
@@ -94,8 +94,8 @@ _BLOCK = np.uint64(BLOCK)
 
 @in_line
 def predict(station, own, coefficients):
-    """As ``kernels.predict`` for one of the rank's own stations."""
-    displacement, velocity, acceleration, work = own
+    """As ``kernels.predict`` for one of the rank's own stations: what the product reads of it."""
+    displacement, velocity, acceleration, _ = own
     dt, c_position, c_velocity, c_work = coefficients
     at = _BLOCK * np.uint64(station)
     d, v, a = load(displacement, at), load(velocity, at), load(acceleration, at)
@@ -103,7 +103,14 @@ def predict(station, own, coefficients):
     v = add_scaled(v, c_velocity, a)
     store(displacement, at, d)
     store(velocity, at, v)
-    store(work, at, add_scaled(add_scaled(zero(), -1.0, d), -c_work, v))
+    return add_scaled(add_scaled(zero(), -1.0, d), -c_work, v)
+
+
+@in_line
+def predict_all(begin, end, own, coefficients):
+    """Predict the rank's own stations from ``begin`` to ``end``, and keep what is read of them."""
+    for i in range(begin, end):
+        store(own[3], _BLOCK * np.uint64(i), predict(i, own, coefficients))
 
 
 @in_line
@@ -120,52 +127,106 @@ def correct(station, x, own, factors):
 
 
 @compiled
-def tell(ready, own, coefficients):
-    """Predict the rank's own stations but those between ``ready``."""
-    begin, end = ready
-    for i in range(begin):
-        predict(i, own, coefficients)
-    for i in range(end, own[0].size // BLOCK):
-        predict(i, own, coefficients)
+def tell(n, ahead, own, coefficients):
+    """Predict the first and last stations of a rank's own n, ``ahead`` each."""
+    predict_all(0, ahead, own, coefficients)
+    predict_all(max(ahead, n - ahead), n, own, coefficients)
 
 
-@compiled
-def forth(multiplied, factored, ready, own, answer, coefficients):
-    """Leave in ``answer`` what elimination leaves of the right-hand side; see ``StationPasses``.
+@in_line
+def station_of(array, number):
+    """What an array holds of a station."""
+    return load(array, _BLOCK * np.uint64(number))
 
-    The rank's own stations between ``ready`` are still to be predicted.
-    """
+
+@in_line
+def eliminate_both(factored, begin, end, x, y, answer):
+    """Eliminate own stations from ``begin`` to ``end``, counted from both ends."""
+    kinds, blocks, low, high = factored
+    for k in range(begin, end):
+        x = eliminate(kinds, blocks, answer, low + k, x, answer)
+        y = eliminate(kinds, blocks, answer, high - 1 - k, y, answer)
+    return x, y
+
+
+@in_line
+def forth_outside(multiplied, factored, ahead, answer):
+    """Multiply and eliminate what is outside of the rank's own stations, and the first ``ahead`` of
+    these at both ends."""
     product_kinds, product_blocks, first, read = multiplied
     kinds, blocks, low, high = factored
-    begin, end = ready
-    n, middle, pairs = high - low, (low + high) // 2, (high - low - 1) // 2
-    # Rows take the place of accelerations, and read what is predicted on both sides of them.
-    multiply_rows(product_kinds, product_blocks, first, read, 0, low, answer)
-    multiply_rows(product_kinds, product_blocks, first, read, high, kinds.size, answer)
+    multiply_rows(product_kinds, product_blocks, first, read, 0, low + ahead, answer)
+    multiply_rows(product_kinds, product_blocks, first, read, high - ahead, kinds.size, answer)
     x, y = zero(), zero()
     for i in range(low):
         x = eliminate(kinds, blocks, answer, i, x, answer)
     for j in range(kinds.size - 1, high - 1, -1):
         y = eliminate(kinds, blocks, answer, j, y, answer)
-    for start in range(0, pairs, _STRETCH):
-        stop = min(start + _STRETCH, pairs)
-        for i in range(begin, min(stop + 1, end)):
-            predict(i, own, coefficients)
-        begin = max(begin, min(stop + 1, end))
-        for j in range(max(n - 1 - stop, begin), end):
-            predict(j, own, coefficients)
-        end = max(begin, min(n - 1 - stop, end))
-        i, j = low + start, high - stop
-        multiply_rows(product_kinds, product_blocks, first, read, i, low + stop, answer)
-        multiply_rows(product_kinds, product_blocks, first, read, j, high - start, answer)
-        for k in range(start, stop):
-            x = eliminate(kinds, blocks, answer, low + k, x, answer)
-            y = eliminate(kinds, blocks, answer, high - 1 - k, y, answer)
-    for i in range(begin, end):
-        predict(i, own, coefficients)
+    return eliminate_both(factored, 0, ahead, x, y, answer)
+
+
+@in_line
+def forth_on_the_left(multiplied, low, begin, end, out, here, own, answer, coefficients):
+    """Predict own stations and multiply those one further out, ``begin`` to ``end``.
+
+    ``out`` and ``here`` are what is read of the last two that are predicted.
+    """
+    kinds, blocks, _, _ = multiplied
+    for k in range(begin, end):
+        inward = predict(k + 1, own, coefficients)
+        row = multiply_row(kinds, blocks, low + k, out, here, inward)
+        store(answer, _BLOCK * np.uint64(low + k), row)
+        out, here = here, inward
+    return out, here
+
+
+@in_line
+def forth_on_the_right(multiplied, high, n, begin, end, out, here, own, answer, coefficients):
+    """As on the left, counted from the other end of the rank's own n stations."""
+    kinds, blocks, _, _ = multiplied
+    for k in range(begin, end):
+        inward = predict(n - 2 - k, own, coefficients)
+        row = multiply_row(kinds, blocks, high - 1 - k, inward, here, out)
+        store(answer, _BLOCK * np.uint64(high - 1 - k), row)
+        out, here = here, inward
+    return out, here
+
+
+@compiled
+def forth(multiplied, factored, ahead, own, answer, coefficients):
+    """Leave in ``answer`` what elimination leaves of the right-hand side; see ``StationPasses``.
+
+    Of the rank's own stations, ``ahead`` at both ends are predicted.
+    """
+    product_kinds, product_blocks, first, read = multiplied
+    kinds, blocks, low, high = factored
+    n, middle, pairs = high - low, (low + high) // 2, (high - low - 1) // 2
+    begin = max(min(ahead, pairs) - 1, 0)
+    end = max(begin, pairs - 1)
+    x, y = forth_outside(multiplied, factored, begin, answer)
+    # Under way, what is predicted goes from station to station without being stored.
+    left, right = first + low + begin, first + high - 1 - begin
+    left_out, left_here = station_of(read, left - 1), station_of(read, left)
+    right_out, right_here = station_of(read, right + 1), station_of(read, right)
+    for start in range(begin, end, _STRETCH):
+        stop = min(start + _STRETCH, end)
+        left_out, left_here = forth_on_the_left(
+            multiplied, low, start, stop, left_out, left_here, own, answer, coefficients
+        )
+        right_out, right_here = forth_on_the_right(
+            multiplied, high, n, start, stop, right_out, right_here, own, answer, coefficients
+        )
+        x, y = eliminate_both(factored, start, stop, x, y, answer)
+    # Rows in the middle read stations of both sides.
+    left, right = first + low + end, first + high - 1 - end
+    store(read, _BLOCK * np.uint64(left - 1), left_out)
+    store(read, _BLOCK * np.uint64(left), left_here)
+    store(read, _BLOCK * np.uint64(right + 1), right_out)
+    store(read, _BLOCK * np.uint64(right), right_here)
+    predict_all(max(ahead, end + 1), min(n - ahead, n - 1 - end), own, coefficients)
+    multiply_rows(product_kinds, product_blocks, first, read, low + end, high - end, answer)
+    x, y = eliminate_both(factored, end, pairs, x, y, answer)
     # One more towards the start of the line, if there is an even number of them.
-    i = low + pairs
-    multiply_rows(product_kinds, product_blocks, first, read, i, middle + 1, answer)
     for i in range(low + pairs, middle + 1):
         x = eliminate(kinds, blocks, answer, i, x, answer)
     substitute(kinds, blocks, middle, y, answer)
