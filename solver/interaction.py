@@ -26,7 +26,7 @@ class Droppers:
     numbers : (n,) numbers in the mesh of those that may carry
     ends : (n, 2) local unknowns of their upper and lower ends
     laws : (n, 4) force at rest [N], stiffness [N/m], damping [N s/m], place along the track [m]
-    latest_tension : (n,) what was found last [N]
+    latest_tension : (n,) what was found last, here or by a free step of the line [N]
     """
 
     def __init__(self, model: Model, form: Equilibrium, line: LineMotion) -> None:
@@ -52,6 +52,7 @@ class Droppers:
         self.per_acceleration = stiffness * line.position_factor + damping * line.velocity_factor
         self.latest_tension = np.zeros(self.numbers.size)
         self._line = line
+        line.look_at(self.ends, self.laws, self.latest_tension)
 
     def tension(self) -> np.ndarray:
         """Tension in the line's present motion [N], shape (n,), overwritten by the next call."""
@@ -170,7 +171,8 @@ class Interaction:
     ) -> None:
         """Fill in this rank's share of the inner problem, after ``place`` and the free solve.
 
-        The line must hold the end of the step without contact forces and with all droppers taut.
+        The line must hold the end of the step without contact forces and with all droppers taut,
+        and the droppers their tension there, as a free step leaves them.
         Droppers are included if their tension may fall below ``margin`` [N] under contact
         forces up to ``force_bound`` (n,) [N].
         """

@@ -130,21 +130,24 @@ def combine(elements, weights, first_node, start, offset, data, answers, filled)
         filled[i, 1] = high
 
 
+@in_line
+def tension_of(dropper, displacement, velocity, ends, laws):
+    """Tension of one of the droppers of ``tension`` [N]."""
+    upper, lower = ends[dropper, 0], ends[dropper, 1]
+    stretch = displacement[upper] - displacement[lower]
+    speed = velocity[upper] - velocity[lower]
+    return laws[dropper, 0] + laws[dropper, 1] * stretch + laws[dropper, 2] * speed
+
+
 @compiled
 def tension(displacement, velocity, ends, laws, result):
     """Tension N0 + k e + c e' of droppers as if they could push [N].
 
     ``ends`` (n, 2) holds local unknowns of upper and lower end, ``laws`` (n, 4) rest force,
-    stiffness, damping and place. Returns whether all are numbers.
+    stiffness, damping and place.
     """
-    total = 0.0
     for d in range(ends.shape[0]):
-        upper, lower = ends[d, 0], ends[d, 1]
-        stretch = displacement[upper] - displacement[lower]
-        speed = velocity[upper] - velocity[lower]
-        result[d] = laws[d, 0] + laws[d, 1] * stretch + laws[d, 2] * speed
-        total += result[d]
-    return np.isfinite(total)
+        result[d] = tension_of(d, displacement, velocity, ends, laws)
 
 
 @compiled
@@ -227,15 +230,19 @@ def watch(
     """Number of droppers whose tension may fall below ``margin``; a row each, as far as they fit.
 
     ``force`` (n,) is their tension if they could push; they stand in the order along the track.
-    Contact i may press with up to ``bound[i]`` and touches those within ``reach`` of it.
+    Contact i may press with up to ``bound[i]`` and touches those within ``reach`` of it. -1 if a
+    tension is no number.
     """
     count, n = 0, contact_x.size
     first = np.searchsorted(laws[:, 3], contact_x.min() - reach)
     last = np.searchsorted(laws[:, 3], contact_x.max() + reach, side="right")
     for d in range(force.size):
-        candidate = force[d] < margin
+        # Also true for what is no number.
+        candidate = not (margin <= force[d] < np.inf)
         if not (candidate or first <= d < last):
             continue
+        if not np.isfinite(force[d]):
+            return -1
         per_acceleration = laws[d, 1] * position_factor + laws[d, 2] * velocity_factor
         upper, lower = ends[d, 0], ends[d, 1]
         if not candidate:
@@ -293,7 +300,7 @@ def respond(
     rate_by_force,
     rows,
 ):
-    """A rank's share of the inner problem, see ``LineResponse``, and the tension of its droppers.
+    """A rank's share of the inner problem, see ``LineResponse``; ``force`` as for ``watch``.
 
     Returns the number of droppers that may slacken, -1 if something is no number.
     """
@@ -301,11 +308,11 @@ def respond(
         displacement, velocity, local, value, slope, rest, train_speed, answers, slope_answers,
         uses_rate, position_factor, velocity_factor, height, rate, height_by_force, rate_by_force,
     )  # fmt: skip
-    # What is no number anywhere is one at the next dropper in the step after.
-    if not (tension(displacement, velocity, ends, laws, force) and finite):
+    if not finite:
         return -1
+    # What is no number anywhere is one at the next dropper in the step after.
     if not may_slacken:
-        return 0
+        return 0 if np.isfinite(force.sum()) else -1
     return watch(
         force, margin, bound, numbers, ends, laws, contact_x, reach, answers, slope_answers,
         uses_rate, train_speed, position_factor, velocity_factor, rows,

@@ -81,6 +81,7 @@ class LineMotion(ABC):
         n = ownership.n_local
         self.displacement, self.velocity = aligned.zeros(n, 2), aligned.zeros(n, 3)
         self.acceleration = self.operators.answer
+        self.look_at(np.zeros((0, 2), np.int64), np.zeros((0, 4)), np.zeros(0))
         # PETSc's time loop wants the solution as a vector; it wraps our array.
         self.solution = PETSc.Vec().createWithArray(self.displacement, size=(n, None), comm=comm)
 
@@ -106,12 +107,21 @@ class LineMotion(ABC):
             "acceleration": self.acceleration,
         }
 
+    def look_at(self, ends: np.ndarray, laws: np.ndarray, tension: np.ndarray) -> None:
+        """Fill ``tension`` (n,) [N] at the end of each ``free_step``, see ``kernels.tension``.
+
+        The droppers stand in the order along the track. Without this there are none. Not
+        collective.
+        """
+        self._droppers = ends, laws, tension
+
     def free_step(self, loads: Loads | None = None) -> None:
         """Take the step without contacts and slack droppers: ``predict``, ``free_acceleration``
         and ``correct``. Collective."""
         self.predict()
         self.free_acceleration(loads)
         self.correct()
+        kernels.tension(self.displacement, self.velocity, *self._droppers)
 
     def free_acceleration(self, loads: Loads | None = None) -> None:
         """Fill the acceleration from the predictions and local loads. Collective.

@@ -55,7 +55,7 @@ class NewmarkLine(LineMotion):
         passes.forth()
         self._forth.end()
         self._back.begin()
-        passes.back()
+        passes.back(self._droppers)
         self._back.end()
 
     def _steps(self) -> Steps:

@@ -66,6 +66,7 @@ class OneSolve:
             interaction.heights(touches, share.early_height, share.early_rate)
             line.free_acceleration(self.loads(time))
             line.correct()
+            interaction.droppers.tension()
         else:
             line.free_step(self.loads(time))
         # From here on the line holds the end of the step without contacts and slack droppers.

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.solver.fours import add_scaled, load, store, zero
-from catenary.solver.kernels import compiled, in_line
+from catenary.solver.kernels import compiled, in_line, tension_of
 from catenary.solver.station_blocks import BLOCK, StationProduct, multiply_row, multiply_rows
 from catenary.solver.station_factors import (
     StationFactors,
@@ -83,9 +83,10 @@ class StationPasses:
         """Predict all others, and eliminate, after ``tell`` and what others told."""
         forth(*self._forth)
 
-    def back(self) -> None:
-        """Find the accelerations and correct."""
-        back(*self._back)
+    def back(self, droppers: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+        """Find the accelerations, correct, and fill the tension of ``droppers``: their ends, laws
+        and tension, as ``LineMotion.look_at`` takes them."""
+        back(*self._back, droppers)
 
 
 # Kernels take what belongs together as tuples, named as in ``StationPasses``.
@@ -232,21 +233,52 @@ def forth(multiplied, factored, ahead, own, answer, coefficients):
     substitute(kinds, blocks, middle, y, answer)
 
 
+@in_line
+def both_within(begin, end, ends, dropper):
+    """Whether both ends of a dropper are among the unknowns from ``begin`` to ``end``."""
+    upper, lower = ends[dropper, 0], ends[dropper, 1]
+    return (upper >= begin) & (lower >= begin) & (upper < end) & (lower < end)
+
+
+@in_line
+def pull(low, high, left, right, own, droppers):
+    """Find the tension of droppers with both ends among own stations from ``low`` to ``high``.
+
+    Those from ``left`` to ``right`` have theirs; returns the like after this.
+    """
+    displacement, velocity, _, _ = own
+    ends, laws, tension = droppers
+    begin, end = BLOCK * low, BLOCK * high
+    while left > 0 and both_within(begin, end, ends, left - 1):
+        left -= 1
+        tension[left] = tension_of(left, displacement, velocity, ends, laws)
+    while right < tension.size and both_within(begin, end, ends, right):
+        tension[right] = tension_of(right, displacement, velocity, ends, laws)
+        right += 1
+    return left, right
+
+
 @compiled
-def back(factored, own, answer, factors):
-    """Fill ``answer`` with the solution, and correct the rank's own; after ``forth``."""
+def back(factored, own, answer, factors, droppers):
+    """Fill ``answer`` with the solution, correct the rank's own, and find the tension of its
+    droppers; after ``forth``."""
     kinds, blocks, low, high = factored
     middle, pairs = (low + high) // 2, (high - low - 1) // 2
     x = y = load(answer, _BLOCK * np.uint64(middle))
     correct(middle - low, x, own, factors)
-    for k in range(1, pairs + 1):
-        x = substitute(kinds, blocks, middle - k, x, answer)
-        y = substitute(kinds, blocks, middle + k, y, answer)
-        correct(middle - k - low, x, own, factors)
-        correct(middle + k - low, y, own, factors)
+    left = right = np.searchsorted(droppers[0][:, 0], BLOCK * (middle - low))
+    for start in range(1, pairs + 1, _STRETCH):
+        stop = min(start + _STRETCH, pairs + 1)
+        for k in range(start, stop):
+            x = substitute(kinds, blocks, middle - k, x, answer)
+            y = substitute(kinds, blocks, middle + k, y, answer)
+            correct(middle - k - low, x, own, factors)
+            correct(middle + k - low, y, own, factors)
+        left, right = pull(middle + 1 - stop - low, middle + stop - low, left, right, own, droppers)
     for i in range(middle - pairs - 1, low - 1, -1):
         x = substitute(kinds, blocks, i, x, answer)
         correct(i - low, x, own, factors)
+    pull(0, high - low, left, right, own, droppers)
     substitute_outside(kinds, blocks, low, high, x, y, answer)
 
 
@@ -260,4 +292,4 @@ def warm_up() -> None:
     passes = StationPasses(product, factors, read, station, (0, 0), *own, steps)
     passes.tell()
     passes.forth()
-    passes.back()
+    passes.back((np.zeros((0, 2), np.int64), np.zeros((0, 4)), np.zeros(0)))

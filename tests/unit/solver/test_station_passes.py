@@ -13,11 +13,12 @@ from catenary.solver.station_passes import StationPasses, Steps
 
 RNG = np.random.default_rng(11)
 STEPS = Steps(0.1, 0.002, 0.05, 0.3, 0.0025, 0.05, 0.4)
+LAWS = RNG.standard_normal((2000, 4))
 # Numbers of order one; the order of a sum differs.
 ROUND_OFF = 1e-13
 
 
-@pytest.mark.parametrize("n_own", [1, 2, 3, 7, 40, 513, 1200])
+@pytest.mark.parametrize("n_own", [1, 2, 3, 7, 40, 513, 5000])
 @pytest.mark.parametrize("before", [0, 1, 30])
 @pytest.mark.parametrize("after", [0, 2, 25])
 def test_passes_take_the_steps_of_their_parts(n_own: int, before: int, after: int) -> None:
@@ -39,12 +40,20 @@ def test_passes_take_the_steps_of_their_parts(n_own: int, before: int, after: in
     factors.solve(force, solution)
     kernels.correct(*expected, *STEPS[4:])
 
+    # Droppers at every third station, whose ends may be at different ones.
+    upper = np.arange(0, n_own, 3)
+    lower = np.minimum(upper + RNG.integers(0, 2, upper.size), n_own - 1)
+    ends = 4 * np.column_stack([upper, lower]) + [2, 0]
+    tension, pulls = np.full((2, upper.size), np.nan)
+
     # It tells as much as it is told, or all that it has.
     told = min(before, n_own), min(after, n_own)
     read = others.copy()
     passes = StationPasses(product, factors, read, answer, told, displacement, velocity, STEPS)
     passes.tell()
     passes.forth()
-    passes.back()
-    for found, right in zip((displacement, velocity, answer[own]), expected, strict=True):
-        assert np.abs(found - right).max() < ROUND_OFF * np.abs(right).max()
+    passes.back((ends, LAWS[: len(ends)], tension))
+    found = displacement, velocity, answer[own], tension
+    kernels.tension(*expected[:2], ends, LAWS, pulls)
+    for one, other in zip(found, (*expected, pulls), strict=True):
+        assert np.abs(one - other).max(initial=0.0) < ROUND_OFF * np.abs(other).max(initial=1.0)
