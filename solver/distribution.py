@@ -8,9 +8,11 @@ import numpy as np
 
 from catenary.solver.model import SAME_STATION, Model
 
-# Nodes of whose steps rank 0 takes as long for pantographs as other ranks for the line: some 5 us,
-# more where a long line leaves the caches cold.
+# Nodes whose steps take as long as what rank 0 does for pantographs while the others are at the
+# line: some 5 us, more where a long line leaves the caches cold.
 PANTOGRAPH_NODES = 1000
+# Times as many nodes are the least that a rank is to have before one of them has less.
+_LONG = 4
 
 
 @dataclass(frozen=True)
@@ -46,9 +48,10 @@ class Ownership:
 def distribute(model: Model, n_ranks: int, rank: int) -> Ownership:
     """Cut a line into ``n_ranks`` runs that take nearly the same time. Not collective.
 
-    Rank 0 moves the pantographs besides and gets fewer nodes, at least half of what others get. A
-    cut never separates nodes of one station nor the two ends of a dropper, so that dropper forces
-    need no communication. Ranks beyond the number of stations own nothing.
+    They are of nearly equal size but for rank 0, which has fewer nodes of a long line because it
+    moves the pantographs besides. A cut never separates nodes of one station nor the two ends of a
+    dropper, so that dropper forces need no communication. Ranks beyond the number of stations own
+    nothing.
     """
     n_nodes = model.mesh.n_nodes
     x = np.empty(n_nodes)
@@ -62,7 +65,7 @@ def distribute(model: Model, n_ranks: int, rank: int) -> Ownership:
     np.add.at(steps, ends[:, 1] + 1, -1)
     can_cut &= np.cumsum(steps)[: n_nodes + 1] == 0
     cuts = np.flatnonzero(can_cut)
-    spared = min(PANTOGRAPH_NODES, n_nodes / (2 * n_ranks - 1))
+    spared = PANTOGRAPH_NODES if n_nodes >= _LONG * PANTOGRAPH_NODES * n_ranks else 0
     wanted = np.linspace(-spared, n_nodes, n_ranks + 1)
     wanted[0] = 0.0
     nearest = cuts[np.clip(np.searchsorted(cuts, wanted), 0, cuts.size - 1)]
