@@ -9,10 +9,10 @@ import numpy as np
 from catenary.solver.model import SAME_STATION, Model
 
 # Nodes whose steps take as long as what rank 0 does for pantographs while the others are at the
-# line: some 5 us, more where a long line leaves the caches cold.
-PANTOGRAPH_NODES = 1000
+# line: some 7 us, more where a long line leaves the caches cold.
+PANTOGRAPH_NODES = 1500
 # Times as many nodes are the least that a rank is to have before one of them has less.
-_LONG = 4
+_LONG = 3
 
 
 @dataclass(frozen=True)

@@ -73,6 +73,9 @@ class Exchange:
         self.share = LineResponse(n, capacity, self._early)
         self._merged = LineResponse(n, capacity, self._early)
         self._answer = np.zeros(_HEAD + n + 2 * capacity)
+        # Said once how long they are and of what, messages cost half a microsecond less.
+        self._told = _message(self._answer)
+        self._sums = _message(self.share.summed), _message(self._merged.summed)
 
     def to_root(self) -> LineResponse | None:
         """Sum of all shares on rank 0, with the rows of all; None elsewhere."""
@@ -81,7 +84,8 @@ class Exchange:
             return share
         is_root = comm.rank == 0
         # Two ranks at most own the ends of an element: the order of summing does not matter.
-        comm.Reduce(share.summed, merged.summed if is_root else None, op=MPI.SUM, root=0)
+        mine, all_together = self._sums
+        comm.Reduce(mine, all_together if is_root else None, op=MPI.SUM, root=0)
         self._count(share.summed.nbytes)
         if not is_root:
             if share.count:
@@ -108,7 +112,7 @@ class Exchange:
             if 0 < count <= room:
                 answer[_HEAD + n : _HEAD + n + count] = reply.droppers
                 answer[_HEAD + n + count : _HEAD + n + 2 * count] = reply.compensation
-        comm.Bcast(answer, root=0)
+        comm.Bcast(self._told, root=0)
         self._count(answer.nbytes)
         count = int(answer[1])
         pairs = answer[_HEAD + n : _HEAD + n + 2 * count]
@@ -144,6 +148,7 @@ class Exchange:
             larger = LineResponse(self._n, 2 * total, self._early)
             larger.summed[:] = merged.summed
             self._merged = merged = larger
+            self._sums = self._sums[0], _message(larger.summed)
         end = share.count
         merged.rows[:end] = share.rows[:end]
         missing = total - end
@@ -161,3 +166,8 @@ class Exchange:
         for source in sorted(parts):
             merged.rows[end : end + len(parts[source])] = parts[source]
             end += len(parts[source])
+
+
+def _message(array: np.ndarray) -> list[Any]:
+    """An array as MPI takes it."""
+    return [array, array.size, MPI.DOUBLE]

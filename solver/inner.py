@@ -68,6 +68,7 @@ class Gap:
     numbers : (2 n + 2 n^2,) these four one after the other
     found : (2, n) depths and rates under the forces looked at last
     found_depth, found_rate : (n,) its rows
+    line : whose answers these are
     """
 
     def __init__(self, n: int) -> None:
@@ -78,7 +79,7 @@ class Gap:
         self.depth_by_force, self.rate_by_force = compliances
         self.found = np.zeros((2, n))
         self.found_depth, self.found_rate = self.found
-        self._line = LineResponse(n, 0)
+        self.line = LineResponse(n, 0)
 
     def put(self, line: LineResponse, heads: Heads) -> None:
         """Take the answers of both sides for this step.
@@ -88,7 +89,7 @@ class Gap:
         RunBroken
             If one of them is no number; it would compare as out of contact and go unnoticed.
         """
-        self._line = line
+        self.line = line
         if not inner_kernels.gap(heads.numbers, line.answers, self._n, self.numbers):
             raise RunBroken(NOT_FINITE)
 
@@ -101,14 +102,14 @@ class Gap:
         RunBroken
             If one of them is no number: what was to give the forces has no solution.
         """
-        rows, found = self._line.rows, self.found
+        rows, found = self.line.rows, self.found
         if not inner_kernels.under(self.numbers, rows, slack.size, force, slack, found):
             raise RunBroken(NOT_FINITE)
         return self.found_depth, self.found_rate
 
     def rounding(self, force: np.ndarray, slack: np.ndarray) -> np.ndarray:
         """What depths [m] and rates [m/s] of ``under`` may be wrong by, (2, n)."""
-        pushed, line = np.abs(force), self._line
+        pushed, line = np.abs(force), self.line
         depth = np.abs(self.depth) + np.abs(self.depth_by_force) @ pushed
         rate = np.abs(self.rate) + np.abs(self.rate_by_force) @ pushed
         if slack.size:
@@ -153,13 +154,14 @@ class InnerProblem:
             If the active set does not settle.
         """
         gap, law = self.gap, self.law
-        gap.put(line, heads)
         self.pivoted = False
-        # Without a force heads stand highest: from there Newton's method comes from one side.
-        law.linearise(gap.depth, gap.rate)
+        if not law.is_linear:
+            # Without a force heads stand highest: from there Newton's method comes from one side.
+            gap.put(line, heads)
+            law.linearise(gap.depth, gap.rate)
         rounds = 0
         for number in range(_MAX_TANGENTS):
-            force, slack, more = self._with_tangents(line)
+            force, slack, more = self._with_tangents(line, heads)
             rounds += more
             depth, rate = gap.found_depth, gap.found_rate
             if law.is_linear:
@@ -194,7 +196,9 @@ class InnerProblem:
             _pivot(matrix, right, always, solution)
         return solution
 
-    def _with_tangents(self, line: LineResponse) -> tuple[np.ndarray, np.ndarray, int]:
+    def _with_tangents(
+        self, line: LineResponse, heads: Heads
+    ) -> tuple[np.ndarray, np.ndarray, int]:
         """Contact forces (n,) and compensations (m,) [N] for the law's tangents, and the rounds.
 
         Depths and rates under them stand in ``gap.found``.
@@ -202,7 +206,10 @@ class InnerProblem:
         gap, n, m = self.gap, self.law.n, line.count
         if m > self._room:
             self._make_room(m)
+        gap.line = line
         rounds, size, finite = inner_kernels.solve(
+            heads.numbers,
+            line.answers,
             gap.numbers,
             self.law.tangents,
             line.rows,

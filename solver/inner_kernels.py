@@ -202,6 +202,8 @@ def under(numbers, rows, count, force, slack, found):
 
 @compiled
 def solve(
+    heads,
+    line,
     numbers,
     tangents,
     rows,
@@ -217,14 +219,15 @@ def solve(
 ):
     """Contact forces and compensations for a law's tangents: rounds needed, and unknowns used.
 
-    ``found`` (2, n) becomes depths and rates at the contacts; told last is whether all of these are
-    numbers.
+    ``heads``, ``line`` and ``numbers`` are those of ``gap``. ``found`` (2, n) becomes depths and
+    rates at the contacts; told last is whether all of it are numbers.
 
     If no contact force pushes a dropper together there are n unknowns, else n + ``count``. Rounds
     are not positive if the active set did not settle; the problem then stands in ``matrix`` and
     ``right``.
     """
     n = tangents.shape[1]
+    finite = gap(heads, line, n, numbers)
     press(numbers, tangents, right, matrix)
     rounds = settle(matrix[:n, :n], right[:n], always[:n], solution[:n], max_rounds)
     size = n
@@ -234,7 +237,7 @@ def solve(
         rounds = settle(
             matrix[:size, :size], right[:size], always[:size], solution[:size], max_rounds
         )
-    finite = under(numbers, rows, size - n, solution, solution[n:], found)
+    finite &= under(numbers, rows, size - n, solution, solution[n:], found)
     return rounds, size, finite
 
 
@@ -294,7 +297,7 @@ def warm_up() -> None:
     hertz(one, one, one, 1.0, 1.5, 0.0, one, one, one, one)
     any_pushed(rows, 1, 1, one)
     solve(
-        numbers, np.ones((4, 1)), rows, 1, 1.0, np.zeros((1, 1)), np.zeros(2, dtype=np.bool_),
+        numbers, numbers, numbers, np.ones((4, 1)), rows, 1, 1.0, np.zeros((1, 1)), np.zeros(2, dtype=np.bool_),
         np.eye(2), np.zeros(2), np.zeros(2), found, 1,
     )  # fmt: skip
     settle(square, one, np.zeros(1, dtype=np.bool_), one, 1)

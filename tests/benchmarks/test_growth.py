@@ -26,7 +26,8 @@ MPI_FLAGS = os.environ.get("MPI_FLAGS", "").split()
 SPANS = (10, 25, 100, 1000, 10_000)
 # Steps that take some tenths of a second on each of them.
 STEPS = {10: 6000, 25: 4000, 100: 2000, 1000: 150, 10_000: 15}
-TURNS = 5
+# Turns of scaling over ranks, some tens of milliseconds each.
+TURNS, STEPS_OF_A_TURN = 40, 100_000
 # Spans of which one rank's share of the state fits the fast caches, the shared one, and none.
 SHARES = (100, 300, 1000)
 # Two neighbours, a sum and a broadcast; a rank whose droppers may slacken tells of them besides.
@@ -61,14 +62,14 @@ def keep(benchmark: Any, found: dict[str, Any]) -> None:
 def test_growth_with_spans(benchmark: Any, spans: int) -> None:
     found = driver("step_cost.py", spans, STEPS[spans])
     if spans == SPANS[0]:
-        print("\n\none rank       unknowns   us a step   us a span   at rest [s]   ready [s]"
-              "   memory [MB]   kB a span")  # fmt: skip
+        print("\n\none rank       unknowns   us a step (fastest)   us a span   at rest [s]"
+              "   ready [s]   memory [MB]   kB a span")  # fmt: skip
     peak = found["peak_bytes"]
     begun = _first.setdefault("peak_bytes", peak)
     print(
         f"{spans:6} spans {found['unknowns']:10}{found['us_per_step']:12.1f}"
-        f"{found['us_per_step'] / spans:12.3f}{found['rest_s']:14.2f}{found['ready_s']:12.2f}"
-        f"{peak / 1e6:14.0f}{(peak - begun) / 1e3 / spans:12.0f}"
+        f"{found['us_fastest']:10.1f}{found['us_fastest'] / spans:12.3f}{found['rest_s']:14.2f}"
+        f"{found['ready_s']:12.2f}{peak / 1e6:14.0f}{(peak - begun) / 1e3 / spans:12.0f}"
     )
     keep(benchmark, found)
 
@@ -85,43 +86,37 @@ def test_a_line_of_ten_thousand_spans_on_two_ranks(benchmark: Any) -> None:
 @needs_mpirun
 @pytest.mark.parametrize("spans", SHARES)
 def test_scaling_over_ranks(benchmark: Any, spans: int) -> None:
-    """Two ranks against one: with as many spans in all (strong), and with as many each (weak).
+    """Two ranks against one, in turns: as many spans in all (strong) or on each rank (weak).
 
-    Means tell what a run takes on the machine as it is. What else that does keeps two cores longer
-    than one, since each waits for the other at every step: half of the steps, and the fastest
-    tenth, tell more of the program. So do two marches side by side, of half the spans each, that
-    do not talk: what two ranks lose against them they lose by being two. Medians over turns.
+    Two ranks wait for each other at every step, so that whatever else the machine does on either
+    core keeps both. The fastest of the turns tells most of the program, half of the turns what it
+    was like; so do two marches side by side that do not talk to each other: what two ranks lose
+    against them they lose by being two, and the rest is the machine's.
     """
-    steps = 200_000 // spans
-    # In turns, so that a machine that is slower for a while is so for all three.
-    turns = [
-        [
-            driver("step_cost.py", count, steps, *apart, ranks=ranks)
-            for count, ranks, *apart in (
-                (spans, 1),
-                (spans, 2),
-                (2 * spans, 2),
-                (spans // 2, 2, "apart"),
-            )
-        ]
-        for _ in range(TURNS)
-    ]
-    print(f"\n\n{spans} spans, {TURNS} turns")
-    found = {}
-    for name, key in (
-        ("mean", "us_per_step"),
-        ("half of the steps", "us_half"),
-        ("a tenth of the steps", "us_tenth"),
+    turns = driver("scaling.py", spans, TURNS, STEPS_OF_A_TURN // spans, ranks=2)
+    costs = {name: np.array(values) for name, values in turns.items()}
+    print(f"\n\nus a step, {TURNS} turns of {STEPS_OF_A_TURN // spans} steps"
+          "     fastest turn   half of the turns")  # fmt: skip
+    for name, what in (
+        ("one", f"{spans} spans on 1 rank"),
+        ("two", f"{spans} spans on 2 ranks"),
+        ("twice", f"{2 * spans} spans on 2 ranks"),
+        ("halves", f"{spans // 2} spans each, side by side"),
+        ("each", f"{spans} spans each, side by side"),
     ):
-        costs = np.array([[run[key] for run in turn] for turn in turns])
-        one, two, twice, apart = np.median(costs, axis=0)
-        strong, weak = one / two / 2, one / twice
-        print(f"  {name:22}{one:5.0f} us a step on 1 rank, {two:.0f} on 2 (strong "
-              f"{100 * strong:.0f} %), {2 * spans} on 2: {twice:.0f} "
-              f"(weak {100 * weak:.0f} %), two of {spans // 2} apart: {apart:.0f} "
-              f"({100 * apart / two:.0f} % reached)")  # fmt: skip
-        found |= {f"strong, {name}": strong, f"weak, {name}": weak}
-        found[f"of two apart, {name}"] = apart / two
+        print(f"  {what:36}{costs[name].min():15.1f}{np.median(costs[name]):18.1f}")
+    found = {}
+    for what, faster, slower, ranks in (
+        ("strong scaling", "one", "two", 2),
+        ("weak scaling", "one", "twice", 1),
+        ("strong, of two side by side", "halves", "two", 1),
+        ("weak, of two side by side", "each", "twice", 1),
+    ):
+        best = costs[faster].min() / costs[slower].min() / ranks
+        # Of each turn by itself: the machine may be another one some turns later.
+        half = np.median(costs[faster] / costs[slower]) / ranks
+        print(f"  {what:36}{100 * best:13.0f} %{100 * half:16.0f} %")
+        found |= {what: best, f"{what}, half of the turns": half}
     keep(benchmark, found)
 
 
