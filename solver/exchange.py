@@ -79,7 +79,7 @@ class Exchange:
 
     def to_root(self) -> LineResponse | None:
         """Sum of all shares on rank 0, with the rows of all; None elsewhere."""
-        comm, share, merged = self._comm, self.share, self._merged
+        comm, share = self._comm, self.share
         if comm.size == 1:
             return share
         is_root = comm.rank == 0

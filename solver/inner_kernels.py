@@ -297,8 +297,8 @@ def warm_up() -> None:
     hertz(one, one, one, 1.0, 1.5, 0.0, one, one, one, one)
     any_pushed(rows, 1, 1, one)
     solve(
-        numbers, numbers, numbers, np.ones((4, 1)), rows, 1, 1.0, np.zeros((1, 1)), np.zeros(2, dtype=np.bool_),
-        np.eye(2), np.zeros(2), np.zeros(2), found, 1,
+        numbers, numbers, numbers, np.ones((4, 1)), rows, 1, 1.0, np.zeros((1, 1)),
+        np.zeros(2, dtype=np.bool_), np.eye(2), np.zeros(2), np.zeros(2), found, 1,
     )  # fmt: skip
     settle(square, one, np.zeros(1, dtype=np.bool_), one, 1)
     solve_on(square, one, np.zeros(1, dtype=np.bool_), one)
