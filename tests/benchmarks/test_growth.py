@@ -26,8 +26,8 @@ MPI_FLAGS = os.environ.get("MPI_FLAGS", "").split()
 SPANS = (10, 25, 100, 1000, 10_000)
 # Steps that take some tenths of a second on each of them.
 STEPS = {10: 6000, 25: 4000, 100: 2000, 1000: 150, 10_000: 15}
-# Turns of scaling over ranks, some tens of milliseconds each.
-TURNS, STEPS_OF_A_TURN = 40, 100_000
+# Turns of scaling over ranks, some ten milliseconds each: as short as the lulls of a busy machine.
+TURNS, STEPS_OF_A_TURN = 160, 30_000
 # Spans of which one rank's share of the state fits the fast caches, the shared one, and none.
 SHARES = (100, 300, 1000)
 # Two neighbours, a sum and a broadcast; a rank whose droppers may slacken tells of them besides.
