@@ -84,6 +84,10 @@ class HardCase(Table):
     ranks: float = Field(
         1e-9, gt=0, description="most by which forces of one and of several ranks differ, relative"
     )
+    chaotic: bool = Field(
+        False, description="whether impacts let round-off grow until it decides forces: ranks are "
+        "then compared as schemes are, by head heights"
+    )  # fmt: skip
     steps: int = Field(0, ge=0, description="kind free: steps")
     short_steps: int = Field(0, ge=0, description="kind free: steps of the short form")
     needs: Needs = Field(default_factory=Needs, description="what must happen in it")
