@@ -170,6 +170,26 @@ def test_damping_by_component_in_parallel(case: tuple[Problem, LineMesh]) -> Non
     assert max(found.values()) < TOLERANCE
 
 
+@pytest.mark.skipif(MPI.COMM_WORLD.size > 3, reason="a longer line would be needed")
+def test_rank_0_may_have_less_of_a_long_line() -> None:
+    """The train crosses the end of rank 0's share."""
+
+    def make() -> tuple[Problem, LineMesh, np.ndarray, float]:
+        scene = load_scene("en50318_2002", ["line.n_spans=140"])
+        problem, mesh = scene.to_problem(), mesh_of(scene)
+        model, _ = find_form(problem, mesh)
+        ownership = distribute(model, max(2, MPI.COMM_WORLD.size), 0)
+        nodes = mesh.wires[CONTACT_WIRE]
+        cut = float(mesh.x(nodes[ownership.owned(model.dofs(nodes))]).max())
+        return problem, mesh, np.diff(ownership.bounds), cut
+
+    problem, mesh, shares, cut = on_root(MPI.COMM_WORLD, make)
+    assert shares[0] < 0.9 * shares[1]
+    train = replace(problem.train, start=cut - 30.0, end=cut + 20.0, raise_time=0.2)
+    found = largest_difference(replace(problem, train=train), mesh)
+    assert max(found.values()) < TOLERANCE
+
+
 def test_a_rank_without_any_station_is_legal(case: tuple[Problem, LineMesh]) -> None:
     """Two bare wires of one element have two stations: on three ranks one owns nothing."""
     problem, _ = case
