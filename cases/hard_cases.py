@@ -84,9 +84,9 @@ class HardCase(Table):
     ranks: float = Field(
         1e-9, gt=0, description="most by which forces of one and of several ranks differ, relative"
     )
-    chaotic: bool = Field(
-        False, description="whether impacts let round-off grow until it decides forces: ranks are "
-        "then compared as schemes are, by head heights"
+    ranks_m: float | None = Field(
+        None, gt=0, description="in place of that where impacts let round-off decide forces: most "
+        "by which head heights differ"
     )  # fmt: skip
     steps: int = Field(0, ge=0, description="kind free: steps")
     short_steps: int = Field(0, ge=0, description="kind free: steps of the short form")

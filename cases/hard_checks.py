@@ -196,9 +196,9 @@ def _ranks(case: HardCase, world: Any, alone: Any, short: bool) -> Criterion:
         one = hard_runs.run(rest, alone)
         if one.force.shape != together.force.shape:
             return _holds(case, name, False, together.outcome)
-        if case.chaotic:
+        if case.ranks_m is not None:
             apart = float(np.abs(together.height - one.height).max())
-            return _below(case, f"1 and {world.size} ranks, head height [m]", apart, case.schemes_m)
+            return _below(case, f"1 and {world.size} ranks, head height [m]", apart, case.ranks_m)
         apart = float(np.abs(together.force - one.force).max() / np.abs(one.force).max())
         return _below(case, name, apart, case.ranks)
 

@@ -18,19 +18,15 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 from step_cost import room
 
-from catenary.cases.meshing import mesh_of
+from catenary.cases.hard_runs import at_rest
 from catenary.cases.scene import load_scene
-from catenary.solver.equilibrium import elasticity, find_form, middle_span
 from catenary.solver.march import March
-from catenary.solver.model import build
 from catenary.solver.observation import Stage, StepView
-from catenary.solver.parallel import on_root
 
 WORLD = MPI.COMM_WORLD
 # Of the steps of a turn, which find the caches full of another march.
@@ -42,18 +38,11 @@ class Timed:
 
     def __init__(self, comm: MPI.Comm, n_spans: int, n_steps: int) -> None:
         scene = load_scene("ambrosio2012", [f"line.n_spans={n_spans}", *room(n_spans)])
-        problem = scene.to_problem()
-        mesh = on_root(WORLD, lambda: mesh_of(scene))
-
-        def rest() -> tuple[Any, ...]:
-            model, form = find_form(problem, mesh)
-            return form, model.dropper_lengths, elasticity(model, *middle_span(problem.line))
-
-        form, lengths, lift = on_root(WORLD, rest)
-        train = problem.train
-        length = n_steps * problem.numerics.dt * train.speed
-        problem = replace(problem, train=replace(train, end=train.start + length))
-        self._march = March(comm, problem, build(problem, mesh, lengths), form, lift)
+        rest = at_rest(scene, WORLD)
+        train = rest.problem.train
+        length = n_steps * rest.problem.numerics.dt * train.speed
+        problem = replace(rest.problem, train=replace(train, end=train.start + length))
+        self._march = March(comm, problem, rest.model, rest.form, rest.lift)
         self._march.run([self])
 
     def start(self, stage: Stage) -> None:
