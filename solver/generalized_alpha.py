@@ -77,5 +77,10 @@ class GeneralizedAlphaLine(LineMotion):
         self._known[:] = (1.0 - self._coefficients[1]) * acceleration
 
     def state(self) -> Mapping[str, np.ndarray]:
-        """All that the next step starts from: this rank's arrays themselves, by name."""
+        """All that the next step starts from, by name; to be read before that."""
         return {**super().state(), "known_acceleration": self._known}
+
+    def restore(self, state: Mapping[str, np.ndarray]) -> None:
+        """Continue from what ``state`` returned, here or elsewhere."""
+        super().restore(state)
+        self._known[:] = state["known_acceleration"]

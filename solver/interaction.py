@@ -57,13 +57,14 @@ class Droppers:
     def tension(self) -> np.ndarray:
         """Tension in the line's present motion [N], shape (n,), overwritten by the next call."""
         line = self._line
-        kernels.tension(line.displacement, line.velocity, self.ends, self.laws, self.latest_tension)
+        kernels.tension(line.motion.read, self.ends, self.laws, self.latest_tension)
         return self.latest_tension
 
     def energy_of_pushing(self) -> float:
         """Elastic energy that the owned droppers would hold by pushing, were they springs [J]."""
         upper, lower = self.ends.T
-        stretch = self._line.displacement[upper] - self._line.displacement[lower]
+        displacement = self._line.displacement
+        stretch = displacement[upper] - displacement[lower]
         rest, stiffness = self.laws[:, 0], self.laws[:, 1]
         pushing = np.minimum(rest + stiffness * stretch, 0.0)
         return float((pushing**2 / (2.0 * stiffness)).sum())
@@ -155,8 +156,7 @@ class Interaction:
         The total rate is what the pan head meets: dw/dt + V dw/dx. Shares add up over the ranks.
         """
         kernels.heights(
-            self.line.displacement,
-            self.line.velocity,
+            self.line.motion.read,
             touches.local,
             touches.value,
             touches.slope,
@@ -178,8 +178,7 @@ class Interaction:
         """
         line, droppers = self.line, self.droppers
         count = kernels.respond(
-            line.displacement,
-            line.velocity,
+            line.motion.read,
             touches.local,
             touches.value,
             touches.slope,
@@ -221,11 +220,8 @@ class Interaction:
             columns.start,
             columns.offset,
             columns.data,
-            line.acceleration,
-            line.displacement,
-            line.velocity,
-            line.position_factor,
-            line.velocity_factor,
+            line.motion.read,
+            line.motion.gains,
         )
 
     def loads(

@@ -88,16 +88,30 @@ def locate(
             slope[i, k] = whole_slope[i, k] * owned[node, unknown]
 
 
+@in_line
+def displacement_at(unknown, motion):
+    """Displacement at one of a rank's unknowns; ``motion`` as ``Motion.read``."""
+    x, y, z, shares = motion
+    return shares[0] * x[unknown] + shares[1] * y[unknown] + shares[2] * z[unknown]
+
+
+@in_line
+def velocity_at(unknown, motion):
+    """Velocity at one of a rank's unknowns; ``motion`` as ``Motion.read``."""
+    _, y, z, shares = motion
+    return shares[3] * y[unknown] + shares[4] * z[unknown]
+
+
 @compiled
-def heights(displacement, velocity, local, value, slope, rest, train_speed, height, rate):
+def heights(motion, local, value, slope, rest, train_speed, height, rate):
     """Owned share of the wire's height and of its total rate dw/dt + V dw/dx at each touch."""
     for i in range(local.shape[0]):
         w, rising, steep = 0.0, 0.0, 0.0
         for k in range(4):
             total = rest[i, k]
-            if displacement.size:
-                total += displacement[local[i, k]]
-                rising += value[i, k] * velocity[local[i, k]]
+            if motion[0].size:
+                total += displacement_at(local[i, k], motion)
+                rising += value[i, k] * velocity_at(local[i, k], motion)
             w += value[i, k] * total
             steep += slope[i, k] * total
         height[i] = w
@@ -131,32 +145,32 @@ def combine(elements, weights, first_node, start, offset, data, answers, filled)
 
 
 @in_line
-def tension_of(dropper, displacement, velocity, ends, laws):
+def tension_of(dropper, motion, ends, laws):
     """Tension of one of the droppers of ``tension`` [N]."""
     upper, lower = ends[dropper, 0], ends[dropper, 1]
-    stretch = displacement[upper] - displacement[lower]
-    speed = velocity[upper] - velocity[lower]
+    stretch = displacement_at(upper, motion) - displacement_at(lower, motion)
+    speed = velocity_at(upper, motion) - velocity_at(lower, motion)
     return laws[dropper, 0] + laws[dropper, 1] * stretch + laws[dropper, 2] * speed
 
 
 @compiled
-def tension(displacement, velocity, ends, laws, result):
+def tension(motion, ends, laws, result):
     """Tension N0 + k e + c e' of droppers as if they could push [N].
 
     ``ends`` (n, 2) holds local unknowns of upper and lower end, ``laws`` (n, 4) rest force,
-    stiffness, damping and place.
+    stiffness, damping and place; ``motion`` is ``Motion.read``.
     """
     for d in range(ends.shape[0]):
-        result[d] = tension_of(d, displacement, velocity, ends, laws)
+        result[d] = tension_of(d, motion, ends, laws)
 
 
 @compiled
-def show(displacement, velocity, arms, ends, laws, kept, uplift, force):
+def show(motion, arms, ends, laws, kept, uplift, force):
     """Displacement at the unknowns ``arms``, and the tension of droppers that keep the share
     ``kept`` of what they would push [N]."""
     for i in range(arms.size):
-        uplift[i] = displacement[arms[i]]
-    tension(displacement, velocity, ends, laws, force)
+        uplift[i] = displacement_at(arms[i], motion)
+    tension(motion, ends, laws, force)
     for d in range(force.size):
         if force[d] < 0.0:
             force[d] *= kept
@@ -176,8 +190,7 @@ def influence(answers, local, weights, factor, result):
 
 @compiled
 def meet(
-    displacement,
-    velocity,
+    motion,
     local,
     value,
     slope,
@@ -197,7 +210,7 @@ def meet(
 
     Returns whether the heights are numbers.
     """
-    heights(displacement, velocity, local, value, slope, rest, train_speed, height, rate)
+    heights(motion, local, value, slope, rest, train_speed, height, rate)
     influence(answers, local, value, 1.0, height_by_force)
     if uses_rate:
         influence(answers, local, slope, train_speed * position_factor, rate_by_force)
@@ -273,8 +286,7 @@ def watch(
 
 @compiled
 def respond(
-    displacement,
-    velocity,
+    motion,
     local,
     value,
     slope,
@@ -305,8 +317,8 @@ def respond(
     Returns the number of droppers that may slacken, -1 if something is no number.
     """
     finite = meet(
-        displacement, velocity, local, value, slope, rest, train_speed, answers, slope_answers,
-        uses_rate, position_factor, velocity_factor, height, rate, height_by_force, rate_by_force,
+        motion, local, value, slope, rest, train_speed, answers, slope_answers, uses_rate,
+        position_factor, velocity_factor, height, rate, height_by_force, rate_by_force,
     )  # fmt: skip
     if not finite:
         return -1
@@ -329,34 +341,32 @@ def superpose(
     start,
     offset,
     data,
-    acceleration,
-    displacement,
-    velocity,
-    position_factor,
-    velocity_factor,
+    motion,
+    gains,
 ):
     """Add the answers to contact forces and to compensations of some droppers to the state.
 
     ``data[offset[d] : offset[d + 1]]`` is the column of dropper d from the local unknown
-    ``start[d]`` on.
+    ``start[d]`` on; ``motion`` and ``gains`` are ``Motion.read`` and ``Motion.gains``.
     """
+    x, y, z, _ = motion
     for i in range(force.size):
         f = force[i]
         if f != 0.0:
             for j in range(filled[i, 0], filled[i, 1]):
                 change = f * answers[i, j]
-                acceleration[j] += change
-                displacement[j] += position_factor * change
-                velocity[j] += velocity_factor * change
+                z[j] += change
+                x[j] += gains[0] * change
+                y[j] += gains[1] * change
     for k in range(numbers.size):
         d, f = numbers[k], compensation[k]
         begin = start[d] - offset[d]
         if f != 0.0:
             for j in range(offset[d], offset[d + 1]):
                 change = f * data[j]
-                acceleration[begin + j] -= change
-                displacement[begin + j] -= position_factor * change
-                velocity[begin + j] -= velocity_factor * change
+                z[begin + j] -= change
+                x[begin + j] -= gains[0] * change
+                y[begin + j] -= gains[1] * change
 
 
 def warm_up() -> None:
@@ -383,18 +393,18 @@ def warm_up() -> None:
         table,
         table,
     )
-    heights(reals, reals, places, table, table, table, 1.0, one, one)
+    motion = reals, reals, reals, np.zeros(5)
+    heights(motion, places, table, table, table, 1.0, one, one)
     bounds = np.zeros(3, dtype=np.int64)
     combine(numbers, table, 0, bounds, bounds, columns, table, range_filled)
     square, none = np.zeros((1, 1)), np.zeros((1, 0))
     ends, laws = np.zeros((1, 2), dtype=np.int64), np.zeros((1, 4))
-    tension(reals, reals, ends, laws, one)
-    show(reals, reals, numbers, ends, laws, 0.0, one, one)
+    tension(motion, ends, laws, one)
+    show(motion, numbers, ends, laws, 0.0, one, one)
     respond(
-        reals, reals, places, table, table, table, one, 1.0, table, none, False, 1.0, 1.0, 1.0,
+        motion, places, table, table, table, one, 1.0, table, none, False, 1.0, 1.0, 1.0,
         one, 1.0, numbers, ends, laws, True, one, one, one, square, square, np.zeros((1, 5)),
     )  # fmt: skip
     superpose(
-        one, table, range_filled, numbers, one, numbers, bounds, columns, reals, reals, reals,
-        1.0, 1.0,
+        one, table, range_filled, numbers, one, numbers, bounds, columns, motion, np.zeros(2)
     )  # fmt: skip

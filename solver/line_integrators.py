@@ -22,10 +22,14 @@ def make_line(
     ownership: Ownership,
     numerics: Numerics,
     lost: np.ndarray | None = None,
+    only_free: bool = True,
 ) -> LineMotion:
     """The line with the method that the numerics ask for. Collective.
 
-    ``lost`` (n_dofs,) is the balance that incidents have taken from it [N], [N m].
+    Parameters
+    ----------
+    lost : (n_dofs,) the balance that incidents have taken from it [N], [N m]
+    only_free : whether its steps will all be free ones without loads, and not taken in parts
     """
     unbalanced = lost is not None and bool(lost.any())
     if numerics.integrator == NEWMARK:
@@ -38,4 +42,6 @@ def make_line(
     if isinstance(line, UnbalancedNewmarkLine | UnbalancedAlphaLine):
         assert lost is not None
         line.lose(lost)
+    elif only_free and isinstance(line, NewmarkLine):
+        line.keep_ahead()
     return line

@@ -28,23 +28,22 @@ from catenary.solver.distribution import Ownership
 from catenary.solver.line_operators import LineOperators, Loads
 from catenary.solver.locality import reach
 from catenary.solver.model import Model
+from catenary.solver.motion import Motion
 
 
 class LineMotion(ABC):
     """State and step operator of the distributed line, relative to its equilibrium.
 
-    Collective to make; ``destroy`` is collective too. The arrays are this rank's part, shape
-    (n_local,), and stay the same objects for the whole run, so that views of them stay valid. A
-    step is ``free_step``, or the three parts of that; forces that are known later only change the
-    acceleration, displacement and velocity by A^-1, sigma A^-1 and tau A^-1.
+    Collective to make; ``destroy`` is collective too. Arrays are this rank's part, shape
+    (n_local,). A step is ``free_step``, or the three parts of that; forces that are known later
+    only change the acceleration, displacement and velocity by A^-1, sigma A^-1 and tau A^-1.
 
     Attributes
     ----------
-    displacement, velocity, acceleration : [m], [m/s], [m/s2] (rad for rotations); the acceleration
-        is the one that balances the forces, M a = f - C v - K d
+    motion : Motion, the state as it is kept
     position_factor, velocity_factor : sigma [s2] and tau [s]
     operators : LineOperators
-    solution : the displacement as a PETSc vector
+    solution : the displacement as a PETSc vector, once ``fill_solution`` has filled it
     """
 
     def __init__(
@@ -79,11 +78,27 @@ class LineMotion(ABC):
             self._beta_share = beta_damping / (1.0 + self.velocity_factor * beta_damping)
             self._alpha_share = alpha - self._beta_share * stiffness_share
         n = ownership.n_local
-        self.displacement, self.velocity = aligned.zeros(n, 2), aligned.zeros(n, 3)
-        self.acceleration = self.operators.answer
+        gains = self.position_factor, self.velocity_factor
+        self.motion = Motion(aligned.zeros(n, 2), aligned.zeros(n, 3), self.operators.answer, gains)
         self.look_at(np.zeros((0, 2), np.int64), np.zeros((0, 4)), np.zeros(0))
         # PETSc's time loop wants the solution as a vector; it wraps our array.
         self.solution = PETSc.Vec().createWithArray(self.displacement, size=(n, None), comm=comm)
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """[m], [rad]; the array itself, if the motion is kept as it is."""
+        return self.motion.displacement
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """[m/s], [rad/s]; the array itself, if the motion is kept as it is."""
+        return self.motion.velocity
+
+    @property
+    def acceleration(self) -> np.ndarray:
+        """The one that balances the forces, M a = f - C v - K d [m/s2], [rad/s2]; the array
+        itself."""
+        return self.motion.acceleration
 
     @abstractmethod
     def predict(self) -> None:
@@ -95,17 +110,23 @@ class LineMotion(ABC):
         self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray
     ) -> None:
         """Start from a state, (n_local,) each, whose acceleration balances its forces."""
-        self.displacement[:] = displacement
-        self.velocity[:] = velocity
-        self.acceleration[:] = acceleration
+        self.motion.put(displacement, velocity, acceleration)
 
     def state(self) -> Mapping[str, np.ndarray]:
-        """All that the next step starts from: this rank's arrays themselves, by name."""
+        """All that the next step starts from, by name; to be read before that."""
         return {
             "displacement": self.displacement,
             "velocity": self.velocity,
             "acceleration": self.acceleration,
         }
+
+    def exact_state(self) -> Mapping[str, np.ndarray]:
+        """``state`` and all that steps like these need to go on as if nothing had happened."""
+        return {**self.state(), **self.motion.carried()}
+
+    def restore(self, state: Mapping[str, np.ndarray]) -> None:
+        """Continue from what ``state`` returned, here or elsewhere, or from an ``exact_state``."""
+        self.motion.take(state)
 
     def look_at(self, ends: np.ndarray, laws: np.ndarray, tension: np.ndarray) -> None:
         """Fill ``tension`` (n,) [N] at the end of each ``free_step``, see ``kernels.tension``.
@@ -121,7 +142,7 @@ class LineMotion(ABC):
         self.predict()
         self.free_acceleration(loads)
         self.correct()
-        kernels.tension(self.displacement, self.velocity, *self._droppers)
+        kernels.tension(self.motion.read, *self._droppers)
 
     def free_acceleration(self, loads: Loads | None = None) -> None:
         """Fill the acceleration from the predictions and local loads. Collective.
@@ -158,12 +179,16 @@ class LineMotion(ABC):
             self._beta_share,
         )
 
+    def fill_solution(self) -> None:
+        """Make ``solution`` the present displacement. Not collective."""
+        self.solution.setArray(self.displacement)
+
     def energies(self) -> tuple[float, float]:
         """Kinetic and elastic energy relative to equilibrium, all droppers taut [J]. Collective."""
-        operators = self.operators
-        np.copyto(operators.factor, self.velocity)
+        operators, displacement, velocity = self.operators, self.displacement, self.velocity
+        np.copyto(operators.factor, velocity)
         kinetic = 0.5 * operators.square("mass")
-        np.copyto(operators.factor, self.displacement)
+        np.copyto(operators.factor, displacement)
         return kinetic, 0.5 * operators.square("stiffness")
 
     def destroy(self) -> None:

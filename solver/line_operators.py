@@ -29,10 +29,11 @@ from catenary.solver.linear import (
     wants_distributed_solver,
 )
 from catenary.solver.model import Model
+from catenary.solver.motion import MotionAhead, Steps
 from catenary.solver.operators import as_petsc, columns_of, part_of, station_block
 from catenary.solver.repeated_rows import RepeatedRows, repeated_rows
 from catenary.solver.station_blocks import StationProduct, station_product
-from catenary.solver.station_passes import StationPasses, Steps
+from catenary.solver.station_passes import StationPasses
 from catenary.solver.subdomain import Halo, Subdomain
 
 logger = logging.getLogger(__name__)
@@ -110,10 +111,10 @@ class LineOperators:
             self._solver.hurry()
         self._stiffness = self._product_by_kinds()
 
-    def passes(
-        self, displacement: np.ndarray, velocity: np.ndarray, steps: Steps
-    ) -> StationPasses | None:
-        """Free steps of Newmark's method in two passes over a state (n_local,), if they can be.
+    def passes(self, motion: MotionAhead, steps: Steps) -> StationPasses | None:
+        """Free steps of Newmark's method in two passes over a motion, if they can be.
+
+        ``motion`` is kept in ``factor``, ``answer`` and an array of its own.
 
         For that the operator is to be factored and multiplied by stations. Not collective.
         """
@@ -122,17 +123,8 @@ class LineOperators:
             return None
         if solver.factors is None or not self._is_direct:
             return None
-        first, last = self._halo.told
-        return StationPasses(
-            stiffness,
-            solver.factors,
-            self._read_padded,
-            self._solution.array,
-            (first // self._block, last // self._block),
-            displacement,
-            velocity,
-            steps,
-        )
+        padded, answer = self._read_padded, self._solution.array
+        return StationPasses(stiffness, solver.factors, padded, answer, motion, steps)
 
     def exchange(self) -> None:
         """Bring ``factor`` up to date where it is others'. Collective."""

@@ -218,6 +218,11 @@ def wants_distributed_solver() -> bool:
     return _is_given(f"{PREFIX}ksp_", f"{PREFIX}pc_")
 
 
+def wants_solution() -> bool:
+    """Whether PETSc's options ask to see the solution of the time loop, or to store it."""
+    return _is_given(f"{PREFIX}ts_monitor_", f"{PREFIX}ts_save_trajectory")
+
+
 def _destroy(*objects: PETSc.Object) -> None:
     for held in objects:
         held.destroy()

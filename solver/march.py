@@ -33,7 +33,7 @@ from catenary.solver.equilibrium import Elasticity, Equilibrium
 from catenary.solver.errors import CatenaryError, InputError, RunBroken
 from catenary.solver.events import event
 from catenary.solver.incidents import DropperBreak, Happened, in_steps
-from catenary.solver.linear import PREFIX, refused_options
+from catenary.solver.linear import PREFIX, refused_options, wants_solution
 from catenary.solver.model import Model
 from catenary.solver.observation import Observer, Stage
 from catenary.solver.pantographs import Pantographs, nominal_height_rule
@@ -158,8 +158,9 @@ class March:
             # What the method keeps besides the state moves with the acceleration.
             nothing = np.zeros_like(jump)
             self._line.start(nothing, nothing, jump)
-            for name, values in self._line.state().items():
-                values += line.state()[name]
+            moved = line.state()
+            jumped = self._line.state()
+            self._line.restore({name: values + moved[name] for name, values in jumped.items()})
             self._scheme.restore(scheme.state())
             self._scheme.counters = scheme.counters
         finally:
@@ -208,7 +209,7 @@ class March:
         since = first
         ahead = [happened for happened in self._ahead if happened.step < self.n_steps]
         ends = [*(happened.step for happened in ahead), self.n_steps]
-        show = self._shown_to(observers)
+        show = self._shown_to_petsc(self._shown_to(observers))
         ts = self._make_ts(show, stop_requested, first, ends[0])
         try:
             self._start(observers, self._showing.stage(dt, first * dt, self.n_steps))
@@ -308,6 +309,17 @@ class March:
                 self._show_event.end()
 
         return show
+
+    def _shown_to_petsc(self, show: Callable[[int, float], None]) -> Callable[[int, float], None]:
+        """The same, followed by PETSc's monitors of the solution if there are any."""
+        if not wants_solution():
+            return show
+
+        def show_both(step: int, time: float) -> None:
+            show(step, time)
+            self._line.fill_solution()
+
+        return show_both
 
     def _make_ts(
         self,

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from catenary.solver import kernels
 from catenary.solver.distribution import Ownership
 from catenary.solver.events import event
 from catenary.solver.line_motion import LineMotion
 from catenary.solver.line_operators import Loads
 from catenary.solver.model import Model
+from catenary.solver.motion import MotionAhead, Steps
 from catenary.solver.problem import Numerics
-from catenary.solver.station_passes import StationPasses, Steps
+from catenary.solver.station_passes import StationPasses
 
 
 class NewmarkLine(LineMotion):
@@ -24,9 +27,31 @@ class NewmarkLine(LineMotion):
         self._predict_position = 0.5 * dt**2 * (1.0 - 2.0 * beta)
         self._predict_velocity = dt * (1.0 - gamma)
         self._passes: StationPasses | None = None
-        if self._proportional:
-            self._passes = self.operators.passes(self.displacement, self.velocity, self._steps())
         self._forth, self._back = event("LineForth"), event("LineBack")
+
+    def keep_ahead(self) -> None:
+        """Keep the state one prediction ahead from now on, if the operators allow it.
+
+        Of steps there are then only free ones without loads, in two passes over the state. Not
+        collective.
+        """
+        if not self._proportional:
+            return
+        steps = Steps(
+            self._dt,
+            self._predict_position,
+            self._predict_velocity,
+            self._alpha_share,
+            self.position_factor,
+            self.velocity_factor,
+            self._beta_share,
+        )
+        operators, (shown, velocity, acceleration, _) = self.operators, self.motion.read
+        motion = MotionAhead(operators.factor, velocity, acceleration, shown, steps)
+        self._passes = operators.passes(motion, steps)
+        if self._passes is not None:
+            motion.put(self.displacement, self.velocity, self.acceleration)
+            self.motion = motion
 
     def predict(self) -> None:
         """Turn displacement and velocity into their predictions of eq. (2.5)."""
@@ -42,14 +67,13 @@ class NewmarkLine(LineMotion):
         )
 
     def free_step(self, loads: Loads | None = None) -> None:
-        """Take the step without contacts and slack droppers: in two passes over the state, where
-        its operators allow it and no ``loads`` act. Collective."""
+        """Take the step without contacts and slack droppers. Collective."""
         passes = self._passes
-        if passes is None or loads is not None:
+        if passes is None:
             super().free_step(loads)
             return
+        assert loads is None
         self._forth.begin()
-        passes.tell()
         if self._comm.size > 1:
             self.operators.exchange()
         passes.forth()
@@ -58,13 +82,10 @@ class NewmarkLine(LineMotion):
         passes.back(self._droppers)
         self._back.end()
 
-    def _steps(self) -> Steps:
-        return Steps(
-            self._dt,
-            self._predict_position,
-            self._predict_velocity,
-            self._alpha_share,
-            self.position_factor,
-            self.velocity_factor,
-            self._beta_share,
-        )
+    def energies(self) -> tuple[float, float]:
+        """Kinetic and elastic energy relative to equilibrium, all droppers taut [J]. Collective."""
+        factor = self.operators.factor
+        ahead = factor.copy()
+        found = super().energies()
+        np.copyto(factor, ahead)
+        return found

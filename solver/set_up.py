@@ -64,7 +64,10 @@ class SetUp:
         ``pantographs`` are those of the problem, made for the same numerics.
         """
         comm, model, train = self.comm, changed.model, problem.train
-        line = make_line(comm, model, self.ownership, problem.numerics, changed.load)
+        numerics = problem.numerics
+        in_parts = numerics.scheme != "one_solve" or numerics.coupling == "explicit"
+        only_free = not (in_parts or model.step_loads)
+        line = make_line(comm, model, self.ownership, numerics, changed.load, only_free)
         on = model.terms_of
         trailing = max(placement.behind for placement in train.placements)
         offsets = [x for placement in train.placements for x in placement.data.strip_offsets]

@@ -100,8 +100,7 @@ class Showing:
         view.row[: told.size] = told
         line, droppers = self._line, self._interaction.droppers
         kernels.show(
-            line.displacement,
-            line.velocity,
+            line.motion.read,
             self._arm_rows,
             droppers.shown_ends,
             droppers.shown_laws,
@@ -128,9 +127,12 @@ class Showing:
         then = np.empty(model.mesh.n_nodes, dtype=np.int64)
         then[model.row_of_node] = checkpoint["row_of_node"]
         rows = slice(line.ownership.first, line.ownership.last)
-        for name, values in line.state().items():
-            by_node = np.reshape(checkpoint[name], (-1, model.block_size))
-            values[:] = by_node[then].ravel()[rows]
+        by_node = {
+            name: np.reshape(checkpoint[name], (-1, model.block_size))
+            for name in line.exact_state()
+            if name in checkpoint
+        }
+        line.restore({name: values[then].ravel()[rows] for name, values in by_node.items()})
         pantographs.contact_force[:] = checkpoint["contact_force"]
         pantographs.head_height[:] = checkpoint["head_height"]
         pantographs.wire_height[:] = checkpoint["wire_height"]
@@ -159,7 +161,8 @@ class Showing:
         """Everything needed to continue after the step shown last, on rank 0. Collective."""
         line, pantographs = self._line, self._pantographs
         whole = {
-            name: self._comm.gather(values.copy(), root=0) for name, values in line.state().items()
+            name: self._comm.gather(values.copy(), root=0)
+            for name, values in line.exact_state().items()
         }
         if self._comm.rank != 0:
             return None

@@ -124,9 +124,8 @@ class StepLevels:
             if answer is not None:
                 goes_on &= answer
                 done += size
-        if self._active:
-            # Observers look at level 0. It is not stepped before it is handed the state again.
-            _hand_over(self._levels[self._active], self._levels[0])
+        # Observers look at level 0, from which a continued run starts: so does this one.
+        self._go_to(0)
         return goes_on
 
     def look(
@@ -231,7 +230,7 @@ class StepLevels:
         parts.scheme.counters = self._counters
         self._levels[level] = parts
         self._before[level] = {
-            name: np.empty_like(values) for name, values in parts.line.state().items()
+            name: np.empty_like(values) for name, values in parts.line.exact_state().items()
         }
 
     def _remember(self, level: int) -> Callable[[], None]:
@@ -241,15 +240,14 @@ class StepLevels:
         remember, only if it failed after the forces were found, which joints alone can make it do.
         """
         parts, before = self._levels[level], self._before[level]
-        for name, values in parts.line.state().items():
+        for name, values in parts.line.exact_state().items():
             np.copyto(before[name], values)
         moved = parts.pantographs
         models = [model.state() for model in moved.models] if moved.joints_in_loop else []
         contacts = (self._error.state(), parts.scheme.state()) if moved.joints_in_loop else None
 
         def take_back() -> None:
-            for name, values in parts.line.state().items():
-                np.copyto(values, before[name])
+            parts.line.restore(before)
             for model, state in zip(moved.models, models, strict=False):
                 model.restore(state)
             if contacts is not None:
@@ -261,7 +259,6 @@ class StepLevels:
 
 def _hand_over(source: Parts, target: Parts) -> None:
     """Bring ``target`` to the state of ``source``. Not collective."""
-    for name, values in target.line.state().items():
-        np.copyto(values, source.line.state()[name])
+    target.line.restore(source.line.state())
     target.scheme.restore(source.scheme.state())
     target.pantographs.take_over(source.pantographs)

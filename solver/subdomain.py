@@ -61,13 +61,11 @@ class Halo:
     Attributes
     ----------
     messages, bytes_sent : that this rank sends at each exchange
-    told : how many of its first and of its last unknowns this rank tells others
     """
 
     def __init__(self, comm: Any, ownership: Ownership, low: int, array: np.ndarray) -> None:
         self._requests: list[MPI.Prequest] = []
         self.messages = self.bytes_sent = 0
-        self.told = 0, 0
         if comm.size == 1:
             return
         ranges = comm.allgather((low, low + array.size))
@@ -85,12 +83,6 @@ class Halo:
                 self._requests.append(comm.Send_init(told, dest=rank))
                 self.messages += 1
                 self.bytes_sent += told.nbytes
-                before, after = end - ownership.first, ownership.last - begin
-                first, last = self.told
-                self.told = (
-                    max(first, before if rank < comm.rank else 0),
-                    max(last, after if rank > comm.rank else 0),
-                )
 
     def exchange(self) -> None:
         """Bring the others' parts up to date."""

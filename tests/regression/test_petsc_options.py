@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from petsc4py import PETSc
 from program import MPIRUN, assert_sound, catenary, short_run
 
 from catenary.postproc.results import Results
@@ -57,6 +58,21 @@ def test_views_show_stepper_solver_and_stages(tmp_path: Path) -> None:
 def test_a_step_in_parts_lists_its_parts(tmp_path: Path) -> None:
     text = run(tmp_path / "out", "-march_pc_type", "lu", "-log_view")
     assert listed(text) == set(NAMES) - IN_PASSES
+
+
+def test_monitors_see_each_solution(tmp_path: Path) -> None:
+    out, seen = tmp_path / "out", tmp_path / "seen"
+    run(out, "-march_ts_monitor_solution", f"binary:{seen}")
+    viewer = PETSc.Viewer().createBinary(str(seen), "r", comm=PETSc.COMM_SELF)
+    with Results(out) as results:
+        uplift = results.channel("arm_uplift")
+        assert np.abs(uplift[-1]).max() > 1e-3
+        for expected in uplift:
+            solution = PETSc.Vec().load(viewer)
+            apart = np.abs(solution.array - expected[:, None]).min(axis=1)
+            solution.destroy()
+            assert apart.max() < 1e-15
+    viewer.destroy()
 
 
 def listed(text: str) -> set[str]:

@@ -7,9 +7,10 @@ import pytest
 from repeating_line import line
 
 from catenary.solver import kernels
+from catenary.solver.motion import Motion, MotionAhead, Steps
 from catenary.solver.station_blocks import station_product
 from catenary.solver.station_factors import station_factors
-from catenary.solver.station_passes import StationPasses, Steps
+from catenary.solver.station_passes import StationPasses
 
 RNG = np.random.default_rng(11)
 STEPS = Steps(0.1, 0.002, 0.05, 0.3, 0.0025, 0.05, 0.4)
@@ -46,14 +47,14 @@ def test_passes_take_the_steps_of_their_parts(n_own: int, before: int, after: in
     ends = 4 * np.column_stack([upper, lower]) + [2, 0]
     tension, pulls = np.full((2, upper.size), np.nan)
 
-    # It tells as much as it is told, or all that it has.
-    told = min(before, n_own), min(after, n_own)
-    read = others.copy()
-    passes = StationPasses(product, factors, read, answer, told, displacement, velocity, STEPS)
-    passes.tell()
+    read, shown = others.copy(), np.zeros(4 * n_own)
+    motion = MotionAhead(read[4:-4][own], np.zeros(4 * n_own), answer[own], shown, STEPS)
+    motion.put(displacement, velocity, answer[own].copy())
+    passes = StationPasses(product, factors, read, answer, motion, STEPS)
     passes.forth()
     passes.back((ends, LAWS[: len(ends)], tension))
-    found = displacement, velocity, answer[own], tension
-    kernels.tension(*expected[:2], ends, LAWS, pulls)
+    found = motion.displacement, motion.velocity, answer[own], tension
+    plain = Motion(*expected, (0.0, 0.0)).read
+    kernels.tension(plain, ends, LAWS, pulls)
     for one, other in zip(found, (*expected, pulls), strict=True):
         assert np.abs(one - other).max(initial=0.0) < ROUND_OFF * np.abs(other).max(initial=1.0)
