@@ -147,7 +147,9 @@ def combine(elements, weights, first_node, start, offset, data, answers, filled)
 @in_line
 def tension_of(dropper, motion, ends, laws):
     """Tension of one of the droppers of ``tension`` [N]."""
-    upper, lower = ends[dropper, 0], ends[dropper, 1]
+    # Unsigned, so that no index is asked whether it counts from the end.
+    dropper = np.uint64(dropper)
+    upper, lower = np.uint64(ends[dropper, 0]), np.uint64(ends[dropper, 1])
     stretch = displacement_at(upper, motion) - displacement_at(lower, motion)
     speed = velocity_at(upper, motion) - velocity_at(lower, motion)
     return laws[dropper, 0] + laws[dropper, 1] * stretch + laws[dropper, 2] * speed

@@ -20,13 +20,14 @@ from catenary.solver.station_passes import StationPasses
 class NewmarkLine(LineMotion):
     """The line by Newmark's method: sigma = beta dt^2, tau = gamma dt. Collective to make."""
 
+    _passes: StationPasses | None = None
+
     def __init__(self, comm: Any, model: Model, ownership: Ownership, numerics: Numerics) -> None:
         dt, beta, gamma = numerics.dt, numerics.beta, numerics.gamma
         super().__init__(comm, model, ownership, beta * dt**2, gamma * dt)
         self._dt = dt
         self._predict_position = 0.5 * dt**2 * (1.0 - 2.0 * beta)
         self._predict_velocity = dt * (1.0 - gamma)
-        self._passes: StationPasses | None = None
         self._forth, self._back = event("LineForth"), event("LineBack")
 
     def keep_ahead(self) -> None:
@@ -50,6 +51,7 @@ class NewmarkLine(LineMotion):
         motion = MotionAhead(operators.factor, velocity, acceleration, shown, steps)
         self._passes = operators.passes(motion, steps)
         if self._passes is not None:
+            self._passes.look_at(*self._droppers)
             motion.put(self.displacement, self.velocity, self.acceleration)
             self.motion = motion
 
@@ -79,8 +81,14 @@ class NewmarkLine(LineMotion):
         passes.forth()
         self._forth.end()
         self._back.begin()
-        passes.back(self._droppers)
+        passes.back()
         self._back.end()
+
+    def look_at(self, ends: np.ndarray, laws: np.ndarray, tension: np.ndarray) -> None:
+        """Fill ``tension`` at the end of each ``free_step``; see ``LineMotion``."""
+        super().look_at(ends, laws, tension)
+        if self._passes is not None:
+            self._passes.look_at(ends, laws, tension)
 
     def energies(self) -> tuple[float, float]:
         """Kinetic and elastic energy relative to equilibrium, all droppers taut [J]. Collective."""

@@ -54,17 +54,22 @@ class StationPasses:
         multiplied = product.kinds, product.blocks, product.first, read
         by_position, by_velocity = map(float, motion.gains)
         changes = steps.dt, by_position, by_velocity, steps.damping_share
+        self._own = low, high
         self._forth = multiplied, factored, answer
         self._back = factored, motion.read, answer, changes
+        self.look_at(np.zeros((0, 2), np.int64), np.zeros((0, 4)), np.zeros(0))
 
     def forth(self) -> None:
         """Multiply and eliminate."""
         forth(*self._forth)
 
-    def back(self, droppers: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
-        """Find the accelerations and what the next step starts from, and fill the tension of
-        ``droppers``: their ends, laws and tension, as ``LineMotion.look_at`` takes them."""
-        back(*self._back, droppers)
+    def look_at(self, ends: np.ndarray, laws: np.ndarray, tension: np.ndarray) -> None:
+        """Fill ``tension`` on the way ``back``, as ``LineMotion.look_at``."""
+        self._droppers = ends, laws, tension, pulled(*self._own, ends)
+
+    def back(self) -> None:
+        """Find the accelerations and what the next step starts from."""
+        back(*self._back, self._droppers)
 
 
 # Kernels take what belongs together as tuples, named as in ``StationPasses``.
@@ -120,52 +125,63 @@ def forth(multiplied, factored, answer):
     substitute(kinds, blocks, middle, right, answer)
 
 
-@in_line
-def both_within(begin, end, ends, dropper):
-    """Whether both ends of a dropper are among the unknowns from ``begin`` to ``end``."""
-    upper, lower = ends[dropper, 0], ends[dropper, 1]
-    return (upper >= begin) & (lower >= begin) & (upper < end) & (lower < end)
+@compiled
+def pulled(low, high, ends):
+    """Droppers that the pass back has left behind with each stretch, (n_stretches + 1, 2).
 
-
-@in_line
-def pull(low, high, left, right, motion, droppers):
-    """Find the tension of droppers with both ends among own stations from ``low`` to ``high``.
-
-    Those from ``left`` to ``right`` have theirs; returns the like after this.
+    They are those from the first of both numbers to the second, and have both ``ends`` among what
+    is known by then. Both wires' unknowns of a place stand together, so that few wait for the next.
     """
-    ends, laws, tension = droppers
-    begin, end = BLOCK * low, BLOCK * high
-    while left > 0 and both_within(begin, end, ends, left - 1):
-        left -= 1
-        tension[left] = tension_of(left, motion, ends, laws)
-    while right < tension.size and both_within(begin, end, ends, right):
-        tension[right] = tension_of(right, motion, ends, laws)
-        right += 1
-    return left, right
+    n, own, pairs = ends.shape[0], high - low, (high - low - 1) // 2
+    middle = own // 2
+    ranges = np.empty((1 + (pairs + _STRETCH - 1) // _STRETCH + 1, 2), dtype=np.int64)
+    first = last = np.searchsorted(ends[:, 0], BLOCK * middle)
+    ranges[0] = first
+    for number in range(1, ranges.shape[0]):
+        reach = min(number * _STRETCH, pairs)
+        begin, end = BLOCK * (middle - reach), BLOCK * (middle + reach + 1)
+        if number == ranges.shape[0] - 1:
+            begin, end = 0, BLOCK * own
+        while first > 0 and begin <= ends[first - 1].min() and ends[first - 1].max() < end:
+            first -= 1
+        while last < n and begin <= ends[last].min() and ends[last].max() < end:
+            last += 1
+        ranges[number, 0], ranges[number, 1] = first, last
+    return ranges
+
+
+@in_line
+def pull(number, motion, droppers):
+    """Find the tension of droppers that a stretch of the pass back has left behind."""
+    ends, laws, tension, ranges = droppers
+    before, now = ranges[number - 1], ranges[number]
+    for dropper in range(now[0], before[0]):
+        tension[dropper] = tension_of(dropper, motion, ends, laws)
+    for dropper in range(before[1], now[1]):
+        tension[dropper] = tension_of(dropper, motion, ends, laws)
 
 
 @compiled
 def back(factored, motion, answer, changes, droppers):
     """Fill ``answer`` with the solution, take the rank's own motion on, and find the tension of
-    its droppers; after ``forth``."""
+    its droppers, which come with their ranges of ``pulled``; after ``forth``."""
     kinds, blocks, low, high = factored
     middle, pairs = (low + high) // 2, (high - low - 1) // 2
     x = y = load(answer, _BLOCK * np.uint64(middle))
     go_on(middle - low, x, motion, changes)
-    left = right = np.searchsorted(droppers[0][:, 0], BLOCK * (middle - low))
+    number = 1
     for start in range(1, pairs + 1, _STRETCH):
-        stop = min(start + _STRETCH, pairs + 1)
-        for k in range(start, stop):
+        for k in range(start, min(start + _STRETCH, pairs + 1)):
             x = substitute(kinds, blocks, middle - k, x, answer)
             y = substitute(kinds, blocks, middle + k, y, answer)
             go_on(middle - k - low, x, motion, changes)
             go_on(middle + k - low, y, motion, changes)
-        begin, end = middle + 1 - stop - low, middle + stop - low
-        left, right = pull(begin, end, left, right, motion, droppers)
+        pull(number, motion, droppers)
+        number += 1
     for i in range(middle - pairs - 1, low - 1, -1):
         x = substitute(kinds, blocks, i, x, answer)
         go_on(i - low, x, motion, changes)
-    pull(0, high - low, left, right, motion, droppers)
+    pull(number, motion, droppers)
     substitute_outside(kinds, blocks, low, high, x, y, answer)
 
 
@@ -179,4 +195,4 @@ def warm_up() -> None:
     motion = MotionAhead(own, station.copy(), station, station.copy(), steps)
     passes = StationPasses(product, factors, read, station, motion, steps)
     passes.forth()
-    passes.back((np.zeros((0, 2), np.int64), np.zeros((0, 4)), np.zeros(0)))
+    passes.back()

@@ -51,8 +51,9 @@ def test_passes_take_the_steps_of_their_parts(n_own: int, before: int, after: in
     motion = MotionAhead(read[4:-4][own], np.zeros(4 * n_own), answer[own], shown, STEPS)
     motion.put(displacement, velocity, answer[own].copy())
     passes = StationPasses(product, factors, read, answer, motion, STEPS)
+    passes.look_at(ends, LAWS[: len(ends)], tension)
     passes.forth()
-    passes.back((ends, LAWS[: len(ends)], tension))
+    passes.back()
     found = motion.displacement, motion.velocity, answer[own], tension
     plain = Motion(*expected, (0.0, 0.0)).read
     kernels.tension(plain, ends, LAWS, pulls)
