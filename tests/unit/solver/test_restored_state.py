@@ -31,7 +31,7 @@ def test_a_state_whose_nodes_stand_in_another_order_continues_bit_for_bit() -> N
     rows = kept["row_of_node"]
     order = np.random.default_rng(3).permutation(rows.size)
     # The node in row i then stood in row order[i].
-    for name in ("displacement", "velocity", "acceleration"):
+    for name in ("displacement", "velocity", "acceleration", "ahead", "velocity_ahead"):
         before = kept[name].reshape(rows.size, -1)
         moved = np.empty_like(before)
         moved[order] = before
