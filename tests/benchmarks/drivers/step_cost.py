@@ -22,7 +22,7 @@ from catenary.solver.march import March
 from catenary.solver.model import build
 from catenary.solver.parallel import on_root
 
-CHUNKS = 5
+CHUNKS, ROUNDS = 5, 20
 
 
 def main(n_spans: int, n_steps: int) -> None:
@@ -72,12 +72,29 @@ def main(n_spans: int, n_steps: int) -> None:
                     # The first march pays for pages and caches.
                     "us_per_step": 1e6 * float(np.median(walls[1:])),
                     "us_fastest": 1e6 * min(walls[1:]),
+                    "us_streamed": 1e6 * streaming(model.n_dofs // comm.size),
                     "peak_bytes": peak,
                     "messages": traffic[0],
                     "message_bytes": traffic[1],
                 }
             )
         )
+
+
+def streaming(n: int) -> float:
+    """Fastest time [s] in which NumPy walks through a state (n,) as a step's two passes must: one
+    of its three arrays read and another written, then all three changed."""
+    x, y, z = np.ones((3, n))
+    repeats = max(2, 1_000_000 // n)
+    times = []
+    for _ in range(ROUNDS):
+        begin = time.perf_counter()
+        for _ in range(repeats):
+            np.copyto(z, x)
+            for array in (x, y, z):
+                array += 1.0
+        times.append((time.perf_counter() - begin) / repeats)
+    return min(times)
 
 
 def peak_memory() -> float:
