@@ -201,7 +201,9 @@ def force_histogram(results: Results, statistics: RunStatistics) -> Figure:
         left = edges[:-1] + 0.07 * bin_width + place * width
         axes.bar(left, percent, width, align="edge", color=colour(index), label=pantograph.name)
     axes.xaxis.set_major_locator(MaxNLocator(12, steps=[1, 2, 2.5, 5, 10]))
-    tidy(axes, "contact force, 20 Hz [N]", "share of time [%]", "Histogram, bins of 10 N")
+    widths = sorted({f"{np.diff(p.histogram_edges[:2])[0]:g}" for _, p in shown}, key=float)
+    title = f"Histogram, bins of {' and '.join(widths)} N"
+    tidy(axes, "contact force, 20 Hz [N]", "share of time [%]", title)
     legend_above(axes)
     return figure
 

@@ -18,7 +18,7 @@ from catenary.postproc.results import Results
 from catenary.solver.errors import InputError
 
 SHORTEST_ARC = 5e-3
-HISTOGRAM_BIN = 10.0
+HISTOGRAM_BIN, MOST_BINS = 10.0, 1000
 _NAN = float("nan")
 
 
@@ -199,7 +199,13 @@ def without_short_losses(lost: np.ndarray, dt: float, shortest: float = SHORTEST
 
 
 def histogram(force: np.ndarray, width: float = HISTOGRAM_BIN) -> tuple[np.ndarray, np.ndarray]:
-    """Edges (n + 1,) [N] at multiples of ``width`` and share of time (n,) [%] of a force record."""
+    """Edges (n + 1,) [N] at multiples of ``width`` and share of time (n,) [%] of a force record.
+
+    Bins are ten times as wide, or more, where there would be too many of them: an unstable run may
+    have reached any force.
+    """
+    while np.ptp(force) > MOST_BINS * width:
+        width *= 10.0
     first = np.floor(force.min() / width)
     last = np.floor(force.max() / width) + 1
     edges = width * np.arange(first, last + 1)

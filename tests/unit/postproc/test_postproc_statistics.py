@@ -85,6 +85,13 @@ def test_histogram_adds_up_and_sorts_values_into_bins() -> None:
     np.testing.assert_allclose(percent, [50.0, 25.0, 25.0])
 
 
+def test_histogram_of_forces_beyond_all_bounds_has_wider_bins() -> None:
+    edges, percent = stats.histogram(np.array([0.0, 5.0, -3e13, 2e13]))
+    np.testing.assert_allclose(np.diff(edges), 1e11)
+    assert percent.size <= stats.MOST_BINS + 1
+    assert percent.sum() == 100.0 and percent[300] == 50.0
+
+
 @pytest.mark.parametrize("position", [POSITION[:7000], POSITION[5000:], POSITION[:1], POSITION[:0]])
 def test_a_record_that_misses_part_of_the_stretch_does_not_cover_it(position: np.ndarray) -> None:
     assert not stats.covers(position, EVALUATION)
