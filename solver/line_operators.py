@@ -27,6 +27,7 @@ from catenary.solver.linear import (
     SchwarzSolver,
     Wrapped,
     wants_distributed_solver,
+    wants_view,
 )
 from catenary.solver.model import Model
 from catenary.solver.motion import MotionAhead, Steps
@@ -108,6 +109,8 @@ class LineOperators:
                 self._solver.iterate()
             self._is_direct = False
         if isinstance(self._solver, PartSolver):
+            if comm.size > 1 and comm.rank == 0 and wants_view():
+                self._solver.view()  # one for all; on one rank PETSc shows it at its first solve
             self._solver.hurry()
         self._stiffness = self._product_by_kinds()
 

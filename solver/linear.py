@@ -22,6 +22,8 @@ from catenary.solver.operators import as_petsc
 from catenary.solver.station_factors import StationFactors, station_factors
 
 PREFIX, PART_PREFIX = "march_", "march_sub_"
+# Options that show a solver and change nothing.
+_LOOKS = (f"{PREFIX}ksp_view", f"{PREFIX}ksp_monitor", f"{PREFIX}ksp_converged_reason")
 # A direct solve of a matrix as well conditioned as A (below 1e6) leaves about 1e-15.
 DIRECT = 1e-12
 
@@ -128,6 +130,10 @@ class PartSolver:
             factored = pc.getFactorMatrix().solve
             self._solve = lambda right, solution: factored(right.vector, solution.vector)
 
+    def view(self) -> None:
+        """Print what PETSc says of the solver."""
+        self._ksp.view()
+
     def iterate(self) -> None:
         """Use the factors as a preconditioner of GMRES from now on."""
         _use_gmres(self._ksp)
@@ -214,8 +220,16 @@ class SchwarzSolver:
 
 
 def wants_distributed_solver() -> bool:
-    """Whether PETSc's options name a solver for the whole line on all ranks."""
-    return _is_given(f"{PREFIX}ksp_", f"{PREFIX}pc_")
+    """Whether PETSc's options name a solver for the whole line on all ranks, not only a look."""
+    return any(
+        name.startswith((f"{PREFIX}ksp_", f"{PREFIX}pc_")) and not name.startswith(_LOOKS)
+        for name in PETSc.Options().getAll()
+    )
+
+
+def wants_view() -> bool:
+    """Whether PETSc's options ask to see the solver of the line."""
+    return _is_given(f"{PREFIX}ksp_view")
 
 
 def wants_solution() -> bool:

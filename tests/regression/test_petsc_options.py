@@ -145,9 +145,15 @@ def test_an_iteration_that_is_too_short_breaks_the_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
+def test_a_view_on_several_ranks_shows_the_solver_that_is_used(tmp_path: Path) -> None:
+    text = run(tmp_path / "out", "-march_ksp_view", ranks=2)
+    assert text.count("KSP Object") == 1 and "exact factors of" in text and "type: asm" not in text
+
+
+@pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
 def test_options_of_the_ranks_own_solvers_are_obeyed(plain: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    options = ["-march_ksp_view", "-march_ts_max_steps", "100"]
+    options = ["-march_ksp_type", "preonly", "-march_ksp_view", "-march_ts_max_steps", "100"]
     # PETSc's Cholesky of a block matrix keeps the order of the unknowns, and says so otherwise.
     reordered = [*options, "-march_sub_pc_factor_mat_ordering_type", "nd"]
     done = catenary(*short_run(out), "--", *reordered, cwd=tmp_path, ranks=2)
