@@ -80,6 +80,10 @@ class GeneralizedAlphaLine(LineMotion):
         """All that the next step starts from, by name; to be read before that."""
         return {**super().state(), "known_acceleration": self._known}
 
+    def kept(self) -> tuple[np.ndarray, ...]:
+        """The arrays themselves that a step changes."""
+        return *super().kept(), self._known
+
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """Continue from what ``state`` returned, here or elsewhere."""
         super().restore(state)

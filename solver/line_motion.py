@@ -120,6 +120,11 @@ class LineMotion(ABC):
             "acceleration": self.acceleration,
         }
 
+    def kept(self) -> tuple[np.ndarray, ...]:
+        """The arrays themselves that a step changes, however the motion is kept: copied and copied
+        back, they take steps of this line back."""
+        return self.motion.read[:3]
+
     def exact_state(self) -> Mapping[str, np.ndarray]:
         """``state`` and all that steps like these need to go on as if nothing had happened."""
         return {**self.state(), **self.motion.carried()}

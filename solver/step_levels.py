@@ -89,7 +89,7 @@ class StepLevels:
         self._error = StepError(whole.pantographs.n_contacts)
         self.pantographs = whole.pantographs
         self._active = self._wanted = self._tried = 0
-        self._before: dict[int, dict[str, np.ndarray]] = {}
+        self._before: dict[int, list[np.ndarray]] = {}
         smallest = self._dt / 2**self._finest
         self._control: StepControl | None = None
 
@@ -229,9 +229,7 @@ class StepLevels:
         parts.scheme.judge = self
         parts.scheme.counters = self._counters
         self._levels[level] = parts
-        self._before[level] = {
-            name: np.empty_like(values) for name, values in parts.line.exact_state().items()
-        }
+        self._before[level] = [np.empty_like(values) for values in parts.line.kept()]
 
     def _remember(self, level: int) -> Callable[[], None]:
         """Keep the state before a step; returns what brings it back.
@@ -240,14 +238,16 @@ class StepLevels:
         remember, only if it failed after the forces were found, which joints alone can make it do.
         """
         parts, before = self._levels[level], self._before[level]
-        for name, values in parts.line.exact_state().items():
-            np.copyto(before[name], values)
+        kept = parts.line.kept()
+        for copied, values in zip(before, kept, strict=True):
+            np.copyto(copied, values)
         moved = parts.pantographs
         models = [model.state() for model in moved.models] if moved.joints_in_loop else []
         contacts = (self._error.state(), parts.scheme.state()) if moved.joints_in_loop else None
 
         def take_back() -> None:
-            parts.line.restore(before)
+            for copied, values in zip(before, kept, strict=True):
+                np.copyto(values, copied)
             for model, state in zip(moved.models, models, strict=False):
                 model.restore(state)
             if contacts is not None:
