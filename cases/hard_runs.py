@@ -19,7 +19,7 @@ from scipy.sparse.linalg import spsolve
 from catenary.cases.meshing import mesh_of
 from catenary.cases.scene import Scene
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
-from catenary.solver.contact import ContactWire, Touches
+from catenary.solver.contact import ContactWire
 from catenary.solver.distribution import distribute
 from catenary.solver.equilibrium import (
     Elasticity,
@@ -145,11 +145,10 @@ class Watcher:
         state = view.checkpoint()
         assert state is not None  # the work is only asked for on one rank
         displacement = state["displacement"]
-        touches = Touches(view.contact_position.size)
-        wire.locate(view.contact_position, 0.0, touches)
-        ends = touches.element[:, None] + np.array([0, 1])
+        touches = wire.touches(view.contact_position)
+        ends = touches["element"][:, None] + np.array([0, 1])
         dofs = wire.dofs[ends].reshape(-1, 4)
-        pushed = [(dofs.ravel(), (view.contact_force[:, None] * touches.whole_value).ravel())]
+        pushed = [(dofs.ravel(), (view.contact_force[:, None] * touches["whole_value"]).ravel())]
         done = self._work[-1] if self._work else 0.0
         if self._before.size:
             for where, values in (*self._pushed, *pushed):

@@ -25,7 +25,7 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
 from catenary.mbs.lumped import LumpedData
-from catenary.solver.contact import ContactWire, Touches
+from catenary.solver.contact import ContactWire
 from catenary.solver.model import Model, iterate_entries
 
 # Vectors of Lanczos's method. What decides is within a few elements of the contact.
@@ -90,11 +90,10 @@ def matrices(model: Model) -> tuple[csc_matrix, csc_matrix, csc_matrix]:
 
 def load_at(wire: ContactWire, x: float, n_dofs: int) -> np.ndarray:
     """Load of a unit force on the contact wire at ``x`` [m], shape (n_dofs,)."""
-    touches = Touches(1)
-    wire.locate(np.array([x]), 0.0, touches)
-    dofs = wire.dofs[touches.element[0] + np.array([0, 1])].ravel()
+    touch = wire.touches(np.array([x]))[0]
+    dofs = wire.dofs[touch["element"] + np.array([0, 1])].ravel()
     load = np.zeros(n_dofs)
-    load[dofs] = touches.whole_value[0]
+    load[dofs] = touch["whole_value"]
     return load
 
 

@@ -48,7 +48,7 @@ def respond(inverse, by_place, by_speed, touch, free, by_force, out):
 
 @compiled
 def linear_step(
-    step, drive, by_drive, inverse, by_place, by_speed, touch, state, free, by_force, out
+    step, by_drive, inverse, by_place, by_speed, touch, state, free, by_force, out, drive
 ):
     """A step without contact of a linear system: ``free`` = ``step`` state + drive by_drive."""
     for i in range(state.size):
@@ -222,7 +222,7 @@ def warm_up() -> None:
     one, three, breaks = np.ones(1), np.ones(3), np.array([0.0, 1.0])
     touch, square, newmark = np.ones((2, 1, 1)), np.ones((1, 1)), np.ones(5)
     state, free, by_force, out = np.ones(3), np.ones(3), np.ones((3, 1)), np.ones(4)
-    linear_step(np.eye(3), 1.0, three, square, 1.0, 1.0, touch, state, free, by_force, out)
+    linear_step(np.eye(3), three, square, 1.0, 1.0, touch, state, free, by_force, out, 1.0)
     raising_step(
         newmark,
         np.zeros(6),

@@ -14,6 +14,7 @@ from scipy import linalg
 
 from catenary.mbs import head_kernels
 from catenary.mbs.base_motion import BaseMotion
+from catenary.mbs.bound import bound
 from catenary.mbs.head_steps import SteppedHead, raised
 from catenary.mbs.interface import HeadState
 from catenary.mbs.lateral import LateralPath
@@ -114,12 +115,24 @@ class LumpedPantograph(SteppedHead):
             np.diag(self._masses) + by_speed * self._damping + by_place * self._stiffness
         )
         free = -inverse @ (self._stiffness @ predict_position + self._damping @ predict_velocity)
-        self._step = np.vstack(
+        step = np.vstack(
             [predict_position + by_place * free, predict_velocity + by_speed * free, free]
         )
         unit = np.vstack([by_place * inverse, by_speed * inverse, inverse])
-        self._by_drive = np.ascontiguousarray(unit[:, self._carrier])
-        self._inverse = inverse
+        self._step = bound(
+            head_kernels.linear_step,
+            step,
+            np.ascontiguousarray(unit[:, self._carrier]),
+            inverse,
+            float(by_place),
+            float(by_speed),
+            self._touch,
+            self._state,
+            self._free,
+            self._by_force,
+            self._out,
+            later=(0.0,),
+        )
 
     def lift(self, time: float) -> float:
         """Net lift on the last mass at ``time`` [N]: a half cosine up to the static force."""
@@ -132,19 +145,7 @@ class LumpedPantograph(SteppedHead):
     def predict(self, time: float) -> HeadState:
         """Strips at ``time`` [s] as affine functions of the contact forces in the coming step."""
         self._aim(time)
-        head_kernels.linear_step(
-            self._step,
-            self._drive(time),
-            self._by_drive,
-            self._inverse,
-            self._newmark[3],
-            self._newmark[4],
-            self._touch,
-            self._state,
-            self._free,
-            self._by_force,
-            self._out,
-        )
+        self._step(self._drive(time))
         return self._head
 
     def energy(self) -> float:

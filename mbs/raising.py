@@ -22,6 +22,7 @@ import numpy as np
 
 from catenary.mbs import head_kernels
 from catenary.mbs.base_motion import BaseMotion
+from catenary.mbs.bound import bound
 from catenary.mbs.head_steps import SteppedHead, raised
 from catenary.mbs.interface import HeadState
 from catenary.mbs.lateral import LateralPath
@@ -90,18 +91,8 @@ class RaisingPantograph(SteppedHead):
         self._lowest, self._highest = float(self._breaks[0]), float(self._breaks[-1])
         # Part of the lift, weight, zero, then height, velocity and acceleration of the base.
         self._drive = np.array([0.0, data.head_weight, self._zero, 0.0, 0.0, 0.0])
-
-    def predict(self, time: float) -> HeadState:
-        """Strips at ``time`` [s] as affine functions of the contact forces in the coming step.
-
-        Raises
-        ------
-        RunBroken
-            The mechanism has left the heights that it can reach.
-        """
-        self._aim(time)
-        self._move_base(time)
-        height = head_kernels.raising_step(
+        self._step = bound(
+            head_kernels.raising_step,
             self._newmark,
             self._drive,
             self._masses,
@@ -115,6 +106,18 @@ class RaisingPantograph(SteppedHead):
             self._by_force,
             self._out,
         )
+
+    def predict(self, time: float) -> HeadState:
+        """Strips at ``time`` [s] as affine functions of the contact forces in the coming step.
+
+        Raises
+        ------
+        RunBroken
+            The mechanism has left the heights that it can reach.
+        """
+        self._aim(time)
+        self._move_base(time)
+        height = self._step()
         # What is not a number is left to those who couple.
         if height < self._lowest or height > self._highest:
             raise self._data.frame.left(height, time)

@@ -100,7 +100,9 @@ class Explicit(_RemembersLaw):
         inner.pivoted = False
         slack = inner.slack_under(line, force)
         inner.gap.put(line, heads)
-        return InnerSolution(force, slack, *inner.gap.under(force, slack), 1, inner.pivoted)
+        depth, rate = inner.gap.under(force, slack)
+        complete = inner.covers(line, force, slack)
+        return InnerSolution(force, slack, depth, rate, 1, inner.pivoted, complete)
 
 
 class Iterated:
@@ -148,7 +150,10 @@ class Iterated:
                 self._latest = force
                 slack = self._inner.slack_under(line, force)
                 depth, rate = gap.under(force, slack)
-                return InnerSolution(force, slack, depth, rate, number, self._inner.pivoted)
+                complete = self._inner.covers(line, force, slack)
+                return InnerSolution(
+                    force, slack, depth, rate, number, self._inner.pivoted, complete
+                )
         raise NotConverged(
             f"line and pantographs do not agree on the contact forces within "
             f"{self._max_iterations} exchanges (numerics.max_iterations): these still change by "

@@ -12,16 +12,14 @@ from petsc4py import PETSc
 
 # Names as -log_view prints them, in the order of a step, and what they hold.
 NAMES = {
+    "LineColumns": "answers of the line to unit contact forces",
     "LineFree": "prediction, product with K, solve and correction of the line",
-    "LineForth": "prediction, product with K and elimination, part of LineFree",
-    "LineBack": "substitution and correction, part of LineFree",
     "LineProduct": "product with K where it is on its own, part of LineFree",
     "LineSolve": "solve with A where it is on its own, part of LineFree",
-    "LineColumns": "answers of the line to unit contact forces",
     "ContactShare": "heights, compliances and tensions that this rank owns",
-    "ContactReduce": "shares to rank 0",
+    "ContactReduce": "shares to rank 0, where there are others",
     "ContactInner": "pantographs' predictions and the inner problem, on rank 0",
-    "ContactReply": "forces to all ranks",
+    "ContactReply": "forces to all ranks, where there are others",
     "LineSuperpose": "answers to the forces",
     "PantoAdvance": "pantographs' steps, on rank 0",
     "Show": "observers: recorder, fields, progress",

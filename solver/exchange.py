@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
+from catenary.solver.events import event
 from catenary.solver.response import LineResponse
 
 _FIRST_CAPACITY = 32
@@ -58,20 +59,22 @@ class Exchange:
     Parameters
     ----------
     early : whether shares hold what the line extrapolates to
+    limits : those of all shares, see ``LineResponse``
     """
 
-    def __init__(self, comm: Any, n_contacts: int, early: bool) -> None:
+    def __init__(self, comm: Any, n_contacts: int, early: bool, limits: np.ndarray) -> None:
         self._comm = comm
         self._n = n_contacts
-        self._early = early
+        self._early, self._limits = early, limits
         self.messages = self.bytes_sent = 0
+        self._reduce, self._reply = event("ContactReduce"), event("ContactReply")
         self.enlarge(_FIRST_CAPACITY)
 
     def enlarge(self, capacity: int) -> None:
         """Make room for at least ``capacity`` droppers a rank."""
         n = self._n
-        self.share = LineResponse(n, capacity, self._early)
-        self._merged = LineResponse(n, capacity, self._early)
+        self.share = LineResponse(n, capacity, self._early, self._limits)
+        self._merged = LineResponse(n, capacity, self._early, self._limits)
         self._answer = np.zeros(_HEAD + n + 2 * capacity)
         # Said once how long they are and of what, messages cost half a microsecond less.
         self._told = _message(self._answer)
@@ -83,6 +86,7 @@ class Exchange:
         if comm.size == 1:
             return share
         is_root = comm.rank == 0
+        self._reduce.begin()
         # Two ranks at most own the ends of an element: the order of summing does not matter.
         mine, all_together = self._sums
         comm.Reduce(mine, all_together if is_root else None, op=MPI.SUM, root=0)
@@ -92,9 +96,10 @@ class Exchange:
                 rows = share.rows[: share.count]
                 comm.Send(rows, dest=0, tag=_ROWS)
                 self._count(rows.nbytes)
-            return None
-        self._receive_rows()
-        return self._merged
+        else:
+            self._receive_rows()
+        self._reduce.end()
+        return self._merged if is_root else None
 
     def from_root(self, reply: Reply | None) -> Reply:
         """Rank 0's reply on all ranks; None is passed elsewhere."""
@@ -102,6 +107,7 @@ class Exchange:
         if comm.size == 1:
             assert reply is not None
             return reply
+        self._reply.begin()
         room = (answer.size - _HEAD - n) // 2
         if reply is not None:
             count = reply.droppers.size
@@ -123,6 +129,7 @@ class Exchange:
                 pairs[:count], pairs[count:] = reply.droppers, reply.compensation
             comm.Bcast(pairs, root=0)
             self._count(pairs.nbytes)
+        self._reply.end()
         if reply is not None:
             return reply
         return Reply(
@@ -145,7 +152,7 @@ class Exchange:
         if total == 0:
             return
         if total > merged.capacity:
-            larger = LineResponse(self._n, 2 * total, self._early)
+            larger = LineResponse(self._n, 2 * total, self._early, self._limits)
             larger.summed[:] = merged.summed
             self._merged = merged = larger
             self._sums = self._sums[0], _message(larger.summed)

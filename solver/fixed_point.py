@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from catenary.solver.contact import Touches
 from catenary.solver.coupling import DIVERGED
 from catenary.solver.errors import NotConverged
 from catenary.solver.heads import Heads
@@ -60,19 +59,20 @@ class FixedPoint:
         self._predicted[0] = line.displacement
         self._predicted[1] = line.velocity
         line.internal_forces()
-        touches = self.pantographs.move_to(time)
+        self.pantographs.move_to(time)
+        self.interaction.locate()
         heads = self._heads_everywhere(time)
         external = self.loads(time) or []
         force = self._force
         fixed = self.numerics.iterations
         for number in range(1, (fixed or self.numerics.max_iterations) + 1):
-            force, depth, rate = self._contact(touches, heads, force)
+            force, depth, rate = self._contact(heads, force)
             compensation = self._compensation()
             self._latest[0] = line.displacement
             self._latest[1] = line.velocity
             np.copyto(line.displacement, self._predicted[0])
             np.copyto(line.velocity, self._predicted[1])
-            line.solve(external + self.interaction.loads(touches, force, compensation))
+            line.solve(external + self.interaction.loads(force, compensation))
             line.correct()
             self.counters.rounds += 1
             # How far a fixed number of them has come is only asked after the last.
@@ -134,12 +134,12 @@ class FixedPoint:
         return heads
 
     def _contact(
-        self, touches: Touches, heads: Heads, force: np.ndarray
+        self, heads: Heads, force: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Contact forces [N], depths [m] and their rates [m/s] from the latest iterate, on all
         ranks."""
         both = np.zeros((2, force.size))
-        self.interaction.heights(touches, both[0], both[1])
+        self.interaction.heights(both[0], both[1])
         if self.comm.size > 1:
             self.comm.Allreduce(MPI.IN_PLACE, both)
         height, rate = both

@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.mbs.bound import bound
 from catenary.solver import inner_kernels
 from catenary.solver.errors import NotConverged, RunBroken
 from catenary.solver.heads import Heads
@@ -38,6 +39,8 @@ _USUAL_TANGENTS = 12
 _ROUNDING = 8.0 * np.finfo(float).eps
 # What there is to say of a step that holds something that is no number.
 NOT_FINITE = "it has no finite solution; try a smaller numerics.dt_s"
+# Answers that no loop works on yet.
+_NOTHING: tuple[np.ndarray, np.ndarray] = (np.zeros(0), np.zeros(0))
 # Droppers that the arrays have room for at first.
 _FIRST_ROOM = 32
 
@@ -47,7 +50,8 @@ class InnerSolution(NamedTuple):
 
     ``contact_force`` (n,) [N]; ``compensation`` (m,) [N] of the droppers with a row; ``depth`` (n,)
     [m] and its ``rate`` (n,) [m/s] at the contacts; ``rounds`` of all iterations; ``pivoted``
-    whether an active set cycled, so that pivoting had to find it.
+    whether an active set cycled, so that pivoting had to find it; ``complete`` whether all droppers
+    that are slack had a row, the limits of the line's response being large enough.
     """
 
     contact_force: np.ndarray
@@ -56,6 +60,7 @@ class InnerSolution(NamedTuple):
     rate: np.ndarray
     rounds: int
     pivoted: bool = False
+    complete: bool = True
 
 
 class Gap:
@@ -140,7 +145,7 @@ class InnerProblem:
         self.gap = Gap(law.n)
         self._no_rounding = np.zeros((2, law.n))
         self._released = 1.0 - kept_ratio
-        self._band = band
+        self._band, self._drop = band, np.zeros(band.shape[0])
         self.pivoted = False
         self._room = -1
         self._make_room(_FIRST_ROOM)
@@ -153,28 +158,10 @@ class InnerProblem:
         RunBroken
             If the active set does not settle.
         """
-        gap, law = self.gap, self.law
         self.pivoted = False
-        if not law.is_linear:
-            # Without a force heads stand highest: from there Newton's method comes from one side.
-            gap.put(line, heads)
-            law.linearise(gap.depth, gap.rate)
-        rounds = 0
-        for number in range(_MAX_TANGENTS):
-            force, slack, more = self._with_tangents(line, heads)
-            rounds += more
-            depth, rate = gap.found_depth, gap.found_rate
-            if law.is_linear:
-                return InnerSolution(force, slack, depth, rate, rounds, self.pivoted)
-            law.linearise(depth, rate)
-            looks = number >= _USUAL_TANGENTS
-            rounding = gap.rounding(force, slack) if looks else self._no_rounding
-            if law.agrees(force, rounding):
-                return InnerSolution(force, slack, depth, rate, rounds, self.pivoted)
-        raise NotConverged(
-            f"the contact law finds no force within {_MAX_TANGENTS} tangents; take a smaller "
-            "numerics.dt_s"
-        )
+        if self.law.is_linear:
+            return self._with_tangents(line, heads)
+        return self._with_law(line, heads)
 
     def slack_under(self, line: LineResponse, force: np.ndarray) -> np.ndarray:
         """Compensations (m,) [N] under given contact forces (n,) [N]."""
@@ -196,33 +183,43 @@ class InnerProblem:
             _pivot(matrix, right, always, solution)
         return solution
 
-    def _with_tangents(
-        self, line: LineResponse, heads: Heads
-    ) -> tuple[np.ndarray, np.ndarray, int]:
-        """Contact forces (n,) and compensations (m,) [N] for the law's tangents, and the rounds.
+    def covers(self, line: LineResponse, force: np.ndarray, slack: np.ndarray) -> bool:
+        """Whether all droppers that are slack under forces (n,) and compensations (m,) [N] had a
+        row."""
+        return not inner_kernels.leaves_out(
+            force, slack, line.rows, line.limits, self._band, self._drop
+        )
 
-        Depths and rates under them stand in ``gap.found``.
-        """
+    def _with_law(self, line: LineResponse, heads: Heads) -> InnerSolution:
+        """Forces and compensations for a law that is not linear, by Newton's method."""
+        gap, law = self.gap, self.law
+        # Without a force heads stand highest: from there Newton's method comes from one side.
+        gap.put(line, heads)
+        law.linearise(gap.depth, gap.rate)
+        rounds = 0
+        for number in range(_MAX_TANGENTS):
+            found = self._with_tangents(line, heads)
+            rounds += found.rounds
+            law.linearise(found.depth, found.rate)
+            looks = number >= _USUAL_TANGENTS
+            force = found.contact_force
+            rounding = gap.rounding(force, found.compensation) if looks else self._no_rounding
+            if law.agrees(force, rounding):
+                return found._replace(rounds=rounds)
+        raise NotConverged(
+            f"the contact law finds no force within {_MAX_TANGENTS} tangents; take a smaller "
+            "numerics.dt_s"
+        )
+
+    def _with_tangents(self, line: LineResponse, heads: Heads) -> InnerSolution:
+        """Forces and compensations for the law's tangents."""
         gap, n, m = self.gap, self.law.n, line.count
         if m > self._room:
             self._make_room(m)
         gap.line = line
-        rounds, size, finite = inner_kernels.solve(
-            heads.numbers,
-            line.answers,
-            gap.numbers,
-            self.law.tangents,
-            line.rows,
-            m,
-            self._released,
-            self._band,
-            self._always,
-            self._matrix,
-            self._right,
-            self._solution,
-            gap.found,
-            _MAX_ROUNDS,
-        )
+        if self._bound_to[0] is not heads.numbers or self._bound_to[1] is not line.rows:
+            self._bind(heads, line)
+        rounds, size, finite, complete = self._solve()
         if rounds <= 0:
             self.pivoted = True
             matrix, right = self._matrix[:size, :size].copy(), self._right[:size].copy()
@@ -231,9 +228,12 @@ class InnerProblem:
             if size == n and m and inner_kernels.any_pushed(line.rows, m, n, force):
                 size, rounds = self._with_all(line, rounds)
             gap.under(force, self._solution[n:size])
+            complete = self.covers(line, force, self._solution[n:size])
         elif not finite:
             raise RunBroken(NOT_FINITE)
-        return self._force, self._solution[n:size] if size > n else self._no_slack, rounds
+        slack = self._solution[n:size] if size > n else self._no_slack
+        depth, rate = gap.found_depth, gap.found_rate
+        return InnerSolution(self._force, slack, depth, rate, rounds, self.pivoted, complete)
 
     def _with_all(self, line: LineResponse, rounds: int) -> tuple[int, int]:
         """Unknowns and rounds by pivoting, droppers included, where contacts alone needed it."""
@@ -246,6 +246,28 @@ class InnerProblem:
         rounds += _pivot(matrix, right, self._always[:size], self._solution[:size])
         return size, rounds
 
+    def _bind(self, heads: Heads, line: LineResponse) -> None:
+        """Let the compiled loop work on these answers, mostly those of the step before."""
+        self._bound_to = heads.numbers, line.rows
+        self._solve = bound(
+            inner_kernels.solve,
+            heads.numbers,
+            line.summed,
+            line.rows,
+            line.limits,
+            self.gap.numbers,
+            self.law.tangents,
+            self._released,
+            self._band,
+            self._always,
+            self._matrix,
+            self._right,
+            self._solution,
+            self.gap.found,
+            self._drop,
+            _MAX_ROUNDS,
+        )
+
     def _make_room(self, n_droppers: int) -> None:
         n = self.law.n
         self._room = max(n_droppers, 2 * self._room)
@@ -255,6 +277,7 @@ class InnerProblem:
         self._force, self._no_slack = self._solution[:n], self._solution[:0]
         self._always = np.zeros(size, dtype=bool)
         self._always[:n] = self.law.pulls
+        self._bound_to = _NOTHING
 
 
 def _pivot(matrix: np.ndarray, right: np.ndarray, always: np.ndarray, solution: np.ndarray) -> int:

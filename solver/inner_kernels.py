@@ -11,6 +11,9 @@ from catenary.solver.kernels import compiled
 
 # Columns of a row of a dropper that may slacken, before its 3 n numbers for n contacts.
 NUMBER, TENSION, COUPLINGS = 0, 1, 2
+# Numbers before the answers in ``LineResponse.summed``: droppers with a row, wish to stop, whether
+# something is no number, droppers that there is no room for.
+FLAGS = 4
 
 
 @compiled
@@ -201,13 +204,44 @@ def under(numbers, rows, count, force, slack, found):
 
 
 @compiled
+def leaves_out(force, slack, rows, limits, band, drop):
+    """Whether a dropper without a row may have gone slack, as the ``limits`` were too small.
+
+    That is, a contact force is beyond its limit or compensations (``slack.size``,) take more than
+    the margin, the last of the limits, off a dropper elsewhere. ``drop`` (n_droppers,) is room to
+    work, all zero before and after.
+    """
+    half, n = band.shape[1] // 2, drop.size
+    if n == 0:
+        return False
+    for i in range(force.size):
+        if force[i] > limits[i]:
+            return True
+    largest = 0.0
+    for k in range(slack.size):
+        if slack[k] != 0.0:
+            e = int(rows[k, NUMBER])
+            for d in range(max(0, e - half), min(n, e + half + 1)):
+                drop[d] += slack[k] * band[e, d - e + half]
+    for k in range(slack.size):
+        drop[int(rows[k, NUMBER])] = 0.0
+    for k in range(slack.size):
+        if slack[k] != 0.0:
+            e = int(rows[k, NUMBER])
+            for d in range(max(0, e - half), min(n, e + half + 1)):
+                largest = max(largest, drop[d])
+                drop[d] = 0.0
+    return largest > limits[force.size]
+
+
+@compiled
 def solve(
     heads,
     line,
+    rows,
+    limits,
     numbers,
     tangents,
-    rows,
-    count,
     released,
     band,
     always,
@@ -215,19 +249,21 @@ def solve(
     right,
     solution,
     found,
+    drop,
     max_rounds,
 ):
     """Contact forces and compensations for a law's tangents: rounds needed, and unknowns used.
 
-    ``heads``, ``line`` and ``numbers`` are those of ``gap``. ``found`` (2, n) becomes depths and
-    rates at the contacts; told last is whether all of it are numbers.
+    ``line`` is ``LineResponse.summed``, ``heads`` and ``numbers`` are those of ``gap``. ``found``
+    (2, n) becomes depths and rates at the contacts; told last are whether all of it are numbers,
+    and whether all droppers that are slack had a row, see ``leaves_out``.
 
     If no contact force pushes a dropper together there are n unknowns, else n + ``count``. Rounds
     are not positive if the active set did not settle; the problem then stands in ``matrix`` and
     ``right``.
     """
-    n = tangents.shape[1]
-    finite = gap(heads, line, n, numbers)
+    n, count = tangents.shape[1], int(line[0])
+    finite = gap(heads, line[FLAGS : FLAGS + numbers.size], n, numbers)
     press(numbers, tangents, right, matrix)
     rounds = settle(matrix[:n, :n], right[:n], always[:n], solution[:n], max_rounds)
     size = n
@@ -238,55 +274,32 @@ def solve(
             matrix[:size, :size], right[:size], always[:size], solution[:size], max_rounds
         )
     finite &= under(numbers, rows, size - n, solution, solution[n:], found)
-    return rounds, size, finite
+    complete = not leaves_out(solution[:n], solution[n:size], rows, limits, band, drop)
+    return rounds, size, finite, complete
 
 
 @compiled
-def leaves_out(force, bound, rows, count, slack, band, margin, drop):
-    """Whether a dropper without a row may have gone slack: ``bound`` or ``margin`` were too small.
+def tell(force, reported, heads, depth, ends, told):
+    """Contact force, head height and wire height of each pantograph, then the force of each strip.
 
-    That is, a contact force is beyond its bound (n,) or compensations (``count``,) take more
-    than the margin [N] off a dropper elsewhere. ``drop`` (n_droppers,) is room to work, all zero
-    before and after.
-    """
-    for i in range(force.size):
-        if force[i] > bound[i]:
-            return True
-    half, n = band.shape[1] // 2, drop.size
-    largest = 0.0
-    for k in range(count):
-        if slack[k] != 0.0:
-            e = int(rows[k, NUMBER])
-            for d in range(max(0, e - half), min(n, e + half + 1)):
-                drop[d] += slack[k] * band[e, d - e + half]
-    for k in range(count):
-        drop[int(rows[k, NUMBER])] = 0.0
-    for k in range(count):
-        if slack[k] != 0.0:
-            e = int(rows[k, NUMBER])
-            for d in range(max(0, e - half), min(n, e + half + 1)):
-                largest = max(largest, drop[d])
-                drop[d] = 0.0
-    return largest > margin
-
-
-@compiled
-def tell(force, reported, head_height, compliance, depth, ends, told):
-    """Contact force, head height and wire height of each pantograph, (3, n_pantographs).
-
+    These are the 3 n_pantographs + n numbers of ``told``; ``heads`` are those of ``gap``.
     Pantograph p has the contacts from ``ends[p]`` to ``ends[p + 1]``: the sum of their forces, and
     the means of their heights.
     """
-    for p in range(ends.size - 1):
-        told[:, p] = 0.0
+    n = ends.size - 1
+    head_height, _, compliance, _ = parts(heads, force.size)
+    for p in range(n):
+        total, mean, mean_of_wire = 0.0, 0.0, 0.0
         for i in range(ends[p], ends[p + 1]):
             height = head_height[i]
             for j in range(ends[p], ends[p + 1]):
                 height -= compliance[i, j] * force[j]
-            told[0, p] += reported[i]
-            told[1, p] += height
-            told[2, p] += height - depth[i]
-        told[1:, p] /= ends[p + 1] - ends[p]
+            total += reported[i]
+            mean += height
+            mean_of_wire += height - depth[i]
+            told[3 * n + i] = reported[i]
+        strips = ends[p + 1] - ends[p]
+        told[p], told[n + p], told[2 * n + p] = total, mean / strips, mean_of_wire / strips
 
 
 def warm_up() -> None:
@@ -297,11 +310,11 @@ def warm_up() -> None:
     hertz(one, one, one, 1.0, 1.5, 0.0, one, one, one, one)
     any_pushed(rows, 1, 1, one)
     solve(
-        numbers, numbers, numbers, np.ones((4, 1)), rows, 1, 1.0, np.zeros((1, 1)),
-        np.zeros(2, dtype=np.bool_), np.eye(2), np.zeros(2), np.zeros(2), found, 1,
+        numbers, np.zeros(8), rows, np.zeros(2), numbers, np.ones((4, 1)), 1.0, np.zeros((1, 1)),
+        np.zeros(2, dtype=np.bool_), np.eye(2), np.zeros(2), np.zeros(2), found, one, 1,
     )  # fmt: skip
     settle(square, one, np.zeros(1, dtype=np.bool_), one, 1)
     solve_on(square, one, np.zeros(1, dtype=np.bool_), one)
     under(numbers, rows, 1, one, one, found)
-    leaves_out(one, one, rows, 1, one, np.zeros((1, 1)), 1.0, one)
-    tell(one, one, one, square, one, np.array([0, 1]), np.zeros((3, 1)))
+    leaves_out(one, one, rows, np.zeros(2), np.zeros((1, 1)), one)
+    tell(one, one, numbers, one, np.array([0, 1]), np.zeros(4))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from catenary.solver import compliance, kernels
-from catenary.solver.contact import ContactWire, Touches
+from catenary.mbs.bound import bound
+from catenary.solver import compliance, contact_kernels, kernels
+from catenary.solver.contact import ContactWire
+from catenary.solver.contact_kernels import TOUCH
 from catenary.solver.equilibrium import Equilibrium
 from catenary.solver.line_motion import LineMotion
 from catenary.solver.model import Model
@@ -81,7 +84,7 @@ class Interaction:
     Parameters
     ----------
     range_of_run : stretch of the contact wire that pan heads will touch [m]
-    n_contacts : number of strips that may touch the wire
+    contact_place : (n,) where strips may touch the wire [m], kept by reference
     train_speed : V of the convective part of the gap rate [m/s]
     uses_rate : whether the contact law needs the gap rate
     may_slacken : whether droppers slacken
@@ -94,7 +97,7 @@ class Interaction:
         form: Equilibrium,
         line: LineMotion,
         range_of_run: tuple[float, float],
-        n_contacts: int,
+        contact_place: np.ndarray,
         train_speed: float,
         uses_rate: bool,
         may_slacken: bool,
@@ -103,135 +106,97 @@ class Interaction:
         self.wire = ContactWire(model, form, line.ownership)
         self.droppers = Droppers(model, form, line)
         self._speed = train_speed
-        self._uses_rate = uses_rate
-        self._may_slacken = may_slacken
-        first, last = self.wire.nodes_between(*range_of_run)
-        self._first_node = first
-        dofs = self.wire.dofs[first:last].reshape(-1, 1)
-        at = np.repeat(self.wire.x[first:last], 2)
         # A force on an unknown that is held, at an anchor, moves nothing.
         free = np.ones(model.n_dofs)
         free[model.constrained] = 0.0
         self._free = free[line.ownership.first : line.ownership.last]
-        columns = compliance.compute(
-            comm, line.operators.solve_for, line.ownership, line.windows, dofs, free[dofs], at
-        )
-        # Both unknowns of a node share a window; their columns stand one after the other.
-        packed = columns.packed()
-        self._node_start = packed.start[0::2].copy()
-        self._node_offset = packed.offset[0::2].copy()
-        self._node_columns = packed.data
-        self._dropper_columns = compliance.ShortColumns(np.zeros(0, np.int64), []).packed()
+        node_columns = self._columns_of_nodes(comm, range_of_run, free)
+        dropper_columns = compliance.ShortColumns(np.zeros(0, np.int64), [])
         self.slack_coupling: SlackCoupling | None = None
         if may_slacken:
-            ends = model.dofs(model.mesh.droppers)
-            dropper_columns = compliance.compute(
-                comm,
-                line.operators.solve_for,
-                line.ownership,
-                line.windows,
-                ends,
-                np.broadcast_to(np.array([1.0, -1.0]), ends.shape),
-                model.mesh.x(model.mesh.droppers[:, 1]),
-            )
+            dropper_columns = self._columns_of_droppers(comm, model)
             self.slack_coupling = SlackCoupling(comm, model, self.droppers, dropper_columns, line)
-            self._dropper_columns = dropper_columns.packed()
-        shape = (n_contacts, line.ownership.n_local)
-        self._answers = np.zeros(shape)
-        self._filled = np.zeros((n_contacts, 2), dtype=np.int64)
-        self._slope_answers = np.zeros(shape if uses_rate else (n_contacts, 0))
-        self._slope_filled = np.zeros((n_contacts, 2), dtype=np.int64)
+        n, n_local = contact_place.size, line.ownership.n_local
+        self._contact_place = contact_place
+        self._touches = np.zeros(n, dtype=TOUCH)
+        self._answers = np.zeros((n, n_local))
+        self._slope_answers = np.zeros((n, n_local if uses_rate else 0))
+        self._place = bound(
+            contact_kernels.place,
+            contact_place,
+            self.wire.nodes,
+            node_columns,
+            self._touches,
+            self._answers,
+            self._slope_answers,
+        )
+        self._superposed = (
+            self._answers,
+            self._touches,
+            *dropper_columns.packed(),
+            line.motion.read,
+            line.motion.gains,
+        )
 
-    def place(self, touches: Touches) -> None:
-        """Work out the line's answer to a unit force at each touch."""
-        self._combine(touches.element, touches.whole_value, self._answers, self._filled)
-        if self._uses_rate:
-            self._combine(
-                touches.element, touches.whole_slope, self._slope_answers, self._slope_filled
-            )
+    def place(self) -> None:
+        """Look where the contacts are now, and work out the line's answer to a unit force at
+        each."""
+        self._place()
 
-    def heights(self, touches: Touches, height: np.ndarray, rate: np.ndarray) -> None:
-        """Fill in this rank's share of wire height [m] and its total rate [m/s] at each touch.
+    def locate(self) -> None:
+        """Look where the contacts are now, for heights and loads only."""
+        contact_kernels.locate(self._contact_place, self.wire.nodes, self._touches)
+
+    def heights(self, height: np.ndarray, rate: np.ndarray) -> None:
+        """Fill in this rank's share of wire height [m] and its total rate [m/s] at each contact.
 
         The total rate is what the pan head meets: dw/dt + V dw/dx. Shares add up over the ranks.
         """
-        kernels.heights(
-            self.line.motion.read,
-            touches.local,
-            touches.value,
-            touches.slope,
-            touches.rest,
-            self._speed,
-            height,
-            rate,
-        )
+        contact_kernels.heights(self.line.motion.read, self._touches, self._speed, height, rate)
 
-    def respond(
-        self, touches: Touches, force_bound: np.ndarray, margin: float, response: LineResponse
-    ) -> None:
-        """Fill in this rank's share of the inner problem, after ``place`` and the free solve.
+    def responder(self, response: LineResponse) -> Callable[[], None]:
+        """What fills in this rank's share of the inner problem, after ``place`` and the free solve.
 
-        The line must hold the end of the step without contact forces and with all droppers taut,
-        and the droppers their tension there, as a free step leaves them.
-        Droppers are included if their tension may fall below ``margin`` [N] under contact
-        forces up to ``force_bound`` (n,) [N].
+        The line must then hold the end of the step without contact forces and with all droppers
+        taut, and the droppers their tension there, as a free step leaves them. Droppers are
+        included if their tension may fall below the response's margin under contact forces up to
+        its limits.
         """
         line, droppers = self.line, self.droppers
-        count = kernels.respond(
+        return bound(
+            contact_kernels.respond,
             line.motion.read,
-            touches.local,
-            touches.value,
-            touches.slope,
-            touches.rest,
-            touches.x,
+            self._touches,
             self._speed,
-            self._answers,
-            self._slope_answers,
-            self._uses_rate,
             line.position_factor,
             line.velocity_factor,
             line.windows.reach,
-            force_bound,
-            margin,
+            self._answers,
+            self._slope_answers,
+            response.limits,
             droppers.numbers,
             droppers.ends,
             droppers.laws,
-            self._may_slacken,
             droppers.latest_tension,
-            response.height,
-            response.rate,
-            response.height_by_force,
-            response.rate_by_force,
+            response.summed,
             response.rows,
         )
-        response.put_count(count)
 
     def superpose(
         self, contact_force: np.ndarray, droppers: np.ndarray, compensation: np.ndarray
     ) -> None:
         """Add the answer to contact forces (n,) and compensations (m,) [N] to the line's state."""
-        line, columns = self.line, self._dropper_columns
-        kernels.superpose(
-            contact_force,
-            self._answers,
-            self._filled,
-            droppers,
-            compensation,
-            columns.start,
-            columns.offset,
-            columns.data,
-            line.motion.read,
-            line.motion.gains,
-        )
+        contact_kernels.superpose(contact_force, droppers, compensation, *self._superposed)
 
     def loads(
-        self, touches: Touches, contact_force: np.ndarray, compensation: np.ndarray
+        self, contact_force: np.ndarray, compensation: np.ndarray
     ) -> list[tuple[np.ndarray, np.ndarray]]:
         """Local unknowns and forces of contacts (n,) and of all owned droppers' compensations."""
         result = []
         if self.line.ownership.n_local == 0:
             return []
-        for local, value, force in zip(touches.local, touches.value, contact_force, strict=True):
+        for touch, force in zip(self._touches, contact_force, strict=True):
+            local, value = touch["local"], touch["value"]
             if force:
                 result.append((local, force * value * self._free[local]))
         slack = np.flatnonzero(compensation)
@@ -241,18 +206,37 @@ class Interaction:
             result.append((lower, compensation[slack]))
         return result
 
-    def _combine(
-        self, elements: np.ndarray, weights: np.ndarray, answers: np.ndarray, filled: np.ndarray
-    ) -> None:
-        kernels.combine(
-            elements,
-            weights,
-            self._first_node,
-            self._node_start,
-            self._node_offset,
-            self._node_columns,
-            answers,
-            filled,
+    def _columns_of_nodes(
+        self, comm: Any, range_of_run: tuple[float, float], free: np.ndarray
+    ) -> np.ndarray:
+        """Columns of A^-1 for the nodes in a stretch of the wire, which are told where theirs are.
+
+        Collective; ``free`` (n_dofs,) is zero for the unknowns that are held.
+        """
+        line = self.line
+        first, last = self.wire.nodes_between(*range_of_run)
+        dofs = self.wire.dofs[first:last].reshape(-1, 1)
+        at = np.repeat(self.wire.x[first:last], 2)
+        packed = compliance.compute(
+            comm, line.operators.solve_for, line.ownership, line.windows, dofs, free[dofs], at
+        ).packed()
+        # Both unknowns of a node share a window; their columns stand one after the other.
+        nodes, offset = self.wire.nodes[first:last], packed.offset[0::2]
+        nodes["begin"], nodes["at"] = packed.start[0::2], offset[:-1]
+        nodes["width"] = np.diff(offset) // 2
+        return packed.data
+
+    def _columns_of_droppers(self, comm: Any, model: Model) -> compliance.ShortColumns:
+        """Columns of A^-1 for unit compensations of all droppers. Collective."""
+        line, ends = self.line, model.dofs(model.mesh.droppers)
+        return compliance.compute(
+            comm,
+            line.operators.solve_for,
+            line.ownership,
+            line.windows,
+            ends,
+            np.broadcast_to(np.array([1.0, -1.0]), ends.shape),
+            model.mesh.x(model.mesh.droppers[:, 1]),
         )
 
 
@@ -263,7 +247,6 @@ class SlackCoupling:
 
     Attributes
     ----------
-    n_droppers : of the whole line
     band : (n_droppers, 2 half + 1): ``band[e, d - e + half]`` is G_de; None on other ranks
     """
 
@@ -295,4 +278,3 @@ class SlackCoupling:
             band[e, offset[inside]] = (droppers.per_acceleration[near] * spread)[inside]
             scratch[filled] = 0.0
         self.band = comm.reduce(band, root=0) if comm.size > 1 else band
-        self.n_droppers = n

@@ -16,6 +16,7 @@ from petsc4py import PETSc
 
 from catenary.solver import (
     aligned,
+    contact_kernels,
     inner_kernels,
     kernels,
     repeated_rows,
@@ -55,6 +56,7 @@ class LineMotion(ABC):
         velocity_factor: float,
     ) -> None:
         kernels.warm_up()
+        contact_kernels.warm_up()
         inner_kernels.warm_up()
         repeated_rows.warm_up()
         station_blocks.warm_up()

@@ -112,7 +112,7 @@ class LineOperators:
             if comm.size > 1 and comm.rank == 0 and wants_view():
                 self._solver.view()  # one for all; on one rank PETSc shows it at its first solve
             self._solver.hurry()
-        self._stiffness = self._product_by_kinds()
+        self._rows_by_kinds("stiffness")  # that no step has to wait for them
 
     def passes(self, motion: MotionAhead, steps: Steps) -> StationPasses | None:
         """Free steps of Newmark's method in two passes over a motion, if they can be.
@@ -121,7 +121,7 @@ class LineOperators:
 
         For that the operator is to be factored and multiplied by stations. Not collective.
         """
-        stiffness, solver = self._stiffness, self._solver
+        stiffness, solver = self._rows_by_kinds("stiffness"), self._solver
         if not (isinstance(stiffness, StationProduct) and isinstance(solver, PartSolver)):
             return None
         if solver.factors is None or not self._is_direct:
@@ -136,13 +136,7 @@ class LineOperators:
     def multiply_stiffness(self) -> None:
         """Make K ``factor`` the internal force. Right after ``exchange``. Not collective."""
         self._product_event.begin()
-        stiffness = self._stiffness
-        if isinstance(stiffness, StationProduct):
-            stiffness.multiply(self._read_padded, self._force.array)
-        elif stiffness is not None:
-            stiffness.multiply(self._read_array, self._force.array)
-        elif self.domain.size:
-            self._product("stiffness").mult(self._read, self._force_here)
+        self._multiply("stiffness", self._force.array, self._force_here)
         self._product_event.end()
 
     def add_damping(self) -> None:
@@ -196,7 +190,7 @@ class LineOperators:
         self.exchange()
         local = 0.0
         if self.domain.size:
-            self._product(name).mult(self._read, self._loaded_here)
+            self._multiply(name, self._loaded.array, self._loaded_here)
             local = float(self._loaded.array[self.domain.owned] @ self.factor)
         return float(self._comm.allreduce(local))
 
@@ -300,6 +294,7 @@ class LineOperators:
         self._read_domain = read_domain.vector
         self._vectors = (*here, *(pair.vector for pair in solved))
         self._products: dict[str, PETSc.Mat] = {}
+        self._by_kinds: dict[str, StationProduct | RepeatedRows | None] = {}
         self.factor, self.answer = read[domain.owned_of_read], answer[domain.owned]
         self._halo = Halo(self._comm, own, read_low, read)
         self._loaded_halo = Halo(self._comm, own, low, loaded)
@@ -311,13 +306,29 @@ class LineOperators:
             self._products[name] = as_petsc(rows, PETSc.COMM_SELF)
         return self._products[name]
 
-    def _product_by_kinds(self) -> StationProduct | RepeatedRows | None:
-        """Products with K that read each kind of rows once, by the fastest way that it allows."""
-        domain, product = self.domain, None
-        if self._in_stations and domain.size:
-            first = (domain.low - domain.read_low) // self._block
-            product = station_product(self._rows_of("stiffness", self._block), first)
-        return product or repeated_rows(self._rows_of("stiffness", self._model.block_size))
+    def _multiply(self, name: str, result: np.ndarray, wrapped: PETSc.Vec) -> None:
+        """Make ``result``, and the vector around it, the product of M or K with what is read."""
+        by_kinds = self._rows_by_kinds(name)
+        if isinstance(by_kinds, StationProduct):
+            by_kinds.multiply(self._read_padded, result)
+        elif by_kinds is not None:
+            by_kinds.multiply(self._read_array, result)
+        elif self.domain.size:
+            self._product(name).mult(self._read, wrapped)
+
+    def _rows_by_kinds(self, name: str) -> StationProduct | RepeatedRows | None:
+        """Products with M or K that read each kind of rows once, by the fastest way that it allows.
+
+        Made when they are first asked for.
+        """
+        if name not in self._by_kinds:
+            domain, product = self.domain, None
+            if self._in_stations and domain.size:
+                first = (domain.low - domain.read_low) // self._block
+                product = station_product(self._rows_of(name, self._block), first)
+            rows = product or repeated_rows(self._rows_of(name, self._model.block_size))
+            self._by_kinds[name] = rows
+        return self._by_kinds[name]
 
     def _rows_of(self, name: str, block: int) -> sparse.bsr_matrix:
         domain = self.domain

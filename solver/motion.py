@@ -14,6 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.solver import kernels
+
 
 class Steps(NamedTuple):
     """What a step of Newmark's method is made of; see ``kernels.predict`` and ``correct``."""
@@ -115,17 +117,15 @@ class MotionAhead(Motion):
     @property
     def displacement(self) -> np.ndarray:
         """At the end of the latest step (n_local,) [m]; overwritten when asked for again."""
-        x, y, z, shares = self.read
-        np.multiply(x, shares[0], out=self._shown)
-        self._shown += shares[1] * y
-        self._shown += shares[2] * z
+        kernels.displacements(self.read, self._shown)
         return self._shown
 
     @property
     def velocity(self) -> np.ndarray:
         """At the end of the latest step (n_local,) [m/s]; a new array."""
-        _, y, z, shares = self.read
-        return np.asarray(y + shares[4] * z)
+        velocity = np.empty_like(self._shown)
+        kernels.velocities(self.read, velocity)
+        return velocity
 
     def put(self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:
         """Take a state, (n_local,) each."""

@@ -8,7 +8,6 @@ import numpy as np
 
 from catenary.solver import kernels
 from catenary.solver.distribution import Ownership
-from catenary.solver.events import event
 from catenary.solver.line_motion import LineMotion
 from catenary.solver.line_operators import Loads
 from catenary.solver.model import Model
@@ -28,7 +27,6 @@ class NewmarkLine(LineMotion):
         self._dt = dt
         self._predict_position = 0.5 * dt**2 * (1.0 - 2.0 * beta)
         self._predict_velocity = dt * (1.0 - gamma)
-        self._forth, self._back = event("LineForth"), event("LineBack")
 
     def keep_ahead(self) -> None:
         """Keep the state one prediction ahead from now on, if the operators allow it.
@@ -75,14 +73,9 @@ class NewmarkLine(LineMotion):
             super().free_step(loads)
             return
         assert loads is None
-        self._forth.begin()
         if self._comm.size > 1:
             self.operators.exchange()
-        passes.forth()
-        self._forth.end()
-        self._back.begin()
-        passes.back()
-        self._back.end()
+        passes.step()
 
     def look_at(self, ends: np.ndarray, laws: np.ndarray, tension: np.ndarray) -> None:
         """Fill ``tension`` at the end of each ``free_step``; see ``LineMotion``."""

@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from catenary.solver import inner_kernels
-from catenary.solver.contact import Touches
 from catenary.solver.coupling import Coupling
 from catenary.solver.errors import RunBroken
 from catenary.solver.events import NAMES, event
@@ -25,6 +23,8 @@ from catenary.solver.schemes import Counters, Judge, LoadSource, StepRejected
 # a step shows that they were too small, and that step is repeated.
 _FIRST_MARGIN = 5.0
 _FIRST_BOUND = 200.0
+# Below it is no tension: no dropper is told of, but for one that is not finite.
+_NO_MARGIN = -np.finfo(float).max
 
 
 @dataclass
@@ -45,25 +45,28 @@ class OneSolve:
 
     def __post_init__(self) -> None:
         n = self.pantographs.n_contacts
-        self._exchange = Exchange(self.comm, n, self.coupling.extrapolates)
-        self._margin = _FIRST_MARGIN
-        self._bound = np.full(n, _FIRST_BOUND)
+        slackens = self.interaction.slack_coupling is not None
+        self._limits = np.append(
+            np.full(n, _FIRST_BOUND), _FIRST_MARGIN if slackens else _NO_MARGIN
+        )
+        self._exchange = Exchange(self.comm, n, self.coupling.extrapolates, self._limits)
+        self._respond = self.interaction.responder(self._exchange.share)
         self._none = np.zeros(n)
-        self._drop = np.zeros(0)
-        if self.interaction.slack_coupling is not None:
-            self._drop = np.zeros(self.interaction.slack_coupling.n_droppers)
         self._found: InnerSolution | None = None
         self._why: RunBroken | None = None
         self._events = {name: event(name) for name in NAMES}
 
     def step(self, time: float, stop: bool) -> bool:
         line, interaction, events = self.interaction.line, self.interaction, self._events
+        events["LineColumns"].begin()
+        self.pantographs.move_to(time)
+        interaction.place()
+        events["LineColumns"].end()
         events["LineFree"].begin()
-        touches = self.pantographs.move_to(time)
         if self.coupling.extrapolates:
             line.predict()
             share = self._exchange.share
-            interaction.heights(touches, share.early_height, share.early_rate)
+            interaction.heights(share.early_height, share.early_rate)
             line.free_acceleration(self.loads(time))
             line.correct()
             interaction.droppers.tension()
@@ -71,10 +74,7 @@ class OneSolve:
             line.free_step(self.loads(time))
         # From here on the line holds the end of the step without contacts and slack droppers.
         events["LineFree"].end()
-        events["LineColumns"].begin()
-        interaction.place(touches)
-        events["LineColumns"].end()
-        reply = self._solve_inner(time, stop, touches)
+        reply = self._solve_inner(time, stop)
         if self.judge is not None:
             self.judge.hear(reply.level)
             if reply.verdict == Verdict.REJECT:
@@ -115,7 +115,7 @@ class OneSolve:
     def destroy(self) -> None:
         """Nothing: there are no PETSc objects of its own."""
 
-    def _solve_inner(self, time: float, stop: bool, touches: Touches) -> Reply:
+    def _solve_inner(self, time: float, stop: bool) -> Reply:
         exchange, interaction, events = self._exchange, self.interaction, self._events
         events["ContactInner"].begin()
         heads = self._heads(time) if self.comm.rank == 0 else None
@@ -123,29 +123,25 @@ class OneSolve:
         while True:
             share = exchange.share
             events["ContactShare"].begin()
-            interaction.respond(touches, self._bound, self._margin, share)
+            self._respond()
             events["ContactShare"].end()
             share.put_stop(stop)
-            events["ContactReduce"].begin()
             merged = exchange.to_root()
-            events["ContactReduce"].end()
             answer = None
             if merged is not None:
                 events["ContactInner"].begin()
                 answer = self._answer(time, merged, heads)
                 events["ContactInner"].end()
-            events["ContactReply"].begin()
             reply = exchange.from_root(answer)
-            events["ContactReply"].end()
             if reply.verdict == Verdict.BROKEN:
                 raise self._broken()
             if reply.verdict == Verdict.ENLARGE:
                 early = share.early_height.copy(), share.early_rate.copy()
                 exchange.enlarge(2 * reply.room)
+                self._respond = interaction.responder(exchange.share)
                 exchange.share.early_height[:], exchange.share.early_rate[:] = early
             elif reply.verdict == Verdict.REPEAT:
-                self._margin *= 2.0
-                self._bound *= 2.0
+                self._limits *= 2.0
                 self.counters.repeated_steps += 1
             else:
                 return reply
@@ -184,7 +180,7 @@ class OneSolve:
         law, level = self.coupling.law, 0
         try:
             found = self.coupling.solve(response, heads)
-            if self._left_out(response, found):
+            if not found.complete:
                 return Reply(Verdict.REPEAT, self._none)
             if self.judge is not None:
                 yielding = heads.height_compliance.diagonal() + response.height_by_force.diagonal()
@@ -202,30 +198,15 @@ class OneSolve:
         self.counters.pivoted_steps += found.pivoted
         verdict = Verdict.ADVANCE_AND_STOP if wants_to_stop else Verdict.ADVANCE
         slack = found.compensation
-        if not slack.size:
+        n_slack = np.count_nonzero(slack)
+        if not n_slack:
             return Reply(verdict, found.contact_force, level=level)
-        pushed = slack != 0.0
-        self.counters.slack_dropper_steps += int(pushed.sum())
-        droppers = response.droppers[pushed]
-        return Reply(verdict, found.contact_force, droppers, slack[pushed], level=level)
-
-    def _left_out(self, response: LineResponse, found: InnerSolution) -> bool:
-        """Whether a dropper without a row may have gone slack: margin or bound were too small."""
-        coupling, slack = self.interaction.slack_coupling, found.compensation
-        if coupling is None:
-            return False
-        return bool(
-            inner_kernels.leaves_out(
-                found.contact_force,
-                self._bound,
-                response.rows,
-                slack.size,
-                slack,
-                coupling.band,
-                self._margin,
-                self._drop,
-            )
-        )
+        self.counters.slack_dropper_steps += n_slack
+        droppers = response.droppers
+        if n_slack < slack.size:
+            pushed = slack != 0.0
+            droppers, slack = droppers[pushed], slack[pushed]
+        return Reply(verdict, found.contact_force, droppers, slack, level=level)
 
 
 def _alone(error: RunBroken) -> RunBroken:

@@ -10,14 +10,15 @@ import numpy as np
 from scipy import integrate
 
 from catenary.mbs.base_motion import BaseMotion
+from catenary.mbs.bound import bound
 from catenary.mbs.build import Operation, has_joints, make_pantograph, roll_of
 from catenary.mbs.full import FullPantograph
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lateral import LateralPath
 from catenary.mbs.lowering import LoweredPantograph
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.solver import inner_kernels
-from catenary.solver.contact import ContactWire, Touches
+from catenary.solver import inner_kernels, kernels
+from catenary.solver.contact import ContactWire
 from catenary.solver.contact_laws import KinematicLaw
 from catenary.solver.equilibrium import Elasticity, Equilibrium
 from catenary.solver.heads import Heads
@@ -36,6 +37,8 @@ class Pantographs:
     Attributes
     ----------
     models : the models on rank 0, empty elsewhere
+    n_contacts : number of strips that may touch the wire
+    contact_place : (n_contacts,) of these along the track [m], all ranks
     position : (n,) of the pantographs along the track [m], all ranks
     contact_force, head_height, wire_height : (n,) after the latest step, rank 0 only: the sum over
         a pantograph's strips, and their means
@@ -67,17 +70,23 @@ class Pantographs:
         ends = np.cumsum([0, *counts])
         self._strips = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
         self._ends = ends.astype(np.int64)
-        self._contact_start = np.repeat(self._start, counts) + np.concatenate(offsets)
-        self._touches = Touches(self.n_contacts)
-        self._touches.x[:] = self._contact_start
+        contact_start = np.repeat(self._start, counts) + np.concatenate(offsets)
+        # Places of contacts and of pantographs move together, in one sum.
+        self.n_contacts = contact_start.size
+        self._all_start = np.concatenate([contact_start, self._start])
         sizes = (self.n, 3 * self.n, self.n_contacts, self.n)
-        self.told = np.zeros(sum(sizes))
+        places_and_told = np.zeros(self.n_contacts + sum(sizes))
+        self._all_places = places_and_told[: self._all_start.size]
+        self._move = bound(kernels.shift, self._all_start, self._all_places, later=(0.0,))
+        self.contact_place = places_and_told[: self.n_contacts]
+        self.told = places_and_told[self.n_contacts :]
         self.position, forces, self.strip_force, self.constraint_violation = np.split(
             self.told, np.cumsum(sizes)[:-1]
         )
-        self.position[:] = self._start
-        self._told = forces.reshape(3, self.n)
-        self.contact_force, self.head_height, self.wire_height = self._told
+        self._all_places[:] = self._all_start
+        self.contact_force, self.head_height, self.wire_height = forces.reshape(3, self.n)
+        # Those of them that a step fills after its forces are known.
+        self._of_step = self.told[self.n : 4 * self.n + self.n_contacts]
         self.wire_height[:] = wire.rest_height(self._start)
         self.head_height[:] = self.wire_height - train.start_below
         self._heads = Heads(self.n_contacts)
@@ -96,22 +105,14 @@ class Pantographs:
         """Number of strips of each pantograph."""
         return tuple(strips.stop - strips.start for strips in self._strips)
 
-    @property
-    def n_contacts(self) -> int:
-        """Number of strips that may touch the wire."""
-        return int(self._contact_start.size)
-
-    def move_to(self, time: float) -> Touches:
-        """Move the contacts to where they are at ``time`` [s]; their places on the wire."""
-        way = self._speed * time
-        np.add(self._start, way, out=self.position)
-        self._wire.locate(self._contact_start, way, self._touches)
-        return self._touches
+    def move_to(self, time: float) -> None:
+        """Move pantographs and contacts to where they are at ``time`` [s]."""
+        self._move(self._speed * time)
 
     def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Heights and velocities (n_contacts,) at ``time`` from the motion alone. Rank 0 only."""
         height, velocity = np.empty(self.n_contacts), np.empty(self.n_contacts)
-        for model, strips in zip(self.models, self._strips, strict=True):
+        for model, strips in self._models_with_strips:
             height[strips], velocity[strips] = model.extrapolate(time)
         return height, velocity
 
@@ -120,7 +121,7 @@ class Pantographs:
         if len(self.models) == 1:
             self._heads.adopt(self.models[0].predict(time))
             return self._heads
-        for model, strips in zip(self.models, self._strips, strict=True):
+        for model, strips in self._models_with_strips:
             self._heads.put(strips, model.predict(time))
         return self._heads
 
@@ -129,20 +130,12 @@ class Pantographs:
 
         ``reported`` is what of the forces counts as contact force in the records.
         """
-        heads = self._heads
-        for model, strips in zip(self.models, self._strips, strict=True):
+        for model, strips in self._models_with_strips:
             model.advance(contact_force[strips])
         if self.joints_in_loop:
             self.look_at_joints()
-        self.strip_force[:] = reported
         inner_kernels.tell(
-            contact_force,
-            reported,
-            heads.height,
-            heads.height_compliance,
-            depth,
-            self._ends,
-            self._told,
+            contact_force, reported, self._heads.numbers, depth, self._ends, self._of_step
         )
 
     def look_at_joints(self) -> None:
@@ -167,6 +160,7 @@ class Pantographs:
             model = self._make(problem, placement, nominal_height(placement))
             model.place(float(self.head_height[number]), float(velocity[number]))
             self.models.append(model)
+        self._models_with_strips = list(zip(self.models, self._strips, strict=True))
         self.look_at_joints()
 
     def _make(self, problem: Problem, placement: Placement, nominal_height: float) -> Pantograph:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.inner_kernels import COUPLINGS, NUMBER, TENSION
+from catenary.solver.inner_kernels import COUPLINGS, FLAGS, NUMBER, TENSION
 
 
 class LineResponse:
@@ -17,6 +17,8 @@ class LineResponse:
     height_by_force, rate_by_force : (n, n) B [m/N] and its rate [m/(N s)]
     answers : (2 n + 2 n^2,) these four one after the other
     early_height, early_rate : (n,) what the line's motion extrapolates to, or (0,) if not asked
+    limits : (n + 1,) contact forces [N], and a margin [N] that slack droppers may take off others:
+        whatever goes slack within them has a row; kept by reference
     rows : (capacity, 2 + 3 n): number of a dropper, tension T0 [N], and for the contacts Q [-], P
         [m/N] and the rate of P [m/(N s)]
 
@@ -24,20 +26,28 @@ class LineResponse:
     ----------
     n_contacts, capacity : how many contacts and droppers there is room for
     early : whether there is room for what the motion extrapolates to
+    limits : there are none if left out
     """
 
-    def __init__(self, n_contacts: int, capacity: int, early: bool = False) -> None:
+    def __init__(
+        self,
+        n_contacts: int,
+        capacity: int,
+        early: bool = False,
+        limits: np.ndarray | None = None,
+    ) -> None:
         n, n_early = n_contacts, n_contacts if early else 0
         self.n_contacts, self.capacity = n, capacity
-        sizes = (4, n, n, n * n, n * n, n_early, n_early)
+        sizes = (FLAGS, n, n, n * n, n * n, n_early, n_early)
         self.summed = np.zeros(sum(sizes))
         parts = np.split(self.summed, np.cumsum(sizes)[:-1])
         self._flags, self.height, self.rate = parts[:3]
         self.height_by_force = parts[3].reshape(n, n)
         self.rate_by_force = parts[4].reshape(n, n)
-        self.answers = self.summed[4 : 4 + 2 * n * (1 + n)]
+        self.answers = self.summed[FLAGS : FLAGS + 2 * n * (1 + n)]
         self.early_height, self.early_rate = parts[5:]
         self.rows = np.zeros((capacity, COUPLINGS + 3 * n))
+        self.limits = np.full(n + 1, np.inf) if limits is None else limits
 
     @property
     def count(self) -> int:
@@ -50,14 +60,6 @@ class LineResponse:
         one holds something that is no number, and for how many droppers one had no room."""
         count, stop, broken, missing = self._flags.tolist()
         return count, stop, broken, missing
-
-    def put_count(self, count: int) -> None:
-        """Say how many droppers may slacken, -1 if something is no number here.
-
-        Beyond ``capacity`` they have no row.
-        """
-        missing = count if count > self.capacity else 0
-        self._flags[0], self._flags[2:] = min(max(count, 0), self.capacity), (count < 0, missing)
 
     def put_stop(self, stop: bool) -> None:
         """Say whether this rank wants this step to be the last."""

@@ -80,7 +80,7 @@ class SetUp:
             self.form,
             line,
             (train.start - trailing - reach[0], train.end + reach[1]),
-            sum(len(placement.data.strip_offsets) for placement in train.placements),
+            pantographs.contact_place,
             train.speed,
             uses_rate,
             "dropper_slackening" in on,

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from catenary.mbs.bound import bound
 from catenary.solver import kernels
 from catenary.solver.changed_line import ChangedLine
 from catenary.solver.equilibrium import Equilibrium
@@ -73,6 +74,17 @@ class Showing:
             constraint_violation=pantographs.constraint_violation,
         )
 
+        self._show = bound(
+            kernels.show,
+            self._line.motion.read,
+            self._arm_rows,
+            interaction.droppers.shown_ends,
+            interaction.droppers.shown_laws,
+            self._pushed_share,
+            self._view.arm_uplift,
+            self._view.dropper_force,
+        )
+
     def stage(self, dt: float, start_time: float, n_steps: int) -> Stage:
         """What stays the same for the whole run."""
         mesh = self._model.mesh
@@ -98,16 +110,7 @@ class Showing:
         view, told = self._view, self._pantographs.told
         view.step, view.time = step, time
         view.row[: told.size] = told
-        line, droppers = self._line, self._interaction.droppers
-        kernels.show(
-            line.motion.read,
-            self._arm_rows,
-            droppers.shown_ends,
-            droppers.shown_laws,
-            self._pushed_share,
-            view.arm_uplift,
-            view.dropper_force,
-        )
+        self._show()
         return view
 
     def restore(self, checkpoint: dict[str, Any]) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from catenary.mbs.bound import bound
 from catenary.solver.fours import add_scaled, load, store, zero
 from catenary.solver.kernels import compiled, in_line, tension_of
 from catenary.solver.motion import MotionAhead, Steps
@@ -34,7 +35,7 @@ class StationPasses:
     product : with K
     factors : of the step operator
     read : what ``product`` reads; the rank's own part is x of the motion, and what others have of
-        it is there before ``forth``
+        it is there before a step
     answer : (4 n,) of all that is solved for; the rank's own part is the acceleration
     motion : of the rank's own stations
     steps : those that the motion is kept for
@@ -55,21 +56,17 @@ class StationPasses:
         by_position, by_velocity = map(float, motion.gains)
         changes = steps.dt, by_position, by_velocity, steps.damping_share
         self._own = low, high
-        self._forth = multiplied, factored, answer
-        self._back = factored, motion.read, answer, changes
+        self._parts = multiplied, factored, answer, motion.read, changes
         self.look_at(np.zeros((0, 2), np.int64), np.zeros((0, 4)), np.zeros(0))
 
-    def forth(self) -> None:
-        """Multiply and eliminate."""
-        forth(*self._forth)
-
     def look_at(self, ends: np.ndarray, laws: np.ndarray, tension: np.ndarray) -> None:
-        """Fill ``tension`` on the way ``back``, as ``LineMotion.look_at``."""
-        self._droppers = ends, laws, tension, pulled(*self._own, ends)
+        """Fill ``tension`` on the way back, as ``LineMotion.look_at``."""
+        droppers = ends, laws, tension, pulled(*self._own, ends)
+        self._step = bound(forth_and_back, *self._parts, droppers)
 
-    def back(self) -> None:
+    def step(self) -> None:
         """Find the accelerations and what the next step starts from."""
-        back(*self._back, self._droppers)
+        self._step()
 
 
 # Kernels take what belongs together as tuples, named as in ``StationPasses``.
@@ -185,6 +182,13 @@ def back(factored, motion, answer, changes, droppers):
     substitute_outside(kinds, blocks, low, high, x, y, answer)
 
 
+@compiled
+def forth_and_back(multiplied, factored, answer, motion, changes, droppers):
+    """Both passes."""
+    forth(multiplied, factored, answer)
+    back(factored, motion, answer, changes, droppers)
+
+
 def warm_up() -> None:
     """Compile the kernels, or load them from Numba's cache, before the clock of a march starts."""
     kinds, station = np.zeros(1, dtype=np.int32), np.zeros(BLOCK)
@@ -194,5 +198,4 @@ def warm_up() -> None:
     own = read[BLOCK : 2 * BLOCK]
     motion = MotionAhead(own, station.copy(), station, station.copy(), steps)
     passes = StationPasses(product, factors, read, station, motion, steps)
-    passes.forth()
-    passes.back()
+    passes.step()

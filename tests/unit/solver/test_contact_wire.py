@@ -10,7 +10,8 @@ import pytest
 from measuring import march
 from small_lines import HANGING, WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 
-from catenary.solver.contact import ContactWire, Touches
+from catenary.solver import contact_kernels
+from catenary.solver.contact import ContactWire
 from catenary.solver.distribution import distribute
 from catenary.solver.equilibrium import find_form
 
@@ -24,38 +25,43 @@ def wire() -> ContactWire:
     return ContactWire(model, form, distribute(model, 1, 0))
 
 
-def located(wire: ContactWire, x: np.ndarray) -> Touches:
-    touches = Touches(x.size)
-    wire.locate(x - 0.25, 0.25, touches)
-    return touches
-
-
 def test_positions_fall_into_the_elements_that_hold_them(wire: ContactWire) -> None:
     x = np.linspace(0.0, wire.x[-1], 997)
-    touches = located(wire, x)
-    assert (wire.x[touches.element] <= x).all()
-    assert (x <= wire.x[touches.element + 1]).all()
+    touches = wire.touches(x)
+    assert (wire.x[touches["element"]] <= x).all()
+    assert (x <= wire.x[touches["element"] + 1]).all()
     # A node belongs to the element that it ends, the first one to the first element.
-    at_nodes = located(wire, wire.x)
-    assert np.array_equal(at_nodes.element, np.maximum(np.arange(wire.x.size) - 1, 0))
+    at_nodes = wire.touches(wire.x)
+    assert np.array_equal(at_nodes["element"], np.maximum(np.arange(wire.x.size) - 1, 0))
+
+
+def test_places_are_found_from_wherever_a_contact_was_before(wire: ContactWire) -> None:
+    """A step mostly stays in its element; a start, a restart or a shorter step need not."""
+    for x in (0.0, 110.0, 3.0, wire.x[7], wire.x[-1] + 1.0, wire.x[-1], wire.x[6], -1.0):
+        place = np.array([x])
+        moved = wire.touches(np.array([57.0]))
+        contact_kernels.locate(place, wire.nodes, moved)
+        assert moved.tobytes() == wire.touches(place).tobytes()
+        expected = np.clip(np.searchsorted(wire.x, x) - 1, 0, wire.x.size - 2)
+        assert moved["element"][0] == expected
 
 
 def test_slopes_are_the_derivatives_of_the_values(wire: ContactWire) -> None:
     """Central differences over 2 mm: error h^2 / 6 of a cubic's third derivative, 12 / l^3."""
     step = 1e-3
     middle = (wire.x[:-1] + wire.x[1:]) / 2 + 0.1
-    before, at, after = (located(wire, middle + shift) for shift in (-step, 0.0, step))
-    difference = (after.whole_value - before.whole_value) / (2 * step)
+    before, at, after = (wire.touches(middle + shift) for shift in (-step, 0.0, step))
+    difference = (after["whole_value"] - before["whole_value"]) / (2 * step)
     shortest = np.diff(wire.x).min()
     round_off = 4 * EPS * wire.x[-1] / (shortest * step)
     error = step**2 / 6 * 12 / shortest**3 + round_off
-    assert np.abs(difference - at.whole_slope).max() < error
-    assert np.array_equal(at.value, at.whole_value)  # one rank owns everything
+    assert np.abs(difference - at["whole_slope"]).max() < error
+    assert np.array_equal(at["value"], at["whole_value"])  # one rank owns everything
 
 
 def test_height_at_rest_is_continuous_and_that_of_the_nodes(wire: ContactWire) -> None:
-    before, after = located(wire, wire.x[1:-1] - 1e-9), located(wire, wire.x[1:-1] + 1e-9)
-    heights = [(t.whole_value * t.rest).sum(axis=1) for t in (before, after)]
+    before, after = wire.touches(wire.x[1:-1] - 1e-9), wire.touches(wire.x[1:-1] + 1e-9)
+    heights = [(t["whole_value"] * t["rest"]).sum(axis=1) for t in (before, after)]
     # 2 nm further along a slope below 1/10.
     assert np.abs(heights[1] - heights[0]).max() < 2e-10 + 16 * EPS * LINE.contact_height
 
@@ -69,7 +75,7 @@ def test_a_run_that_ends_at_a_node_stays_within_its_stretch(wire: ContactWire) -
                 start = node - speed * n_steps * dt
                 at_end = start + speed * (n_steps * dt)
                 first, last = wire.nodes_between(start, node)
-                element = int(located(wire, np.array([at_end])).element[0])
+                element = int(wire.touches(np.array([at_end]))["element"][0])
                 passed += at_end > node
                 outside += not first <= element < last - 1
     print(f"{passed} positions pass the end by round-off")

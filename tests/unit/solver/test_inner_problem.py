@@ -87,7 +87,7 @@ def make_case(
     line.height[:], line.rate[:] = rng.normal(size=(2, n))
     line.height_by_force[:] = position * among_contacts
     line.rate_by_force[:] = velocity * among_contacts
-    line.put_count(m)
+    line.summed[0] = m
     line.rows[:, 0], line.rows[:, 1] = np.arange(m), rng.normal(size=m)
     line.couplings(0)[:] = per_acceleration[:, None] * between
     line.couplings(1)[:] = position * between
@@ -148,7 +148,7 @@ def test_a_problem_that_cycles_is_handed_to_the_pivoting() -> None:
     matrix = np.array([[1.0, -3.0, 2.0], [3.0, 1.0, 0.0], [-3.0, -2.0, 1.0]])
     right = np.array([1.0, -2.0, 3.0])
     line = LineResponse(0, 3)
-    line.put_count(3)
+    line.summed[0] = 3
     line.rows[:, 0], line.rows[:, 1] = np.arange(3), -right
     law = LinearInSteps(LinearLaw(1.0, 0.0), 0, pulls=False)
     found = InnerProblem(law, 0.0, band_of(np.eye(3) - matrix)).solve(line, Heads(0))
@@ -225,7 +225,7 @@ def test_contacts_beside_droppers_that_lost_much_find_their_force() -> None:
         [4.166943311109159e-03, 1.877413449708056e-10],
         [-4.178905455472464e-06, 3.993942428118032e-03],
     ]
-    line.put_count(4)
+    line.summed[0] = 4
     line.rows[:] = [
         [0, -3.2008731e6, -9.9e-8, -4.8402539e-5, -1.31e-13, -6.4280368e-11, -7.8e-15, -6.85045e-9],
         [1, -3.8134575e6, -5.63e-4, -1.12034647e-1, -7.475e-10, -1.48786168e-7, -4.499e-10,

@@ -52,8 +52,7 @@ def test_passes_take_the_steps_of_their_parts(n_own: int, before: int, after: in
     motion.put(displacement, velocity, answer[own].copy())
     passes = StationPasses(product, factors, read, answer, motion, STEPS)
     passes.look_at(ends, LAWS[: len(ends)], tension)
-    passes.forth()
-    passes.back()
+    passes.step()
     found = motion.displacement, motion.velocity, answer[own], tension
     plain = Motion(*expected, (0.0, 0.0)).read
     kernels.tension(plain, ends, LAWS, pulls)
