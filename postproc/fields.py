@@ -12,12 +12,21 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
-from h5py import h5d, h5s, h5t
+from h5py import h5d, h5p, h5s, h5t
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.postproc.gathering import ColumnGather
-from catenary.postproc.storage import MARGIN, broken_write, opened, reserve, write_whole
+from catenary.postproc.storage import (
+    MARGIN,
+    appears_whole,
+    broken_write,
+    opened,
+    reserve,
+    write_at,
+    write_whole,
+)
 from catenary.solver.errors import RunBroken
 from catenary.solver.observation import Stage, StepView
 from catenary.solver.parallel import on_root
@@ -26,6 +35,8 @@ logger = logging.getLogger("catenary.fields")
 
 COMPONENTS = {CONTACT_WIRE: 0, MESSENGER_WIRE: 1, "droppers": 2}
 _MAX_BUFFER = 32 * 1024 * 1024
+# More than HDF5's tables take for a dataset (about 500) [bytes].
+_TABLES = 1024
 
 
 class FieldRecorder:
@@ -81,6 +92,7 @@ class FieldRecorder:
             On all ranks, if the files cannot be written.
         """
         self._first_step = round(stage.start_time / stage.dt)
+        self._n_snapshots = stage.n_steps // self._every + 1
         self._n_nodes = int(stage.node_points.shape[0])
         self._capacity = max(1, min(self._capacity, _MAX_BUFFER // (8 * self._n_nodes)))
         self._gather = ColumnGather(self._comm, stage.owned_nodes, self._n_nodes, self._capacity)
@@ -131,58 +143,76 @@ class FieldRecorder:
         if self._resume and self._h5.exists() and self._cut(stage):
             self._describe()
             return
-        self._xdmf.unlink(missing_ok=True)  # one of an earlier run would name other numbers
-        with opened(self._h5, "w") as file:
+        for path in (self._xdmf, self._h5):  # of an earlier run
+            path.unlink(missing_ok=True)
+        with appears_whole(self._h5) as path, opened(path, "w") as file:
+            reserve(path, 0, self._size())
             file["mesh/points"] = stage.node_points
             file["mesh/cells"] = self._cells
             file["mesh/component"] = self._component
-            file.create_dataset("times", shape=(0,), maxshape=(None,), chunks=(256,), dtype="f8")
-            file.create_group("uplift")
-            file.create_group("displacement")
+            file["times"] = np.full(self._n_snapshots, np.nan)
+            self._make_places(file)
+        with h5py.File(self._h5, "r") as file:
+            self._find_places(file)
+
+    def _size(self) -> int:
+        """What the file takes at most [bytes]."""
+        mesh = self._n_nodes * 3 * 8 + self._cells.nbytes + self._component.nbytes
+        return mesh + self._n_snapshots * (4 * 4 * self._n_nodes + 8 + 2 * _TABLES) + MARGIN
+
+    def _make_places(self, file: h5py.File) -> None:
+        # Room in the file now, and no zeros written into it.
+        how = h5p.create(h5p.DATASET_CREATE)
+        how.set_alloc_time(h5d.ALLOC_TIME_EARLY)
+        how.set_fill_time(h5d.FILL_TIME_NEVER)
+        n = self._n_nodes
+        kinds = [
+            (file.create_group(name).id, h5s.create_simple(shape))
+            for name, shape in (("uplift", (n,)), ("displacement", (n, 3)))
+        ]
+        for number in range(self._n_snapshots):
+            for group, space in kinds:
+                h5d.create(group, _name(number).encode(), h5t.IEEE_F32LE, space, how)
+
+    def _find_places(self, file: h5py.File) -> None:
+        """Where in the file the times and the snapshots are [bytes]; KeyError without one."""
+        self._times_at = file["times"].id.get_offset()
+        kinds = [file[name].id for name in ("uplift", "displacement")]
+        self._places = [
+            [h5d.open(group, _name(number).encode()).get_offset() for group in kinds]
+            for number in range(self._n_snapshots)
+        ]
 
     def _cut(self, stage: Stage) -> bool:
-        """Drop the snapshots from the stage's start on; False if a kill has spoilt the file."""
+        """Forget the snapshots from the stage's start on; False if the file is not as it was."""
         try:
             with opened(self._h5, "r+") as file:
-                times = file["times"][...]
-                keep = int(np.searchsorted(times, stage.start_time - 0.5 * stage.dt))
-                for group in (file["uplift"], file["displacement"]):
-                    # Also what was being written when the run was killed.
-                    for name in [name for name in group if int(name) >= keep]:
-                        del group[name]
-                file["times"].resize(keep, axis=0)
-        except (OSError, KeyError, RuntimeError):
+                times = file["times"]
+                keep = int(np.sum(times[...] < stage.start_time - 0.5 * stage.dt))
+                times[keep:] = np.full(self._n_snapshots - keep, np.nan)
+                self._find_places(file)
+                self._written = times[:keep].tolist()
+        except (OSError, KeyError, RuntimeError, TypeError):
             logger.warning(
-                "%s cannot be continued, it was being written when the run was killed: its "
-                "snapshots now begin at t = %.3f s",
+                "%s cannot be continued, it is damaged or of another version: its snapshots now "
+                "begin at t = %.3f s",
                 self._h5,
                 stage.start_time,
             )
             return False
-        self._written = times[:keep].tolist()
         return True
 
     def _append(self, times: list[float], uplift: np.ndarray) -> None:
-        # Room for uncompressed snapshots, so that a full disk cannot spoil what is there.
-        need = len(times) * (4 * 4 * self._n_nodes + 2048)
-        reserve(self._h5, self._h5.stat().st_size, need + MARGIN)
-        scalar = np.zeros(self._n_nodes, dtype=np.float32)
-        vector = np.zeros((self._n_nodes, 3), dtype=np.float32)
-        with opened(self._h5, "r+") as file:
-            # HDF5's own calls, and no compression: a tenth of the time for twice the space.
-            places = [
-                (file[group].id, h5s.create_simple(values.shape), values)
-                for group, values in (("uplift", scalar), ("displacement", vector))
-            ]
-            for row, time in enumerate(times):
-                name = _name(len(self._written)).encode()
-                scalar[:] = vector[:, 2] = uplift[row]
-                for group, space, values in places:
-                    made = h5d.create(group, name, h5t.IEEE_F32LE, space)
-                    made.write(h5s.ALL, h5s.ALL, values)
-                self._written.append(time)
-            file["times"].resize(len(self._written), axis=0)
-            file["times"][-len(times) :] = times
+        first = len(self._written)
+        scalar = np.zeros(self._n_nodes, dtype="<f4")
+        vector = np.zeros((self._n_nodes, 3), dtype="<f4")
+        with self._h5.open("r+b", buffering=0) as file:
+            for (scalar_at, vector_at), values in zip(self._places[first:], uplift, strict=False):
+                scalar[:] = vector[:, 2] = values
+                write_at(file.fileno(), scalar_at, scalar)
+                write_at(file.fileno(), vector_at, vector)
+            write_at(file.fileno(), self._times_at + 8 * first, np.array(times, dtype="<f8"))
+        self._written += times
         self._describe()
 
     def _describe(self) -> None:

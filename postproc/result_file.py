@@ -1,7 +1,9 @@
 """The result file as its only writer, rank 0, handles it. Nothing here is collective.
 
 Everything that grows does so in ``append`` alone, which leaves a file that is readable as it
-stands; room on the disk is claimed one append ahead, so that a full disk costs no record.
+stands; room on the disk is claimed one append ahead, so that a full disk costs no record. HDF5
+writes its tables in no order that helps one who reads a file whose writer was killed: a table may
+have got longer, and its rows not be there yet. Hence ``COMPLETE``, which is told after the rows.
 """
 
 from __future__ import annotations
@@ -21,6 +23,8 @@ from catenary.postproc.storage import MARGIN, abandon, as_attribute, reserve
 from catenary.solver.observation import Stage
 
 FORMAT = "catenary-run-1"
+# Rows that are whole, of the channels and of the energies; a table may be longer after a kill.
+COMPLETE = "complete_rows"
 RUNNING, DONE, INTERRUPTED = "running", "done", "interrupted"
 # The state to continue from is kept twice and written in turn: a run that is killed while it
 # writes one still has the other.
@@ -69,6 +73,7 @@ class ResultFile:
                     _create_growing(self._file, name, channel, columns, rows_per_append)
             # Kept open: closing a dataset writes what is left of it, and h5py ignores errors there.
             self._growing = {name: self._file[name] for name in table}
+            self._complete = self._file[COMPLETE]
             self._file.attrs["outcome"] = RUNNING
             self._file.flush()
             self._reserve()
@@ -96,6 +101,8 @@ class ResultFile:
             start = dataset.shape[0]
             dataset.resize(start + block.shape[0], axis=0)
             dataset[start:] = block
+        self._file.flush()
+        self._complete[...] = _rows(self._file)
         self._file.flush()
         if state is not None:
             self._store(state)
@@ -175,7 +182,7 @@ def _write_head(file: h5py.File, stage: Stage, header: Header, n_ranks: int) -> 
         "line/dropper_x": stage.dropper_x,
         "line/node_points": stage.node_points,
     }
-    for name, array in {**header.datasets, **known}.items():
+    for name, array in {**header.datasets, **known, COMPLETE: [0, 0]}.items():
         file.create_dataset(name, data=array)
 
 
@@ -194,15 +201,26 @@ def _create_growing(
     dataset.attrs["meaning"] = channel.meaning
 
 
+def _rows(file: h5py.File) -> list[int]:
+    """Rows of the channels and of the energies."""
+    return [file["time"].shape[0], file["energy/time"].shape[0] if "energy" in file else 0]
+
+
+def complete_rows(file: h5py.File) -> list[int]:
+    """Rows of the channels and of the energies that are whole; all in files of earlier versions."""
+    return file[COMPLETE][...].tolist() if COMPLETE in file else _rows(file)
+
+
 def _cut(file: h5py.File, time: float) -> None:
     """Drop the records from ``time`` [s] on."""
     parts = [(file["time"], [file["time"], *file["channels"].values()])]
     if "energy" in file:
         parts.append((file["energy/time"], list(file["energy"].values())))
-    for clock, datasets in parts:
-        keep = int(np.searchsorted(clock[...], time))
+    for (clock, datasets), complete in zip(parts, complete_rows(file), strict=False):
+        keep = int(np.searchsorted(clock[:complete], time))
         for dataset in datasets:
             dataset.resize(keep, axis=0)
+    _replace(file, COMPLETE, _rows(file))
 
 
 def _replace(group: h5py.Group, name: str, value: Any) -> None:

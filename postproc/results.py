@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from catenary.postproc import channels
-from catenary.postproc.result_file import DONE, FORMAT, RUNNING
+from catenary.postproc.result_file import DONE, FORMAT, RUNNING, complete_rows
 from catenary.solver.errors import InputError
 
 RESULT_FILE = "run.h5"
@@ -32,8 +32,8 @@ _JSON_ATTRIBUTES = (
 class Results:
     """A result file opened for reading. A context manager; not collective.
 
-    All channels are cut to their shortest common length, so that a file whose writer was killed
-    reads like a shorter run.
+    All channels are cut to the rows that are whole, so that a file whose writer was killed reads
+    like a shorter run.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class Results:
     @cached_property
     def _length(self) -> int:
         lengths = [dataset.shape[0] for dataset in self._file["channels"].values()]
-        return min(self._file["time"].shape[0], *lengths)
+        return min(complete_rows(self._file)[0], *lengths)
 
     @cached_property
     def time(self) -> np.ndarray:
@@ -191,7 +191,8 @@ class Results:
         if "energy" not in self._file:
             return {}
         group = self._file["energy"]
-        n = min(group[name].shape[0] for name in channels.ENERGIES)
+        lengths = [group[name].shape[0] for name in channels.ENERGIES]
+        n = min(complete_rows(self._file)[1], *lengths)
         return {name: np.asarray(group[name][:n]) for name in channels.ENERGIES}
 
     # ---- constants --------------------------------------------------------------------------

@@ -123,16 +123,40 @@ def broken_write(path: Path, time: float, error: Exception) -> RunBroken:
     )
 
 
-def write_whole(path: Path, content: bytes | str) -> None:
-    """Write a file so that it appears whole or not at all (temporary file, then rename)."""
-    data = content.encode() if isinstance(content, str) else content
+@contextlib.contextmanager
+def appears_whole(path: Path) -> Iterator[Path]:
+    """Another name for ``path`` while it is made, which takes its own when it is whole.
+
+    A context manager. If something fails there is nothing new.
+    """
     partial = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        partial.write_bytes(data)
+        yield partial
         os.replace(partial, path)
     except BaseException:
         partial.unlink(missing_ok=True)
         raise
+
+
+def write_whole(path: Path, content: bytes | str) -> None:
+    """Write a file so that it appears whole or not at all."""
+    data = content.encode() if isinstance(content, str) else content
+    with appears_whole(path) as partial:
+        partial.write_bytes(data)
+
+
+def write_at(handle: int, offset: int, numbers: np.ndarray) -> None:
+    """Write an array into a place of an open file, ``offset`` [bytes] from its beginning.
+
+    Raises
+    ------
+    OSError
+        If not all of it could be written.
+    """
+    left = memoryview(numbers.tobytes())
+    while left.nbytes:
+        written = os.pwrite(handle, left, offset)
+        left, offset = left[written:], offset + written
 
 
 def write_all(folder: Path, content: Mapping[str, bytes | str]) -> list[Path]:

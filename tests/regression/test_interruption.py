@@ -192,7 +192,7 @@ def can_mount() -> bool:
 
 @pytest.mark.skipif(not can_mount(), reason="no small disk can be mounted")
 @pytest.mark.parametrize(
-    ("room", "ranks"), [("300k", 1), pytest.param("2500k", 2, marks=needs_mpirun), ("4m", 1)]
+    ("room", "ranks"), [("300k", 1), pytest.param("3900k", 2, marks=needs_mpirun), ("4m", 1)]
 )
 def test_a_full_disk_ends_the_run_with_a_sentence(room: str, ranks: int, tmp_path: Path) -> None:
     """A disk that is full from the start, soon, and when hardly the report finds room."""
@@ -217,7 +217,7 @@ def test_a_full_disk_ends_the_run_with_a_sentence(room: str, ranks: int, tmp_pat
     assert "Traceback" not in done.stderr
     (sentence,) = done.sentences
     if room == "300k":  # not even the first step
-        assert "run.h5 failed at t = 0.000 s (No space left on device)" in sentence
+        assert "fields.h5 failed at t = 0.000 s (No space left on device)" in sentence
         return
     with Results(kept) as results:
         assert results.n_steps >= FLUSH

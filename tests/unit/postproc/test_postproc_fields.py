@@ -13,7 +13,6 @@ import pyvista
 
 from catenary.postproc import fields
 from catenary.postproc.fields import FieldRecorder
-from catenary.postproc.storage import NoRoom
 from catenary.solver.errors import RunBroken
 
 
@@ -96,14 +95,44 @@ def test_a_snapshot_that_a_kill_left_half_written_is_replaced(
     march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
     march.drive(watch(march, path), outcome="interrupted", last=620)
     with h5py.File(tmp_path / "fields.h5", "r+") as file:
-        # In the file, but not yet among its times.
-        file["uplift/000013"] = np.zeros(3)
+        # In its place, but not yet among the times.
+        file["uplift/000013"][:7] = 99.0
     march.drive(watch(march, path, resume=True), first_step=600)
     reader = pyvista.get_reader(path)
     np.testing.assert_allclose(reader.time_values, 0.05 * np.arange(21), rtol=1e-12)
     reader.set_active_time_value(reader.time_values[13])
     expected = march.wave(0.65, march.mesh.points[:, 0])
     np.testing.assert_allclose(reader.read().point_data["uplift"], expected, atol=1e-8)
+
+
+def test_no_table_of_the_file_changes_once_the_run_goes_on(tmp_path: Path, make_march: Any) -> None:
+    # What a kill could leave half done would be among the bytes outside the snapshots' places.
+    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
+    numbers = tmp_path / "fields.h5"
+    watcher = watch(march, path)
+    watcher.start(march.stage())
+    before = bytearray(numbers.read_bytes())
+    for step in range(1001):
+        watcher.observe(march.view(step))
+    watcher.finish("done")
+    after = bytearray(numbers.read_bytes())
+    assert len(after) == len(before) and after != before
+    with h5py.File(numbers) as file:
+        kinds = [list(file[name].values()) for name in ("uplift", "displacement")]
+        places = [file["times"], *sum(kinds, [])]
+        assert len(places) == 1 + 2 * 21
+        for offset, size in [(place.id.get_offset(), place.nbytes) for place in places]:
+            before[offset : offset + size] = after[offset : offset + size] = bytes(size)
+    assert after == before
+
+
+def test_times_tell_how_far_a_run_came(tmp_path: Path, make_march: Any) -> None:
+    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
+    march.drive(watch(march, path), outcome="interrupted", last=620)
+    with h5py.File(tmp_path / "fields.h5") as file:
+        times = file["times"][...]
+    np.testing.assert_allclose(times[:13], 0.05 * np.arange(13), rtol=1e-12)
+    assert times.size == 21 and np.isnan(times[13:]).all()
 
 
 @pytest.mark.parametrize("share", [0.0, 0.6])
@@ -133,9 +162,9 @@ def test_a_full_disk_breaks_the_run_and_keeps_the_snapshots(
         watcher.observe(march.view(step))
 
     def full(*_: object) -> None:
-        raise NoRoom(28, "No space left on device")
+        raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(fields, "reserve", full)
+    monkeypatch.setattr(fields, "write_at", full)
     with pytest.raises(RunBroken, match=r"fields.h5 failed at t = 0.400 s \(No space left"):
         for step in range(201, 500):
             watcher.observe(march.view(step))
