@@ -23,6 +23,7 @@ from catenary.solver import (
     station_blocks,
     station_factors,
     station_passes,
+    subnormals,
 )
 from catenary.solver.compliance import Windows
 from catenary.solver.distribution import Ownership
@@ -62,6 +63,7 @@ class LineMotion(ABC):
         station_blocks.warm_up()
         station_factors.warm_up()
         station_passes.warm_up()
+        subnormals.warm_up()
         self._comm = comm
         self.ownership = ownership
         self.position_factor = position_factor

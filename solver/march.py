@@ -43,6 +43,7 @@ from catenary.solver.set_up import Parts, SetUp, kept_ratio
 from catenary.solver.showing import Showing
 from catenary.solver.step_levels import StepLevels
 from catenary.solver.stepper import Stepper
+from catenary.solver.subnormals import taken_for_zero
 
 
 @dataclass
@@ -222,7 +223,7 @@ class March:
         except RunBroken as error:
             self._stepper.broken = str(error)
         else:
-            ts.solve(self._line.solution)
+            self._advance(ts)
         for happened, end in zip(ahead, ends[1:], strict=True):
             if not self._stepper.goes_on_from(happened.step):
                 break
@@ -234,7 +235,7 @@ class March:
                 break
             since = happened.step
             ts = self._make_ts(show, stop_requested, since, end)
-            ts.solve(self._line.solution)
+            self._advance(ts)
         wall = clock.perf_counter() - begin
         if self._stepper.broken:
             # The error's traceback may still hold the TS, which PETSc would then free, with the
@@ -275,6 +276,11 @@ class March:
         # Errors of ours reach all ranks; at any other the rest may be waiting elsewhere.
         if error is None or isinstance(error, CatenaryError):
             self.destroy()
+
+    def _advance(self, ts: PETSc.TS) -> None:
+        """March to the end of ``ts``. Collective."""
+        with taken_for_zero():
+            ts.solve(self._line.solution)
 
     def _traffic(self, n_steps: int) -> tuple[float, float] | None:
         """Messages and bytes a step of the rank that sent most; None if none. Collective."""
