@@ -279,23 +279,11 @@ def respond(
 
 
 @compiled
-def superpose(
-    force,
-    numbers,
-    compensation,
-    answers,
-    touches,
-    start,
-    offset,
-    data,
-    motion,
-    gains,
-):
-    """Add the answers to contact forces and to compensations of some droppers to the state.
+def superpose(force, answers, touches, motion, gains):
+    """Add the answers to contact forces to the state.
 
-    ``answers`` and ``touches`` are those of ``place``; ``data[offset[d] : offset[d + 1]]`` is the
-    column of dropper d from the local unknown ``start[d]`` on; ``motion`` and ``gains`` are
-    ``Motion.read`` and ``Motion.gains``.
+    ``answers`` and ``touches`` are those of ``place``; ``motion`` and ``gains`` are ``Motion.read``
+    and ``Motion.gains``.
     """
     x, y, z, _ = motion
     for i in range(force.size):
@@ -307,6 +295,16 @@ def superpose(
                 z[j] += change
                 x[j] += gains[0] * change
                 y[j] += gains[1] * change
+
+
+@compiled
+def compensate(numbers, compensation, start, offset, data, motion, gains):
+    """Add the answers to compensations of some droppers to the state.
+
+    ``data[offset[d] : offset[d + 1]]`` is the column of dropper d from the local unknown
+    ``start[d]`` on; the rest as for ``superpose``.
+    """
+    x, y, z, _ = motion
     for k in range(numbers.size):
         d, f = numbers[k], compensation[k]
         begin = start[d] - offset[d]
@@ -331,5 +329,6 @@ def warm_up() -> None:
         motion, touches, 1.0, 1.0, 1.0, 1.0, table, table, np.zeros(2), numbers,
         np.zeros((1, 2), dtype=np.int64), table, one, np.zeros(8), np.zeros((1, 5)),
     )  # fmt: skip
-    offset = np.zeros(2, dtype=np.int64)
-    superpose(one, numbers, one, table, touches, numbers, offset, one, motion, np.zeros(2))
+    offset, gains = np.zeros(2, dtype=np.int64), np.zeros(2)
+    superpose(one, table, touches, motion, gains)
+    compensate(numbers, one, numbers, offset, one, motion, gains)

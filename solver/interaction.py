@@ -130,13 +130,12 @@ class Interaction:
             self._answers,
             self._slope_answers,
         )
-        self._superposed = (
-            self._answers,
-            self._touches,
-            *dropper_columns.packed(),
-            line.motion.read,
-            line.motion.gains,
+        motion = line.motion.read, line.motion.gains
+        self._force = np.zeros(n)
+        self._superpose = bound(
+            contact_kernels.superpose, self._force, self._answers, self._touches, *motion
         )
+        self._compensated = (*dropper_columns.packed(), *motion)
 
     def place(self) -> None:
         """Look where the contacts are now, and work out the line's answer to a unit force at
@@ -186,7 +185,10 @@ class Interaction:
         self, contact_force: np.ndarray, droppers: np.ndarray, compensation: np.ndarray
     ) -> None:
         """Add the answer to contact forces (n,) and compensations (m,) [N] to the line's state."""
-        contact_kernels.superpose(contact_force, droppers, compensation, *self._superposed)
+        self._force[:] = contact_force
+        self._superpose()
+        if droppers.size:
+            contact_kernels.compensate(droppers, compensation, *self._compensated)
 
     def loads(
         self, contact_force: np.ndarray, compensation: np.ndarray

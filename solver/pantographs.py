@@ -130,8 +130,11 @@ class Pantographs:
 
         ``reported`` is what of the forces counts as contact force in the records.
         """
-        for model, strips in self._models_with_strips:
-            model.advance(contact_force[strips])
+        if len(self.models) == 1:
+            self.models[0].advance(contact_force)
+        else:
+            for model, strips in self._models_with_strips:
+                model.advance(contact_force[strips])
         if self.joints_in_loop:
             self.look_at_joints()
         inner_kernels.tell(
