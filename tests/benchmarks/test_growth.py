@@ -20,10 +20,13 @@ from program import MPIRUN
 
 needs_mpirun = pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
 _first: dict[str, Any] = {}
+_a_span: list[float] = []
 DRIVERS = Path(__file__).parent / "drivers"
 # The Makefile says how this machine's MPI takes more ranks than cores, and root.
 MPI_FLAGS = os.environ.get("MPI_FLAGS", "").split()
 SPANS = (10, 25, 100, 1000, 10_000)
+# What a step costs whatever the line's length is nothing beside the rest from here on.
+PROPORTIONAL_FROM = 100
 # Steps that take some tenths of a second on each of them.
 STEPS = {10: 6000, 25: 4000, 100: 2000, 1000: 150, 10_000: 15}
 # Turns of scaling over ranks, some ten milliseconds each: as short as the lulls of a busy machine.
@@ -75,6 +78,15 @@ def test_growth_with_spans(benchmark: Any, spans: int) -> None:
         f"{found['rest_s']:14.2f}{found['ready_s']:12.2f}"
         f"{peak / 1e6:14.0f}{(peak - begun) / 1e3 / spans:12.0f}"
     )
+    if spans >= PROPORTIONAL_FROM:
+        _a_span.append(found["us_fastest"] / spans)
+    if spans == SPANS[-1]:
+        low, high = min(_a_span), max(_a_span)
+        middle = 0.5 * (low + high)
+        print(
+            f"{PROPORTIONAL_FROM} to {spans} spans: {middle:.3f} us a span, "
+            f"within {100 * (high / middle - 1):.1f} %"
+        )
     keep(benchmark, found)
 
 
