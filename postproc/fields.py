@@ -35,7 +35,7 @@ logger = logging.getLogger("catenary.fields")
 
 COMPONENTS = {CONTACT_WIRE: 0, MESSENGER_WIRE: 1, "droppers": 2}
 _MAX_BUFFER = 32 * 1024 * 1024
-# More than HDF5's tables take for a dataset (about 500) [bytes].
+# More than HDF5's tables take for a dataset (about 400) [bytes].
 _TABLES = 1024
 
 

@@ -146,14 +146,14 @@ def write_whole(path: Path, content: bytes | str) -> None:
 
 
 def write_at(handle: int, offset: int, numbers: np.ndarray) -> None:
-    """Write an array into a place of an open file, ``offset`` [bytes] from its beginning.
+    """Write a contiguous array into a place of an open file, ``offset`` [bytes] from its beginning.
 
     Raises
     ------
     OSError
         If not all of it could be written.
     """
-    left = memoryview(numbers.tobytes())
+    left = numbers.data.cast("B")
     while left.nbytes:
         written = os.pwrite(handle, left, offset)
         left, offset = left[written:], offset + written

@@ -2,8 +2,8 @@
 
 An implicit step answers a force at all distances at once: ahead of its waves a line holds numbers
 that fall off to 1e-308 m and on to zero. Those below, which are kept with fewer digits
-(subnormal), take processors of the x86 family a hundred times longer, and a long line's
-march up to three times; the processor is told to take them for zero.
+(subnormal), take some processors of the x86 family far longer: half of the march of a hundred
+spans. The processor is told to take them for zero.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from numba.extending import intrinsic
 
 from catenary.solver.kernels import compiled
 
-# Other processors are as fast with them.
-_ARE_SLOW = platform.machine().lower() in ("x86_64", "amd64")
+# What is told below is understood by this family only.
+_UNDERSTOOD = platform.machine().lower() in ("x86_64", "amd64")
 # In the control register of SSE: results that are subnormal, and operands that are.
 _TAKEN_FOR_ZERO = 0x8000 | 0x0040
 _ALL = 0xFFFFFFFF
@@ -63,7 +63,8 @@ def taken_for_zero() -> Iterator[None]:
 
     A context manager. Not collective.
     """
-    if not (_ARE_SLOW and hasattr(_exchange, "overloads")):  # or Numba was told to compile nothing
+    # Numba may have been told to compile nothing.
+    if not (_UNDERSTOOD and hasattr(_exchange, "overloads")):
         yield
         return
     for kind in (np.float32, np.float64):
