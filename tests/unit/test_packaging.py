@@ -45,7 +45,8 @@ def must(done: subprocess.CompletedProcess[str]) -> str:
 
 def library_files() -> set[str]:
     """Python files of the checkout, by the names under which they are to be installed."""
-    return {f"catenary/{part}/{path.name}" for part in PARTS for path in (ROOT / part).glob("*.py")}
+    files = (path for part in PARTS for path in (ROOT / part).rglob("*.py"))
+    return {f"catenary/{path.relative_to(ROOT)}" for path in files}
 
 
 def data_files() -> set[str]:
