@@ -182,7 +182,7 @@ def begin(
     abort_on_unforeseen_error(comm)
     set_up_logging(comm, verbose)
     what, options = on_root(comm, read)
-    arguments = as_arguments(scene_of(what).petsc, options)
+    arguments = as_arguments(scene_of(what).petsc.given(), options)
     start_petsc(arguments)
     return comm, what, arguments
 

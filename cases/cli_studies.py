@@ -107,10 +107,11 @@ def run_study(
 ) -> int:
     """What ``catenary run CASE --study`` does; returns the exit code. Collective."""
     from catenary.cases.petsc_options import split_extras
-    from catenary.cases.study import Plan, make_plan
+    from catenary.cases.study import Plan, find_study, make_plan
 
     def read() -> tuple[Plan, list[str]]:
         more, options = split_extras(extras)
+        console.say(f"--study runs the program {find_study(case)}, which may do all that you may")
         return make_plan(case, [*assignments, *more], shortened), options
 
     comm, plan, arguments = cli.begin(read, verbose, lambda made: made.jobs[0].scene)

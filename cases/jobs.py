@@ -80,6 +80,16 @@ class Ended:
         return self.outcome == "done"
 
 
+def _refuse_petsc(variant: Variant) -> None:
+    """PETSc starts once, with the options of the first scene."""
+    for assignment in variant.assignments:
+        if assignment.split("=")[0].strip().split(".")[0] == "petsc":
+            raise InputError(
+                f"variant {variant.name} assigns {shown(assignment)[1:-1]}, but PETSc takes its "
+                "options once, when the program starts: give them with --set or after --"
+            )
+
+
 def make_jobs(
     case: str,
     variants: Sequence[Variant],
@@ -99,6 +109,7 @@ def make_jobs(
     """
     jobs = []
     for variant in variants:
+        _refuse_petsc(variant)
         try:
             scene = load_scene(case, [*overrides, *variant.assignments], shortened)
         except InputError as error:

@@ -137,8 +137,8 @@ def is_known(key: str, known: list[str]) -> bool:
 
 
 def _matches(parts: list[str], pattern: list[str]) -> bool:
-    if pattern in (["petsc", ANY], ["test", ANY]):
-        return len(parts) >= 2 and parts[0] == pattern[0]  # free tables: names may hold dots
+    if pattern == ["test", ANY]:
+        return len(parts) >= 2 and parts[0] == pattern[0]  # a free table: its names hold dots
     return len(parts) == len(pattern) and all(
         want in (ANY, part) for part, want in zip(parts, pattern, strict=True)
     )

@@ -81,8 +81,8 @@ def assign(raw: dict[str, Any], key: str, value: Any, where: str = COMMAND_LINE)
         If the key leads through something that is neither a table nor a list.
     """
     parts = key.split(".")
-    if parts[0] in ("petsc", "test") and len(parts) > 2:
-        parts = [parts[0], ".".join(parts[1:])]  # their keys may hold dots
+    if parts[0] == "test" and len(parts) > 2:
+        parts = [parts[0], ".".join(parts[1:])]  # its keys hold dots
     here: Any = raw
     for depth, part in enumerate(parts):
         last = depth == len(parts) - 1

@@ -8,6 +8,7 @@ from typing import Any, NoReturn
 
 from pydantic import BaseModel, ValidationError
 
+from catenary.cases.input.petsc_table import ELSEWHERE
 from catenary.cases.keys import is_known, known_keys, nearest, without_kinds
 from catenary.cases.units import unit_of
 from catenary.solver.errors import InputError
@@ -59,6 +60,9 @@ def refuse(origin: Origin, key: str, value: object, why: str) -> NoReturn:
 def unknown_key(key: str, where: str, known: list[str]) -> str:
     """The sentence for a key that the scene does not know."""
     near = nearest(key, known)
+    if key.startswith("petsc."):
+        hint = f"; did you mean {near}?" if near and near.startswith("petsc.") else ""
+        return f"{shown(key)[1:-1]} {where} {ELSEWHERE}{hint}"
     hint = f"; did you mean {near}?" if near else "; see `catenary list --keys` for all keys"
     return f"{shown(key)[1:-1]} {where} is unknown{hint}"
 

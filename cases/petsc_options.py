@@ -49,15 +49,15 @@ def as_arguments(table: Mapping[str, Any], command_line: Sequence[str] = ()) -> 
 
 
 def start_petsc(arguments: Sequence[str]) -> None:
-    """Start PETSc with these options. Collective.
+    """Start PETSc with these options and without options files. Collective.
 
     If PETSc runs already, which happens only inside other Python programs, they are added.
     """
     import petsc4py
 
     running = "petsc4py.PETSc" in sys.modules
-    petsc4py.init(["catenary", *arguments])
-    if running and arguments:
-        from petsc4py import PETSc
+    petsc4py.init(["catenary", "-skip_petscrc", *arguments])
+    from catenary.solver.petsc import PETSc
 
+    if running and arguments:
         PETSc.Options().insertString(shlex.join(arguments))

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from petsc4py import PETSc
 
 from catenary.cases.incident_facts import incident_facts
 from catenary.cases.interrupts import StopRequest
@@ -44,6 +43,7 @@ from catenary.solver.march import March, Outcome
 from catenary.solver.model import Model, build
 from catenary.solver.observation import Observer
 from catenary.solver.parallel import on_root
+from catenary.solver.petsc import PETSc
 from catenary.solver.problem import Problem
 
 logger = logging.getLogger("catenary.runner")

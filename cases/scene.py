@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field, PrivateAttr, ValidationError
 
 from catenary.cases.catalogue import find_case
+from catenary.cases.input.petsc_table import PetscTable
 from catenary.cases.keys import is_known, known_keys, with_kinds
 from catenary.cases.loading import assign, parse_assignment, read_toml
 from catenary.cases.messages import COMMAND_LINE, Origin, input_error, unknown_key
@@ -26,7 +27,6 @@ from catenary.cases.schema_run import (
     EvaluationTable,
     NumericsTable,
     OutputTable,
-    PetscTable,
     TrainTable,
 )
 from catenary.cases.schema_vehicle import VehicleTable
@@ -65,7 +65,9 @@ class Scene(Table):
     effects: dict[str, bool] = Field(
         default_factory=dict, description="what is simulated; see `catenary plan`"
     )
-    petsc: PetscTable = Field(default_factory=dict, description="PETSc options; those after -- win")
+    petsc: PetscTable = Field(
+        default_factory=PetscTable, description="PETSc's solver options; those after -- win"
+    )
     test: dict[str, Any] = Field(
         default_factory=dict, description="keys and values that shorten the case for tests"
     )

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import re
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 from pydantic import (
-    AfterValidator,
     Field,
     SerializerFunctionWrapHandler,
     field_validator,
@@ -269,20 +267,3 @@ class OutputTable(Table):
         description="steps after which the result file is brought up to date; about half a "
         "second's worth if absent",
     )
-
-
-def _petsc_value(value: Any) -> Any:
-    if not isinstance(value, str | int | float | bool):
-        raise ValueError("must be text, a number, true or false")
-    return value
-
-
-def _petsc_name(name: str) -> str:
-    if not re.fullmatch(r"[A-Za-z][\w.:-]*", name):
-        raise ValueError("must be named like a PETSc option without its dash, e.g. ksp_type")
-    return name
-
-
-PetscTable = dict[
-    Annotated[str, AfterValidator(_petsc_name)], Annotated[Any, AfterValidator(_petsc_value)]
-]

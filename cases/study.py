@@ -5,6 +5,8 @@ A case folder may hold a ``study.py`` with three functions:
 - ``variants(scene, shortened)`` gives the ``StudyVariant`` s; it loads no backend;
 - ``measure(results)`` takes plain figures from each run's result file;
 - ``conclude(runs)`` turns the runs by name into a ``postproc.study_report.Study``.
+
+It is a program, unlike the scene: it runs with ``--study`` only, after a line that names it.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from petsc4py import PETSc
+from catenary.solver.petsc import PETSc
 
 # Names as -log_view prints them, in the order of a step, and what they hold.
 NAMES = {

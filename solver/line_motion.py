@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from catenary.solver import (
     aligned,
@@ -31,6 +30,7 @@ from catenary.solver.line_operators import LineOperators, Loads
 from catenary.solver.locality import reach
 from catenary.solver.model import Model
 from catenary.solver.motion import Motion
+from catenary.solver.petsc import PETSc
 
 
 class LineMotion(ABC):

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from petsc4py import PETSc
 from scipy import sparse
 
 from catenary.solver import aligned
@@ -32,6 +31,7 @@ from catenary.solver.linear import (
 from catenary.solver.model import Model
 from catenary.solver.motion import MotionAhead, Steps
 from catenary.solver.operators import as_petsc, columns_of, part_of, station_block
+from catenary.solver.petsc import PETSc
 from catenary.solver.repeated_rows import RepeatedRows, repeated_rows
 from catenary.solver.station_blocks import StationProduct, station_product
 from catenary.solver.station_passes import StationPasses

@@ -13,12 +13,12 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
-from petsc4py import PETSc
 from scipy import sparse
 
 from catenary.solver.distribution import Ownership
 from catenary.solver.errors import InputError
 from catenary.solver.operators import as_petsc
+from catenary.solver.petsc import PETSc
 from catenary.solver.station_factors import StationFactors, station_factors
 
 PREFIX, PART_PREFIX = "march_", "march_sub_"

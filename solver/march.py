@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from catenary.solver.changed_line import (
     ChangedLine,
@@ -37,6 +36,7 @@ from catenary.solver.linear import PREFIX, refused_options, wants_solution
 from catenary.solver.model import Model
 from catenary.solver.observation import Observer, Stage
 from catenary.solver.pantographs import Pantographs, nominal_height_rule
+from catenary.solver.petsc import PETSc
 from catenary.solver.problem import Problem
 from catenary.solver.schemes import Scheme
 from catenary.solver.set_up import Parts, SetUp, kept_ratio

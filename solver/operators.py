@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 from scipy import sparse
 
 from catenary.solver.distribution import Ownership
 from catenary.solver.model import SAME_STATION, Model, iterate_entries
+from catenary.solver.petsc import PETSc
 
 
 def part_of(

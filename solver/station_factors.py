@@ -9,12 +9,12 @@ A^-1, so that the factors of alike spans are alike, and a solve reads little mor
 from __future__ import annotations
 
 import numpy as np
-from petsc4py import PETSc
 from scipy import sparse
 
 from catenary.solver import station_blocks
 from catenary.solver.fours import add_product, by_diagonals, load, store, zero
 from catenary.solver.kernels import compiled, in_line
+from catenary.solver.petsc import PETSc
 from catenary.solver.station_blocks import BLOCK
 
 

@@ -14,10 +14,10 @@ import ctypes
 from typing import Any, NamedTuple
 
 import numpy as np
-from petsc4py import PETSc
 
 from catenary.solver.errors import InputError
 from catenary.solver.linear import PREFIX, refused_options
+from catenary.solver.petsc import PETSc
 
 # The local error of a step of a method of order two falls with the cube of its size.
 _ORDER = 3

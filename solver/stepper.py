@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from petsc4py import PETSc
-
 from catenary.solver.errors import NotConverged, RunBroken
+from catenary.solver.petsc import PETSc
 from catenary.solver.schemes import Scheme
 
 

@@ -10,13 +10,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from catenary.solver.errors import InputError, NotConverged
 from catenary.solver.integration import GENERALIZED_ALPHA, NEWMARK, integration_of
 from catenary.solver.interaction import Interaction
 from catenary.solver.linear import PREFIX
 from catenary.solver.pantographs import Pantographs
+from catenary.solver.petsc import PETSc
 from catenary.solver.problem import Numerics
 from catenary.solver.schemes import Counters
 from catenary.solver.whole_system import WholeSystem

@@ -107,11 +107,12 @@ def test_another_solver_gives_the_same_answer(
 
 def test_the_scene_may_hold_options_and_the_command_line_wins(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    words = short_run(out, "petsc.march_pc_type=ilu", "petsc.march_ksp_view=true")
-    plain = catenary(*words, cwd=tmp_path)
+    words = short_run(out, "petsc.march_pc_type=ilu")
+    plain = catenary(*words, "--", "-march_ksp_view", cwd=tmp_path)
     assert plain.code == 0, plain.stderr
     assert "type: ilu" in plain.stdout
-    other = catenary(*words, "--force", "--", "-march_pc_type", "lu", cwd=tmp_path)
+    options = ["-march_ksp_view", "-march_pc_type", "lu"]
+    other = catenary(*words, "--force", "--", *options, cwd=tmp_path)
     assert other.code == 0, other.stderr
     assert "type: lu" in other.stdout and "type: ilu" not in other.stdout
 

@@ -261,16 +261,16 @@ def test_exit_codes_of_run(
 
 def test_run_hands_everything_over(runner: types.SimpleNamespace, tmp_path: Path) -> None:
     runner.result = outcome("done", True)
-    words = ["--set", "train.speed_km_h=300", "petsc.step_ksp_type=cg", "--force", "--short"]
+    words = ["--set", "train.speed_km_h=300", "petsc.march_ksp_type=cg", "--force", "--short"]
     out = tmp_path / "out"
-    result = invoke("run", "en50318_2002", "-o", str(out), *words, "--", "-step_ksp_type", "gmres")
+    result = invoke("run", "en50318_2002", "-o", str(out), *words, "--", "-march_ksp_type", "gmres")
     assert result.exit_code == 0, result.output
     ((scene, folder, options),) = runner.calls
     assert folder == out
     assert scene.train.speed_km_h == 300
     assert scene.line.n_spans == load_scene("en50318_2002", shortened=True).line.n_spans
     assert options["force"] is True
-    assert options["petsc_options"] == ["-step_ksp_type", "cg", "-step_ksp_type", "gmres"]
+    assert options["petsc_options"] == ["-march_ksp_type", "cg", "-march_ksp_type", "gmres"]
 
 
 def test_a_run_that_breaks_ends_in_its_sentence(

@@ -239,8 +239,8 @@ ASSIGNMENTS = {
     "unknown edition": (["evaluation.edition=1999"], "must be text"),
     "unknown edition as text": (['evaluation.edition="1999"'], "must be one of"),
     "unknown system": (["evaluation.system=steam"], "must be one of"),
-    "list for a PETSc option": (["petsc.ksp_type=[1]"], "must be text"),
-    "PETSc option with its dash": (["petsc.-ksp_type=cg"], "without its dash"),
+    "list for a PETSc option": (["petsc.march_ksp_type=[1]"], "must be preonly, richardson"),
+    "PETSc option with its dash": (["petsc.-march_ksp_type=cg"], "mean petsc.march_ksp_type?"),
     "unknown key in the test table": (["test.train.sped_km_h=3"], "did you mean train.speed_km_h?"),
 }
 
