@@ -14,7 +14,7 @@ import numpy as np
 
 from catenary.cases.checks_contact import check_contact
 from catenary.cases.checks_incidents import check_incidents
-from catenary.cases.checks_pantograph import check_heights, check_pantographs
+from catenary.cases.checks_pantograph import check_mechanisms, check_pantographs
 from catenary.cases.checks_scheme import check_scheme
 from catenary.cases.checks_vehicle import check_vehicle
 from catenary.cases.keys import is_known, known_keys
@@ -51,15 +51,16 @@ def check(scene: Scene) -> None:
     line = scene.to_line()
     _droppers_inside_spans(scene, line)
     _dropper_lengths(scene, line)
-    check_heights(scene, line)
     _speed(scene, line)
     _running(scene, line)
-    check_vehicle(scene, line)
     _evaluation(scene)
     _raising(scene)
-    check_incidents(scene, line)
     _standard(scene)
     _mesh_file(scene)
+    # What may need the machinery of multibody systems stands last: other faults are told at once.
+    check_mechanisms(scene, line)
+    check_vehicle(scene, line)
+    check_incidents(scene, line)
 
 
 def _refuse(scene: Scene, key: str, value: object, why: str) -> NoReturn:

@@ -6,50 +6,53 @@ import difflib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, NoReturn
 
-from catenary.cases.convert_pantograph import multibody_of, wanted_force
+from catenary.cases.convert_pantograph import wanted_force
 from catenary.cases.messages import refuse, shown
 from catenary.cases.schema_mechanism import ActuatorTable
 from catenary.cases.schema_pantograph import MultibodyTable
-from catenary.mbs.bodies import SPACE
-from catenary.mbs.joints import PrescribedPoint, constant
-from catenary.mbs.multibody import HOLDER, MultibodyData, reduced, stand
+from catenary.mbs.frame import SPACE
 from catenary.meshgen.line import Line
 from catenary.solver.errors import InputError, RunBroken
 
 if TYPE_CHECKING:
     from catenary.cases.scene import Scene
+    from catenary.mbs.multibody import MultibodyData
 
 # By how much the arm may be further down than the head while both fall [m].
 _LEADS = 0.05
 
 
 def check_pantographs(scene: Scene) -> None:
-    """Raise ``InputError`` with the first thing that is wrong with a kind of pantograph.
-
-    Names and forces of every kind are checked; only those on the train are assembled.
-    """
+    """Raise ``InputError`` with the first name or force that is wrong with a kind of pantograph."""
     on_the_train = {place.name for place in scene.train.pantographs}
     for name, table in scene.pantographs.items():
         if isinstance(table, MultibodyTable):
             _names(scene, name, table)
             _actuator(scene, name, table)
     _static_forces(scene, on_the_train)
-    for name in scene.pantographs:
-        if name in on_the_train:
-            _mechanism(scene, name)
 
 
-def check_heights(scene: Scene, line: Line) -> None:
-    """Raise ``InputError`` if a mechanism does not reach the wire from the height that it is put
-    to by its ``nominal_height_m``."""
+def check_mechanisms(scene: Scene, line: Line) -> None:
+    """Raise ``InputError`` if a mechanism on the train cannot be assembled, or does not reach the
+    wire from the height that it is put to by its ``nominal_height_m``.
+
+    The machinery of multibody systems is imported here, for scenes that have a mechanism.
+    """
+    on_the_train = {place.name for place in scene.train.pantographs}
+    for name, table in scene.pantographs.items():
+        if name in on_the_train and isinstance(table, MultibodyTable):
+            _mechanism(scene, name, table)
+    _heights(scene, line)
+
+
+def _heights(scene: Scene, line: Line) -> None:
     lowest = line.contact_height - max(max(sags, default=0.0) for sags in line.pre_sag)
     heights = lowest, line.contact_height
     for name in dict.fromkeys(place.name for place in scene.train.pantographs):
         table = scene.pantographs[name]
         if not isinstance(table, MultibodyTable) or table.nominal_height_m is None:
             continue
-        data = multibody_of(name, table, scene.train.speed_km_h)
-        working = stand(data).working_height
+        data, working = _standing(scene, name, table)
         for height in heights:
             if _reaches(data, working + height - table.nominal_height_m):
                 continue
@@ -70,12 +73,24 @@ def reaches_below(scene: Scene, name: str, line: Line, drop: float) -> bool:
         return True
     lowest = line.contact_height - max(max(sags, default=0.0) for sags in line.pre_sag)
     nominal = line.contact_height if table.nominal_height_m is None else table.nominal_height_m
+    data, working = _standing(scene, name, table)
+    return _reaches(data, working + lowest - nominal - drop - _LEADS)
+
+
+def _standing(scene: Scene, name: str, table: MultibodyTable) -> tuple[MultibodyData, float]:
+    """A mechanism and the height of its arm above its base where it stands [m]."""
+    from catenary.cases.input.convert_mechanism import multibody_of
+    from catenary.mbs.multibody import stand
+
     data = multibody_of(name, table, scene.train.speed_km_h)
-    return _reaches(data, stand(data).working_height + lowest - nominal - drop - _LEADS)
+    return data, stand(data).working_height
 
 
 def _reaches(data: MultibodyData, arm: float) -> bool:
     """Whether a mechanism can have its arm at a height above its base [m]."""
+    from catenary.mbs.joints import PrescribedPoint, constant
+    from catenary.mbs.multibody import HOLDER, reduced, stand
+
     if data.all_bodies is None:
         heights = reduced(data).heights
         return bool(heights[0] <= arm <= heights[-1])
@@ -160,12 +175,9 @@ def _static_forces(scene: Scene, on_the_train: set[str]) -> None:
             )
 
 
-def _mechanism(scene: Scene, name: str) -> None:
-    table = scene.pantographs[name]
-    if not isinstance(table, MultibodyTable):
-        return
+def _mechanism(scene: Scene, name: str, table: MultibodyTable) -> None:
     try:
-        stand(multibody_of(name, table, scene.train.speed_km_h))
+        _standing(scene, name, table)
     except (InputError, RunBroken) as error:
         key = f"pantographs.{name}"
         raise InputError(f"{key} {scene.origin.of(key)} cannot be built: {error}") from error

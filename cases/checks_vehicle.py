@@ -12,10 +12,7 @@ from catenary.cases.convert_vehicle import vehicle_of
 from catenary.cases.messages import refuse
 from catenary.cases.schema_pantograph import LumpedTable, MultibodyTable
 from catenary.cases.schema_vehicle import MotionTable
-from catenary.mbs.base_motion import BaseMotion
-from catenary.mbs.build import roll_of
-from catenary.mbs.lateral import LateralPath
-from catenary.mbs.multibody import stand
+from catenary.mbs.roll import roll_of
 from catenary.meshgen.line import Line
 from catenary.solver.errors import InputError
 
@@ -91,6 +88,8 @@ def _multibody_strips(scene: Scene) -> None:
         kind = scene.pantographs[name]
         if not isinstance(kind, MultibodyTable) or kind.strips.mass_kg is None:
             continue
+        from catenary.mbs.multibody import stand
+
         data = pantograph_of(name, kind, scene.train.speed_km_h)
         mass = stand(data).head.mass  # type: ignore[arg-type]
         if kind.strips.mass >= mass:
@@ -170,11 +169,12 @@ def _farthest(scene: Scene, line: Line, number: int) -> tuple[float, float]:
     place, speed = scene.train.pantographs[number], scene.train.speed_km_h / 3.6
     start = scene.train.start_m - place.behind_m
     duration = (scene.end_m - scene.train.start_m) / speed
-    offsets = (scene.strips_ahead()[number], -scene.strips_ahead()[number])
+    offsets = np.array([1.0, -1.0]) * scene.strips_ahead()[number]
     base = None
     if scene.switches()["vehicle_motion"] and scene.vehicle is not None:
+        from catenary.mbs.base_motion import BaseMotion
+
         base = BaseMotion(vehicle_of(scene.vehicle), start, speed)
-    path = LateralPath(line.support_positions, line.stagger, start, offsets, speed, base)
     # Extremes are at supports, unless the vehicle sways: then every 0.25 m and 20 ms are looked at.
     times = [0.0, duration]
     times += [(x - start - ahead) / speed for x in line.support_positions for ahead in offsets]
@@ -185,8 +185,11 @@ def _farthest(scene: Scene, line: Line, number: int) -> tuple[float, float]:
     for time in times:
         if not 0.0 <= time <= duration:
             continue
-        path.move_to(time)
-        strip = int(np.argmax(np.abs(path.place)))
-        if abs(path.place[strip]) > abs(far):
-            far, at = float(path.place[strip]), start + speed * time
+        ahead = start + speed * time + offsets
+        places = np.interp(ahead, line.support_positions, line.stagger)
+        if base is not None:
+            places -= base.lateral(time).place
+        strip = int(np.argmax(np.abs(places)))
+        if abs(places[strip]) > abs(far):
+            far, at = float(places[strip]), start + speed * time
     return far, at

@@ -176,12 +176,19 @@ def begin(
     whose ``[petsc]`` table stands before them.
     """
     from catenary.cases.petsc_options import as_arguments, start_petsc
-    from catenary.solver.parallel import abort_on_unforeseen_error, on_root, set_up_logging
+    from catenary.solver.parallel import (
+        abort_on_unforeseen_error,
+        launched_by_mpirun,
+        on_root,
+        set_up_logging,
+    )
 
+    # A process of its own is refused before MPI has started.
+    read_before = None if launched_by_mpirun() else read()
     comm = console.world()
     abort_on_unforeseen_error(comm)
     set_up_logging(comm, verbose)
-    what, options = on_root(comm, read)
+    what, options = read_before or on_root(comm, read)
     arguments = as_arguments(scene_of(what).petsc.given(), options)
     start_petsc(arguments)
     return comm, what, arguments
@@ -242,9 +249,10 @@ def plan(
     shortened: Shortened = False,
 ) -> None:
     """Serial."""
+    scene = load(case, assignments, extras, shortened)
     from catenary.cases.plan import make_plan, plan_text
 
-    console.say(plan_text(make_plan(load(case, assignments, extras, shortened))))
+    console.say(plan_text(make_plan(scene)))
 
 
 @app.command(
@@ -262,11 +270,12 @@ def check(
     shortened: Shortened = False,
 ) -> None:
     """Serial."""
+    scene = load(case, assignments, extras, shortened)
+    # What a refusal does not need is imported once the scene is sound.
     from catenary.cases.meshing import mesh_of
     from catenary.cases.pantograph_facts import kind_lines
     from catenary.solver.equilibrium import find_form
 
-    scene = load(case, assignments, extras, shortened)
     problem = scene.to_problem()
     mesh = mesh_of(scene)
     find_form(problem, mesh)
@@ -294,9 +303,10 @@ def mesh(
     force: Force = False,
 ) -> None:
     """Serial."""
+    scene = load(case, assignments, extras)
     from catenary.cases.meshing import write_mesh_of
 
-    made = write_mesh_of(load(case, assignments, extras), out, force)
+    made = write_mesh_of(scene, out, force)
     console.say(f"{out}: {made.n_nodes} nodes, {made.droppers.shape[0]} droppers")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from catenary.cases.schema_incidents import (
     DropperBreakTable,
@@ -10,9 +11,11 @@ from catenary.cases.schema_incidents import (
     LoweringTable,
     TensionLossTable,
 )
-from catenary.mbs.lowering import Lowering
 from catenary.meshgen.line import Line
 from catenary.solver.incidents import DropperBreak, LineIncident, TensionLoss
+
+if TYPE_CHECKING:
+    from catenary.mbs.lowering import Lowering
 
 
 def line_incidents(
@@ -33,6 +36,8 @@ def lowering_of(tables: Sequence[IncidentTable], number: int, dt: float) -> Lowe
     """How the pantograph ``number``, from 1, is lowered; None if it is not."""
     for table in tables:
         if isinstance(table, LoweringTable) and table.pantograph == number:
+            from catenary.mbs.lowering import Lowering
+
             return Lowering(at_step(table.at_s, dt), table.force_N, table.within_s, table.drop_m)
     return None
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from catenary.cases.schema_vehicle import Course, MotionTable, VehicleTable
 from catenary.cases.units import angle_from_deg
-from catenary.mbs.base_motion import Harmonic, Source, Table, VehicleMotion
 from catenary.mbs.irregularity import Irregularity
+from catenary.mbs.motion_sources import Harmonic, Source, Table, VehicleMotion
 
 
 def vehicle_of(table: VehicleTable) -> VehicleMotion:

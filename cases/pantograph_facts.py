@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from catenary.cases.scene import Scene
-from catenary.mbs.build import PantographData
-from catenary.mbs.multibody import MultibodyData, describe, describe_assembly, stand
+from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.strips import Strips
 from catenary.solver.problem import Problem
+
+if TYPE_CHECKING:
+    from catenary.mbs.build import PantographData
 
 
 def model_of(data: PantographData) -> str:
     """The model's name, as ``type`` has it in a scene."""
-    return "multibody" if isinstance(data, MultibodyData) else "lumped"
+    return "lumped" if isinstance(data, LumpedData) else "multibody"
 
 
 def description_of(data: PantographData, static_force: float) -> str:
     """A line about a pantograph."""
-    if isinstance(data, MultibodyData):
+    if not isinstance(data, LumpedData):
+        from catenary.mbs.multibody import describe
+
         return describe(data) + _strips_of(data.strips)
     masses = ", ".join(f"{mass:g}" for mass in data.masses)
     noun = "mass" if len(data.masses) == 1 else "masses"
@@ -57,13 +61,19 @@ def kind_lines(scene: Scene, problem: Problem) -> dict[str, list[str]]:
     lines: dict[str, list[str]] = {}
     for place, placement in zip(scene.train.pantographs, problem.train.placements, strict=True):
         lines[place.name] = [description_of(placement.data, placement.static_force)]
-        if isinstance(placement.data, MultibodyData):
+        if not isinstance(placement.data, LumpedData):
+            from catenary.mbs.multibody import describe_assembly, stand
+
             lines[place.name].append(describe_assembly(stand(placement.data).missed))
     return lines
 
 
 def _actuator_force(data: PantographData) -> float | None:
-    return stand(data).actuator_force if isinstance(data, MultibodyData) else None
+    if isinstance(data, LumpedData):
+        return None
+    from catenary.mbs.multibody import stand
+
+    return stand(data).actuator_force
 
 
 def _touching_mass(data: PantographData) -> float:
@@ -71,5 +81,12 @@ def _touching_mass(data: PantographData) -> float:
     head."""
     if data.strips.suspension is not None:
         return data.strips.suspension.mass
-    head = stand(data).head.mass if isinstance(data, MultibodyData) else data.masses[0]
-    return head / data.strips.number
+    return _head_mass(data) / data.strips.number
+
+
+def _head_mass(data: PantographData) -> float:
+    if isinstance(data, LumpedData):
+        return data.masses[0]
+    from catenary.mbs.multibody import stand
+
+    return stand(data).head.mass

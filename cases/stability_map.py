@@ -24,7 +24,7 @@ from catenary.cases.stability_march import (
     STEPS,
     Bench,
 )
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.contact import ContactWire
 from catenary.solver.distribution import distribute
 from catenary.solver.equilibrium import middle_span

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from catenary.cases.hard_runs import AtRest
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.contact_laws import LinearLaw
 from catenary.solver.march import March
 from catenary.solver.observation import Stage, StepView

@@ -24,7 +24,7 @@ from scipy import linalg, optimize
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.contact import ContactWire
 from catenary.solver.model import Model, iterate_entries
 

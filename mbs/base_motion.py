@@ -7,14 +7,13 @@ all at once. Velocities and accelerations are derivatives of the same splines an
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from catenary.mbs import head_kernels
-from catenary.mbs.irregularity import Irregularity
+from catenary.mbs.motion_sources import Harmonic, Source, Table, VehicleMotion
 
 
 class Motion(NamedTuple):
@@ -23,39 +22,6 @@ class Motion(NamedTuple):
     place: float
     velocity: float
     acceleration: float
-
-
-@dataclass(frozen=True)
-class Table:
-    """A cubic spline through ``values`` [m] at ``points``, which grow.
-
-    ``points`` are times [s], or with ``along_track`` places [m]. It is not bent at
-    its ends, where it must not be left.
-    """
-
-    points: tuple[float, ...]
-    values: tuple[float, ...]
-    along_track: bool = False
-
-
-@dataclass(frozen=True)
-class Harmonic:
-    """``amplitude`` sin(2 pi ``frequency`` t + ``phase``) [m], [Hz], [rad]."""
-
-    amplitude: float
-    frequency: float
-    phase: float = 0.0
-
-
-Source = Table | Harmonic | Irregularity
-
-
-@dataclass(frozen=True)
-class VehicleMotion:
-    """Sums of sources that move the bases of a train's pantographs, up and to the left."""
-
-    vertical: tuple[Source, ...] = ()
-    lateral: tuple[Source, ...] = ()
 
 
 class _Course(Protocol):

@@ -11,12 +11,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from catenary.mbs import kernels
+from catenary.mbs.frame import SPACE
 from catenary.solver.errors import InputError
 
 Vector = Sequence[float] | np.ndarray
-
-# What bodies can be joined to besides each other: the frame at rest.
-SPACE = "space"
 
 
 def rotation_matrix(parameters: np.ndarray) -> np.ndarray:

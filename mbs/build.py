@@ -8,14 +8,15 @@ from typing import NamedTuple
 from catenary.mbs import head_kernels
 from catenary.mbs.base_motion import BaseMotion
 from catenary.mbs.full import FullPantograph
-from catenary.mbs.head_turning import PITCH, ROLL, head_turning
+from catenary.mbs.head_turning import PITCH, head_turning
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lateral import LateralPath
 from catenary.mbs.lowering import LoweredPantograph, Lowering
-from catenary.mbs.lumped import LumpedData, LumpedPantograph
+from catenary.mbs.lumped import LumpedPantograph
+from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.multibody import MultibodyData, head_weight_under_way, reduced, stand
 from catenary.mbs.raising import RaisingData, RaisingPantograph
-from catenary.mbs.strips import Turning
+from catenary.mbs.roll import roll_of
 
 # What a pantograph can be described by.
 PantographData = LumpedData | MultibodyData
@@ -93,10 +94,3 @@ def raising_data(data: MultibodyData, static_force: float, nominal_height: float
         strips=strips,
         roll=roll_of(data),
     )
-
-
-def roll_of(data: PantographData) -> Turning | None:
-    """How the head of a pantograph rolls, None if it cannot. Not collective."""
-    if isinstance(data, MultibodyData):
-        return head_turning(data, ROLL)
-    return data.roll

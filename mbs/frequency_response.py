@@ -13,7 +13,7 @@ from catenary.mbs.bodies import Motion, Vector
 from catenary.mbs.forces import PointForce
 from catenary.mbs.joints import PrescribedPoint, constant
 from catenary.mbs.linearisation import LinearModel, linearise, of_chain, with_strips
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.multibody import MultibodyData, reduced, stand
 from catenary.mbs.statics import equilibrium
 from catenary.mbs.system import System

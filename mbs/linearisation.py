@@ -17,7 +17,7 @@ from catenary.mbs.bodies import Motion, Vector
 from catenary.mbs.dense import least_squares, null_space
 from catenary.mbs.joints import ORIGIN, unit
 from catenary.mbs.kinematics import point
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.strips import Strips
 from catenary.mbs.system import System
 from catenary.solver.errors import InputError, RunBroken

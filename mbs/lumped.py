@@ -6,7 +6,6 @@ Source: EN 50318, annex (two masses); the benchmark of ten codes of 2015 (three 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -18,42 +17,7 @@ from catenary.mbs.bound import bound
 from catenary.mbs.head_steps import SteppedHead, raised
 from catenary.mbs.interface import HeadState
 from catenary.mbs.lateral import LateralPath
-from catenary.mbs.strips import ONE_STRIP, HeadParts, Strips, Turning, head_parts
-
-
-@dataclass(frozen=True)
-class LumpedData:
-    """A chain of masses, head first.
-
-    ``masses`` [kg], shape (n,); ``stiffnesses`` [N/m] and ``dampings`` [N s/m], shape (n,): entry
-    i joins mass i to mass i + 1, the last entry joins the last mass to the base. The first mass is
-    the whole head, ``strips`` included, which may turn about the track as ``roll`` says.
-    """
-
-    masses: tuple[float, ...]
-    stiffnesses: tuple[float, ...]
-    dampings: tuple[float, ...]
-    strips: Strips = ONE_STRIP
-    roll: Turning | None = None
-
-    @property
-    def n_masses(self) -> int:
-        return len(self.masses)
-
-    @property
-    def strip_offsets(self) -> tuple[float, ...]:
-        """Places of the strips ahead of the pantograph's own place [m]."""
-        return self.strips.offsets
-
-    def chain(self, values: tuple[float, ...]) -> np.ndarray:
-        """Matrix of springs (or dampers) between neighbours, the last to ground, shape (n, n)."""
-        n = len(values)
-        return _chain(np.zeros((1, 1)), values)[:n, :n]
-
-    def head(self, rolls: bool) -> HeadParts:
-        """The head on the second mass, or on the base if there is none."""
-        values = self.masses[0], self.stiffnesses[0], self.dampings[0]
-        return head_parts(*values, self.strips, self.roll if rolls else None)
+from catenary.mbs.lumped_data import LumpedData, chain_matrix
 
 
 class LumpedPantograph(SteppedHead):
@@ -96,8 +60,8 @@ class LumpedPantograph(SteppedHead):
         # The lift acts on the last mass, which is the head itself if there is no other.
         self._carrier = n - 1 if data.n_masses > 1 else int(np.flatnonzero(head.level)[-1])
         self._masses = np.concatenate([head.masses, data.masses[1:]])
-        springs = _chain(head.stiffness, data.stiffnesses[1:])
-        dampers = _chain(head.damping, data.dampings[1:])
+        springs = chain_matrix(head.stiffness, data.stiffnesses[1:])
+        dampers = chain_matrix(head.damping, data.dampings[1:])
         self._stiffness, self._damping = springs[:n, :n], dampers[:n, :n]
         self._base_stiffness, self._base_damping = data.stiffnesses[-1], data.dampings[-1]
         # The base spring carries nothing when the head is at its nominal height under the static
@@ -167,14 +131,3 @@ class LumpedPantograph(SteppedHead):
         force = -self._stiffness @ self.position - self._damping @ self.velocity
         force[self._carrier] += self._drive(time)
         return np.asarray(force / self._masses)
-
-
-def _chain(head: np.ndarray, below: tuple[float, ...]) -> np.ndarray:
-    """A head's matrix with springs (or dampers) ``below`` its carrier, the last one to the base."""
-    n = len(head) + len(below)
-    matrix = np.zeros((n, n))
-    matrix[: len(head), : len(head)] = head
-    for upper, value in enumerate(below, start=len(head) - 1):
-        pair = slice(upper, upper + 2)
-        matrix[pair, pair] += value * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    return matrix

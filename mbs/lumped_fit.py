@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 
 from catenary.mbs.bodies import Vector
 from catenary.mbs.linearisation import apparent_mass, of_chain
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.errors import InputError, RunBroken
 
 MOST_MASSES = 3

@@ -11,9 +11,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from catenary.postproc.statistics import PantographStatistics, RunStatistics
 from catenary.solver.errors import InputError
+
+if TYPE_CHECKING:
+    from catenary.postproc.statistics import PantographStatistics, RunStatistics
 
 SYSTEMS = {"ac": "AC", "dc_3kv": "DC 3 kV", "dc_1500v": "DC 1.5 kV"}
 KMH = 3.6  # km/h in 1 m/s

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from catenary.mbs.build import roll_of
+from typing import TYPE_CHECKING
+
+from catenary.mbs.roll import roll_of
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.contact_laws import KinematicLaw
 from catenary.solver.effects import Effect, register
 from catenary.solver.incidents import DropperBreak, TensionLoss
-from catenary.solver.model import ModelBuilder
 from catenary.solver.problem import slowest_wave_speed
+
+if TYPE_CHECKING:
+    from catenary.solver.model import ModelBuilder
 
 
 def _vertical(builder: ModelBuilder) -> None:

@@ -24,7 +24,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
 
 
 @dataclass(frozen=True)
@@ -94,6 +93,7 @@ def _gonthier(restitution: float) -> float:
     e = restitution
     if e == 1.0:
         return 0.0
+    from scipy.optimize import brentq  # the one law that needs it
 
     def excess(chi: float) -> float:
         return float(chi * (1 + e) - np.log1p(chi) + np.log1p(-chi * e))

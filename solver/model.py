@@ -128,7 +128,7 @@ class ModelBuilder:
 
     def __init__(self, model: Model) -> None:
         self.model = model
-        self.problem = model.problem
+        self.problem: Problem = model.problem
         self.mesh = model.mesh
         self._gravity = 0.0
         self._hanging: list[tuple[np.ndarray, np.ndarray]] = []

@@ -11,11 +11,12 @@ from scipy import integrate
 
 from catenary.mbs.base_motion import BaseMotion
 from catenary.mbs.bound import bound
-from catenary.mbs.build import Operation, has_joints, make_pantograph, roll_of
+from catenary.mbs.build import Operation, has_joints, make_pantograph
 from catenary.mbs.full import FullPantograph
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lateral import LateralPath
 from catenary.mbs.lowering import LoweredPantograph
+from catenary.mbs.roll import roll_of
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver import inner_kernels, kernels
 from catenary.solver.contact import ContactWire

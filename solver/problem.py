@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from catenary.mbs.base_motion import VehicleMotion
-from catenary.mbs.build import PantographData
-from catenary.mbs.lowering import Lowering
+from catenary.mbs.motion_sources import VehicleMotion
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.contact_laws import ContactLaw
 from catenary.solver.incidents import LineIncident, TensionLoss
+
+if TYPE_CHECKING:
+    from catenary.mbs.build import PantographData
+    from catenary.mbs.lowering import Lowering
 
 # Halvings of a step where the scene names no smallest one.
 DEFAULT_HALVINGS = 5

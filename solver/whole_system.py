@@ -16,7 +16,7 @@ import numpy as np
 from scipy import sparse
 
 from catenary.mbs.head_steps import raised
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.contact_laws import LinearLaw
 from catenary.solver.elements import shape_slopes, shape_values

@@ -16,11 +16,12 @@ from mpi4py import MPI
 
 from catenary.cases.meshing import mesh_of
 from catenary.cases.scene import load_scene
-from catenary.mbs.base_motion import BaseMotion, VehicleMotion
+from catenary.mbs.base_motion import BaseMotion
 from catenary.mbs.build import Operation, PantographData, make_pantograph
 from catenary.mbs.irregularity import Irregularity
 from catenary.mbs.lateral import LateralPath
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.motion_sources import VehicleMotion
 from catenary.mbs.strips import Strips, Suspension, Turning
 from catenary.solver.equilibrium import elasticity, find_form, middle_span
 from catenary.solver.march import March

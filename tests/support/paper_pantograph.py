@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from catenary.cases.convert_pantograph import multibody_of
+from catenary.cases.input.convert_mechanism import multibody_of
 from catenary.cases.scene import load_scene
 from catenary.cases.schema_pantograph import CorrectionTable, MultibodyTable
 from catenary.mbs.multibody import MultibodyData, without_head

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.line import DropperKind, Line, SteadyArm, Wire
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.solver.contact_laws import LinearLaw

@@ -16,7 +16,7 @@ from catenary.cases.cli import app
 from catenary.cases.loading import read_toml
 from catenary.cases.scene import load_scene
 from catenary.mbs.linearisation import of_chain
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
 
 
 def invoke(*words: str) -> Any:

@@ -11,8 +11,8 @@ import pytest
 from catenary.cases.checks import MIN_SEPARATION
 from catenary.cases.messages import Origin
 from catenary.cases.scene import Scene, load_scene, scene_from
-from catenary.mbs.base_motion import Harmonic, Table, VehicleMotion
 from catenary.mbs.irregularity import Irregularity
+from catenary.mbs.motion_sources import Harmonic, Table, VehicleMotion
 from catenary.mbs.multibody import MultibodyData
 from catenary.mbs.strips import Strips, Suspension, Turning
 from catenary.solver.errors import InputError

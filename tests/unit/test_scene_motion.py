@@ -11,7 +11,7 @@ from catenary.cases.scene import Scene, load_scene, scene_from
 from catenary.mbs.build import has_joints
 from catenary.mbs.full import FullPantograph
 from catenary.mbs.joints import PrescribedPoint, constant
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.multibody import AllBodies, MultibodyData, reduced
 from catenary.mbs.raising import RaisingPantograph
 from catenary.solver.errors import InputError, RunBroken

@@ -11,7 +11,8 @@ from measuring import check
 from paper_pantograph import corrections, data, number_at, table
 
 from catenary.cases.checks_pantograph import check_pantographs
-from catenary.cases.convert_pantograph import multibody_of, static_force
+from catenary.cases.convert_pantograph import static_force
+from catenary.cases.input.convert_mechanism import multibody_of
 from catenary.cases.keys import is_known, known_keys
 from catenary.cases.loading import read_toml
 from catenary.cases.pantograph_facts import header_facts, kind_lines
@@ -33,7 +34,7 @@ from catenary.mbs.joints import (
     Spherical,
     constant,
 )
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.multibody import MultibodyData, stand
 
 TELESCOPE = Path(__file__).parents[1] / "support" / "telescope.toml"

@@ -12,7 +12,7 @@ from scipy import signal
 from scipy.integrate import quad
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.mbs.base_motion import BaseMotion, Harmonic, Table, VehicleMotion
+from catenary.mbs.base_motion import BaseMotion
 from catenary.mbs.build import raising_data
 from catenary.mbs.constraint_handling import Baumgarte
 from catenary.mbs.forces import PointForce
@@ -21,7 +21,9 @@ from catenary.mbs.irregularity import SPECTRA, Irregularity
 from catenary.mbs.joints import Fixed, PrescribedPoint, Prismatic, constant
 from catenary.mbs.kinematics import Law
 from catenary.mbs.lateral import LateralPath
-from catenary.mbs.lumped import LumpedData, LumpedPantograph
+from catenary.mbs.lumped import LumpedPantograph
+from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.motion_sources import Harmonic, Table, VehicleMotion
 from catenary.mbs.multibody import stand
 from catenary.mbs.raising import RaisingPantograph
 from catenary.mbs.statics import equilibrium

@@ -10,7 +10,8 @@ from measuring import History, check, march, print_table, start_march
 from scipy import signal
 from small_lines import HANGING, WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.mbs.lumped import LumpedData, LumpedPantograph
+from catenary.mbs.lumped import LumpedPantograph
+from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.contact_laws import HertzLaw, KinematicLaw, LinearLaw
 from catenary.solver.coupling import Coupling, make_coupling

@@ -19,7 +19,7 @@ from small_lines import (
     train,
 )
 
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.equilibrium import find_form, stiffness_matrix
 
 EPS = np.finfo(float).eps

@@ -13,7 +13,7 @@ import numpy as np
 from measuring import march
 from small_lines import HANGING, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
 
 LIFT = 300.0
 

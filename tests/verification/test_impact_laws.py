@@ -17,7 +17,8 @@ import pytest
 from measuring import check, print_table
 from scipy.optimize import brentq
 
-from catenary.mbs.lumped import LumpedData, LumpedPantograph
+from catenary.mbs.lumped import LumpedPantograph
+from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.contact_laws import HYSTERESIS, HertzLaw, LinearLaw
 from catenary.solver.heads import Heads
 from catenary.solver.inner import InnerProblem

@@ -26,7 +26,7 @@ from catenary.cases.loading import read_toml
 from catenary.cases.schema_pantograph import MultibodyTable
 from catenary.mbs.build import PantographData
 from catenary.mbs.lowering import Lowering
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.problem import Damping, Problem
 
 TELESCOPE = Path(__file__).parents[1] / "support" / "telescope.toml"

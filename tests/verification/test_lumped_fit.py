@@ -8,7 +8,7 @@ from measuring import check
 from seven_bodies import HEAD, at_rest, calibrated, pressed
 
 from catenary.mbs.linearisation import linearise, of_chain
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.lumped_fit import BOUNDS, fit_chain
 from catenary.solver.errors import InputError
 

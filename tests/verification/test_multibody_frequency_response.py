@@ -23,7 +23,7 @@ from catenary.mbs.integrators import integrate
 from catenary.mbs.joints import Prismatic, Revolute, Spherical
 from catenary.mbs.kinematics import point
 from catenary.mbs.linearisation import apparent_mass, linearise, of_chain
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.raising import RaisingPantograph
 from catenary.mbs.stepping import Stepper
 from catenary.mbs.strips import Strips, Suspension

@@ -10,13 +10,14 @@ import pytest
 from measuring import check
 from seven_bodies import at_rest, calibrated, pressed
 
-from catenary.mbs.base_motion import BaseMotion, Table, VehicleMotion
+from catenary.mbs.base_motion import BaseMotion
 from catenary.mbs.build import raising_data
 from catenary.mbs.full import FullPantograph
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.joints import PrescribedAngle
 from catenary.mbs.lateral import LateralPath
 from catenary.mbs.linearisation import linearise
+from catenary.mbs.motion_sources import Table, VehicleMotion
 from catenary.mbs.multibody import stand
 from catenary.mbs.raising import RaisingPantograph
 from catenary.mbs.spins import without_spins

@@ -14,7 +14,7 @@ from catenary.cases.convert_pantograph import pantograph_of
 from catenary.cases.loading import read_toml
 from catenary.cases.schema_pantograph import MultibodyTable
 from catenary.mbs.build import PantographData
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.multibody import MultibodyData, reduced, stand
 
 TELESCOPE = Path(__file__).parents[1] / "support" / "telescope.toml"

@@ -6,13 +6,15 @@ import numpy as np
 import paper_pantograph as ambrosio
 from measuring import check, orders, print_table
 
-from catenary.mbs.base_motion import BaseMotion, Harmonic, VehicleMotion
+from catenary.mbs.base_motion import BaseMotion
 from catenary.mbs.constraint_handling import Baumgarte
 from catenary.mbs.forces import PointForce
 from catenary.mbs.integrators import integrate
 from catenary.mbs.joints import PrescribedPoint, constant
 from catenary.mbs.lateral import LateralPath
-from catenary.mbs.lumped import LumpedData, LumpedPantograph
+from catenary.mbs.lumped import LumpedPantograph
+from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.motion_sources import Harmonic, VehicleMotion
 from catenary.mbs.raising import RaisingData, RaisingPantograph
 from catenary.mbs.reduction import ReducedMechanism, reduce_mechanism
 from catenary.mbs.statics import calibrate_actuator, equilibrium

@@ -16,7 +16,7 @@ from catenary.cases.hard_runs import AtRest
 from catenary.cases.stability_map import RESOLUTION, Grid, as_rows, find, make_map
 from catenary.cases.stability_march import COUPLINGS, Bench
 from catenary.cases.stability_plot import draw
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.contact import ContactWire
 from catenary.solver.distribution import distribute
 from catenary.solver.equilibrium import elasticity, find_form, middle_span

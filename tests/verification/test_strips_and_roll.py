@@ -11,14 +11,16 @@ from measuring import History, check, orders, print_table, start_march
 from scipy.integrate import solve_ivp
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.mbs.build import raising_data, roll_of
+from catenary.mbs.build import raising_data
 from catenary.mbs.forces import PointForce
 from catenary.mbs.full import FullPantograph
 from catenary.mbs.joints import PrescribedPoint, constant
 from catenary.mbs.lateral import LateralPath
-from catenary.mbs.lumped import LumpedData, LumpedPantograph
+from catenary.mbs.lumped import LumpedPantograph
+from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.multibody import stand
 from catenary.mbs.raising import RaisingPantograph
+from catenary.mbs.roll import roll_of
 from catenary.mbs.statics import equilibrium
 from catenary.mbs.strips import Strips, Suspension, Turning
 from catenary.solver.contact_laws import ContactLaw, KinematicLaw, LinearLaw

@@ -9,7 +9,8 @@ from scipy.interpolate import CubicSpline
 
 from catenary.mbs import head_kernels
 from catenary.mbs.lateral import LateralPath
-from catenary.mbs.lumped import LumpedData, LumpedPantograph
+from catenary.mbs.lumped import LumpedPantograph
+from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.raising import RaisingData, RaisingPantograph
 from catenary.mbs.reduction import ReducedMechanism
 from catenary.mbs.strips import Strips, Suspension, Turning, head_parts

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from catenary.mbs import head_kernels
 from catenary.mbs.interface import Pantograph
-from catenary.mbs.lumped import LumpedData, LumpedPantograph
+from catenary.mbs.lumped import LumpedPantograph
+from catenary.mbs.lumped_data import LumpedData
 
 DT = 1e-3
 EPS = np.finfo(float).eps

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from small_lines import BARE, EN_PANTOGRAPH, ac_simple_line, mesh_of, problem_of, train
 
-from catenary.mbs.base_motion import Harmonic, VehicleMotion
 from catenary.mbs.build import Operation, make_pantograph
 from catenary.mbs.lateral import LateralPath
 from catenary.mbs.lowering import Lowering
+from catenary.mbs.motion_sources import Harmonic, VehicleMotion
 from catenary.mbs.strips import Turning
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import MESSENGER_WIRE, LineMesh

@@ -1,0 +1,55 @@
+"""A chain of lumped masses as data, and its matrices; `lumped` makes it run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catenary.mbs.strips import ONE_STRIP, HeadParts, Strips, Turning, head_parts
+
+
+@dataclass(frozen=True)
+class LumpedData:
+    """A chain of masses, head first.
+
+    ``masses`` [kg], shape (n,); ``stiffnesses`` [N/m] and ``dampings`` [N s/m], shape (n,): entry
+    i joins mass i to mass i + 1, the last entry joins the last mass to the base. The first mass is
+    the whole head, ``strips`` included, which may turn about the track as ``roll`` says.
+    """
+
+    masses: tuple[float, ...]
+    stiffnesses: tuple[float, ...]
+    dampings: tuple[float, ...]
+    strips: Strips = ONE_STRIP
+    roll: Turning | None = None
+
+    @property
+    def n_masses(self) -> int:
+        return len(self.masses)
+
+    @property
+    def strip_offsets(self) -> tuple[float, ...]:
+        """Places of the strips ahead of the pantograph's own place [m]."""
+        return self.strips.offsets
+
+    def chain(self, values: tuple[float, ...]) -> np.ndarray:
+        """Matrix of springs (or dampers) between neighbours, the last to ground, shape (n, n)."""
+        n = len(values)
+        return chain_matrix(np.zeros((1, 1)), values)[:n, :n]
+
+    def head(self, rolls: bool) -> HeadParts:
+        """The head on the second mass, or on the base if there is none."""
+        values = self.masses[0], self.stiffnesses[0], self.dampings[0]
+        return head_parts(*values, self.strips, self.roll if rolls else None)
+
+
+def chain_matrix(head: np.ndarray, below: tuple[float, ...]) -> np.ndarray:
+    """A head's matrix with springs (or dampers) ``below`` its carrier, the last one to the base."""
+    n = len(head) + len(below)
+    matrix = np.zeros((n, n))
+    matrix[: len(head), : len(head)] = head
+    for upper, value in enumerate(below, start=len(head) - 1):
+        pair = slice(upper, upper + 2)
+        matrix[pair, pair] += value * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    return matrix

@@ -1,0 +1,68 @@
+"""What a verb imports before it has an answer: lists, help and refusals need no backend.
+
+Modules are counted, not seconds: they are what costs, and a busy machine does not change them.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from typing import Any
+
+BACKENDS = {"gmsh", "h5py", "matplotlib", "meshio", "mpi4py", "numba", "petsc4py", "scipy", "tqdm"}
+# One process runs all command lines, one after the other, and prints the exit code of each with
+# the packages that are loaded by then.
+PROGRAM = """
+import contextlib, io, json, sys
+from catenary.cases.cli import main
+found = []
+for words in json.loads(sys.argv[1]):
+    sys.argv = ["catenary", *words.split()]
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        try:
+            main()
+        except SystemExit as end:
+            found.append([end.code, sorted({name.partition(".")[0] for name in sys.modules})])
+print(json.dumps(found))
+"""
+ANSWERED = ["--help", "run --help", "list", "list --keys"]
+REFUSED = [
+    "check no_such_case",
+    "check en50318_2002 --set train.sped=300",
+    "check en50318_2002 --set train.speed_km_h=-1",
+    "check en50318_2002 --set train.speed_km_h=900",
+    "check ambrosio2012 --set train.speed_km_h=900",
+    "plan ac_simple --set line.n_spans=0",
+    "run ac_simple -o nowhere --set evaluation.to_m=1e6",
+    "sweep ac_simple -o nowhere --vary train.speed_km_h=250,900",
+    "mesh ac_simple -o nowhere.msh --set mesh.elements_per_gap=0",
+    "static ac_simple --set line.contact_wire.tension_N=0",
+]
+
+
+def run_all(command_lines: list[str]) -> list[Any]:
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, json.dumps(command_lines)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+        # Python's own view: MPI, once started by another test, adds a launcher's marks below it.
+        env=dict(os.environ),
+    )
+    return list(json.loads(done.stdout))
+
+
+def test_no_backend_is_loaded_for_an_answer_or_a_refusal() -> None:
+    lines = ANSWERED + REFUSED
+    for line, (code, loaded) in zip(lines, run_all(lines), strict=True):
+        assert code == (2 if line in REFUSED else 0), line
+        assert not BACKENDS & set(loaded), line
+
+
+def test_a_sound_case_loads_them() -> None:
+    """So that the names above are those of modules."""
+    _, loaded = run_all(["check en50318_2002"])[0]
+    assert {"gmsh", "meshio", "numba", "scipy"} <= set(loaded)
