@@ -105,7 +105,7 @@ class FieldRecorder:
             self._uplift[len(self._buffered)] = view.node_uplift()
             self._buffered.append(view.time)
         # The first snapshot is written at once: from then on there is something to look at.
-        due = (view.step - self._first_step) % self._flush_every == 0
+        due = view.step == self._first_step or (view.step + 1) % self._flush_every == 0
         if len(self._buffered) == self._capacity or (due and self._buffered):
             self._flush()
 

@@ -102,8 +102,10 @@ class Recorder:
         self._last_time = view.time
         if self._energy_every and view.step % self._energy_every == 0:
             self._energies.append((view.time, *view.energies()))
-        # The first step is written at once: it makes room for the state to continue from.
-        if self._rows == self._flush_every or not self._flushed_once:
+        # The first step is written at once: it makes room for the state to continue from. After it
+        # each flush ends with a chunk of the file: a chunk is written once, so that a kill in the
+        # midst of writing one spoils no checksum of earlier rows.
+        if (view.step + 1) % self._flush_every == 0 or not self._flushed_once:
             self._flush(view)
 
     def finish(self, outcome: str) -> None:

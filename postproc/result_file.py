@@ -19,6 +19,13 @@ import numpy as np
 from catenary.postproc import channels
 from catenary.postproc.channels import Channel
 from catenary.postproc.header import Header
+from catenary.postproc.record.checked import (
+    FORMAT_BOUNDS,
+    create_checked,
+    seal_arrays,
+    seal_attributes,
+    set_attribute,
+)
 from catenary.postproc.storage import MARGIN, abandon, as_attribute, reserve
 from catenary.solver.observation import Stage
 
@@ -63,7 +70,7 @@ class ResultFile:
         self._room = 2 * 8 * rows_per_append * width + MARGIN
         self._start_time = stage.start_time
         self._n_states = 0
-        self._file = h5py.File(path, "r+" if resume else "w")
+        self._file = h5py.File(path, "r+" if resume else "w", libver=FORMAT_BOUNDS)
         try:
             if resume:
                 _cut(self._file, stage.start_time - 0.5 * stage.dt)
@@ -74,7 +81,7 @@ class ResultFile:
             # Kept open: closing a dataset writes what is left of it, and h5py ignores errors there.
             self._growing = {name: self._file[name] for name in table}
             self._complete = self._file[COMPLETE]
-            self._file.attrs["outcome"] = RUNNING
+            set_attribute(self._file, "outcome", RUNNING)
             self._file.flush()
             self._reserve()
         except (OSError, RuntimeError):
@@ -112,7 +119,7 @@ class ResultFile:
         """Store how the run ended."""
         time = self._growing["time"]
         attributes = self._file.attrs
-        attributes["outcome"] = outcome
+        set_attribute(self._file, "outcome", outcome)
         attributes["n_steps"] = max(time.shape[0] - 1, 0)
         attributes["simulated_s"] = float(time[-1] - time[0]) if time.shape[0] else 0.0
         # Of a resumed run the part that its wall time belongs to.
@@ -122,7 +129,7 @@ class ResultFile:
     def close(self, performance: Mapping[str, Any]) -> None:
         """Store ``performance`` as root attributes and close the file."""
         for name, value in performance.items():
-            self._file.attrs[name] = as_attribute(value)
+            set_attribute(self._file, name, as_attribute(value))
         self._file.close()
 
     def abandon(self) -> None:
@@ -137,8 +144,9 @@ class ResultFile:
             place = group.require_group(slot)
             for name, value in state.items():
                 _replace(place, name, value)
+            seal_arrays(place, state)
             self._file.flush()
-            group.attrs["latest"] = slot
+            set_attribute(group, "latest", slot)
         self._file.flush()
         self._n_states += 1
 
@@ -169,21 +177,23 @@ def _table(stage: Stage, with_energies: bool) -> dict[str, tuple[Channel, int]]:
 def _write_head(file: h5py.File, stage: Stage, header: Header, n_ranks: int) -> None:
     fixed = {
         "format": FORMAT,
-        "n_ranks": n_ranks,
         "dt_s": stage.dt,
         "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         "n_steps_planned": stage.n_steps,
         "n_strips": list(stage.n_strips),
     }
     for name, value in {**header.attributes, **fixed}.items():
-        file.attrs[name] = as_attribute(value)
+        set_attribute(file, name, as_attribute(value))
+    seal_attributes(file)
+    # A restart changes it.
+    file.attrs["n_ranks"] = n_ranks
     known = {
         "line/arm_x": stage.arm_x,
         "line/dropper_x": stage.dropper_x,
         "line/node_points": stage.node_points,
     }
     for name, array in {**header.datasets, **known, COMPLETE: [0, 0]}.items():
-        file.create_dataset(name, data=array)
+        create_checked(file, name, array)
 
 
 def _create_growing(
@@ -196,9 +206,18 @@ def _create_growing(
         if one_value_a_row
         else ((0, columns), (None, columns or None), (chunk_rows, max(columns, 1)))
     )
-    dataset = file.create_dataset(path, shape=shape, maxshape=limit, chunks=chunks, dtype="f8")
-    dataset.attrs["unit"] = channel.unit
-    dataset.attrs["meaning"] = channel.meaning
+    # A chunk that HDF5's index has lost reads as NaN, not as zeros.
+    dataset = file.create_dataset(
+        path,
+        shape=shape,
+        maxshape=limit,
+        chunks=chunks,
+        dtype="f8",
+        fletcher32=True,
+        fillvalue=np.nan,
+    )
+    set_attribute(dataset, "unit", channel.unit)
+    set_attribute(dataset, "meaning", channel.meaning)
 
 
 def _rows(file: h5py.File) -> list[int]:

@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 
 from catenary.postproc import channels
+from catenary.postproc.record.checked import text_of
 from catenary.postproc.result_file import DONE, FORMAT, RUNNING, complete_rows
 from catenary.solver.errors import InputError
 
@@ -55,7 +56,7 @@ class Results:
             self._file = h5py.File(self.path, "r", locking=False)
         except OSError as error:
             raise InputError(f"{self.path} cannot be read as HDF5 ({error})") from error
-        found = self._file.attrs.get("format")
+        found = text_of(self._file.attrs.get("format"))
         if found != FORMAT:
             self._file.close()
             raise InputError(
@@ -88,7 +89,7 @@ class Results:
             if name in _JSON_ATTRIBUTES:
                 decoded[name] = json.loads(value)
             else:
-                decoded[name] = value.item() if isinstance(value, np.generic) else value
+                decoded[name] = text_of(value)
         return decoded
 
     @property
@@ -234,7 +235,7 @@ class Results:
         group = self._file.get("checkpoint")
         if group is None or "latest" not in group.attrs:
             raise InputError(f"{self.path} holds no state to continue from")
-        slot = group[group.attrs["latest"]]
+        slot = group[text_of(group.attrs["latest"])]
         return {name: _value(dataset) for name, dataset in slot.items()}
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from catenary.postproc.record.checked import FORMAT_BOUNDS
 from catenary.solver.errors import RunBroken
 
 # Room for HDF5's own tables and for the last words of a run that has filled the disk [bytes].
@@ -101,7 +102,7 @@ def abandon(file: h5py.File) -> None:
 @contextlib.contextmanager
 def opened(path: Path, mode: str) -> Iterator[h5py.File]:
     """An HDF5 file for writing, abandoned if something fails. A context manager."""
-    file = h5py.File(path, mode)
+    file = h5py.File(path, mode, libver=FORMAT_BOUNDS)
     try:
         yield file
         file.flush()

@@ -48,7 +48,7 @@ def test_each_step_has_the_largest_open_joint(
     assert heads == ["leading constraint_violation [m]", "trailing constraint_violation [m]"]
     assert float(rows[101][rows[0].index(heads[0])]) == pytest.approx(1e-10, rel=1e-8)
     with h5py.File(tmp_path / "run.h5") as file:
-        assert file["channels/constraint_violation"].attrs["unit"] == "m"
+        assert file["channels/constraint_violation"].attrs["unit"] == b"m"
 
 
 def test_summary_and_report_tell_the_largest(

@@ -49,7 +49,7 @@ def test_each_strip_has_a_column(tmp_path: Path, with_strips: Any, record_run: A
     column = rows[0].index(heads[1])
     assert float(rows[101][column]) == pytest.approx(0.4 * force[100, 1], rel=1e-8)
     with h5py.File(tmp_path / "run.h5") as file:
-        assert file["channels/strip_force"].attrs["unit"] == "N"
+        assert file["channels/strip_force"].attrs["unit"] == b"N"
 
 
 def test_the_report_shows_them(tmp_path: Path, with_strips: Any, record_run: Any) -> None:
