@@ -28,6 +28,7 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.fields import FieldRecorder
 from catenary.postproc.header import Header, line_datasets, static_datasets
 from catenary.postproc.progress import Progress
+from catenary.postproc.record.own_files import remove_stale
 from catenary.postproc.recorder import Recorder
 from catenary.postproc.report import write_report, write_summary
 from catenary.postproc.results import Results
@@ -38,7 +39,7 @@ from catenary.solver.equilibrium import (
     find_form,
     middle_span,
 )
-from catenary.solver.errors import InputError, RunBroken
+from catenary.solver.errors import CatenaryError, InputError, RunBroken
 from catenary.solver.march import March, Outcome
 from catenary.solver.model import Model, build
 from catenary.solver.observation import Observer
@@ -213,16 +214,9 @@ def _march(
     header = _header(scene, problem, at_rest, petsc_options) if comm.rank == 0 else None
     dt, output = problem.numerics.dt, scene.output
     flush_every = output.flush_every_steps or flush_cadence(problem, at_rest.model.n_dofs)
-    recorder = Recorder(
-        comm,
-        out_dir / RESULT,
-        header,
-        flush_every=flush_every,
-        energy_every=_cadence(output.energy_every_s, dt),
-        resume=resume,
-    )
     # The recorder is the last to write: the state to continue from stands for all before it.
-    observers: list[Observer] = [Progress(comm), recorder]
+    observers: list[Observer] = [Progress(comm)]
+    fields: FieldRecorder | None = None
     field_every = _cadence(output.field_every_s, dt)
     if field_every:
         fields = FieldRecorder(
@@ -233,11 +227,30 @@ def _march(
             every=field_every,
             flush_every=flush_every,
             resume=resume,
+            wait=True,
         )
         observers.insert(0, fields)
+
+    def begun() -> None:
+        remove_stale(out_dir)
+        if fields is not None:
+            fields.publish()
+
+    recorder = Recorder(
+        comm,
+        out_dir / RESULT,
+        header,
+        flush_every=flush_every,
+        energy_every=_cadence(output.energy_every_s, dt),
+        resume=resume,
+        on_begun=begun,
+    )
+    observers.append(recorder)
     with march, phases("march"), StopRequest() as stop:
         outcome = march.run(observers, stop)
     recorder.close(_performance(outcome, phases, comm.size))
+    if not recorder.begun:
+        raise RunBroken(outcome.outcome)
     tell(outcome.outcome)
     with phases("report"):
         result = on_root(comm, lambda: _report(out_dir, outcome, only_summary))
@@ -252,12 +265,12 @@ def _report(out_dir: Path, outcome: Outcome, only_summary: bool) -> RunOutcome:
         else:
             accepted = write_report(out_dir / RESULT, out_dir).verdict
         summary = json.loads((out_dir / "summary.json").read_text(encoding="utf-8"))
-    except OSError as error:
+    except (OSError, CatenaryError) as error:
         if outcome.outcome != "done":  # that has been told, and this adds nothing
             return RunOutcome(outcome.outcome, None)
         raise RunBroken(
-            f"writing the report into {out_dir} failed ({error.strerror or error}); the results "
-            f"are complete: `catenary report {out_dir}` writes it again"
+            f"{error}; the results are complete: `catenary report {out_dir}` writes the report "
+            "again"
         ) from error
     return RunOutcome(outcome.outcome, accepted, summary)
 

@@ -7,7 +7,9 @@ dataset lose their arrays silently in the Xdmf3 reader, hence the layout. Warp b
 
 from __future__ import annotations
 
+import contextlib
 import logging
+import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -18,10 +20,11 @@ from h5py import h5d, h5p, h5s, h5t
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.postproc.gathering import ColumnGather
+from catenary.postproc.record.own_files import part_of
 from catenary.postproc.storage import (
     MARGIN,
-    appears_whole,
     broken_write,
+    check_in_place,
     opened,
     reserve,
     write_at,
@@ -42,8 +45,8 @@ _TABLES = 1024
 class FieldRecorder:
     """Observer that writes ``fields.xdmf`` and the ``.h5`` beside it.
 
-    Collective, like all its methods except ``observe`` between flushes. Both files are closed and
-    valid after every flush.
+    Collective, like all its methods except ``observe`` between flushes. Both files are valid after
+    every flush.
 
     Parameters
     ----------
@@ -57,6 +60,7 @@ class FieldRecorder:
         which is to follow in the list of observers, a killed run can be continued without a gap
     snapshots_per_flush : most snapshots kept in memory
     resume : continue the files: snapshots from the stage's start time on are replaced
+    wait : keep new files under another name, and others as they are, until ``publish`` is called
     """
 
     def __init__(
@@ -70,6 +74,7 @@ class FieldRecorder:
         flush_every: int = 500,
         snapshots_per_flush: int = 50,
         resume: bool = False,
+        wait: bool = False,
     ) -> None:
         self._comm = comm
         self._xdmf = Path(path_xdmf)
@@ -82,6 +87,9 @@ class FieldRecorder:
         self._buffered: list[float] = []
         self._written: list[float] = []
         self._broken = False
+        self._handle = -1
+        self._wait = wait
+        self._published = False
 
     def start(self, stage: Stage) -> None:
         """Write the mesh. Collective.
@@ -111,8 +119,24 @@ class FieldRecorder:
 
     def finish(self, outcome: str) -> None:
         """Write what is left. Collective."""
-        if not self._broken:
-            self._flush()
+        try:
+            if not self._broken:
+                self._flush()
+        finally:
+            self._close()
+
+    def publish(self) -> None:
+        """Give new files their names, in place of earlier ones. On rank 0; not collective.
+
+        Raises
+        ------
+        OSError
+        """
+        if self._handle < 0 or self._published:
+            return
+        os.replace(self._made_as, self._h5)
+        self._published = True
+        self._describe()
 
     def _flush(self) -> None:
         times = list(self._buffered)
@@ -140,20 +164,42 @@ class FieldRecorder:
 
     def _open(self, stage: Stage) -> None:
         self._h5.parent.mkdir(parents=True, exist_ok=True)
+        self._made_as = part_of(self._h5, os.getpid())
         if self._resume and self._h5.exists() and self._cut(stage):
+            self._handle = os.open(self._h5, os.O_RDWR)
+            self._published = True
             self._describe()
             return
-        for path in (self._xdmf, self._h5):  # of an earlier run
-            path.unlink(missing_ok=True)
-        with appears_whole(self._h5) as path, opened(path, "w") as file:
-            reserve(path, 0, self._size())
+        try:
+            self._make(stage)
+        except BaseException:
+            self._made_as.unlink(missing_ok=True)
+            raise
+        self._handle = os.open(self._made_as, os.O_RDWR)
+        if self._resume or not self._wait:
+            self.publish()
+
+    def _make(self, stage: Stage) -> None:
+        """Write a file without a snapshot."""
+        with opened(self._made_as, "w") as file:
+            reserve(file.id.get_vfd_handle(), 0, self._size())
             file["mesh/points"] = stage.node_points
             file["mesh/cells"] = self._cells
             file["mesh/component"] = self._component
             file["times"] = np.full(self._n_snapshots, np.nan)
             self._make_places(file)
-        with h5py.File(self._h5, "r") as file:
+        with h5py.File(self._made_as, "r") as file:
             self._find_places(file)
+
+    def _close(self) -> None:
+        """Close the file, remove one that was never published."""
+        if self._handle < 0:
+            return
+        os.close(self._handle)
+        self._handle = -1
+        if not self._published:
+            with contextlib.suppress(OSError):
+                self._made_as.unlink(missing_ok=True)
 
     def _size(self) -> int:
         """What the file takes at most [bytes]."""
@@ -206,14 +252,15 @@ class FieldRecorder:
         first = len(self._written)
         scalar = np.zeros(self._n_nodes, dtype="<f4")
         vector = np.zeros((self._n_nodes, 3), dtype="<f4")
-        with self._h5.open("r+b", buffering=0) as file:
-            for (scalar_at, vector_at), values in zip(self._places[first:], uplift, strict=False):
-                scalar[:] = vector[:, 2] = values
-                write_at(file.fileno(), scalar_at, scalar)
-                write_at(file.fileno(), vector_at, vector)
-            write_at(file.fileno(), self._times_at + 8 * first, np.array(times, dtype="<f8"))
+        for (scalar_at, vector_at), values in zip(self._places[first:], uplift, strict=False):
+            scalar[:] = vector[:, 2] = values
+            write_at(self._handle, scalar_at, scalar)
+            write_at(self._handle, vector_at, vector)
+        write_at(self._handle, self._times_at + 8 * first, np.array(times, dtype="<f8"))
         self._written += times
-        self._describe()
+        if self._published:
+            check_in_place(self._h5, self._handle)
+            self._describe()
 
     def _describe(self) -> None:
         write_whole(

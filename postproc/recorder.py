@@ -17,11 +17,13 @@ from catenary.postproc import channels
 from catenary.postproc.gathering import ColumnGather
 from catenary.postproc.header import Header
 from catenary.postproc.result_file import DONE, INTERRUPTED, ResultFile
-from catenary.postproc.storage import NoRoom, broken_write
+from catenary.postproc.storage import Elsewhere, NoRoom, broken_write
 from catenary.solver.errors import RunBroken
 from catenary.solver.observation import Stage, StepView
 from catenary.solver.parallel import on_root
 
+# What a run leaves that breaks before its first step.
+_NOTHING = "nothing was written, and results of an earlier run are as they were"
 _OF_PANTOGRAPHS = ("contact_position", "contact_force", "head_height", "wire_height")
 
 
@@ -34,11 +36,13 @@ class Recorder:
     Parameters
     ----------
     comm : mpi4py communicator
-    path : the result file, overwritten unless ``resume``; its folder is made
+    path : the result file; its folder is made. A new file takes the place of an earlier one when
+        its first step is on the disk
     header : on rank 0 what the runner knows before the first step; ignored elsewhere
     flush_every : steps between two flushes
     energy_every : steps between two records of the energies, None for none
     resume : continue a file: what it holds from the stage's start time on is replaced
+    on_begun : called on rank 0 when a new file has taken its place
     """
 
     def __init__(
@@ -50,6 +54,7 @@ class Recorder:
         flush_every: int = 500,
         energy_every: int | None = None,
         resume: bool = False,
+        on_begun: Callable[[], None] = lambda: None,
     ) -> None:
         if comm.rank == 0 and header is None:
             raise ValueError("rank 0 needs the head of the result file")
@@ -59,6 +64,7 @@ class Recorder:
         self._flush_every = flush_every
         self._energy_every = energy_every
         self._resume = resume
+        self._on_begun = on_begun
         self._file: ResultFile | None = None
         self._broken = False
         self._view: StepView | None = None
@@ -66,6 +72,11 @@ class Recorder:
         self._flushed_once = False
         self._rows = 0
         self._energies: list[tuple[float, float, float]] = []
+
+    @property
+    def begun(self) -> bool:
+        """Whether the result file holds this run; not before its first step. The same on all."""
+        return self._resume or self._flushed_once
 
     def start(self, stage: Stage) -> None:
         """Make the buffers and open the file. Collective.
@@ -128,14 +139,14 @@ class Recorder:
             needed on rank 0 only
         """
         if not self._broken:
-            self._guarded(lambda: self._open_file.close(performance or {}))
+            self._guarded(lambda: self._close(performance or {}))
 
     def _flush(self, view: StepView | None) -> None:
         """Gather the buffers, append them, and store the state of ``view``. Collective."""
         arms = self._gather_arms(self._columns("arm_uplift"))
         droppers = self._gather_droppers(self._columns("dropper_force"))
         state = view.checkpoint() if view is not None else None
-        self._guarded(lambda: self._open_file.append(self._blocks(arms, droppers), state))
+        self._guarded(lambda: self._append(self._blocks(arms, droppers), state))
         self._rows = 0
         self._energies.clear()
         self._flushed_once = True
@@ -153,8 +164,9 @@ class Recorder:
             try:
                 work()
             except (OSError, RuntimeError) as error:  # h5py raises both when a disk is full
-                broken = broken_write(self._path, self._last_time, error)
-                if isinstance(error, NoRoom) and self._file is not None:
+                words = (self._path, self._last_time, error)
+                broken = broken_write(*words) if self.begun else broken_write(*words, _NOTHING)
+                if isinstance(error, (NoRoom, Elsewhere)) and self._file is not None:
                     self._file.conclude(str(broken))
                     self._file.close({})
                 elif self._file is not None:
@@ -178,7 +190,17 @@ class Recorder:
             rows_per_append=self._flush_every,
             with_energies=bool(self._energy_every),
             resume=self._resume,
+            on_begun=self._on_begun,
         )
+
+    def _append(self, blocks: Mapping[str, np.ndarray], state: Mapping[str, Any] | None) -> None:
+        # In this order nothing is lost of a file that was moved.
+        self._open_file.append(blocks, state)
+        self._open_file.check_in_place()
+
+    def _close(self, performance: Mapping[str, Any]) -> None:
+        self._open_file.check_in_place()
+        self._open_file.close(performance)
 
     def _blocks(self, arms: np.ndarray, droppers: np.ndarray) -> dict[str, np.ndarray]:
         """What a flush appends, the time last: it counts the rows."""

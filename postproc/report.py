@@ -22,7 +22,7 @@ from catenary.postproc.remarks import remarks
 from catenary.postproc.results import Results
 from catenary.postproc.standards import KMH, Criterion
 from catenary.postproc.statistics import RunStatistics
-from catenary.postproc.storage import write_whole
+from catenary.postproc.storage import write_into
 from catenary.postproc.summary import as_json, real_time_factor, summarise
 
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -75,6 +75,8 @@ def write_report(result_path: Path | str, out_dir: Path | str) -> Report:
     ------
     InputError
         If ``result_path`` is no result file.
+    RunBroken
+        If a file cannot be written.
     """
     out = Path(out_dir)
     with Results(result_path) as results:
@@ -86,9 +88,7 @@ def write_report(result_path: Path | str, out_dir: Path | str) -> Report:
         content["report.html"] = _html(results, statistics, criteria, pictures)
         content["summary.json"] = as_json(summarise(results, statistics, criteria))
         verdict = standards.verdict(criteria) if results.complete else None
-    for name, data in content.items():
-        write_whole(out / name, data)
-    return Report([out / name for name in content], criteria, verdict)
+    return Report(write_into(out, content), criteria, verdict)
 
 
 def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
@@ -104,7 +104,7 @@ def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
         criteria = judge(results, statistics)
         text = as_json(summarise(results, statistics, criteria))
         verdict = standards.verdict(criteria) if results.complete else None
-    write_whole(Path(out_dir) / "summary.json", text)
+    write_into(Path(out_dir), {"summary.json": text})
     return verdict
 
 

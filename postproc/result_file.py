@@ -8,7 +8,8 @@ have got longer, and its rows not be there yet. Hence ``COMPLETE``, which is tol
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Callable, Mapping
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,8 @@ from catenary.postproc.record.checked import (
     seal_attributes,
     set_attribute,
 )
-from catenary.postproc.storage import MARGIN, abandon, as_attribute, reserve
+from catenary.postproc.record.own_files import part_of
+from catenary.postproc.storage import MARGIN, abandon, as_attribute, check_in_place, reserve
 from catenary.solver.observation import Stage
 
 FORMAT = "catenary-run-1"
@@ -41,15 +43,19 @@ _SLOTS = ("0", "1")
 class ResultFile:
     """A result file open for writing.
 
+    A new one is made under another name, and takes its own when its first rows are on the disk:
+    until then an earlier file, or a link, stays as it is. All writes go through one descriptor.
+
     Parameters
     ----------
-    path : the file, overwritten unless ``resume``
+    path : the file, replaced at the end of the first ``append`` unless ``resume``
     stage : of the run
     header : what the runner knows before the first step
     n_ranks : size of the run's communicator
     rows_per_append : largest number of rows of an append
     with_energies : whether energies will be appended
     resume : continue a file; what it holds from the stage's start time on is dropped
+    on_begun : called when a new file has taken its place
     """
 
     def __init__(
@@ -62,15 +68,19 @@ class ResultFile:
         rows_per_append: int,
         with_energies: bool,
         resume: bool,
+        on_begun: Callable[[], None] = lambda: None,
     ) -> None:
         self._path = path
+        self._made_as = path if resume else part_of(path, os.getpid())
+        self._begun = resume
+        self._on_begun = on_begun
         table = _table(stage, with_energies)
         width = sum(columns or 1 for _, columns in table.values())
         # An append touches the chunk begun last and one more.
         self._room = 2 * 8 * rows_per_append * width + MARGIN
         self._start_time = stage.start_time
         self._n_states = 0
-        self._file = h5py.File(path, "r+" if resume else "w", libver=FORMAT_BOUNDS)
+        self._file = h5py.File(self._made_as, "r+" if resume else "w", libver=FORMAT_BOUNDS)
         try:
             if resume:
                 _cut(self._file, stage.start_time - 0.5 * stage.dt)
@@ -114,6 +124,15 @@ class ResultFile:
         if state is not None:
             self._store(state)
         self._reserve()
+        if not self._begun:
+            os.replace(self._made_as, self._path)
+            self._begun = True
+            self._on_begun()
+
+    def check_in_place(self) -> None:
+        """Raise ``storage.Elsewhere`` if the path names this file no longer."""
+        if self._begun:
+            check_in_place(self._path, self._file.id.get_vfd_handle())
 
     def conclude(self, outcome: str) -> None:
         """Store how the run ended."""
@@ -131,10 +150,17 @@ class ResultFile:
         for name, value in performance.items():
             set_attribute(self._file, name, as_attribute(value))
         self._file.close()
+        self._forget()
 
     def abandon(self) -> None:
         """Close the file without writing to it, after a write has failed."""
         abandon(self._file)
+        self._forget()
+
+    def _forget(self) -> None:
+        """Remove a new file that never held a row."""
+        if not self._begun:
+            self._made_as.unlink(missing_ok=True)
 
     def _store(self, state: Mapping[str, Any]) -> None:
         """Write a state, the first one into both slots, any other into the older one."""
@@ -151,7 +177,8 @@ class ResultFile:
         self._n_states += 1
 
     def _reserve(self) -> None:
-        reserve(self._path, self._file.id.get_filesize(), self._room)
+        handle = self._file.id.get_vfd_handle()
+        reserve(handle, self._file.id.get_filesize(), self._room)
 
 
 def _table(stage: Stage, with_energies: bool) -> dict[str, tuple[Channel, int]]:

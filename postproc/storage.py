@@ -7,7 +7,6 @@ import errno
 import json
 import math
 import os
-import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,8 @@ import h5py
 import numpy as np
 
 from catenary.postproc.record.checked import FORMAT_BOUNDS
+from catenary.postproc.record.disk_errors import reason, remedy
+from catenary.postproc.record.own_files import part_of
 from catenary.solver.errors import RunBroken
 
 # Room for HDF5's own tables and for the last words of a run that has filled the disk [bytes].
@@ -52,23 +53,54 @@ class NoRoom(OSError):
     """The disk, a quota or a limit of the process leaves no room; nothing was written yet."""
 
 
-def reserve(path: Path, start: int, n_bytes: int) -> None:
-    """Claim ``n_bytes`` [bytes] on the disk behind a file's end at ``start``. Not collective.
+class Elsewhere(OSError):
+    """The path no longer names the file that is being written; says where the file is."""
+
+
+def reserve(handle: int, start: int, n_bytes: int) -> None:
+    """Claim ``n_bytes`` [bytes] on the disk behind an open file's end. Not collective.
 
     HDF5 updates its tables in place and appends the data: if the disk fills up in between, the
     tables point to data that are not there and the file is lost. Claimed space excludes that.
+
+    Parameters
+    ----------
+    handle : descriptor of the file, open for writing; its path may name another file by now
+    start : end of the file [bytes]
 
     Raises
     ------
     NoRoom
     """
-    handle = os.open(path, os.O_RDWR)
     try:
         _claim(handle, start, n_bytes)
     except OSError as error:
         raise NoRoom(error.errno, error.strerror) from error
-    finally:
-        os.close(handle)
+
+
+def check_in_place(path: Path, handle: int) -> None:
+    """Raise ``Elsewhere`` unless ``path`` names the file open as ``handle``. Not collective."""
+    with contextlib.suppress(OSError):
+        if os.path.samestat(os.stat(path), os.fstat(handle)):
+            return
+    if os.fstat(handle).st_nlink == 0:
+        if os.path.lexists(path):
+            raise Elsewhere(
+                f"{path} was replaced by another file while the run went on; that file is left as "
+                "it is, what the run had written is lost"
+            )
+        what = path if path.parent.is_dir() else f"the folder {path.parent}"
+        raise Elsewhere(f"{what} was removed while the run went on; what it had written is lost")
+    try:
+        now = Path(os.readlink(f"/proc/self/fd/{handle}"))
+    except OSError:  # not Linux
+        raise Elsewhere(
+            f"{path} was moved while the run went on; what the run had written is there"
+        ) from None
+    raise Elsewhere(
+        f"{path} is now {now}, moved while the run went on: what was written is there, and "
+        f"`catenary restart {now.parent}` continues the run"
+    )
 
 
 def _claim(handle: int, start: int, n_bytes: int) -> None:
@@ -112,15 +144,17 @@ def opened(path: Path, mode: str) -> Iterator[h5py.File]:
     file.close()
 
 
-def broken_write(path: Path, time: float, error: Exception) -> RunBroken:
-    """The error for the user when writing ``path`` failed at ``time`` [s] of the simulation."""
-    code = getattr(error, "errno", None)
-    # HDF5 hides the system's word among the figures of several lines.
-    hidden = re.search(r"error message = '([^']*)'", str(error))
-    reason = os.strerror(code) if code else hidden.group(1) if hidden else str(error)
+def broken_write(
+    path: Path, time: float, error: Exception, kept: str = "what was written before stays readable"
+) -> RunBroken:
+    """The error for the user when writing ``path`` failed at ``time`` [s] of the simulation.
+
+    ``kept`` says what the failure leaves.
+    """
+    if isinstance(error, Elsewhere):
+        return RunBroken(f"the run ended at t = {time:.3f} s because {error}")
     return RunBroken(
-        f"writing {path} failed at t = {time:.3f} s ({reason}): free some space or choose another "
-        "output folder; what was written before stays readable"
+        f"writing {path} failed at t = {time:.3f} s ({reason(error)}): {remedy(error)}; {kept}"
     )
 
 
@@ -130,7 +164,7 @@ def appears_whole(path: Path) -> Iterator[Path]:
 
     A context manager. If something fails there is nothing new.
     """
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+    partial = part_of(path, os.getpid())
     try:
         yield partial
         os.replace(partial, path)
@@ -170,13 +204,31 @@ def write_all(folder: Path, content: Mapping[str, bytes | str]) -> list[Path]:
     RunBroken
         If one cannot be written.
     """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _unwritten(folder, error) from error
+    return write_into(folder, content)
+
+
+def write_into(folder: Path, content: Mapping[str, bytes | str]) -> list[Path]:
+    """The same for a folder that is there already.
+
+    Raises
+    ------
+    RunBroken
+        If one cannot be written.
+    """
     for name, data in content.items():
         try:
-            folder.mkdir(parents=True, exist_ok=True)
             write_whole(folder / name, data)
         except OSError as error:
-            raise RunBroken(
-                f"writing {folder / name} failed ({error.strerror or error}): free some space or "
-                "choose another output folder; what was written before stays readable"
-            ) from error
+            raise _unwritten(folder / name, error) from error
     return [folder / name for name in content]
+
+
+def _unwritten(path: Path, error: OSError) -> RunBroken:
+    return RunBroken(
+        f"writing {path} failed ({reason(error)}): {remedy(error)}; what was written before stays "
+        "readable"
+    )

@@ -135,6 +135,7 @@ def test_the_folder_of_the_result_file_is_made(tmp_path: Path, make_march: Any) 
     march = make_march()
     watcher = Recorder(march.comm, tmp_path / "some" / "where" / "run.h5", march.header())
     watcher.start(march.stage())
+    watcher.observe(march.view(0))
     watcher.finish("done")
     watcher.close()
     assert [path.name for path in (tmp_path / "some" / "where").iterdir()] == ["run.h5"]
@@ -230,7 +231,7 @@ def test_a_full_disk_ends_the_run_with_a_sentence_and_keeps_the_record(
     last = program.stderr.strip().splitlines()[-1]
     assert program.returncode == 1
     assert last.startswith(f"catenary.solver.errors.RunBroken: writing {path} failed at t = ")
-    assert "(File too large): free some space" in last
+    assert "(File too large): raise the limit on the size of a file" in last
     with Results(path) as results:
         # Everything up to the step at which the run broke is there, and the file says why.
         assert results.outcome in last

@@ -1,0 +1,68 @@
+"""Names of all files that a run and its report leave in their folder.
+
+A run that replaces another removes these and nothing else: a user's own files stay.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import re
+import time
+from pathlib import Path
+
+logger = logging.getLogger("catenary.record")
+
+RUN_FILE = "run.h5"
+FIELD_FILES = ("fields.h5", "fields.xdmf")
+REPORT_FILES = (
+    "summary.json",
+    "report.html",
+    "droppers.csv",
+    "contact_force.png",
+    "strip_forces.png",
+    "statistics.png",
+    "histogram.png",
+    "uplift.png",
+    "droppers.png",
+    "static.png",
+    "energy.png",
+)
+# What a sweep leaves beside a run's files.
+VARIANT_FILE = "variant.json"
+OWN_FILES = (RUN_FILE, *FIELD_FILES, *REPORT_FILES, VARIANT_FILE)
+
+_PART = re.compile(r"\.(?P<name>.+)\.\d+\.part")
+# A report may be written beside a run; its files are made in less [s].
+_MAKING = 600.0
+
+
+def part_of(path: Path, process: int) -> Path:
+    """Name under which a process makes a file that is to appear whole."""
+    return path.with_name(f".{path.name}.{process}.part")
+
+
+def remove_stale(folder: Path) -> None:
+    """Remove what an earlier run left beside its result file, which is replaced already."""
+    for name in OWN_FILES:
+        if name == RUN_FILE:
+            continue
+        try:
+            (folder / name).unlink(missing_ok=True)
+        except OSError as error:  # a folder of this name is not ours
+            logger.warning(
+                "%s of an earlier run could not be removed (%s)", folder / name, error.strerror
+            )
+
+
+def remove_parts(folder: Path) -> None:
+    """Remove parts of files that dead runs left. Only who holds the folder's lock may."""
+    with contextlib.suppress(OSError):
+        for path in folder.iterdir():
+            part = _PART.fullmatch(path.name)
+            if part is None or part["name"] not in OWN_FILES:
+                continue
+            with contextlib.suppress(OSError):
+                old = time.time() - path.lstat().st_mtime > _MAKING
+                if old or part["name"] in (RUN_FILE, *FIELD_FILES):
+                    path.unlink()
