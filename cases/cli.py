@@ -24,7 +24,7 @@ app: typer.Typer = typer.Typer(
     name="catenary",
     help="Finite elements for railway overhead lines coupled with pantographs.",
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -85,6 +85,31 @@ Strict = Annotated[
     bool, typer.Option("--strict", help="Exit with 3 if an acceptance criterion fails.")
 ]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more.")]
+
+
+def _version(wanted: bool) -> None:
+    """Print all versions and end, if that is wanted."""
+    if wanted:
+        from catenary.cases.commands.versions import versions_text
+
+        if console.speaks():
+            typer.echo(versions_text())
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version",
+            callback=_version,
+            is_eager=True,
+            help="Versions of Catenary, PETSc, MPI, HDF5, Numba and others.",
+        ),
+    ] = False,
+) -> None:
+    """Not collective."""
 
 
 @app.command(
@@ -187,7 +212,7 @@ def begin(
     read_before = None if launched_by_mpirun() else read()
     comm = console.world()
     abort_on_unforeseen_error(comm)
-    set_up_logging(comm, verbose)
+    set_up_logging(comm, verbose, console.is_quiet())
     what, options = read_before or on_root(comm, read)
     arguments = as_arguments(scene_of(what).petsc.given(), options)
     start_petsc(arguments)

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
-from catenary.solver.errors import CatenaryError
+from catenary.solver.errors import CatenaryError, InputError
 from catenary.solver.parallel import launched_by_mpirun, on_root
 
 DONE, BROKEN, BAD_INPUT, NOT_ACCEPTED = 0, 1, 2, 3
 _RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK")
+# The option that ``guarded`` adds to every verb, and whether the present one has it.
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
+_quiet = False
 
 
 def speaks() -> bool:
@@ -23,9 +27,14 @@ def speaks() -> bool:
     return all(os.environ.get(name, "0") == "0" for name in _RANK_VARIABLES)
 
 
+def is_quiet() -> bool:
+    """Whether the verb that runs prints nothing but errors. Not collective."""
+    return _quiet
+
+
 def say(text: str) -> None:
-    """Print to standard output on rank 0. Not collective."""
-    if speaks():
+    """Print to standard output on rank 0, unless the verb is to be quiet. Not collective."""
+    if speaks() and not _quiet:
         typer.echo(text)
 
 
@@ -56,12 +65,17 @@ def world() -> Any:
 def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
     """A command whose foreseen errors end in a sentence and an exit code, not in a traceback.
 
-    The command returns its exit code, None for 0. Collective if the command is.
+    The command returns its exit code, None for 0; it gets the option ``--quiet``. Collective if the
+    command is.
     """
 
     @functools.wraps(command)
-    def wrapped(*args: Any, **kwargs: Any) -> None:
+    def wrapped(*args: Any, quiet: bool = False, **kwargs: Any) -> None:
+        global _quiet
+        _quiet = quiet
         try:
+            if quiet and kwargs.get("verbose"):
+                raise InputError("--quiet and --verbose exclude each other; give one of them")
             code = command(*args, **kwargs)
         except CatenaryError as error:
             complain(str(error))
@@ -75,6 +89,14 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
         if code:
             raise typer.Exit(code)
 
+    # The command line is made from signature and annotations.
+    signature = inspect.signature(command, eval_str=True)
+    option = inspect.Parameter(
+        "quiet", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Quiet
+    )
+    parameters = [*signature.parameters.values(), option]
+    wrapped.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    wrapped.__annotations__ = {one.name: one.annotation for one in parameters}
     return wrapped
 
 

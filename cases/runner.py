@@ -75,10 +75,14 @@ class AtRest(NamedTuple):
 
 
 class Phases:
-    """Wall time of the phases of a run [s], each also a PETSc log stage. Collective by use."""
+    """Wall time of the phases of a run [s], each shown while it lasts, and also a PETSc log stage.
 
-    def __init__(self) -> None:
+    Collective by use.
+    """
+
+    def __init__(self, progress: Progress) -> None:
         self.wall: dict[str, float] = {}
+        self.progress = progress
 
     @contextmanager
     def __call__(self, name: str) -> Iterator[None]:
@@ -87,7 +91,8 @@ class Phases:
         stage = PETSc.Log.Stage(name)
         stage.push()
         try:
-            yield
+            with self.progress.phase(name):
+                yield
         finally:
             stage.pop()
             self.wall[name] = time.perf_counter() - begin
@@ -123,7 +128,7 @@ def run_case(
         If files cannot be written.
     """
     on_root(comm, lambda: refuse_to_write(out_dir, force))
-    phases = Phases()
+    phases = Phases(Progress(comm))
     problem = scene.to_problem()
     at_rest = _at_rest(scene, problem, comm, phases)
     return _march(
@@ -159,7 +164,7 @@ def restart_case(
         If there is nothing to continue.
     """
     on_root(comm, lambda: _refuse_to_continue(out_dir))
-    phases = Phases()
+    phases = Phases(Progress(comm))
     problem = scene.to_problem()
     at_rest = _at_rest(scene, problem, comm, phases)
     return _march(scene, problem, at_rest, out_dir, comm, phases, petsc_options, tell, resume=True)
@@ -215,7 +220,7 @@ def _march(
     dt, output = problem.numerics.dt, scene.output
     flush_every = output.flush_every_steps or flush_cadence(problem, at_rest.model.n_dofs)
     # The recorder is the last to write: the state to continue from stands for all before it.
-    observers: list[Observer] = [Progress(comm)]
+    observers: list[Observer] = [phases.progress]
     fields: FieldRecorder | None = None
     field_every = _cadence(output.field_every_s, dt)
     if field_every:

@@ -70,8 +70,11 @@ def abort_on_unforeseen_error(comm: Any) -> None:
     sys.excepthook = hook
 
 
-def set_up_logging(comm: Any, verbose: bool = False) -> None:
-    """Send log records to standard error on rank 0 and nowhere on the others. Not collective."""
+def set_up_logging(comm: Any, verbose: bool = False, quiet: bool = False) -> None:
+    """Send log records to standard error on rank 0 and nowhere on the others. Not collective.
+
+    ``verbose`` lets more through than warnings and progress, ``quiet`` errors only.
+    """
     root = logging.getLogger("catenary")
     root.handlers.clear()
     root.propagate = False
@@ -81,7 +84,7 @@ def set_up_logging(comm: Any, verbose: bool = False) -> None:
         root.addHandler(handler)
     else:
         root.addHandler(logging.NullHandler())
-    root.setLevel(logging.DEBUG if verbose else logging.INFO)
+    root.setLevel(logging.ERROR if quiet else logging.DEBUG if verbose else logging.INFO)
 
 
 def launched_by_mpirun() -> bool:

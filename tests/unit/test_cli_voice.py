@@ -1,0 +1,44 @@
+"""Who speaks and how much: --quiet, --version, completion."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from catenary.cases.cli import app
+
+
+def invoke(*words: str) -> Any:
+    return CliRunner().invoke(app, list(words))
+
+
+def test_every_verb_can_be_quiet() -> None:
+    command: Any = typer.main.get_command(app)
+    for name, verb in command.commands.items():
+        assert any("--quiet" in option.opts for option in verb.params), name
+
+
+def test_quiet_says_nothing_but_errors() -> None:
+    assert invoke("list").stdout
+    done = invoke("list", "--quiet")
+    assert done.exit_code == 0 and not done.output
+    refused = invoke("check", "no_such_case", "-q")
+    assert refused.exit_code == 2 and "no_such_case" in refused.output
+    assert invoke("list").stdout  # the next one speaks again
+
+
+def test_quiet_and_verbose_exclude_each_other() -> None:
+    done = invoke("run", "ac_simple", "-o", "nowhere", "-q", "-v")
+    assert done.exit_code == 2
+    assert "--quiet and --verbose exclude each other" in done.output
+
+
+@pytest.mark.parametrize("library", ["PETSc", "MPI", "HDF5", "numba", "h5py", "mpi4py", "gmsh"])
+def test_version_names_the_libraries(library: str) -> None:
+    done = invoke("--version")
+    assert done.exit_code == 0
+    assert library in done.output
+    assert done.output.startswith("catenary ")
