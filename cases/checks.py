@@ -1,14 +1,18 @@
 """What types and bounds cannot see: whether line, train, evaluation and effects fit together.
 
-Every check raises ``InputError`` with one sentence that names the key, its value, what is allowed
-and where the key was written.
+Every check yields a ``Fault`` for each thing that is wrong: its sentence names the key, its value,
+what is allowed and where the key was written. A check that needs what another one found wrong is
+left out; all others go on.
 """
 
 from __future__ import annotations
 
 import difflib
+import functools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,8 +21,9 @@ from catenary.cases.checks_incidents import check_incidents
 from catenary.cases.checks_pantograph import check_mechanisms, check_pantographs
 from catenary.cases.checks_scheme import check_scheme
 from catenary.cases.checks_vehicle import check_vehicle
+from catenary.cases.input.faults import Fault, SceneError
 from catenary.cases.keys import is_known, known_keys
-from catenary.cases.messages import refuse, shown, unknown_key
+from catenary.cases.messages import refusal, shown, unknown_key
 from catenary.meshgen.line import Line
 from catenary.solver import effects
 from catenary.solver.errors import InputError
@@ -31,6 +36,8 @@ if TYPE_CHECKING:
 MIN_SEPARATION = 1.0
 # Slack for sums of decimal lengths [m].
 _TINY = 1e-6
+# As many span lengths are told in a sentence.
+_SOME = 6
 # Effects that are off by default and need a value in the scene: the key that holds it.
 _DATA_OF = {
     "residual_dropper_stiffness": "line.dropper.residual_stiffness_ratio",
@@ -38,69 +45,119 @@ _DATA_OF = {
 
 
 def check(scene: Scene) -> None:
-    """Raise ``InputError`` with the first thing in which a scene contradicts itself."""
-    _test_keys(scene)
-    _effect_names(scene)
-    _effect_requirements(scene)
-    _effect_data(scene)
-    check_contact(scene)
-    _pantograph_names(scene)
-    _separations(scene)
-    check_pantographs(scene)
-    check_scheme(scene)
-    line = scene.to_line()
-    _droppers_inside_spans(scene, line)
-    _dropper_lengths(scene, line)
-    _speed(scene, line)
-    _running(scene, line)
-    _evaluation(scene)
-    _raising(scene)
-    _standard(scene)
-    _mesh_file(scene)
+    """Raise ``SceneError`` with all in which a scene contradicts itself."""
+    faults = faults_of(scene)
+    if faults:
+        raise SceneError(faults)
+
+
+def faults_of(scene: Scene) -> list[Fault]:
+    """All in which a scene contradicts itself."""
+    found = _Findings()
+    for of_tables in _OF_TABLES:
+        found.nothing_by(of_tables, scene)
+    if found.nothing_by(_pantograph_names, scene):
+        found.nothing_by(check_pantographs, scene)
+        found.nothing_by(check_scheme, scene)
+    line = _line(scene, found)
+    if line is None:
+        return found.faults
+    for of_line in (_dropper_lengths, _speed):
+        found.nothing_by(of_line, scene, line)
+    if found.nothing_by(_running, scene, line) and found.nothing_by(_evaluation, scene):
+        found.nothing_by(_raising, scene)
+    if found.faults:
+        return found.faults
     # What may need the machinery of multibody systems stands last: other faults are told at once.
-    check_mechanisms(scene, line)
-    check_vehicle(scene, line)
-    check_incidents(scene, line)
+    if found.nothing_by(check_mechanisms, scene, line):
+        found.nothing_by(_requirements_of_defaults, scene)
+        found.nothing_by(check_vehicle, scene, line)
+        found.nothing_by(check_incidents, scene, line)
+    return found.faults
 
 
-def _refuse(scene: Scene, key: str, value: object, why: str) -> NoReturn:
-    refuse(scene.origin, key, value, why)
+@dataclass
+class _Findings:
+    """What checks have found so far."""
+
+    faults: list[Fault] = field(default_factory=list)
+
+    def nothing_by(self, check: Callable[..., Iterator[Fault]], *of: Any) -> bool:
+        """Take in what a check finds; returns whether that is nothing."""
+        before = len(self.faults)
+        try:
+            self.faults.extend(check(*of))
+        except SceneError as error:
+            self.faults.extend(error.faults)
+        except InputError as error:
+            self.faults.append(Fault("", str(error)))
+        return len(self.faults) == before
 
 
-def _test_keys(scene: Scene) -> None:
+def _line(scene: Scene, found: _Findings) -> Line | None:
+    """The line of a scene, None if its droppers do not fit into its spans."""
+    lines: list[Line] = []
+
+    def make() -> Iterator[Fault]:
+        lines.append(scene.to_line())
+        yield from _droppers_inside_spans(scene, lines[0])
+
+    return lines[0] if found.nothing_by(make) else None
+
+
+def _refusal(scene: Scene, key: str, value: object, why: str) -> Fault:
+    return refusal(scene.origin, key, value, why)
+
+
+def _test_keys(scene: Scene) -> Iterator[Fault]:
     known = known_keys(type(scene))
     for key in scene.test:
         if not is_known(key, known) or key.startswith("test."):
             where = f"in the [test] table {scene.origin.of('test')}"
-            raise InputError(unknown_key(key, where, known))
+            yield Fault("test", unknown_key(key, where, known))
 
 
-def _effect_names(scene: Scene) -> None:
+def _effect_names(scene: Scene) -> Iterator[Fault]:
     known = effects.registry()
     for name, on in scene.effects.items():
         key = f"effects.{name}"
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1)
             hint = f"did you mean effects.{near[0]}?" if near else f"known are {', '.join(known)}"
-            raise InputError(f"{shown(key)[1:-1]} {scene.origin.of(key)} is unknown; {hint}")
-        if known[name].always and not on:
-            _refuse(scene, key, on, "it is part of every scene and cannot be left out")
+            yield Fault(key, f"{shown(key)[1:-1]} {scene.origin.of(key)} is unknown; {hint}")
+        elif known[name].always and not on:
+            yield _refusal(scene, key, on, "it is part of every scene and cannot be left out")
 
 
-def _effect_requirements(scene: Scene) -> None:
-    switches = scene.switches()
+def _requirements_of_chosen(scene: Scene) -> Iterator[Fault]:
+    for name in scene.effects:
+        yield from _requirements(scene, name, "on", f"effects.{name}")
+
+
+def _requirements_of_defaults(scene: Scene) -> Iterator[Fault]:
+    """Of effects that are on by default, unless the scene holds nothing for them to act on."""
+    problem = functools.cache(scene.to_problem)
     for name, effect in effects.registry().items():
-        for required in effect.requires if switches[name] else ():
-            if not switches[required]:
-                how = "on" if name in scene.effects else "on by default"
-                key = f"effects.{name}" if name in scene.effects else f"effects.{required}"
-                raise InputError(
-                    f"effects.{name} is {how} and requires effects.{required}, which is off "
-                    f"{scene.origin.of(key)}; switch both on or both off"
-                )
+        if name in scene.effects:
+            continue
+        for fault in _requirements(scene, name, "on by default", ""):
+            if effect.applies(problem()):
+                yield fault
 
 
-def _effect_data(scene: Scene) -> None:
+def _requirements(scene: Scene, name: str, how: str, key: str) -> Iterator[Fault]:
+    switches = scene.switches()
+    for required in effects.registry()[name].requires if switches.get(name) else ():
+        if not switches[required]:
+            at = key or f"effects.{required}"
+            yield Fault(
+                at,
+                f"effects.{name} is {how} and requires effects.{required}, which is off "
+                f"{scene.origin.of(at)}; switch both on or both off",
+            )
+
+
+def _effect_data(scene: Scene) -> Iterator[Fault]:
     values = {
         "residual_dropper_stiffness": scene.line.dropper.residual_stiffness_ratio,
     }
@@ -108,9 +165,11 @@ def _effect_data(scene: Scene) -> None:
     for name, value in values.items():
         key = _DATA_OF[name]
         if switches.get(name) and value == 0:
-            _refuse(scene, key, value, f"effects.{name} is on and needs a value greater than 0")
+            yield _refusal(
+                scene, key, value, f"effects.{name} is on and needs a value greater than 0"
+            )
         if value > 0 and name not in scene.effects and switches.get(name) is False:
-            _refuse(
+            yield _refusal(
                 scene,
                 key,
                 value,
@@ -119,10 +178,12 @@ def _effect_data(scene: Scene) -> None:
     n = len(scene.train.pantographs)
     if n > 1 and not switches.get("several_pantographs", True):
         key = "effects.several_pantographs"
-        _refuse(scene, key, False, f"train.pantographs has {n} entries; leave one or switch it on")
+        yield _refusal(
+            scene, key, False, f"train.pantographs has {n} entries; leave one or switch it on"
+        )
 
 
-def _pantograph_names(scene: Scene) -> None:
+def _pantograph_names(scene: Scene) -> Iterator[Fault]:
     for i, place in enumerate(scene.train.pantographs):
         if place.name not in scene.pantographs:
             near = difflib.get_close_matches(place.name, scene.pantographs, n=1)
@@ -131,23 +192,25 @@ def _pantograph_names(scene: Scene) -> None:
                 if near
                 else f"it must be one of {', '.join(scene.pantographs)}"
             )
-            _refuse(scene, f"train.pantographs.{i}.name", place.name, hint)
-        if place.reversed and scene.pantographs[place.name].type == "lumped":
+            yield _refusal(scene, f"train.pantographs.{i}.name", place.name, hint)
+        elif place.reversed and scene.pantographs[place.name].type == "lumped":
             key = f"train.pantographs.{i}.reversed"
-            _refuse(scene, key, True, f"{place.name} is a chain of lumped masses, with no front")
+            yield _refusal(
+                scene, key, True, f"{place.name} is a chain of lumped masses, with no front"
+            )
 
 
-def _separations(scene: Scene) -> None:
+def _separations(scene: Scene) -> Iterator[Fault]:
     behind = [place.behind_m for place in scene.train.pantographs]
     if behind[0] != 0:
         key = "train.pantographs.0.behind_m"
-        _refuse(scene, key, behind[0], "the first pantograph leads, so it must be 0")
+        yield _refusal(scene, key, behind[0], "the first pantograph leads, so it must be 0")
     ahead = scene.strips_ahead()
     for i in range(1, len(behind)):
         strips = ahead[i - 1] + ahead[i]
         if behind[i] < behind[i - 1] + MIN_SEPARATION + strips - _TINY:
             because = f", because its strips and that one's take {strips:g} m" if strips else ""
-            _refuse(
+            yield _refusal(
                 scene,
                 f"train.pantographs.{i}.behind_m",
                 behind[i],
@@ -156,32 +219,37 @@ def _separations(scene: Scene) -> None:
             )
 
 
-def _droppers_inside_spans(scene: Scene, line: Line) -> None:
+def _droppers_inside_spans(scene: Scene, line: Line) -> Iterator[Fault]:
     kind = scene.line.dropper
     if kind.positions_m is not None and len(set(line.span_lengths)) > 1:
         key = "line.dropper.positions_m"
-        raise InputError(
+        lengths = ", ".join(f"{span:g}" for span in sorted(set(line.span_lengths))[:_SOME])
+        yield Fault(
+            key,
             f"{key} {scene.origin.of(key)} holds for one span length, but the spans are "
-            f"{', '.join(f'{span:g}' for span in sorted(set(line.span_lengths)))} m long; give "
-            "line.dropper.patterns or count and spacing_m"
+            f"{lengths} m long; give line.dropper.patterns or count and spacing_m",
         )
+        return
     for span, positions in zip(line.span_lengths, line.dropper_positions, strict=True):
         outside = [x for x in positions if not _TINY < x < span - _TINY]
         if not outside:
             continue
         if kind.count is not None:
-            _refuse(
+            yield _refusal(
                 scene,
                 "line.dropper.count",
                 kind.count,
                 f"at a spacing of {kind.spacing_m:g} m these do not fit into a span of {span:g} m",
             )
+            return
         which = "positions_m" if kind.positions_m is not None else "patterns"
         key = f"line.dropper.{which}"
-        raise InputError(
+        yield Fault(
+            key,
             f"{key} {scene.origin.of(key)} puts a dropper at {outside[0]:g} m; it must lie inside "
-            f"the span, between 0 and {span:g} m"
+            f"the span, between 0 and {span:g} m",
         )
+        return
 
 
 def estimated_dropper_lengths(line: Line, gravity: float) -> list[np.ndarray]:
@@ -206,12 +274,12 @@ def estimated_dropper_lengths(line: Line, gravity: float) -> list[np.ndarray]:
     return lengths
 
 
-def _dropper_lengths(scene: Scene, line: Line) -> None:
+def _dropper_lengths(scene: Scene, line: Line) -> Iterator[Fault]:
     gravity = Problem.gravity if scene.switches().get("gravity", True) else 0.0
     shortest = [float(v.min()) for v in estimated_dropper_lengths(line, gravity)]
     span = int(np.argmin(shortest))
     if shortest[span] <= 0:
-        _refuse(
+        yield _refusal(
             scene,
             "line.encumbrance_m",
             line.encumbrance,
@@ -220,11 +288,11 @@ def _dropper_lengths(scene: Scene, line: Line) -> None:
         )
 
 
-def _speed(scene: Scene, line: Line) -> None:
+def _speed(scene: Scene, line: Line) -> Iterator[Fault]:
     wave = 3.6 * line.contact_wire.wave_speed
     speed = scene.train.speed_km_h
     if speed >= wave and not scene.switches().get("supercritical_speed", False):
-        _refuse(
+        yield _refusal(
             scene,
             "train.speed_km_h",
             speed,
@@ -233,7 +301,7 @@ def _speed(scene: Scene, line: Line) -> None:
         )
 
 
-def _running(scene: Scene, line: Line) -> None:
+def _running(scene: Scene, line: Line) -> Iterator[Fault]:
     first, last = line.running_range
     start, end = scene.train.start_m, scene.end_m
     rear = scene.train.pantographs[-1].behind_m
@@ -243,9 +311,9 @@ def _running(scene: Scene, line: Line) -> None:
     if any(ahead):
         inside += ", strips included"
     if not first - _TINY <= start <= last + _TINY:
-        _refuse(scene, "train.start_m", start, f"it must lie inside the line: {inside}")
+        yield _refusal(scene, "train.start_m", start, f"it must lie inside the line: {inside}")
     if start - rear < first - _TINY:
-        _refuse(
+        yield _refusal(
             scene,
             "train.start_m",
             start,
@@ -254,31 +322,37 @@ def _running(scene: Scene, line: Line) -> None:
         )
     given = scene.train.end_m
     if given is not None and given > last + _TINY:
-        _refuse(scene, "train.end_m", given, f"it must lie inside the line: {inside}")
+        yield _refusal(scene, "train.end_m", given, f"it must lie inside the line: {inside}")
     if end <= start:
         if given is None:
-            _refuse(scene, "train.start_m", start, f"it must lie before the end at {end:g} m")
-        _refuse(scene, "train.end_m", given, f"it must be greater than train.start_m ({start:g} m)")
+            yield _refusal(
+                scene, "train.start_m", start, f"it must lie before the end at {end:g} m"
+            )
+        yield _refusal(
+            scene, "train.end_m", given, f"it must be greater than train.start_m ({start:g} m)"
+        )
     if end - start < scene.train.speed_km_h / 3.6 * scene.numerics.dt_s:
-        _refuse(scene, "numerics.dt_s", scene.numerics.dt_s, "the run would have no step at all")
+        yield _refusal(
+            scene, "numerics.dt_s", scene.numerics.dt_s, "the run would have no step at all"
+        )
 
 
-def _evaluation(scene: Scene) -> None:
+def _evaluation(scene: Scene) -> Iterator[Fault]:
     start, end = scene.train.start_m, scene.end_m
     stretch = scene.evaluation
     for i, place in enumerate(scene.train.pantographs):
         who = "the pantograph" if len(scene.train.pantographs) == 1 else f"pantograph {i + 1}"
         covers = f"{who} only runs from {start - place.behind_m:g} to {end - place.behind_m:g} m"
         if stretch.from_m < start - place.behind_m - _TINY:
-            _refuse(scene, "evaluation.from_m", stretch.from_m, covers)
+            yield _refusal(scene, "evaluation.from_m", stretch.from_m, covers)
         if stretch.to_m > end - place.behind_m + _TINY:
-            _refuse(scene, "evaluation.to_m", stretch.to_m, covers)
+            yield _refusal(scene, "evaluation.to_m", stretch.to_m, covers)
 
 
-def _raising(scene: Scene) -> None:
+def _raising(scene: Scene) -> Iterator[Fault]:
     run = (scene.evaluation.from_m - scene.train.start_m) / (scene.train.speed_km_h / 3.6)
     if scene.train.raise_time_s > run + _TINY:
-        _refuse(
+        yield _refusal(
             scene,
             "train.raise_time_s",
             scene.train.raise_time_s,
@@ -287,7 +361,7 @@ def _raising(scene: Scene) -> None:
         )
 
 
-def _standard(scene: Scene) -> None:
+def _standard(scene: Scene) -> Iterator[Fault]:
     from catenary.postproc.standards import EDITIONS, SYSTEMS
 
     for key, value, known in (
@@ -295,10 +369,10 @@ def _standard(scene: Scene) -> None:
         ("evaluation.system", scene.evaluation.system, SYSTEMS),
     ):
         if value not in known:
-            _refuse(scene, key, value, f"it must be one of {', '.join(known)}")
+            yield _refusal(scene, key, value, f"it must be one of {', '.join(known)}")
 
 
-def _mesh_file(scene: Scene) -> None:
+def _mesh_file(scene: Scene) -> Iterator[Fault]:
     path = scene.mesh_file()
     if path is None:
         return
@@ -307,4 +381,17 @@ def _mesh_file(scene: Scene) -> None:
     except (OSError, ValueError):
         found = False
     if not found:
-        _refuse(scene, "mesh.file", str(path), "there is no such file")
+        yield _refusal(scene, "mesh.file", str(path), "there is no such file")
+
+
+# Checks that need no other one.
+_OF_TABLES: tuple[Callable[[Scene], Iterator[Fault]], ...] = (
+    _test_keys,
+    _effect_names,
+    _requirements_of_chosen,
+    _effect_data,
+    check_contact,
+    _separations,
+    _standard,
+    _mesh_file,
+)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from catenary.cases.messages import refuse
+from catenary.cases.input.faults import Fault
+from catenary.cases.messages import refusal
 from catenary.cases.schema_contact import HERTZ, WITH_RESTITUTION
 from catenary.solver.integration import NEWMARK
 
@@ -12,14 +14,14 @@ if TYPE_CHECKING:
     from catenary.cases.scene import Scene
 
 
-def check_contact(scene: Scene) -> None:
-    """Raise ``InputError`` with the first thing about contact that contradicts itself."""
-    _damping(scene)
-    _loss(scene)
-    _kinematic(scene)
+def check_contact(scene: Scene) -> Iterator[Fault]:
+    """What contradicts itself about contact."""
+    yield from _damping(scene)
+    yield from _loss(scene)
+    yield from _kinematic(scene)
 
 
-def _damping(scene: Scene) -> None:
+def _damping(scene: Scene) -> Iterator[Fault]:
     contact, switches = scene.contact, scene.switches()
     law, on = contact.law, switches["contact_damping"]
     said = "contact_damping" in scene.effects
@@ -32,7 +34,7 @@ def _damping(scene: Scene) -> None:
         acts = value < 1
     else:
         if on:
-            refuse(
+            yield refusal(
                 scene.origin,
                 "effects.contact_damping",
                 True,
@@ -42,9 +44,9 @@ def _damping(scene: Scene) -> None:
     key = f"contact.{key}"
     if on and not acts:
         why = f"effects.contact_damping is on and needs a value {dissipates}"
-        refuse(scene.origin, key, value, why)
+        yield refusal(scene.origin, key, value, why)
     if acts and not on and not said:
-        refuse(
+        yield refusal(
             scene.origin,
             key,
             value,
@@ -53,9 +55,9 @@ def _damping(scene: Scene) -> None:
         )
 
 
-def _loss(scene: Scene) -> None:
+def _loss(scene: Scene) -> Iterator[Fault]:
     if scene.contact.law in HERTZ and not scene.switches()["contact_loss"]:
-        refuse(
+        yield refusal(
             scene.origin,
             "effects.contact_loss",
             False,
@@ -68,7 +70,7 @@ def _loss(scene: Scene) -> None:
 KINEMATIC_GAMMA = 0.55
 
 
-def _kinematic(scene: Scene) -> None:
+def _kinematic(scene: Scene) -> Iterator[Fault]:
     if scene.contact.law != "kinematic":
         return
     numerics = scene.numerics
@@ -77,28 +79,28 @@ def _kinematic(scene: Scene) -> None:
         ("coupling", numerics.coupling or "implicit", "implicit"),
     ):
         if value != needed:
-            refuse(
+            yield refusal(
                 scene.origin,
                 f"numerics.{key}",
                 value,
                 f"contact.law kinematic has no force before the motion is known: take {needed}",
             )
     if numerics.adaptive_tolerance_N is not None:
-        refuse(
+        yield refusal(
             scene.origin,
             "numerics.adaptive_tolerance_N",
             numerics.adaptive_tolerance_N,
             "contact.law kinematic has no stiffness to estimate an error with: take another law",
         )
     if scene.train.start_below_m:
-        refuse(
+        yield refusal(
             scene.origin,
             "train.start_below_m",
             scene.train.start_below_m,
             "contact.law kinematic has no gap that a head could rise through: take another law",
         )
     if numerics.integrator != NEWMARK:
-        refuse(
+        yield refusal(
             scene.origin,
             "numerics.integrator",
             numerics.integrator,
@@ -106,7 +108,7 @@ def _kinematic(scene: Scene) -> None:
             f"both: take newmark, with numerics.newmark_gamma of at least {KINEMATIC_GAMMA:g}",
         )
     if numerics.newmark_gamma < KINEMATIC_GAMMA:
-        refuse(
+        yield refusal(
             scene.origin,
             "numerics.newmark_gamma",
             numerics.newmark_gamma,

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 from catenary.cases.convert_pantograph import wanted_force
-from catenary.cases.messages import refuse, shown
+from catenary.cases.input.faults import Fault
+from catenary.cases.messages import refusal, shown
 from catenary.cases.schema_mechanism import ActuatorTable
 from catenary.cases.schema_pantograph import MultibodyTable
 from catenary.mbs.frame import SPACE
@@ -22,30 +23,31 @@ if TYPE_CHECKING:
 _LEADS = 0.05
 
 
-def check_pantographs(scene: Scene) -> None:
-    """Raise ``InputError`` with the first name or force that is wrong with a kind of pantograph."""
+def check_pantographs(scene: Scene) -> Iterator[Fault]:
+    """Names and forces that are wrong with a kind of pantograph."""
     on_the_train = {place.name for place in scene.train.pantographs}
+    yield from _static_forces(scene, on_the_train)
     for name, table in scene.pantographs.items():
         if isinstance(table, MultibodyTable):
-            _names(scene, name, table)
-            _actuator(scene, name, table)
-    _static_forces(scene, on_the_train)
+            yield from _names(scene, name, table)
+            yield from _actuator(scene, name, table)
 
 
-def check_mechanisms(scene: Scene, line: Line) -> None:
-    """Raise ``InputError`` if a mechanism on the train cannot be assembled, or does not reach the
-    wire from the height that it is put to by its ``nominal_height_m``.
+def check_mechanisms(scene: Scene, line: Line) -> Iterator[Fault]:
+    """Mechanisms on the train that cannot be assembled, or do not reach the wire from the height
+    that ``nominal_height_m`` puts them to. Names and forces have no fault.
 
     The machinery of multibody systems is imported here, for scenes that have a mechanism.
     """
     on_the_train = {place.name for place in scene.train.pantographs}
+    found: list[Fault] = []
     for name, table in scene.pantographs.items():
         if name in on_the_train and isinstance(table, MultibodyTable):
-            _mechanism(scene, name, table)
-    _heights(scene, line)
+            found += _mechanism(scene, name, table)
+    yield from found or _heights(scene, line)
 
 
-def _heights(scene: Scene, line: Line) -> None:
+def _heights(scene: Scene, line: Line) -> Iterator[Fault]:
     lowest = line.contact_height - max(max(sags, default=0.0) for sags in line.pre_sag)
     heights = lowest, line.contact_height
     for name in dict.fromkeys(place.name for place in scene.train.pantographs):
@@ -56,7 +58,7 @@ def _heights(scene: Scene, line: Line) -> None:
         for height in heights:
             if _reaches(data, working + height - table.nominal_height_m):
                 continue
-            refuse(
+            yield refusal(
                 scene.origin,
                 f"pantographs.{name}.nominal_height_m",
                 table.nominal_height_m,
@@ -64,6 +66,7 @@ def _heights(scene: Scene, line: Line) -> None:
                 f"head would be {height - table.nominal_height_m:+.4g} m away from there, beyond "
                 "the reach of its mechanism",
             )
+            break
 
 
 def reaches_below(scene: Scene, name: str, line: Line, drop: float) -> bool:
@@ -103,28 +106,32 @@ def _reaches(data: MultibodyData, arm: float) -> bool:
     return True
 
 
-def _names(scene: Scene, kind: str, table: MultibodyTable) -> None:
+def _names(scene: Scene, kind: str, table: MultibodyTable) -> Iterator[Fault]:
     key = f"pantographs.{kind}"
     bodies = list(table.bodies)
     if SPACE in bodies:
-        _refuse(scene, f"{key}.bodies.{SPACE}", "is the name of the frame at rest; choose another")
+        yield _refusal(
+            scene, f"{key}.bodies.{SPACE}", "is the name of the frame at rest; choose another"
+        )
     for role in ("head", "arm"):
-        _known(scene, f"{key}.{role}", getattr(table, role), bodies)
+        yield from _known(scene, f"{key}.{role}", getattr(table, role), bodies)
     if table.head == table.arm:
-        _refuse(scene, f"{key}.head", f"is {shown(table.head)} as the arm is; they are two bodies")
+        yield _refusal(
+            scene, f"{key}.head", f"is {shown(table.head)} as the arm is; they are two bodies"
+        )
     if table.actuator is not None:
-        _known(scene, f"{key}.actuator", table.actuator, list(table.forces))
+        yield from _known(scene, f"{key}.actuator", table.actuator, list(table.forces))
     for place, name in _uses(table):
         # What is on one body alone would be without effect on what is at rest.
         on_one = place.endswith(".body")
-        _known(scene, f"{key}.{place}", name, bodies if on_one else [*bodies, SPACE])
+        yield from _known(scene, f"{key}.{place}", name, bodies if on_one else [*bodies, SPACE])
     for what in ("joints", "forces"):
         for label, one in getattr(table, what).items():
             if getattr(one, "i", None) == getattr(one, "j", SPACE):
-                _refuse(scene, f"{key}.{what}.{label}", f"has {shown(one.i)} on both sides")
+                yield _refusal(scene, f"{key}.{what}.{label}", f"has {shown(one.i)} on both sides")
     for label in table.forces:
         if label in table.joints or label == "gravity":
-            _refuse(scene, f"{key}.forces.{label}", "has the name of a joint or of gravity")
+            yield _refusal(scene, f"{key}.forces.{label}", "has the name of a joint or of gravity")
 
 
 def _uses(table: MultibodyTable) -> Iterator[tuple[str, str]]:
@@ -136,23 +143,24 @@ def _uses(table: MultibodyTable) -> Iterator[tuple[str, str]]:
                     yield f"{what}.{label}.{end}", getattr(one, end)
 
 
-def _known(scene: Scene, key: str, name: str, known: list[str]) -> None:
+def _known(scene: Scene, key: str, name: str, known: list[str]) -> Iterator[Fault]:
     if name in known:
         return
     near = difflib.get_close_matches(name, known, n=1)
     hint = f"did you mean {near[0]}?" if near else f"it must be one of {', '.join(known)}"
-    _refuse(scene, key, f"is {shown(name)}", hint)
+    yield _refusal(scene, key, f"is {shown(name)}", hint)
 
 
-def _actuator(scene: Scene, kind: str, table: MultibodyTable) -> None:
-    if not table.calibrate or table.actuator is None:
+def _actuator(scene: Scene, kind: str, table: MultibodyTable) -> Iterator[Fault]:
+    if not table.calibrate or table.actuator not in table.forces:
         return
     force = table.forces[table.actuator]
     key = f"pantographs.{kind}.actuator"
     if not isinstance(force, ActuatorTable):
-        _refuse(scene, key, f"is {shown(table.actuator)}", f"that is a {force.type}, no actuator")
-    if force.force_N is None:
-        _refuse(
+        hint = f"that is a {force.type}, no actuator"
+        yield _refusal(scene, key, f"is {shown(table.actuator)}", hint)
+    elif force.force_N is None:
+        yield _refusal(
             scene,
             key,
             f"is {shown(table.actuator)}",
@@ -160,7 +168,7 @@ def _actuator(scene: Scene, kind: str, table: MultibodyTable) -> None:
         )
 
 
-def _static_forces(scene: Scene, on_the_train: set[str]) -> None:
+def _static_forces(scene: Scene, on_the_train: set[str]) -> Iterator[Fault]:
     speed = scene.train.speed_km_h
     for name, table in scene.pantographs.items():
         if name not in on_the_train or table.static_force_by_speed is None:
@@ -169,19 +177,20 @@ def _static_forces(scene: Scene, on_the_train: set[str]) -> None:
             first, last = table.static_force_by_speed[0][0], table.static_force_by_speed[-1][0]
             key = "train.speed_km_h"
             held = f"{first:g} km/h" if first == last else f"{first:g} to {last:g} km/h"
-            raise InputError(
+            yield Fault(
+                key,
                 f"{key} is {speed:g} km/h {scene.origin.of(key)}; "
-                f"pantographs.{name}.static_force_by_speed only holds forces for {held}"
+                f"pantographs.{name}.static_force_by_speed only holds forces for {held}",
             )
 
 
-def _mechanism(scene: Scene, name: str, table: MultibodyTable) -> None:
+def _mechanism(scene: Scene, name: str, table: MultibodyTable) -> Iterator[Fault]:
     try:
         _standing(scene, name, table)
     except (InputError, RunBroken) as error:
         key = f"pantographs.{name}"
-        raise InputError(f"{key} {scene.origin.of(key)} cannot be built: {error}") from error
+        yield Fault(key, f"{key} {scene.origin.of(key)} cannot be built: {error}")
 
 
-def _refuse(scene: Scene, key: str, says: str, hint: str = "") -> NoReturn:
-    raise InputError(f"{key} {says} {scene.origin.of(key)}{f'; {hint}' if hint else ''}")
+def _refusal(scene: Scene, key: str, says: str, hint: str = "") -> Fault:
+    return Fault(key, f"{key} {says} {scene.origin.of(key)}{f'; {hint}' if hint else ''}")

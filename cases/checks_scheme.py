@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from catenary.cases.messages import refuse
+from catenary.cases.input.faults import Fault
+from catenary.cases.messages import refusal
 from catenary.cases.schema_pantograph import LumpedTable
 
 if TYPE_CHECKING:
     from catenary.cases.scene import Scene
 
 
-def check_scheme(scene: Scene) -> None:
-    """Raise ``InputError`` with the first thing in a scene that its scheme cannot simulate.
+def check_scheme(scene: Scene) -> Iterator[Fault]:
+    """What a scene's scheme cannot simulate.
 
     The names of its pantographs must be known.
     """
@@ -20,15 +22,15 @@ def check_scheme(scene: Scene) -> None:
         return
     knows = "numerics.scheme ts_alpha2 knows only"
     if scene.contact.law != "linear":
-        refuse(scene.origin, "contact.law", scene.contact.law, f"{knows} law linear")
+        yield refusal(scene.origin, "contact.law", scene.contact.law, f"{knows} law linear")
     switches = scene.switches()
     for i, incident in enumerate(scene.incidents):
         if switches[incident.type]:
             why = f"{knows} lines and pantographs that stay what they are"
-            refuse(scene.origin, f"incidents.{i}.type", incident.type, why)
+            yield refusal(scene.origin, f"incidents.{i}.type", incident.type, why)
     for name in ("head_roll", "vehicle_motion"):
         if switches[name]:
-            refuse(
+            yield refusal(
                 scene.origin,
                 f"effects.{name}",
                 True,
@@ -37,13 +39,15 @@ def check_scheme(scene: Scene) -> None:
     for name in {place.name: None for place in scene.train.pantographs}:
         table = scene.pantographs[name]
         if not isinstance(table, LumpedTable):
-            refuse(scene.origin, f"pantographs.{name}.type", table.type, f"{knows} type lumped")
+            key = f"pantographs.{name}.type"
+            yield refusal(scene.origin, key, table.type, f"{knows} type lumped")
+            continue
         key = f"pantographs.{name}.strips"
         if table.strips.number != 1:
-            refuse(scene.origin, f"{key}.number", table.strips.number, f"{knows} one strip")
+            yield refusal(scene.origin, f"{key}.number", table.strips.number, f"{knows} one strip")
         if table.strips.stiffness_N_per_m is not None:
             value = table.strips.stiffness_N_per_m
-            refuse(
+            yield refusal(
                 scene.origin,
                 f"{key}.stiffness_N_per_m",
                 value,

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NoReturn
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from catenary.cases.convert_pantograph import pantograph_of
 from catenary.cases.convert_vehicle import vehicle_of
-from catenary.cases.messages import refuse
+from catenary.cases.input.faults import Fault
+from catenary.cases.messages import refusal
 from catenary.cases.schema_pantograph import LumpedTable, MultibodyTable
 from catenary.cases.schema_vehicle import MotionTable
 from catenary.mbs.roll import roll_of
 from catenary.meshgen.line import Line
-from catenary.solver.errors import InputError
 
 if TYPE_CHECKING:
     from catenary.cases.scene import Scene
@@ -25,41 +26,44 @@ STEPS_PER_WAVE = 8
 _TINY = 1e-6
 
 
-def check_vehicle(scene: Scene, line: Line) -> None:
-    """Raise ``InputError`` with the first thing in which vehicle, heads and line contradict."""
-    _vehicle_acts(scene)
-    _roll_acts(scene)
-    _multibody_strips(scene)
-    _tables_reach(scene)
-    _waves(scene)
-    _strip_lengths(scene, line)
+def check_vehicle(scene: Scene, line: Line) -> Iterator[Fault]:
+    """What contradicts each other in vehicle, heads and line."""
+    yield from _vehicle_acts(scene)
+    yield from _roll_acts(scene)
+    yield from _multibody_strips(scene)
+    reaches = list(_tables_reach(scene))
+    yield from reaches
+    yield from _waves(scene)
+    if not reaches:
+        yield from _strip_lengths(scene, line)
 
 
-def _vehicle_acts(scene: Scene) -> None:
+def _vehicle_acts(scene: Scene) -> Iterator[Fault]:
     on, said = scene.switches()["vehicle_motion"], "vehicle_motion" in scene.effects
     if on and scene.vehicle is None:
         why = "there is no table [vehicle] that says how it moves"
-        refuse(scene.origin, "effects.vehicle_motion", True, why)
+        yield refusal(scene.origin, "effects.vehicle_motion", True, why)
     if scene.vehicle is None:
         return
     if not on and not said:
-        _idle(scene, "vehicle", "vehicle_motion")
+        yield _idle(scene, "vehicle", "vehicle_motion")
     if on and scene.vehicle.lateral is not None and not scene.switches()["head_roll"]:
         key = "vehicle.lateral"
-        raise InputError(
+        yield Fault(
+            key,
             f"{key} {scene.origin.of(key)} moves the wire along the strips, which acts only with "
-            "effects.head_roll = true"
+            "effects.head_roll = true",
         )
 
 
-def _roll_acts(scene: Scene) -> None:
+def _roll_acts(scene: Scene) -> Iterator[Fault]:
     on, said = scene.switches()["head_roll"], "head_roll" in scene.effects
     speed = scene.train.speed_km_h
     names = list(dict.fromkeys(place.name for place in scene.train.pantographs))
     for name in names:
         kind = scene.pantographs[name]
         if isinstance(kind, LumpedTable) and kind.roll is not None and not on and not said:
-            _idle(scene, f"pantographs.{name}.roll", "head_roll")
+            yield _idle(scene, f"pantographs.{name}.roll", "head_roll")
     if not on:
         return
     rolling = [
@@ -67,23 +71,24 @@ def _roll_acts(scene: Scene) -> None:
     ]
     if not rolling:
         why = f"no head of the train can roll; give one a table such as pantographs.{names[0]}.roll"
-        refuse(scene.origin, "effects.head_roll", True, why)
+        yield refusal(scene.origin, "effects.head_roll", True, why)
     for name in rolling:
         if scene.pantographs[name].strips.length_m is None:
             why = (
                 f"it needs pantographs.{name}.strips.length_m, the strip that the wire moves along"
             )
-            refuse(scene.origin, "effects.head_roll", True, why)
+            yield refusal(scene.origin, "effects.head_roll", True, why)
 
 
-def _idle(scene: Scene, key: str, effect: str) -> NoReturn:
-    raise InputError(
+def _idle(scene: Scene, key: str, effect: str) -> Fault:
+    return Fault(
+        key,
         f"{key} {scene.origin.of(key)} acts only with effects.{effect} = true; write that, or "
-        "false to leave it out"
+        "false to leave it out",
     )
 
 
-def _multibody_strips(scene: Scene) -> None:
+def _multibody_strips(scene: Scene) -> Iterator[Fault]:
     for name in dict.fromkeys(place.name for place in scene.train.pantographs):
         kind = scene.pantographs[name]
         if not isinstance(kind, MultibodyTable) or kind.strips.mass_kg is None:
@@ -93,7 +98,7 @@ def _multibody_strips(scene: Scene) -> None:
         data = pantograph_of(name, kind, scene.train.speed_km_h)
         mass = stand(data).head.mass  # type: ignore[arg-type]
         if kind.strips.mass >= mass:
-            refuse(
+            yield refusal(
                 scene.origin,
                 f"pantographs.{name}.strips.mass_kg",
                 kind.strips.mass_kg,
@@ -101,7 +106,7 @@ def _multibody_strips(scene: Scene) -> None:
             )
 
 
-def _tables_reach(scene: Scene) -> None:
+def _tables_reach(scene: Scene) -> Iterator[Fault]:
     """Tables must hold for all of the run; splines are not continued."""
     if scene.vehicle is None:
         return
@@ -121,19 +126,20 @@ def _tables_reach(scene: Scene) -> None:
             first, last = pairs[0][0], pairs[-1][0]
             if first > low + _TINY or last < high - _TINY:
                 key = f"vehicle.{direction}.{name}"
-                raise InputError(
+                yield Fault(
+                    key,
                     f"{key} {scene.origin.of(key)} holds from {first:g} to {last:g} {unit}, but "
-                    f"the run needs it from {low:g} to {high:.5g} {unit}"
+                    f"the run needs it from {low:g} to {high:.5g} {unit}",
                 )
 
 
-def _waves(scene: Scene) -> None:
+def _waves(scene: Scene) -> Iterator[Fault]:
     if scene.vehicle is None or scene.vehicle.irregularity is None:
         return
     step = scene.train.speed_km_h / 3.6 * scene.numerics.dt_s
     shortest = scene.vehicle.irregularity.shortest_m
     if shortest < STEPS_PER_WAVE * step:
-        refuse(
+        yield refusal(
             scene.origin,
             "vehicle.irregularity.shortest_m",
             shortest,
@@ -142,7 +148,7 @@ def _waves(scene: Scene) -> None:
         )
 
 
-def _strip_lengths(scene: Scene, line: Line) -> None:
+def _strip_lengths(scene: Scene, line: Line) -> Iterator[Fault]:
     for i, place in enumerate(scene.train.pantographs):
         kind = scene.pantographs[place.name]
         length = kind.strips.length_m
@@ -154,7 +160,7 @@ def _strip_lengths(scene: Scene, line: Line) -> None:
             if scene.switches()["vehicle_motion"] and scene.vehicle is not None:
                 keys += " and vehicle"
             needed = math.ceil(2e3 * abs(far) - 1e-6) / 1e3
-            refuse(
+            yield refusal(
                 scene.origin,
                 f"pantographs.{place.name}.strips.length_m",
                 length,

@@ -293,9 +293,16 @@ def check(
     extras: MoreAssignments = None,
     assignments: Assignments = None,
     shortened: Shortened = False,
-) -> None:
+) -> int:
     """Serial."""
-    scene = load(case, assignments, extras, shortened)
+    from catenary.cases.input.faults import SceneError
+
+    try:
+        scene = load(case, assignments, extras, shortened)
+    except SceneError as error:
+        for line in error.lines():
+            console.complain(line)
+        return console.BAD_INPUT
     # What a refusal does not need is imported once the scene is sound.
     from catenary.cases.meshing import mesh_of
     from catenary.cases.pantograph_facts import kind_lines
@@ -311,6 +318,7 @@ def check(
     )
     for name, lines in kind_lines(scene, problem).items():
         console.say(f"pantograph {name}, " + "\n  ".join(lines))
+    return console.DONE
 
 
 @app.command(

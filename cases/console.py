@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
+from catenary.cases.input.plain_text import plain
 from catenary.solver.errors import CatenaryError, InputError
 from catenary.solver.parallel import launched_by_mpirun, on_root
 
@@ -41,7 +42,7 @@ def say(text: str) -> None:
 def complain(sentence: str) -> None:
     """Print one sentence to standard error on rank 0. Not collective."""
     if speaks():
-        typer.echo(f"catenary: {' '.join(sentence.split())}", err=True)
+        typer.echo(f"catenary: {plain(' '.join(sentence.split()))}", err=True)
 
 
 def folder(text: str) -> Path:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from catenary.cases.keys import nearest
+from catenary.cases.loading import Assigned
 from catenary.cases.messages import shown
 from catenary.cases.scene import Scene, load_scene
 from catenary.cases.variants import Variant
@@ -80,6 +81,18 @@ class Ended:
         return self.outcome == "done"
 
 
+def _assigned(variant: Variant) -> list[Assigned]:
+    """The assignments of a variant, each with what gave it."""
+    own = len(variant.assignments) - sum(key != "variant" for key in variant.varied)
+    by_name = f"by the variant {variant.name}"
+    return [
+        Assigned(text, "--vary", "on the command line (--vary)")
+        if number >= own
+        else Assigned(text, f"variant {variant.name}:", by_name)
+        for number, text in enumerate(variant.assignments)
+    ]
+
+
 def _refuse_petsc(variant: Variant) -> None:
     """PETSc starts once, with the options of the first scene."""
     for assignment in variant.assignments:
@@ -111,7 +124,7 @@ def make_jobs(
     for variant in variants:
         _refuse_petsc(variant)
         try:
-            scene = load_scene(case, [*overrides, *variant.assignments], shortened)
+            scene = load_scene(case, overrides, shortened, _assigned(variant))
         except InputError as error:
             if len(variants) == 1:
                 raise

@@ -12,10 +12,13 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from catenary.cases.table import Table
+from catenary.cases.units import SUFFIXES
 from catenary.solver import effects
 
 # Stands for an index into a list of tables or for a name that the scene chooses.
 ANY = "*"
+# A longer key is no misspelt one.
+_LONGEST = 200
 
 
 def known_keys(model: type[BaseModel], location: Sequence[int | str] = ()) -> list[str]:
@@ -150,24 +153,32 @@ def nearest(key: str, known: list[str]) -> str | None:
     In this order: the same last part in another table, a similar one in the same table, a similar
     one anywhere, a similar key as a whole. What the scene itself names is shown as ``<name>``.
     """
+    if len(key) > _LONGEST:
+        return None
     parts = key.split(".")
     named = [candidate for candidate in known if not candidate.endswith(ANY)]
     lasts = [candidate.rsplit(".", 1)[-1] for candidate in named]
     if parts[-1] in lasts:
         return _most_alike(key, named, parts[-1])
-    siblings = [
-        last
+    siblings = {
+        written: last
         for candidate, last in zip(named, lasts, strict=True)
         if _matches(parts[:-1], candidate.split(".")[:-1])
-    ]
+        for written in (last, _without_unit(last))
+    }
     close = difflib.get_close_matches(parts[-1], siblings, n=1, cutoff=0.6)
     if close:
-        return ".".join([*parts[:-1], close[0]])
+        return ".".join([*parts[:-1], siblings[close[0]]])
     close = difflib.get_close_matches(parts[-1], lasts, n=1, cutoff=0.75)
     if close:
         return _most_alike(key, named, close[0])
     close = difflib.get_close_matches(key, named, n=1, cutoff=0.6)
     return close[0].replace(ANY, "<name>") if close else None
+
+
+def _without_unit(name: str) -> str:
+    """A key's last part as one types it who forgets the unit at its end."""
+    return next((name.removesuffix(end) for end in SUFFIXES if name.endswith(end)), name)
 
 
 def _most_alike(key: str, known: list[str], last: str) -> str:

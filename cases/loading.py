@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+from catenary.cases.input.plain_text import DEEPEST, decode, plain, read_whole
 from catenary.cases.messages import COMMAND_LINE, shown
 from catenary.solver.errors import InputError
 
@@ -14,50 +16,71 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-_MAX_BYTES = 10_000_000  # a scene is written by hand; more is some other file
+# A key part and its dot; more of them in a row make a table that is nested too deeply, which would
+# take the parser a time that grows with their square.
+_PART = r"""(?:[A-Za-z0-9_-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')[ \t]*\.[ \t]*"""
+_DEEP_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*(?:{_PART}){{{DEEPEST}}}", re.MULTILINE)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Contents of a TOML file.
+    """Contents of a TOML file in UTF-8, with or without a byte order mark.
 
     Raises
     ------
     InputError
         If the file cannot be read or is not TOML.
     """
-    try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise InputError(f"{path} is too large for a case file ({_MAX_BYTES} bytes allowed)")
-        text = path.read_bytes().decode("utf-8")
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path} is not a text file in UTF-8 (byte {error.start} is not)"
-        ) from error
+    text = decode(read_whole(path, str(path)), str(path))
+    deep = _DEEP_KEY.search(text)
+    if deep is not None:
+        line = text.count("\n", 0, deep.start() + 1) + 1
+        raise InputError(f"{path} has in line {line} a key of more than {DEEPEST} parts")
     try:
         return tomllib.loads(text)
     except RecursionError as error:
         raise InputError(f"{path} is nested too deeply") from error
     except ValueError as error:  # TOMLDecodeError, and integers of thousands of digits
-        raise InputError(f"{path} is not valid TOML: {error}") from error
+        raise InputError(f"{path} is not valid TOML: {_toml_words(error)}") from error
+
+
+def _toml_words(error: ValueError) -> str:
+    """What the parser says, without Python's way to write keys; it also fails on long integers."""
+    if not isinstance(error, tomllib.TOMLDecodeError):
+        return "a number is too long"
+    keys = re.compile(r"\((?:'[^']*'(?:, )?)+,?\)")
+    return plain(keys.sub(lambda m: ".".join(re.findall(r"'([^']*)'", m[0])), str(error)), 300)
 
 
 # What ``key=`` stands for: the key is taken away, so that its default holds.
 REMOVED = object()
 
 
-def parse_assignment(text: str) -> tuple[str, Any]:
+class Assigned(NamedTuple):
+    """An assignment ``key=value``, the option that gave it, and its place for use in a sentence."""
+
+    text: str
+    option: str = "--set"
+    where: str = COMMAND_LINE
+
+
+def parse_assignment(text: str, option: str = "--set") -> tuple[str, Any]:
     """Key and value of ``key=value``; the value is read as TOML, as plain text if it is none.
 
-    An empty value is ``REMOVED``.
+    An empty value is ``REMOVED``. ``option`` names in an error what gave it.
+
+    Raises
+    ------
+    InputError
+        If it has another form, or a key that no scene can have.
     """
     key, equals, value = text.partition("=")
     key = key.strip()
     if not equals or not key or any(not part for part in key.split(".")):
         raise InputError(
-            f"--set {shown(text)} must have the form key=value, e.g. train.speed_km_h=300"
+            f"{option} {shown(text)} must have the form key=value, e.g. train.speed_km_h=300"
         )
+    if key.count(".") >= DEEPEST:
+        raise InputError(f"{option} {shown(key)} has a key of more than {DEEPEST} parts")
     if not value.strip():
         return key, REMOVED
     try:

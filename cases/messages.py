@@ -7,23 +7,25 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 
+from catenary.cases.input.faults import MOST_TOLD, Fault, SceneError
 from catenary.cases.input.petsc_table import ELSEWHERE
+from catenary.cases.input.plain_text import plain
 from catenary.cases.keys import is_known, known_keys, nearest, without_kinds
 from catenary.cases.units import unit_of
-from catenary.solver.errors import InputError
 
-_SHOWN = 60
+_SHOWN, _SOME, _DEEP = 60, 8, 3
 COMMAND_LINE = "on the command line (--set)"
 
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a scene's keys were written: its file, the keys given by ``--set``, and pairs of a key
-    and the file that its value was read from."""
+    """Where a scene's keys were written: its file, pairs of a key that was assigned and the place
+    of that, and pairs of a key and the file that its value was read from."""
 
     file: str
-    overridden: tuple[str, ...] = ()
+    overridden: tuple[tuple[str, str], ...] = ()
     taken_in: tuple[tuple[str, str], ...] = ()
 
     def of(self, key: str) -> str:
@@ -31,30 +33,56 @@ class Origin:
         for above, file in self.taken_in:
             if key == above or key.startswith(above + "."):
                 return f"in {file}"
-        for given in self.overridden:
+        for given, where in reversed(self.overridden):
             if key == given or key.startswith(given + ".") or given.startswith(key + "."):
-                return COMMAND_LINE
+                return where
         return f"in {self.file}"
+
+    def is_overridden(self, key: str) -> bool:
+        """Whether just this key was assigned."""
+        return any(key == given for given, _ in self.overridden)
 
 
 def shown(value: Any) -> str:
     """A value as a person would write it, shortened."""
+    return plain(_as_toml(value), _SHOWN)
+
+
+def _as_toml(value: Any, depth: int = 0) -> str:
+    """A value as TOML has it; of what is long or deep, the beginning."""
     if isinstance(value, bool):
         return "true" if value else "false"
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, float):
+        return f"{value:.12g}"
+    if isinstance(value, list | tuple | dict) and depth == _DEEP:
+        return "..."
+    if isinstance(value, list | tuple):
+        some = ", ".join(_as_toml(one, depth + 1) for one in value[:_SOME])
+        return f"[{some}{', ...' if len(value) > _SOME else ''}]"
+    if isinstance(value, dict):
+        some = [f"{key} = {_as_toml(one, depth + 1)}" for key, one in list(value.items())[:_SOME]]
+        return f"{{{', '.join(some)}{', ...' if len(value) > _SOME else ''}}}"
+    if value is None:
+        return "nothing"
     try:
-        text = f'"{value}"' if isinstance(value, str) else str(value)
-    except ValueError:  # integers of thousands of digits
-        text = "a number of thousands of digits"
-    text = "".join(c if c.isprintable() else "?" for c in text)
-    return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
+        return str(value)
+    except ValueError:
+        return "a number of thousands of digits"
 
 
-def refuse(origin: Origin, key: str, value: object, why: str) -> NoReturn:
-    """Raise the ``InputError`` that says what a key is, where it was written, and why it cannot."""
+def refusal(origin: Origin, key: str, value: object, why: str) -> Fault:
+    """The fault that says what a key is, where it was written, and why it cannot be."""
     unit = unit_of(key)
     number = f"{value:g}" if isinstance(value, float) else shown(value)
     in_unit = f" {unit}" if unit else ""
-    raise InputError(f"{key} is {number}{in_unit} {origin.of(key)}; {why}")
+    return Fault(key, f"{key} is {number}{in_unit} {origin.of(key)}; {why}")
+
+
+def refuse(origin: Origin, key: str, value: object, why: str) -> NoReturn:
+    """Raise the ``SceneError`` with the one fault that ``refusal`` gives."""
+    raise SceneError([refusal(origin, key, value, why)])
 
 
 def unknown_key(key: str, where: str, known: list[str]) -> str:
@@ -110,38 +138,41 @@ _OF_A_NUMBER = (
 )
 
 
-def input_error(
+def schema_faults(
     failed: ValidationError, raw: dict[str, Any], model: type[BaseModel], origin: Origin
-) -> InputError:
-    """The first problem of a validation as one sentence that counts the others."""
-    problems = failed.errors(include_url=False)
+) -> tuple[list[Fault], int]:
+    """The faults of a validation, ``MOST_TOLD`` at most, and how many there are more."""
+    found = failed.errors(include_url=False)
     # A misspelt key often shows up as a missing one too: the misspelling is the cause.
-    problems.sort(key=lambda p: 0 if p["type"] == "extra_forbidden" else 1)
-    text = _sentence(dict(problems[0]), raw, model, origin)
-    if len(problems) > 1:
-        more = len(problems) - 1
-        text += f" (and {more} more {'problem' if more == 1 else 'problems'})"
-    return InputError(text)
+    found.sort(key=lambda p: 0 if p["type"] == "extra_forbidden" else 1)
+    faults: list[Fault] = []
+    for one in found[:MOST_TOLD]:
+        parts, field = without_kinds(one["loc"], model)
+        key = ".".join(_location(parts, raw)) or "the scene"
+        faults.append(Fault(key, _sentence(dict(one), key, parts, field, model, origin)))
+    return faults, max(0, len(found) - MOST_TOLD)
 
 
 def _sentence(
-    problem: dict[str, Any], raw: dict[str, Any], model: type[BaseModel], origin: Origin
+    fault: dict[str, Any],
+    key: str,
+    parts: list[int | str],
+    field: FieldInfo | None,
+    model: type[BaseModel],
+    origin: Origin,
 ) -> str:
-    parts, field = without_kinds(problem["loc"], model)
-    location = _location(parts, raw)
-    key = ".".join(location) or "the scene"
     where = origin.of(key)
-    kind = problem["type"]
+    kind = fault["type"]
     if kind == "extra_forbidden":
-        of_this_kind = known_keys(model, problem["loc"])
+        of_this_kind = known_keys(model, fault["loc"])
         if not is_known(key, of_this_kind) and is_known(key, known_keys(model)):
-            return f"{key} {where} does not belong to type {_kind(problem['loc'], parts)}"
+            return f"{key} {where} does not belong to type {_kind(fault['loc'], parts)}"
         return unknown_key(key, where, of_this_kind)
     if kind == "missing":
         meaning = field.description if field is not None else ""
         return f"{key}{f' ({meaning})' if meaning else ''} is missing {where}"
-    wanted = _WANTED.get(kind, lambda c: problem["msg"])(problem.get("ctx") or {})
-    value = problem["input"]
+    wanted = _WANTED.get(kind, lambda c: fault["msg"])(fault.get("ctx") or {})
+    value = fault["input"]
     if isinstance(value, dict | BaseModel):
         return f"{key} {where} {wanted}"
     unit = unit_of(key)

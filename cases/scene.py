@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field, PrivateAttr, ValidationError
 
 from catenary.cases.catalogue import find_case
+from catenary.cases.input.faults import Fault, SceneError
 from catenary.cases.input.petsc_table import PetscTable
+from catenary.cases.input.plain_text import refuse_deep, text_faults
 from catenary.cases.keys import is_known, known_keys, with_kinds
-from catenary.cases.loading import assign, parse_assignment, read_toml
-from catenary.cases.messages import COMMAND_LINE, Origin, input_error, unknown_key
+from catenary.cases.loading import Assigned, assign, parse_assignment, read_toml
+from catenary.cases.messages import Origin, schema_faults, unknown_key
 from catenary.cases.schema_contact import ContactTable
 from catenary.cases.schema_incidents import Incident
 from catenary.cases.schema_line import LineTable, MeshTable
@@ -130,7 +132,12 @@ class Scene(Table):
         return plain
 
 
-def load_scene(case: str | Path, overrides: Sequence[str] = (), shortened: bool = False) -> Scene:
+def load_scene(
+    case: str | Path,
+    overrides: Sequence[str] = (),
+    shortened: bool = False,
+    varied: Sequence[Assigned] = (),
+) -> Scene:
     """The checked scene of a shipped case's name or a case file. Not collective.
 
     Parameters
@@ -138,11 +145,12 @@ def load_scene(case: str | Path, overrides: Sequence[str] = (), shortened: bool 
     case : name, file or folder
     overrides : ``key=value`` each, value in TOML; they win over the file; ``key=`` removes a key
     shortened : apply the case's ``[test]`` table before the overrides
+    varied : further assignments, which come last, and where they were written
 
     Raises
     ------
     InputError
-        In one sentence, if anything is wrong.
+        If anything is wrong: a ``SceneError`` with all faults of the scene, or one sentence.
     """
     path = find_case(str(case)).absolute()
     raw = read_toml(path)
@@ -151,13 +159,13 @@ def load_scene(case: str | Path, overrides: Sequence[str] = (), shortened: bool 
         for key, value in raw["test"].items():
             assign(raw, key, value, f"in the [test] table of {path}")
     given = []
-    for text in overrides:
-        key, value = parse_assignment(text)
+    for assigned in (*(Assigned(text) for text in overrides), *varied):
+        key, value = parse_assignment(assigned.text, assigned.option)
         if not is_known(key, known):
             near = known_keys(Scene, with_kinds(key, raw, Scene))
-            raise InputError(unknown_key(key, COMMAND_LINE, near))
-        assign(raw, key, value)
-        given.append(key)
+            raise InputError(unknown_key(key, assigned.where, near))
+        assign(raw, key, value, assigned.where)
+        given.append((key, assigned.where))
     return scene_from(raw, Origin(str(path), tuple(given)), folder=path.parent)
 
 
@@ -169,13 +177,23 @@ def scene_from(raw: dict[str, Any], origin: Origin, folder: Path | None = None) 
     """
     from catenary.cases.checks import check
 
+    refuse_deep(raw, origin.file)
     raw = copy.deepcopy(raw)
-    _fill_in(raw, folder, "mesh.file" in origin.overridden)
-    origin = take_in_files(raw, origin, folder)
+    faults, more = text_faults(raw, origin), 0
+    _fill_in(raw, folder, origin.is_overridden("mesh.file"))
+    try:
+        origin = take_in_files(raw, origin, folder)
+    except InputError as error:
+        faults.append(Fault("vehicle", str(error)))
+        del raw["vehicle"]
     try:
         scene = Scene.model_validate(raw)
     except ValidationError as failed:
-        raise input_error(failed, raw, Scene, origin) from None
+        of_schema, more = schema_faults(failed, raw, Scene, origin)
+        told = {fault.key for fault in faults}
+        faults += [fault for fault in of_schema if fault.key not in told]
+    if faults:
+        raise SceneError(faults, more)
     scene._origin = origin
     check(scene)
     return scene

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import (
+    BeforeValidator,
     Field,
     SerializerFunctionWrapHandler,
     field_validator,
@@ -234,12 +235,19 @@ class NumericsTable(Table):
         return plain
 
 
+def _year(value: Any) -> Any:
+    """An edition is named by a year, which one writes as a number too."""
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
 class EvaluationTable(Table):
     """The stretch whose statistics are judged, and by what."""
 
     from_m: float = Field(ge=0, le=1e6, description="start of the evaluated stretch")
     to_m: float = Field(gt=0, le=1e6, description="end of the evaluated stretch")
-    edition: str = Field("2006", description="edition of EN 50367 whose limits are applied")
+    edition: Annotated[str, BeforeValidator(_year)] = Field(
+        "2006", description="edition of EN 50367 whose limits are applied"
+    )
     system: str = Field("ac", description="power supply, which decides the mean force allowed")
 
     @model_validator(mode="after")

@@ -181,6 +181,6 @@ def check_keys(variants: Sequence[Variant], where: str) -> None:
     known = known_keys(Scene)
     for variant in variants:
         for assignment in variant.assignments:
-            key, _ = parse_assignment(assignment)
+            key, _ = parse_assignment(assignment, f"variant {variant.name}:")
             if not is_known(key, known):
                 raise InputError(unknown_key(key, where, known))

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from catenary.cases.input.plain_text import decode, read_whole
 from catenary.cases.messages import Origin, shown
 from catenary.solver.errors import InputError
 
@@ -48,7 +49,7 @@ def take_in_files(raw: dict[str, Any], origin: Origin, folder: Path | None) -> O
                     f"{key} is {shown(name)} {origin.of(key)}; vehicle.{direction}.{course} is "
                     "given too: take one of them away"
                 )
-            own = key in origin.overridden or folder is None
+            own = origin.is_overridden(key) or folder is None
             path = (Path.cwd() if own else folder or Path()) / name
             table[course] = _pairs(path, f"{key} is {_named(name)} {origin.of(key)}")
             del table[f"{course}_file"]
@@ -58,10 +59,7 @@ def take_in_files(raw: dict[str, Any], origin: Origin, folder: Path | None) -> O
 
 def _pairs(path: Path, where: str) -> list[list[float]]:
     """Two columns of numbers; comments after #, and one line of names before the numbers."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:
-        raise InputError(f"{where}; it cannot be read: {_why(error)}") from error
+    text = decode(read_whole(path, f"{where}; it"), f"{where}; it")
     pairs: list[list[float]] = []
     named = False
     for number, cells in enumerate(csv.reader(text.splitlines()), start=1):
@@ -88,9 +86,3 @@ def _pairs(path: Path, where: str) -> list[list[float]]:
 def _named(name: str) -> str:
     """A file's name, whole as long as it can be one: its end tells most."""
     return f'"{name}"' if len(name) <= _LONGEST_NAME and name.isprintable() else shown(name)
-
-
-def _why(error: Exception) -> str:
-    if isinstance(error, OSError):
-        return (error.strerror or "no reason is given").lower()
-    return "it is not text"

@@ -133,3 +133,58 @@ def test_a_program_beside_a_case_runs_only_with_study_and_is_named_before() -> N
     assert result.stdout.startswith("--study runs the program ")
     assert "study.py" in result.stdout.splitlines()[0]
     assert Path("canary").exists()  # the canary sings when it is let out
+
+
+def told_by_check(*words: str) -> list[str]:
+    """The keys that ``check`` names, one sentence each."""
+    result = CliRunner().invoke(app, ["check", *words])
+    assert result.exit_code == 2 and result.stdout == "", result.output
+    sentences = result.stderr.splitlines()
+    assert all(sentence.startswith("catenary: ") for sentence in sentences)
+    return [sentence.split()[1] for sentence in sentences]
+
+
+def test_check_tells_every_fault_of_the_tables_with_its_key() -> None:
+    changes = (
+        ("n_spans = 22", "n_spans = 0"),
+        ("speed_km_h", "sped_km_h"),
+        ("dt_s = 1e-3", "dt_s = 1"),
+    )
+    text = (
+        SOUND.read_text().replace("[line]", "[line]\nmasts = 3").replace("sound", "so\\u0007und", 2)
+    )
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    Path("case.toml").write_text(text)
+    keys = told_by_check(".")
+    assert sorted(keys) == [
+        "case.name",
+        "line.masts",
+        "line.n_spans",
+        "numerics.dt_s",
+        "train.sped_km_h",
+        "train.speed_km_h",
+    ]
+    assert refusal("plan", ".").endswith("(and 5 more: `catenary check` lists them)")
+
+
+def test_check_tells_every_fault_of_the_geometry_with_its_key() -> None:
+    changes = {
+        "line.encumbrance_m": "0.3",
+        "train.speed_km_h": "450",
+        "train.pantographs.0.behind_m": "5",
+        "evaluation.system": "steam",
+        "evaluation.from_m": "50",
+        "effects.contact_loss": "false",
+        "effects.vertical": "false",
+    }
+    assigned = [f"{key}={value}" for key, value in changes.items()]
+    keys = told_by_check(str(SOUND), "--set", *assigned, "contact.law=hertz")
+    assert sorted(keys) == sorted(changes)
+
+
+def test_faults_beyond_fifty_are_counted() -> None:
+    Path("case.toml").write_text(SOUND.read_text() + "".join(f"[x{i}]\n" for i in range(3000)))
+    assert told_by_check(".")[-1] == "there"
+    assert "(and 2999 more: " in refusal("plan", ".")
