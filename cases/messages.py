@@ -62,8 +62,8 @@ def _as_toml(value: Any, depth: int = 0) -> str:
         some = ", ".join(_as_toml(one, depth + 1) for one in value[:_SOME])
         return f"[{some}{', ...' if len(value) > _SOME else ''}]"
     if isinstance(value, dict):
-        some = [f"{key} = {_as_toml(one, depth + 1)}" for key, one in list(value.items())[:_SOME]]
-        return f"{{{', '.join(some)}{', ...' if len(value) > _SOME else ''}}}"
+        pairs = [f"{key} = {_as_toml(one, depth + 1)}" for key, one in list(value.items())[:_SOME]]
+        return f"{{{', '.join(pairs)}{', ...' if len(value) > _SOME else ''}}}"
     if value is None:
         return "nothing"
     try:
