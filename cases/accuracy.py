@@ -59,14 +59,14 @@ def measure(results: Results) -> dict[str, Any]:
     """
     start, end = results.evaluation
     places = np.linspace(start, end, 1 + math.ceil((end - start) / _SPACING))
-    position = results.channel("contact_position")
-    force = results.channel("contact_force")
     histories: list[list[float]] = []
     for p in range(results.n_pantographs):
-        if not covers(position[:, p], (start, end)):
+        position = results.column("contact_position", p)
+        if not covers(position, (start, end)):
             histories.append([])
             continue
-        curve = CubicSpline(position[:, p], filters.low_pass(force[:, p], results.dt))
+        force = results.column("contact_force", p)
+        curve = CubicSpline(position, filters.low_pass(force, results.dt))
         histories.append(np.round(curve(places), 4).tolist())
     return {"histories": histories}
 

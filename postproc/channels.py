@@ -56,6 +56,9 @@ CHANNELS: dict[str, Channel] = {
     )
 }
 
+# Those with a column for each place on the line, which may be recorded in part.
+LINE_CHANNELS = tuple(c.name for c in CHANNELS.values() if c.per in (ARM, DROPPER))
+
 # Only of runs in which a pantograph has more than one strip.
 STRIP_FORCE = Channel(
     "strip_force",

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import csv
 import io
-from typing import NamedTuple
+from typing import NamedTuple, TextIO
 
 import numpy as np
 
 from catenary.postproc import channels
 from catenary.postproc.results import Results
+
+# Steps that are written at once.
+_ROWS = 10_000
 
 
 class DropperRow(NamedTuple):
@@ -61,28 +64,31 @@ def droppers_csv(results: Results) -> str:
 
 def pantographs_csv(results: Results) -> str:
     """Time and the channels of all pantographs as CSV text, one line a step. Not collective."""
-    heads, columns = [channels.TIME.label], [results.time]
-    names = results.pantograph_names()
-    for channel in channels.CHANNELS.values():
-        if channel.per != channels.PANTOGRAPH:
-            continue
-        values = results.channel(channel.name)
-        for p, name in enumerate(names):
-            prefix = f"{name} " if len(names) > 1 else ""
-            heads.append(prefix + channel.label)
-            columns.append(values[:, p])
-    violations = results.constraint_violations()
-    if violations is not None:
-        for p, name in enumerate(names):
-            prefix = f"{name} " if len(names) > 1 else ""
-            heads.append(prefix + channels.CONSTRAINT_VIOLATION.label)
-            columns.append(violations[:, p])
-    for name, forces in zip(names, results.strip_forces(), strict=False):
-        prefix = f"{name} " if len(names) > 1 else ""
-        for number in range(forces.shape[1] if forces.shape[1] > 1 else 0):
-            heads.append(f"{prefix}strip {number + 1} {channels.STRIP_FORCE.label}")
-            columns.append(forces[:, number])
     stream = io.StringIO()
-    csv.writer(stream, lineterminator="\n").writerow(heads)
-    np.savetxt(stream, np.column_stack(columns), fmt="%.9g", delimiter=",")
+    write_pantographs_csv(results, stream)
     return stream.getvalue()
+
+
+def write_pantographs_csv(results: Results, stream: TextIO) -> None:
+    """The same into an open text file, by blocks of steps. Not collective."""
+    names = results.pantograph_names()
+    prefixes = [f"{name} " if len(names) > 1 else "" for name in names]
+    tables = [c for c in channels.CHANNELS.values() if c.per == channels.PANTOGRAPH]
+    if results.has_violations:
+        tables.append(channels.CONSTRAINT_VIOLATION)
+    heads = [channels.TIME.label]
+    heads += [prefix + channel.label for channel in tables for prefix in prefixes]
+    strips = []
+    if results.several_strips:
+        for prefix, columns in zip(prefixes, results.strip_columns(), strict=True):
+            for number, column in enumerate(columns if len(columns) > 1 else []):
+                heads.append(f"{prefix}strip {number + 1} {channels.STRIP_FORCE.label}")
+                strips.append(column)
+    csv.writer(stream, lineterminator="\n").writerow(heads)
+    for start in range(0, results.n_rows("time"), _ROWS):
+        part = slice(start, min(start + _ROWS, results.n_rows("time")))
+        blocks = [results.times(part)[:, None]]
+        blocks += [results.rows(channel.name, part) for channel in tables]
+        if strips:
+            blocks.append(results.rows(channels.STRIP_FORCE.name, part)[:, strips])
+        np.savetxt(stream, np.hstack(blocks), fmt="%.9g", delimiter=",")

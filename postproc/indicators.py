@@ -36,6 +36,8 @@ COARSE_STEP = 0.05
 # A wave is resolved while its frequency on the mesh is wrong by less than this.
 RESOLVED = 0.01
 _WAVE_NUMBERS = 400
+# Records longer than this are thinned before their spectrum is taken, to this rate at least [Hz].
+_SPECTRUM, _SAMPLED_HZ = 500_000, 1000.0
 # Waves of two elements belong to the lower branch, whatever rounding says.
 _ZONE = np.pi * (1.0 + 1e-9)
 
@@ -76,18 +78,18 @@ def indicate(results: Results) -> Indicators:
     """The indicators of a run, as far as its record goes. Not collective."""
     about = results.attributes
     config = about["config"]
-    position = results.channel("contact_position")
-    force = results.channel("contact_force")
     method = _method(config)
     n = results.n_pantographs
     error, deviation = np.full(n, np.nan), np.full(n, np.nan)
     start, end = results.evaluation
     for p in range(n):
-        within = (position[:, p] >= start) & (position[:, p] <= end)
-        if not covers(position[:, p], (start, end)) or np.count_nonzero(within) < 8:
+        position = results.column("contact_position", p)
+        within = (position >= start) & (position <= end)
+        if not covers(position, (start, end)) or np.count_nonzero(within) < 8:
             continue
+        del position
         try:
-            filtered = filters.low_pass(force[:, p], results.dt)[within]
+            filtered = filters.low_pass(results.column("contact_force", p), results.dt)[within]
         except InputError:  # the statistics say so
             continue
         deviation[p] = filtered.std()
@@ -114,8 +116,10 @@ def step_error(force: np.ndarray, dt: float, method: Method) -> float:
     dt : time step [s]
     """
     deviation = float(force.std())
+    # What is filtered needs few samples; a long record has more than a spectrum has use for.
+    every = max(1, min(force.size // _SPECTRUM, int(1.0 / (_SAMPLED_HZ * dt))))
     frequency, power = signal.periodogram(
-        force, 1.0 / dt, window="hann", detrend="constant", scaling="spectrum"
+        force[::every], 1.0 / (every * dt), window="hann", detrend="constant", scaling="spectrum"
     )
     omega, power = 2.0 * np.pi * frequency[1:], power[1:]
     if deviation == 0.0 or power.sum() == 0.0:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
-from catenary.postproc import filters
+from catenary.postproc import channels, filters
+from catenary.postproc.pages.envelope import thinned
 from catenary.postproc.results import Results
 from catenary.postproc.statistics import RunStatistics
 from catenary.solver.errors import InputError
@@ -19,6 +23,8 @@ COLOURS = ("#1f5fa8", "#d1641b", "#2f8f4e", "#7b4fa3", "#8c6d31", "#444444")
 GREY, LIGHT, SHADE, LIMIT = "#6b6b6b", "#c9c9c9", "#eef3e6", "#b3261e"
 WIDTH = 9.0
 _RESOLUTION = 130
+# Evaluated arms whose passage is drawn.
+_MOST_ARMS = 60
 
 
 def png(figure: Figure) -> bytes:
@@ -82,9 +88,7 @@ def mark_line(axes: Axes, results: Results, start: float, end: float) -> None:
     axes.axvspan(low, high, color=SHADE, zorder=0, label="evaluation stretch")
     support = results.line("support_x")
     support = support[(support >= start) & (support <= end)]
-    for number, x in enumerate(support):
-        label = "support" if number == 0 else None
-        axes.axvline(x, color=LIGHT, linewidth=0.9, zorder=1, label=label)
+    _uprights(axes, support, 0.9)
     dropper = results.line("dropper_x")
     dropper = dropper[(dropper >= start) & (dropper <= end)]
     transform = axes.get_xaxis_transform()
@@ -104,31 +108,29 @@ def mark_line(axes: Axes, results: Results, start: float, end: float) -> None:
 
 def contact_force(results: Results) -> Figure:
     """Contact force of each pantograph along the track: unfiltered light, 20 Hz low-pass bold."""
-    position = results.channel("contact_position")
-    force = results.channel("contact_force")
     names = results.pantograph_names()
     n = results.n_pantographs
-    start, end = float(position.min()), float(position.max())
+    start, end = _travelled(results)
     figure = new_figure(0.7 + 2.7 * n)
     panels = figure.subplots(n, 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for p, axes in enumerate(panels):
         mark_line(axes, results, start, end)
+        position, force = results.column("contact_position", p), results.column("contact_force", p)
         axes.plot(
-            position[:, p],
-            force[:, p],
+            *thinned(position, force),
             color=colour(p),
             alpha=0.3,
             linewidth=0.6,
             label="unfiltered",
         )
         try:
-            filtered = filters.low_pass(force[:, p], results.dt)
+            force = filters.low_pass(force, results.dt)
         except InputError:  # sampled too slowly; the report says so
-            filtered = None
-        if filtered is not None:
-            axes.plot(
-                position[:, p], filtered, color=colour(p), linewidth=1.5, label="20 Hz low-pass"
-            )
+            pass
+        else:
+            label = "20 Hz low-pass"
+            axes.plot(*thinned(position, force), color=colour(p), linewidth=1.5, label=label)
+        del position, force
         tidy(axes, "", "contact force [N]", names[p].capitalize())
         legend_above(axes)
     panels[-1].set_xlabel("position along the track [m]")
@@ -138,20 +140,20 @@ def contact_force(results: Results) -> Figure:
 def strip_forces(results: Results) -> Figure:
     """Share of each strip in the contact force along the track, 20 Hz low-pass, for pantographs
     with more than one."""
-    position = results.channel("contact_position")
-    shown = [(p, forces) for p, forces in enumerate(results.strip_forces()) if forces.shape[1] > 1]
-    start, end = float(position.min()), float(position.max())
+    shown = [(p, own) for p, own in enumerate(results.strip_columns()) if len(own) > 1]
+    start, end = _travelled(results)
     figure = new_figure(0.7 + 2.7 * len(shown))
     panels = figure.subplots(len(shown), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-    for axes, (p, forces) in zip(panels, shown, strict=True):
+    for axes, (p, columns) in zip(panels, shown, strict=True):
         mark_line(axes, results, start, end)
-        for number in range(forces.shape[1]):
-            try:
-                force = filters.low_pass(forces[:, number], results.dt)
-            except InputError:  # sampled too slowly; the report says so
-                force = forces[:, number]
+        position = results.column("contact_position", p)
+        for number, column in enumerate(columns):
+            force = results.column(channels.STRIP_FORCE.name, column)
+            with contextlib.suppress(InputError):  # sampled too slowly; the report says so
+                force = filters.low_pass(force, results.dt)
             label = ("leading strip", "trailing strip")[number]
-            axes.plot(position[:, p], force, color=colour(number), linewidth=1.2, label=label)
+            curve = thinned(position, force)
+            axes.plot(*curve, color=colour(number), linewidth=1.2, label=label)
         name = results.pantograph_names()[p]
         tidy(axes, "", "force of a strip [N]", name.capitalize())
         legend_above(axes)
@@ -213,40 +215,10 @@ def arm_uplift(results: Results, statistics: RunStatistics, limit: float | None)
 
     ``limit`` is the allowed uplift [m], None for none.
     """
-    position = results.channel("contact_position")
-    leader = int(np.argmax(position[0]))
-    uplift = 1e3 * results.channel("arm_uplift")
     supports = statistics.supports
-    evaluated = np.flatnonzero(supports.evaluated)
     figure = new_figure(5.6)
     passing, along = figure.subplots(2, 1)
-
-    worst = evaluated[np.argmax(supports.uplift[evaluated])] if evaluated.size else None
-    for number, arm in enumerate(i for i in evaluated if i != worst):
-        passing.plot(
-            position[:, leader] - supports.x[arm],
-            uplift[:, arm],
-            color=LIGHT,
-            linewidth=0.8,
-            label="other evaluated arms" if number == 0 else None,
-        )
-    if worst is not None:
-        passing.plot(
-            position[:, leader] - supports.x[worst],
-            uplift[:, worst],
-            color="#222222",
-            linewidth=1.6,
-            label=f"largest uplift, arm at {supports.x[worst]:.1f} m",
-        )
-    behind = position[0, leader] - position[0]
-    for p, name in enumerate(results.pantograph_names()):
-        passing.axvline(
-            behind[p], color=colour(p), linestyle="--", linewidth=1.1, label=f"{name} passes"
-        )
-    passing.set_xlim(-60.0, float(behind.max()) + 140.0)
-    who = "leading pantograph" if results.n_pantographs > 1 else "pantograph"
-    tidy(passing, f"position of the {who} relative to the arm [m]", "uplift [mm]")
-    legend_above(passing)
+    _passing_train(passing, results, statistics)
 
     mark_line(along, results, float(supports.x.min(initial=0)), float(supports.x.max(initial=1)))
     along.margins(x=0.02)
@@ -263,9 +235,50 @@ def arm_uplift(results: Results, statistics: RunStatistics, limit: float | None)
     return figure
 
 
+def _passing_train(axes: Axes, results: Results, statistics: RunStatistics) -> None:
+    """Uplift of evaluated arms over the position of the leading pantograph relative to each."""
+    supports = statistics.supports
+    evaluated = np.flatnonzero(supports.evaluated & np.isfinite(supports.uplift))
+    first = results.first_position
+    leader = int(np.argmax(first))
+    behind = first[leader] - first
+    before, after = -60.0, float(behind.max()) + 140.0
+    position = results.column("contact_position", leader)[:: results.line_record.every]
+
+    def curve(arm: int) -> tuple[np.ndarray, np.ndarray]:
+        from_to = np.searchsorted(position, supports.x[arm] + np.array([before, after]))
+        rows = slice(*np.clip(from_to, 0, results.n_rows("arm_uplift")).tolist())
+        uplift = results.column("arm_uplift", arm, rows)
+        return thinned(position[rows] - supports.x[arm], 1e3 * uplift)
+
+    worst = int(evaluated[np.argmax(supports.uplift[evaluated])]) if evaluated.size else None
+    others = evaluated[evaluated != worst]
+    shown = others[np.linspace(0, others.size - 1, min(others.size, _MOST_ARMS)).astype(int)]
+    label = "other evaluated arms"
+    if shown.size < others.size:
+        label += f", {shown.size} of {others.size}"
+    for number, arm in enumerate(shown):
+        told = label if number == 0 else None
+        axes.plot(*curve(int(arm)), color=LIGHT, linewidth=0.8, label=told)
+    if worst is not None:
+        axes.plot(
+            *curve(worst),
+            color="#222222",
+            linewidth=1.6,
+            label=f"largest uplift, arm at {supports.x[worst]:.1f} m",
+        )
+    for p, name in enumerate(results.pantograph_names()):
+        axes.axvline(
+            behind[p], color=colour(p), linestyle="--", linewidth=1.1, label=f"{name} passes"
+        )
+    axes.set_xlim(before, after)
+    who = "leading pantograph" if results.n_pantographs > 1 else "pantograph"
+    tidy(axes, f"position of the {who} relative to the arm [m]", "uplift [mm]")
+    legend_above(axes)
+
+
 def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
     """Forces of the worst dropper and of a mid-span one, and the range of every dropper."""
-    time, force = results.time, results.channel("dropper_force")
     droppers = statistics.droppers
     x, evaluated = droppers.x, np.flatnonzero(droppers.evaluated)
     figure = new_figure(5.6)
@@ -278,8 +291,11 @@ def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
         worst = int(evaluated[np.argmin(droppers.lowest[evaluated])])
         if worst != middle:
             chosen.insert(0, (worst, f"lowest force, dropper at {x[worst]:.1f} m", "#222222"))
+    time = results.line_time
     for dropper, label, line_colour in chosen:
-        history.plot(time, force[:, dropper], color=line_colour, linewidth=1.2, label=label)
+        curve = thinned(time, results.column("dropper_force", dropper))
+        history.plot(*curve, color=line_colour, linewidth=1.2, label=label)
+    del time
     history.axhline(0.0, color=LIMIT, linewidth=1.0, linestyle="--", label="slack")
     history.margins(x=0.0)
     tidy(history, "time [s]", "dropper force [N]")
@@ -350,8 +366,9 @@ def energies(results: Results) -> Figure | None:
         return None
     figure = new_figure(3.0)
     axes = figure.subplots()
-    axes.plot(recorded["time"], recorded["kinetic"], color=COLOURS[0], label="kinetic")
-    axes.plot(recorded["time"], recorded["elastic"], color=COLOURS[1], label="elastic")
+    for number, name in enumerate(("kinetic", "elastic")):
+        curve = thinned(recorded["time"], recorded[name])
+        axes.plot(*curve, color=COLOURS[number], label=name)
     axes.margins(x=0.0)
     tidy(axes, "time [s]", "energy [J]", "Energies of the line relative to equilibrium")
     legend_above(axes)
@@ -359,10 +376,8 @@ def energies(results: Results) -> Figure | None:
 
 
 def _mark_static(axes: Axes, results: Results, start: float, end: float) -> None:
-    inside = [x for x in results.line("support_x") if start - 1e-6 <= x <= end + 1e-6]
-    for number, x in enumerate(inside):
-        label = "support" if number == 0 else None
-        axes.axvline(x, color=LIGHT, linewidth=1.2, zorder=1, label=label)
+    support = results.line("support_x")
+    _uprights(axes, support[(support >= start - 1e-6) & (support <= end + 1e-6)], 1.2)
     dropper = results.line("dropper_x")
     dropper = dropper[(dropper >= start) & (dropper <= end)]
     axes.plot(
@@ -375,6 +390,22 @@ def _mark_static(axes: Axes, results: Results, start: float, end: float) -> None
         label="dropper",
     )
     axes.set_xlim(*_with_margin(np.array([start, end])))
+
+
+def _uprights(axes: Axes, support: np.ndarray, width: float) -> None:
+    """Supports as lines over the whole height: one collection, however many there are."""
+    if not support.size:
+        return
+    lines = [((x, 0.0), (x, 1.0)) for x in support]
+    transform = axes.get_xaxis_transform()
+    known: dict[str, Any] = {"colors": LIGHT, "linewidths": width, "zorder": 1, "label": "support"}
+    axes.add_collection(LineCollection(lines, transform=transform, **known), autolim=False)
+
+
+def _travelled(results: Results) -> tuple[float, float]:
+    """From and to of the stretch on which a pantograph was [m]."""
+    low, high = results.extremes("contact_position")
+    return float(low.min()), float(high.max())
 
 
 def _with_margin(x: np.ndarray) -> tuple[float, float]:

@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from catenary.postproc import channels
-from catenary.postproc.gathering import ColumnGather
 from catenary.postproc.header import Header
-from catenary.postproc.result_file import DONE, INTERRUPTED, ResultFile
+from catenary.postproc.record.line_record import LineRecord
+from catenary.postproc.record.line_rows import LineGather, LineRows
+from catenary.postproc.result_file import DONE, INTERRUPTED, LineBlock, ResultFile
 from catenary.postproc.storage import Elsewhere, NoRoom, broken_write
 from catenary.solver.errors import RunBroken
 from catenary.solver.observation import Stage, StepView
@@ -41,6 +42,7 @@ class Recorder:
     header : on rank 0 what the runner knows before the first step; ignored elsewhere
     flush_every : steps between two flushes
     energy_every : steps between two records of the energies, None for none
+    record : which part of the line's channels is recorded
     resume : continue a file: what it holds from the stage's start time on is replaced
     on_begun : called on rank 0 when a new file has taken its place
     """
@@ -53,6 +55,7 @@ class Recorder:
         *,
         flush_every: int = 500,
         energy_every: int | None = None,
+        record: LineRecord | None = None,
         resume: bool = False,
         on_begun: Callable[[], None] = lambda: None,
     ) -> None:
@@ -63,6 +66,7 @@ class Recorder:
         self._header = header
         self._flush_every = flush_every
         self._energy_every = energy_every
+        self._record = record or LineRecord()
         self._resume = resume
         self._on_begun = on_begun
         self._file: ResultFile | None = None
@@ -70,7 +74,9 @@ class Recorder:
         self._view: StepView | None = None
         self._where: dict[str, slice] = {}
         self._flushed_once = False
+        self._extremes: dict[str, np.ndarray] = {}
         self._rows = 0
+        self._first_step = 0
         self._energies: list[tuple[float, float, float]] = []
 
     @property
@@ -88,10 +94,7 @@ class Recorder:
         """
         rows = self._flush_every
         self._last_time = stage.start_time
-        self._gather_arms = ColumnGather(self._comm, stage.owned_arms, stage.arm_x.size, rows)
-        self._gather_droppers = ColumnGather(
-            self._comm, stage.owned_droppers, stage.dropper_x.size, rows
-        )
+        self._line = LineGather(self._comm, stage, self._record, rows)
         self._time = np.zeros(rows)
         self._names = [*_OF_PANTOGRAPHS]
         if stage.several_strips:
@@ -99,10 +102,15 @@ class Recorder:
         if stage.joints_in_loop:
             self._names.append(channels.CONSTRAINT_VIOLATION.name)
         self._guarded(lambda: self._open(stage))
+        if self._resume:
+            self._guarded(self._read_extremes)
+            self._line.restore(self._comm.bcast(self._extremes, root=0))
 
     def observe(self, view: StepView) -> None:
         """Copy a step into the buffers; collective at the first step and whenever they are full."""
         row = self._rows
+        if row == 0:
+            self._first_step = view.step
         if not self._where:
             self._where = view.columns
             self._kept = np.zeros((self._flush_every, view.row.size))
@@ -143,10 +151,9 @@ class Recorder:
 
     def _flush(self, view: StepView | None) -> None:
         """Gather the buffers, append them, and store the state of ``view``. Collective."""
-        arms = self._gather_arms(self._columns("arm_uplift"))
-        droppers = self._gather_droppers(self._columns("dropper_force"))
+        line = self._line(self._first_step, self._columns)
         state = view.checkpoint() if view is not None else None
-        self._guarded(lambda: self._append(self._blocks(arms, droppers), state))
+        self._guarded(lambda: self._append(self._blocks(), self._block(line), state))
         self._rows = 0
         self._energies.clear()
         self._flushed_once = True
@@ -189,23 +196,36 @@ class Recorder:
             self._comm.size,
             rows_per_append=self._flush_every,
             with_energies=bool(self._energy_every),
+            record=self._record,
             resume=self._resume,
             on_begun=self._on_begun,
         )
 
-    def _append(self, blocks: Mapping[str, np.ndarray], state: Mapping[str, Any] | None) -> None:
+    def _append(
+        self, blocks: Mapping[str, np.ndarray], line: LineBlock, state: Mapping[str, Any] | None
+    ) -> None:
         # In this order nothing is lost of a file that was moved.
-        self._open_file.append(blocks, state)
+        self._open_file.append(blocks, line, state)
         self._open_file.check_in_place()
 
     def _close(self, performance: Mapping[str, Any]) -> None:
         self._open_file.check_in_place()
         self._open_file.close(performance)
 
-    def _blocks(self, arms: np.ndarray, droppers: np.ndarray) -> dict[str, np.ndarray]:
-        """What a flush appends, the time last: it counts the rows."""
+    def _read_extremes(self) -> None:
+        found = self._open_file.extremes()
+        if found is None:
+            raise OSError("the extremes up to the state to continue from are missing")
+        self._extremes = found
+
+    def _block(self, line: LineRows) -> LineBlock:
+        """The rows of the line's channels with their times and positions of the train."""
+        position = self._kept[line.chosen, self._where["contact_position"]]
+        return LineBlock(self._time[line.chosen], position, line.values, line.extremes)
+
+    def _blocks(self) -> dict[str, np.ndarray]:
+        """What a flush appends of each step."""
         blocks = {f"channels/{name}": self._columns(name) for name in self._names}
-        blocks["channels/arm_uplift"], blocks["channels/dropper_force"] = arms, droppers
         if self._energies:
             table = np.array(self._energies)
             blocks.update({f"energy/{n}": table[:, i] for i, n in enumerate(channels.ENERGIES)})

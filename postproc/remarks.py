@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from catenary.postproc.results import Results
 from catenary.solver.problem import n_halvings
 
@@ -78,9 +80,11 @@ def _about_incidents(results: Results) -> list[str]:
     if not found:
         return []
     start, end = results.evaluation
-    position = results.channel("contact_position")
-    evaluated = ((position >= start) & (position <= end)).any(axis=1)
-    last = float(results.time[evaluated].max(initial=-1.0))
+    last = -1.0
+    for part, position in results.blocks("contact_position"):
+        evaluated = ((position >= start) & (position <= end)).any(axis=1)
+        if evaluated.any():
+            last = results.time_at(part.start + int(np.flatnonzero(evaluated)[-1]))
     return [
         f"At {fact['time_s']:.4g} s {fact['says']}. The statistics of the evaluated stretch cover "
         "what comes of it: they are not those of a sound line under sound pantographs."

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from catenary.postproc import export, plots, standards
 from catenary.postproc import statistics as stats
 from catenary.postproc.indicators import Indicators, indicate
+from catenary.postproc.record.line_record import says
 from catenary.postproc.remarks import remarks
 from catenary.postproc.results import Results
 from catenary.postproc.standards import KMH, Criterion
@@ -122,11 +123,11 @@ def judge(results: Results, statistics: RunStatistics) -> list[Criterion]:
 
 def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
     drawn: list[tuple[str, str, Figure | None]] = []
-    if results.time.size > 1:
+    if results.n_rows("time") > 1:
         drawn.append(
             ("contact_force", "Contact force along the track.", plots.contact_force(results))
         )
-        if results.strip_forces():
+        if results.several_strips:
             caption = "Shares of the collector strips in the contact force, below 20 Hz."
             drawn.append(("strip_forces", caption, plots.strip_forces(results)))
         if len(statistics.complaints) < len(statistics.pantographs):
@@ -234,7 +235,7 @@ def _mesh_facts(found: Indicators) -> list[tuple[str, str]]:
 
 def _violation_row(results: Results) -> list[tuple[str, str, list[str]]]:
     """Joints of the whole run, where a pantograph has any in the time loop."""
-    if results.constraint_violations() is None:
+    if not results.has_violations:
         return []
     found = results.largest_violations()
     return [
@@ -266,6 +267,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
             (f"incident at {fact['time_s']:.4g} s", fact["says"])
             for fact in about.get("incidents", [])
         ),
+        ("arm uplift and dropper forces", says(results.line_record, results.dt)),
         ("time step", f"{1e3 * results.dt:g} ms"),
         ("steps", f"{results.n_steps} of {about['n_steps_planned']}"),
         ("simulated time", f"{results.simulated:.3f} s"),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -12,11 +14,16 @@ import h5py
 import numpy as np
 
 from catenary.postproc import channels
+from catenary.postproc.record import reading
 from catenary.postproc.record.checked import text_of
-from catenary.postproc.result_file import DONE, FORMAT, RUNNING, complete_rows
+from catenary.postproc.record.kept_extremes import extremes_at
+from catenary.postproc.record.line_record import LineRecord, from_table
+from catenary.postproc.result_file import DONE, FORMAT, LINE_TIME, RUNNING, complete_rows
 from catenary.solver.errors import InputError
 
 RESULT_FILE = "run.h5"
+# Files whose line channels stand beside the others, at every step, without extremes.
+EARLIER_FORMAT = "catenary-run-1"
 _JSON_ATTRIBUTES = (
     "incidents",
     "versions",
@@ -27,6 +34,7 @@ _JSON_ATTRIBUTES = (
     "inner_iterations",
     "pantographs",
     "n_strips",
+    "line_record",
 )
 
 
@@ -57,7 +65,7 @@ class Results:
         except OSError as error:
             raise InputError(f"{self.path} cannot be read as HDF5 ({error})") from error
         found = text_of(self._file.attrs.get("format"))
-        if found != FORMAT:
+        if found not in (FORMAT, EARLIER_FORMAT):
             self._file.close()
             raise InputError(
                 f'{self.path} is no result file of this program: its attribute "format" is '
@@ -110,12 +118,13 @@ class Results:
     @property
     def n_steps(self) -> int:
         """Steps recorded, without the initial state."""
-        return max(self.time.size - 1, 0)
+        return max(self._length - 1, 0)
 
     @property
     def simulated(self) -> float:
         """Time between the first and the last record [s]."""
-        return float(self.time[-1] - self.time[0]) if self.time.size else 0.0
+        clock, n = self._file["time"], self._length
+        return float(clock[n - 1] - clock[0]) if n else 0.0
 
     # ---- channels ---------------------------------------------------------------------------
 
@@ -125,13 +134,129 @@ class Results:
         return min(complete_rows(self._file)[0], *lengths)
 
     @cached_property
+    def _line_length(self) -> int:
+        """Rows of the line's channels, none of which is later than the last step."""
+        if LINE_TIME not in self._file:
+            return self._length
+        tables = self._file["line_channels"].values()
+        n = min(complete_rows(self._file)[2], *(table.shape[0] for table in tables))
+        return min(n, (self._length - 1) // self.line_record.every + 1) if self._length else 0
+
+    @cached_property
+    def line_record(self) -> LineRecord:
+        """Which part of the line's channels is recorded; all in files of earlier versions."""
+        told = self.attributes.get("line_record")
+        return LineRecord() if told is None else from_table(told)
+
+    @property
     def time(self) -> np.ndarray:
-        """Times of the records, shape (n,) [s]."""
+        """Times of the records, shape (n,) [s], read anew at each call."""
         return np.asarray(self._file["time"][: self._length])
 
+    def times(self, part: slice) -> np.ndarray:
+        """Times of some records [s]."""
+        return np.asarray(self._file["time"][part])
+
+    def time_at(self, row: int) -> float:
+        """Time of a record [s]."""
+        return float(self._file["time"][row])
+
+    @property
+    def line_time(self) -> np.ndarray:
+        """Times of the rows of the line's channels, shape (m,) [s], read anew at each call."""
+        clock = self._file[LINE_TIME if LINE_TIME in self._file else "time"]
+        return np.asarray(clock[: self._line_length])
+
+    def times_of(self, name: str) -> np.ndarray:
+        """Times of the rows of a channel [s]."""
+        return self.line_time if name in channels.LINE_CHANNELS else self.time
+
+    def n_rows(self, name: str) -> int:
+        """Rows of a channel; those of the line may be fewer than the steps."""
+        return self._line_length if name in channels.LINE_CHANNELS else self._length
+
     def channel(self, name: str) -> np.ndarray:
-        """A channel of ``postproc.channels``, shape (n, columns), read anew at each call."""
-        return np.asarray(self._file[f"channels/{name}"][: self._length])
+        """A channel of ``postproc.channels``, shape (n, columns), read anew at each call.
+
+        What is not recorded of the line is NaN. Reads all of it into memory: see ``column`` and
+        ``blocks``.
+        """
+        return self.rows(name, slice(0, self.n_rows(name)))
+
+    def rows(self, name: str, part: slice) -> np.ndarray:
+        """Some rows of a channel, shape (rows, columns), NaN where the line is not recorded."""
+        table = self._table(name)
+        if table is None or name not in channels.LINE_CHANNELS:
+            return self._unrecorded(name, part) if table is None else np.asarray(table[part])
+        columns = self.recorded_columns(name)
+        if columns.size == self._n_places(name):
+            return np.asarray(table[part])
+        whole = self._unrecorded(name, part)
+        whole[:, columns] = table[part]
+        return whole
+
+    def column(self, name: str, index: int, part: slice | None = None) -> np.ndarray:
+        """One column of a channel, all of its rows or ``part`` of them, from ``start`` to ``stop``;
+        NaN where the line is not recorded."""
+        table = self._table(name)
+        part = slice(0, self.n_rows(name)) if part is None else part
+        if name in channels.LINE_CHANNELS:
+            place = np.flatnonzero(self.recorded_columns(name) == index)
+            if table is None or not place.size:
+                return np.full(part.stop - part.start, np.nan)
+            index = int(place[0])
+        assert table is not None
+        return reading.column(table, part, index)
+
+    def blocks(self, name: str) -> Iterator[tuple[slice, np.ndarray]]:
+        """All rows of a channel in order, by blocks: which rows, and their values as ``rows``."""
+        table = self._table(name)
+        step = table.chunks[0] if table is not None and table.chunks else 1
+        if table is None or name in channels.LINE_CHANNELS:
+            n_columns = self._n_places(name)
+        else:
+            n_columns = table.shape[1]
+        for part in reading.row_blocks(self.n_rows(name), n_columns, step):
+            yield part, self.rows(name, part)
+
+    def recorded_columns(self, name: str) -> np.ndarray:
+        """Which arms or droppers have a column in the table of a line's channel, (n,) int."""
+        if name not in self.line_record.names:
+            return np.zeros(0, dtype=np.int64)
+        path = f"line_columns/{name}"
+        if path in self._file:
+            return np.asarray(self._file[path][...])
+        return np.arange(self._n_places(name))
+
+    def extremes(self, name: str) -> np.ndarray:
+        """Smallest and largest value of each column of a channel, shape (2, columns).
+
+        Over every step, whatever is recorded of the line; NaN if there are no steps.
+        """
+        if name not in channels.LINE_CHANNELS:
+            return reading.extremes(self._file[f"channels/{name}"], self._length)
+        kept = extremes_at(self._file, self._length)
+        if kept is not None:
+            return kept[name]
+        table = self._table(name)
+        if table is None or not self.line_record.whole:
+            return np.full((2, self._n_places(name)), np.nan)
+        return reading.extremes(table, self._line_length)
+
+    def _table(self, name: str) -> h5py.Dataset | None:
+        """The table of a channel, None if the channel was not recorded."""
+        if name in channels.LINE_CHANNELS and f"line_channels/{name}" in self._file:
+            return self._file[f"line_channels/{name}"]
+        return self._file.get(f"channels/{name}")
+
+    def _n_places(self, name: str) -> int:
+        """Columns that a channel of the line has if all are recorded."""
+        of = {channels.ARM: "line/arm_x", channels.DROPPER: "line/dropper_x"}
+        return int(self._file[of[channels.CHANNELS[name].per]].shape[0])
+
+    def _unrecorded(self, name: str, part: slice) -> np.ndarray:
+        n = len(range(*part.indices(self.n_rows(name))))
+        return np.full((n, self._n_places(name)), np.nan)
 
     @property
     def n_pantographs(self) -> int:
@@ -143,15 +268,30 @@ class Results:
         told: list[int] = self.attributes.get("n_strips", [])
         return told or [1] * self.n_pantographs
 
+    @property
+    def several_strips(self) -> bool:
+        """Whether a pantograph has more than one strip."""
+        return max(self.n_strips(), default=1) > 1
+
+    def strip_columns(self) -> list[range]:
+        """Columns of ``strip_force`` of each pantograph."""
+        ends = np.cumsum([0, *self.n_strips()]).tolist()
+        return [range(*pair) for pair in itertools.pairwise(ends)]
+
     def strip_forces(self) -> list[np.ndarray]:
         """Shares of the strips in the contact force of each pantograph, (n, its strips) each [N].
 
-        Empty if no pantograph has more than one.
+        Empty if no pantograph has more than one. Reads all of them into memory.
         """
-        counts = self.n_strips()
-        if max(counts, default=1) == 1:
+        if not self.several_strips:
             return []
-        return np.split(self.channel(channels.STRIP_FORCE.name), np.cumsum(counts)[:-1], axis=1)
+        whole = self.channel(channels.STRIP_FORCE.name)
+        return [whole[:, columns.start : columns.stop] for columns in self.strip_columns()]
+
+    @property
+    def has_violations(self) -> bool:
+        """Whether a pantograph has joints in the time loop."""
+        return channels.CONSTRAINT_VIOLATION.name in self._file["channels"]
 
     def constraint_violations(self) -> np.ndarray | None:
         """Largest open joint of each pantograph at each record, (n, n_pantographs) [m].
@@ -159,14 +299,15 @@ class Results:
         NaN where a pantograph has no joints in the time loop, None if none has.
         """
         name = channels.CONSTRAINT_VIOLATION.name
-        return self.channel(name) if name in self._file["channels"] else None
+        return self.channel(name) if self.has_violations else None
 
     def largest_violations(self) -> list[float | None]:
         """The same over the whole run (n_pantographs,) [m], None without joints in the loop."""
-        found = self.constraint_violations()
-        if found is None or not len(found):
+        name = channels.CONSTRAINT_VIOLATION.name
+        if not self.has_violations or not self._length:
             return [None] * self.n_pantographs
-        return [None if np.isnan(largest) else float(largest) for largest in found.max(axis=0)]
+        found = self.extremes(name)[1]
+        return [None if np.isnan(largest) else float(largest) for largest in found]
 
     def pantograph_facts(self) -> list[dict[str, Any]]:
         """What is told of each pantograph, by their order: ``kind``, ``model``, ``description``,
@@ -179,13 +320,17 @@ class Results:
         n = self.n_pantographs
         if n == 1:
             return ["pantograph"]
-        position = self.channel("contact_position")
-        first = position[0] if position.shape[0] else -np.arange(n, dtype=float)
+        first = self.first_position if self._length else -np.arange(n, dtype=float)
         names = [""] * n
         for place, index in enumerate(np.argsort(-first, kind="stable")):
             middle = f"no. {place + 1}"
             names[index] = "leading" if place == 0 else "trailing" if place == n - 1 else middle
         return names
+
+    @property
+    def first_position(self) -> np.ndarray:
+        """Where the pantographs are in the first record, (n_pantographs,) [m]."""
+        return np.asarray(self._file["channels/contact_position"][0])
 
     def energies(self) -> dict[str, np.ndarray]:
         """Energies by name, each (m,), empty if the run did not record them."""
@@ -235,6 +380,11 @@ class Results:
         group = self._file.get("checkpoint")
         if group is None or "latest" not in group.attrs:
             raise InputError(f"{self.path} holds no state to continue from")
+        if self.attributes["format"] != FORMAT:
+            raise InputError(
+                f"{self.path} was written by an earlier version of Catenary, which this one reads "
+                "but cannot continue; start the run anew"
+            )
         slot = group[text_of(group.attrs["latest"])]
         return {name: _value(dataset) for name, dataset in slot.items()}
 

@@ -60,7 +60,7 @@ class PantographStatistics:
 
 @dataclass(frozen=True)
 class SupportStatistics:
-    """Uplift of the contact wire at the steady arms over the whole record.
+    """Uplift of the contact wire at the steady arms over every step of the run.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class SupportStatistics:
 
 @dataclass(frozen=True)
 class DropperStatistics:
-    """Dropper forces over the whole record.
+    """Dropper forces over every step of the run.
 
     Attributes
     ----------
@@ -114,14 +114,8 @@ class RunStatistics:
 
 def evaluate(results: Results) -> RunStatistics:
     """Statistics of a run, as far as its record goes. Not collective."""
-    position = results.channel("contact_position")
-    force = results.channel("contact_force")
-    height = results.channel("wire_height")
     names = results.pantograph_names()
-    pantographs = [
-        _pantograph(names[p], position[:, p], force[:, p], height[:, p], results)
-        for p in range(results.n_pantographs)
-    ]
+    pantographs = [_pantograph(name, p, results) for p, name in enumerate(names)]
     return RunStatistics(pantographs, _supports(results), _droppers(results))
 
 
@@ -163,27 +157,39 @@ def contact_statistics(
         If the time step is too long for the 20 Hz filter.
     """
     within = (position >= evaluation[0]) & (position <= evaluation[1])
-    filtered = filters.low_pass(force, dt)[within]
-    mean, std = float(filtered.mean()), float(filtered.std())
-    height = filters.low_pass(wire_height, dt)[within]
-    lost = force[within] <= 0.0
-    edges, percent = histogram(filtered)
     return PantographStatistics(
         name=name,
-        mean=mean,
-        std=std,
-        std_0_5=float(filters.band_0_5(force, dt)[within].std()),
-        std_5_20=float(filters.band_5_20(force, dt)[within].std()),
-        maximum=float(filtered.max()),
-        minimum=float(filtered.min()),
-        stat_max=mean + 3.0 * std,
-        stat_min=mean - 3.0 * std,
-        loss_percent=100.0 * float(lost.mean()),
-        arcing_percent=100.0 * float(without_short_losses(lost, dt).mean()),
-        contact_height_range=float(np.ptp(height)),
-        histogram_edges=edges,
-        histogram_percent=percent,
+        **_of_force(force, within, dt),
+        contact_height_range=_range(wire_height, within, dt),
     )
+
+
+def _of_force(force: np.ndarray, within: np.ndarray, dt: float) -> dict[str, Any]:
+    """What the force of a pantograph gives; at no time more than a few records are in memory."""
+    filtered = filters.low_pass(force, dt)[within]
+    mean, std = float(filtered.mean()), float(filtered.std())
+    edges, percent = histogram(filtered)
+    maximum, minimum = float(filtered.max()), float(filtered.min())
+    del filtered
+    lost = force[within] <= 0.0
+    return {
+        "mean": mean,
+        "std": std,
+        "std_0_5": float(filters.band_0_5(force, dt)[within].std()),
+        "std_5_20": float(filters.band_5_20(force, dt)[within].std()),
+        "maximum": maximum,
+        "minimum": minimum,
+        "stat_max": mean + 3.0 * std,
+        "stat_min": mean - 3.0 * std,
+        "loss_percent": 100.0 * float(lost.mean()),
+        "arcing_percent": 100.0 * float(without_short_losses(lost, dt).mean()),
+        "histogram_edges": edges,
+        "histogram_percent": percent,
+    }
+
+
+def _range(wire_height: np.ndarray, within: np.ndarray, dt: float) -> float:
+    return float(np.ptp(filters.low_pass(wire_height, dt)[within]))
 
 
 def without_short_losses(lost: np.ndarray, dt: float, shortest: float = SHORTEST_ARC) -> np.ndarray:
@@ -213,10 +219,10 @@ def histogram(force: np.ndarray, width: float = HISTOGRAM_BIN) -> tuple[np.ndarr
     return edges, 100.0 * counts / force.size
 
 
-def _pantograph(
-    name: str, position: np.ndarray, force: np.ndarray, height: np.ndarray, results: Results
-) -> PantographStatistics:
+def _pantograph(name: str, number: int, results: Results) -> PantographStatistics:
+    """Statistics of a pantograph; its histories are read one after the other."""
     start, end = results.evaluation
+    position = results.column("contact_position", number)
     if not covers(position, (start, end)):
         seen = f"{position[0]:.0f} to {position[-1]:.0f} m" if position.size else "nothing"
         return PantographStatistics(
@@ -224,8 +230,14 @@ def _pantograph(
             complaint=f"No statistics of the {_noun(name)}: its record covers {seen}, the "
             f"evaluation stretch is {start:.0f} to {end:.0f} m.",
         )
+    within = (position >= start) & (position <= end)
+    del position
     try:
-        return contact_statistics(name, position, force, height, results.dt, (start, end))
+        return PantographStatistics(
+            name=name,
+            **_of_force(results.column("contact_force", number), within, results.dt),
+            contact_height_range=_range(results.column("wire_height", number), within, results.dt),
+        )
     except InputError as error:
         return PantographStatistics(name, complaint=f"No statistics of the {_noun(name)}: {error}.")
 
@@ -236,15 +248,14 @@ def _noun(name: str) -> str:
 
 def _supports(results: Results) -> SupportStatistics:
     x = results.line("arm_x")
-    uplift = _extreme(results.channel("arm_uplift"), np.max)
+    uplift = results.extremes("arm_uplift")[1]
     evaluated = _inside(x, results.evaluation)
     return SupportStatistics(x, uplift, evaluated, _of(uplift[evaluated], np.max))
 
 
 def _droppers(results: Results) -> DropperStatistics:
     x = results.line("dropper_x")
-    force = results.channel("dropper_force")
-    highest, lowest = _extreme(force, np.max), _extreme(force, np.min)
+    lowest, highest = results.extremes("dropper_force")
     evaluated = _inside(x, results.evaluation)
     # Droppers that may push, or that carry nothing at rest, do not slacken at zero force.
     slackens = any(name == "dropper_slackening" for name, *_ in results.attributes["effects_on"])
@@ -261,13 +272,6 @@ def _droppers(results: Results) -> DropperStatistics:
 
 def _inside(x: np.ndarray, evaluation: tuple[float, float]) -> np.ndarray:
     return np.asarray((x >= evaluation[0]) & (x <= evaluation[1]))
-
-
-def _extreme(history: np.ndarray, which: Callable[..., Any]) -> np.ndarray:
-    """Extreme of each column, NaN if there are no rows."""
-    if not history.shape[0]:
-        return np.full(history.shape[1], _NAN)
-    return np.asarray(which(history, axis=0))
 
 
 def _of(values: np.ndarray, which: Callable[..., Any]) -> float:

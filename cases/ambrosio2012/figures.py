@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from catenary.cases.ambrosio2012.measures import mid_span
+from catenary.cases.ambrosio2012.measures import leading_position, mid_span
 from catenary.cases.ambrosio2012.statements import AVERAGE, LIGHT, SINGLE, Force, Run, Runs
 from catenary.postproc import filters, plots
 from catenary.postproc.results import Results
@@ -64,13 +64,13 @@ def _label(train: str, place: str) -> str:
 
 def _filtered(results: Results) -> list[tuple[str, np.ndarray, np.ndarray]]:
     """Place, position [m] and 20 Hz force [N] of each pantograph within the stretch."""
-    position, force = results.channel("contact_position"), results.channel("contact_force")
     start, end = results.evaluation
-    filtered = filters.low_pass(force, results.dt)
     found = []
     for p, place in enumerate(_places(results.n_pantographs)):
-        within = (position[:, p] >= start) & (position[:, p] <= end)
-        found.append((place, position[within, p], filtered[within, p]))
+        position = results.column("contact_position", p)
+        within = (position >= start) & (position <= end)
+        filtered = filters.low_pass(results.column("contact_force", p), results.dt)
+        found.append((place, position[within], filtered[within]))
     return found
 
 
@@ -167,7 +167,7 @@ def _uplift(shown: Folders) -> StudyFigure:
     def record(results: Results) -> tuple[float, np.ndarray]:
         x = results.line("arm_x")
         arm = int(np.argmin(np.abs(x - np.mean(results.evaluation))))
-        return float(x[arm]), 1e3 * results.channel("arm_uplift")[:, arm]
+        return float(x[arm]), 1e3 * results.column("arm_uplift", arm)
 
     return _passages(
         shown, record, "figure_11", "uplift [mm]",
@@ -181,7 +181,7 @@ def _droppers(shown: Folders) -> StudyFigure:
     def record(results: Results) -> tuple[float, np.ndarray]:
         x, span = results.line("dropper_x"), results.line("dropper_span")
         chosen = np.flatnonzero(mid_span(results) & (span == results.reference_span))
-        return float(x[chosen[0]]), results.channel("dropper_force")[:, chosen[0]]
+        return float(x[chosen[0]]), results.column("dropper_force", int(chosen[0]))
 
     return _passages(
         shown, record, "figure_12", "dropper force [N]",
@@ -204,10 +204,11 @@ def _passages(
         for number, (train, folder) in enumerate(trains.items()):
             with Results(folder) as results:
                 x, values = record(results)
-                position = results.channel("contact_position")
+                position = leading_position(results)[:: results.line_record.every]
+                first = results.first_position
                 speed = results.attributes["speed_m_per_s"]
-            since = (position.max(axis=1) - x) / speed
-            behind = float(position[0].max() - position[0].min()) / speed
+            since = (position - x) / speed
+            behind = float(np.ptp(first)) / speed
             colour = plots.colour(number)
             axes.plot(since, values, color=colour, linewidth=1.1, label=train)
             axes.axvline(behind, color=colour, linestyle="--", linewidth=0.9)

@@ -34,12 +34,17 @@ def slack_droppers(results: Results) -> dict[str, dict[str, int]]:
     x = results.line("dropper_x")
     start, end = results.evaluation
     evaluated = (x >= start) & (x <= end)
-    position, force = results.channel("contact_position"), results.channel("dropper_force")
-    slack = force <= 0.0
-    last = position.min(axis=1)
-    after = last[:, None] >= x[None, :] - AHEAD if position.shape[1] > 1 else np.zeros_like(slack)
-    leading = (slack & ~after).any(axis=0)
-    trailing = (slack & after).any(axis=0)
+    leading, trailing = np.zeros(x.size, dtype=bool), np.zeros(x.size, dtype=bool)
+    every = results.line_record.every
+    for part, force in results.blocks("dropper_force"):
+        slack = force <= 0.0
+        steps = slice(part.start * every, (part.stop - 1) * every + 1, every)
+        last = results.rows("contact_position", steps).min(axis=1)
+        after = last[:, None] >= x[None, :] - AHEAD
+        if results.n_pantographs == 1:
+            after[:] = False
+        leading |= (slack & ~after).any(axis=0)
+        trailing |= (slack & after).any(axis=0)
     groups = {"mid": evaluated & mid_span(results), "all": evaluated}
     return {
         name: {
@@ -72,10 +77,17 @@ def uplift_onset(results: Results) -> float | None:
     """
     x = results.line("arm_x")
     start, end = results.evaluation
-    lead = results.channel("contact_position").max(axis=1)
-    uplift = results.channel("arm_uplift")
+    lead = leading_position(results)[:: results.line_record.every]
+    largest = results.extremes("arm_uplift")[1]
     ahead = []
     for arm in np.flatnonzero((x >= start) & (x <= end)):
-        begun = np.flatnonzero(uplift[:, arm] >= BEGUN * uplift[:, arm].max())
-        ahead.append(float(x[arm] - lead[begun[0]]))
+        begun = results.column("arm_uplift", int(arm)) >= BEGUN * largest[arm]
+        if begun.any():  # it has begun outside of what is recorded otherwise
+            ahead.append(float(x[arm] - lead[int(np.argmax(begun))]))
     return min(ahead) if ahead else None
+
+
+def leading_position(results: Results) -> np.ndarray:
+    """Where the foremost pantograph is at each record, (n,) [m]."""
+    foremost = int(np.argmax(results.first_position))
+    return results.column("contact_position", foremost)

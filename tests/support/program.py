@@ -164,8 +164,9 @@ def n_rows(result: Path) -> int:
 def assert_sound(result: Path) -> int:
     """Check that a result file is closed, whole and finite; return its number of rows."""
     with h5py.File(result, "r") as file:  # with its lock: no writer has it open
-        lengths = {name: file[f"channels/{name}"].shape[0] for name in CHANNELS}
-        assert set(lengths.values()) == {file["time"].shape[0]}, lengths
+        for clock, group in (("time", "channels"), ("line_channels/time", "line_channels")):
+            lengths = {name: table.shape[0] for name, table in file[group].items()}
+            assert set(lengths.values()) == {file[clock].shape[0]}, lengths
         energies = {name: values.shape[0] for name, values in file["energy"].items()}
         assert len(set(energies.values())) == 1, energies
     with Results(result) as results:

@@ -69,7 +69,7 @@ def test_a_run_without_a_step_leaves_the_earlier_file(
 
         watcher = recorder(march, path)
         watcher.start(march.stage())
-        watcher._open_file.append = lambda blocks, state: fail()  # type: ignore[method-assign]
+        watcher._open_file.append = lambda blocks, line, state: fail()  # type: ignore[method-assign]
         with pytest.raises(RunBroken, match="nothing was written, and results of an earlier run"):
             watcher.observe(march.view(0))
     assert not watcher.begun
@@ -121,13 +121,13 @@ def test_a_file_that_is_taken_away_ends_the_run(how: str, tmp_path: Path, make_m
         show(watcher, march, 51, 200)
     watcher.finish(str(caught.value))
     watcher.close()
-    assert "ended at t = 0.060 s" in str(caught.value)
+    assert "ended at t = 0.059 s" in str(caught.value)
     if how == "replaced":  # not a byte longer
         assert path.read_text() == "mine"
     elif how == "folder moved":
         with Results(tmp_path / "elsewhere") as results:
             assert results.outcome == str(caught.value)
-            assert results.n_steps == 60 == results.checkpoint["step"]
+            assert results.n_steps == 59 == results.checkpoint["step"]
     else:
         assert list(tmp_path.glob("out/*")) == []
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -103,9 +104,15 @@ class Running(Told):
         super().__init__(7.2, 1e-3, law="linear", stiffness_N_per_m=1e6)
         self.attributes["incidents"] = list(incidents)
 
-    def channel(self, name: str) -> np.ndarray:
+    def blocks(self, name: str) -> Iterator[tuple[slice, np.ndarray]]:
         assert name == "contact_position"
-        return 100.0 + 50.0 * self.time[:, None] - np.array([0.0, 30.0])
+        position = 100.0 + 50.0 * self.time[:, None] - np.array([0.0, 30.0])
+        for start in range(0, 401, 50):
+            part = slice(start, min(start + 50, 401))
+            yield part, position[part]
+
+    def time_at(self, row: int) -> float:
+        return float(self.time[row])
 
 
 def test_incidents_that_the_statistics_cover_are_told() -> None:

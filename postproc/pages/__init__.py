@@ -1,0 +1,1 @@
+"""Pages and pictures of results: what reports and figures are made of."""

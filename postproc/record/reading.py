@@ -1,0 +1,47 @@
+"""Reads tables of a result file by blocks of rows, so that no whole table is ever in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import h5py
+import numpy as np
+
+# What a block of rows takes at most [B].
+BLOCK_BYTES = 16e6
+
+
+def row_blocks(n_rows: int, n_columns: int, step: int = 1) -> Iterator[slice]:
+    """Rows 0 to ``n_rows`` in order, in slices that start at multiples of ``step``.
+
+    Parameters
+    ----------
+    n_columns : columns that are read, 8 bytes each
+    """
+    rows = max(1, int(BLOCK_BYTES / (8 * max(n_columns, 1))))
+    rows = max(step, rows - rows % step)
+    for start in range(0, n_rows, rows):
+        yield slice(start, min(start + rows, n_rows))
+
+
+def column(dataset: h5py.Dataset, part: slice, index: int) -> np.ndarray:
+    """One column of some rows of a table, (rows,); HDF5 reads it chunk by chunk."""
+    values = np.empty(part.stop - part.start)
+    if values.size:
+        dataset.read_direct(values, np.s_[part.start : part.stop, index])
+    return values
+
+
+def extremes(dataset: h5py.Dataset, n_rows: int) -> np.ndarray:
+    """Smallest and largest value of each column, (2, columns); NaN if there are no rows."""
+    n_columns = dataset.shape[1]
+    found = np.full((2, n_columns), np.nan)
+    rows = dataset.chunks[0] if dataset.chunks else 1
+    for part in row_blocks(n_rows, n_columns, rows):
+        block = dataset[part]
+        low, high = block.min(axis=0), block.max(axis=0)
+        if part.start == 0:
+            found[:] = low, high
+        np.minimum(found[0], low, out=found[0])
+        np.maximum(found[1], high, out=found[1])
+    return found
