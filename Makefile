@@ -1,6 +1,8 @@
 # One thread a rank: the linear algebra is small, and MPI is what runs in parallel.
 export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
+# What the environment holds is used, not what a user's shell adds.
+unexport PYTHONPATH PYTHONHOME
 
 PYTHON := .venv/bin/python
 PYTEST := $(PYTHON) -m pytest
@@ -26,13 +28,25 @@ endif
 .DEFAULT_GOAL := help
 # The targets share .venv and two cores: one after the other, also under make -j.
 .NOTPARALLEL:
-.PHONY: help setup run test test-unit test-verification test-mpi test-regression bench long-runs fuzz lint format clean
+.PHONY: help setup setup-newest compile update-versions run test test-unit test-verification test-mpi test-regression bench long-runs fuzz lint format clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 20
 
 setup: ## install what is needed, system packages included; quick when all is there
 	@bash .setup/setup.sh
+
+setup-newest: ## the same with the newest packages that pyproject.toml allows; says what differs
+	@bash .setup/setup.sh --newest
+
+compile: setup ## compile the loops of the shipped cases ahead, for an installation that others share
+	@work=$$(mktemp -d) && trap 'rm -rf "$$work"' EXIT && \
+	for case in $$(.venv/bin/catenary list | cut -d' ' -f1); do \
+	    .venv/bin/catenary run $$case --short -o "$$work/$$case" >/dev/null || exit 1; \
+	done
+
+update-versions: ## write what is installed into .setup/tested, from where make setup takes it
+	@.venv/bin/python -I .setup/versions.py write
 
 run: setup ## simulate the paper's case and write its report
 	.venv/bin/catenary run ambrosio2012 -o $(RESULT) --force

@@ -5,6 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parent))  # python -I does not
+
+import versions  # noqa: E402
+
 OLDEST_PETSC = (3, 18)
 
 
@@ -45,6 +49,8 @@ def main() -> None:
         f"mpi4py {mpi4py.__version__}, h5py {h5py.__version__}, numpy {numpy.__version__}, "
         f"scipy {scipy.__version__}, gmsh {gmsh.__version__}"
     )
+    if remark := versions.remark():
+        print(remark)
 
 
 main()

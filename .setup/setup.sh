@@ -3,7 +3,8 @@
 #
 # Debian and Ubuntu: PETSc, MPI, HDF5 and gmsh's shared libraries come from apt, the rest from the
 # package index. Elsewhere (clusters, conda) the python3 on the PATH must bring petsc4py, mpi4py
-# and h5py. Versions stand in pyproject.toml only.
+# and h5py. Either way the environment sees five packages of the system and no others. Bounds of
+# versions stand in pyproject.toml, the tested ones in .setup/tested; --newest disregards those.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -30,7 +31,7 @@ fail() {
 # What the environment was made from; the folder is in it because scripts of a venv hold its path.
 fingerprint() {
     printf '%s\n' "$PWD"
-    cat pyproject.toml setup.py .setup/* | cksum
+    cat pyproject.toml setup.py .setup/*.* .setup/tested/* | cksum
 }
 
 is_current() {
@@ -127,7 +128,7 @@ petsc_folder() {
 # --- other systems -----------------------------------------------------------------------------
 
 has_everything() {
-    command -v "$1" >/dev/null && "$1" -c 'import petsc4py, mpi4py, h5py, numpy, venv' 2>/dev/null
+    command -v "$1" >/dev/null && "$1" -c 'import petsc4py, mpi4py, h5py, numpy, scipy, venv' 2>/dev/null
 }
 
 # What to do, given the names of missing packages where there is apt.
@@ -150,9 +151,10 @@ TEXT
 # --- steps -------------------------------------------------------------------------------------
 
 # Sets `python` (the interpreter to build on) and `extra_path` (PETSc's folder, empty if not needed).
+# Debian's runs isolated (-I); elsewhere PYTHONPATH or the user's folder may bring the packages.
 choose_python() {
     local -a missing=()
-    python=python3
+    python=(python3)
     extra_path=
     if command -v apt-get >/dev/null && command -v dpkg-query >/dev/null; then
         mapfile -t missing < <(missing_packages)
@@ -161,70 +163,77 @@ choose_python() {
             missing=()
         fi
         if [ "${#missing[@]}" = 0 ]; then
-            python=/usr/bin/python3
+            python=(/usr/bin/python3 -I)
             extra_path=$(petsc_folder)
             [ -n "$extra_path" ] || fail "dpkg lists no petsc4py in python3-petsc4py-real"
             return
         fi
     fi
-    has_everything "$python" || explain "${missing[@]}"
+    has_everything "${python[0]}" || explain "${missing[@]}"
 }
 
 make_environment() {
-    # A half-made or moved environment is not worth repairing.
+    # A half-made or moved environment is not worth repairing, nor one that sees all of the system.
     if [ ! -f "$STAMP" ] || [ "$(head -n 1 "$STAMP")" != "$PWD" ] ||
-        ! .venv/bin/python -m pip --version >/dev/null 2>&1; then
+        ! .venv/bin/python -m pip --version >/dev/null 2>&1 ||
+        ! grep -q '^include-system-site-packages = false' .venv/pyvenv.cfg; then
         rm -rf .venv
-        "$python" -m venv --system-site-packages .venv
+        "${python[@]}" -m venv .venv
     fi
     rm -f "$STAMP"
-    local site
-    site=$(.venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
-    if [ -n "$extra_path" ]; then
-        printf '%s\n' "$extra_path" >"$site/petsc.pth"
-    fi
+    "${python[@]}" .setup/system_packages.py .venv ${extra_path:+"$extra_path"}
+}
+
+# Run by the environment's Python without the user's PYTHONPATH and folder.
+pip_install() {
+    .venv/bin/python -I -m pip install --quiet --no-input --disable-pip-version-check "$@" >&2
 }
 
 install_python_packages() {
-    local work
+    local work tested
     work=$(mktemp -d)
     # shellcheck disable=SC2064  # the folder of now, not of later
     trap "rm -rf '$work'" EXIT
-    .venv/bin/python .setup/requirements.py pyproject.toml >"$work/requirements.txt"
+    .venv/bin/python -I .setup/requirements.py pyproject.toml >"$work/requirements.txt"
     # petsc4py and h5py are compiled against the system's numpy: nothing may bring another one.
-    "$python" - >"$work/constraints.txt" <<'CODE'
-import importlib
+    .venv/bin/python -I - >"$work/system.txt" <<'CODE'
+import numpy
+import scipy
 
-for name in ("numpy", "scipy"):
-    try:
-        print(f"{name}=={importlib.import_module(name).__version__}")
-    except ModuleNotFoundError:
-        pass
+print(f"numpy=={numpy.__version__}\nscipy=={scipy.__version__}")
 CODE
+    local -a wanted=(--requirement "$work/requirements.txt" --constraint "$work/system.txt")
+    tested=.setup/tested/$(.venv/bin/python -I -c \
+        'import sys; print("python{}.{}.txt".format(*sys.version_info))')
     say "setup: installing Python packages into .venv"
-    .venv/bin/python -m pip install --quiet --no-input --disable-pip-version-check \
-        --constraint "$work/constraints.txt" --requirement "$work/requirements.txt" >&2
-    .venv/bin/python -m pip install --quiet --no-input --disable-pip-version-check \
-        --no-deps --no-build-isolation --editable . >&2
+    if [ "$newest" ]; then
+        pip_install --upgrade --upgrade-strategy eager "${wanted[@]}"
+    elif [ -f "$tested" ]; then
+        pip_install "${wanted[@]}" --constraint "$tested" || {
+            say "setup: the versions of $tested cannot be had here; taking what pyproject.toml allows"
+            pip_install "${wanted[@]}"
+        }
+    else
+        pip_install "${wanted[@]}"
+    fi
+    pip_install --no-deps --no-build-isolation --editable .
+    # -E: the program reads the environment's packages, not those of the user's PYTHONPATH. In the
+    # second line the interpreter stands if its path is too long for the first.
+    sed -i -E "1s|^(#!.*/python[0-9.]*)\$|\1 -E|; 2s|^('''exec' .*/python[^ ]*) |\1 -E |" \
+        .venv/bin/catenary
 }
 
-# Numba compiles anew what stands in a changed file, but not what calls that from another file.
-forget_outdated_loops() {
-    local file newest=""
-    while read -r file; do
-        if [[ -z "$newest" || "$file" -nt "$newest" ]]; then
-            newest=$file
-        fi
-    done < <(grep -rlE --include='*.py' '^@(compiled|njit|inlined)' solver mbs)
-    find solver mbs -name '*.nb[ic]' ! -newer "$newest" -delete
-}
-
-forget_outdated_loops
-if is_current; then
+newest=
+case "${1-}" in
+--newest) newest=yes ;;
+"") ;;
+*) fail "unknown option $1; there is --newest" ;;
+esac
+if [ ! "$newest" ] && is_current; then
     exit 0
 fi
 choose_python
 make_environment
 install_python_packages
-.venv/bin/python .setup/check.py >&2
+.venv/bin/python -I .setup/check.py >&2
 fingerprint >"$STAMP"

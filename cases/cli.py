@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 from pathlib import Path
@@ -433,6 +434,7 @@ def main() -> None:
     # small here, and MPI is what runs in parallel.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    logging.getLogger("catenary").addHandler(console.LogHandler())
     if launched_by_mpirun():
         # From here on the end of each rank waits for the others', so that a sentence of rank 0
         # is out before the launcher sees the exit code of another.

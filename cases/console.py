@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import logging
 import os
 import sys
 from collections.abc import Callable
@@ -43,6 +44,14 @@ def complain(sentence: str) -> None:
     """Print one sentence to standard error on rank 0. Not collective."""
     if speaks():
         typer.echo(f"catenary: {plain(' '.join(sentence.split()))}", err=True)
+
+
+class LogHandler(logging.Handler):
+    """Prints what the library logs as sentences on rank 0."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Not collective."""
+        complain(record.getMessage())
 
 
 def folder(text: str) -> Path:

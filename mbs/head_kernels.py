@@ -10,9 +10,8 @@ user's cache), so that only the first run waits.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-compiled = njit(cache=True, error_model="numpy")
+from catenary.solver.base.compiled import compiled
 
 
 @compiled

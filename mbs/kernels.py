@@ -1,16 +1,14 @@
 """The loops of multibody systems, compiled by Numba: rotations, rows of joints, lines of forces.
 
 Each works on arrays of all bodies, the frame at rest in the last row, and knows nothing of joints
-or forces by name. Numba keeps the compiled code beside the sources (or in the user's cache), so
-that only the first run waits.
+or forces by name.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-compiled = njit(cache=True, error_model="numpy")
+from catenary.solver.base.compiled import compiled
 
 
 @compiled

@@ -6,7 +6,8 @@ Unknowns of an element: (w1, theta1, w2, theta2) with theta = dw/dx. Source: pap
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from catenary.solver.base.compiled import compiled
 
 
 def stiffness(length: np.ndarray, bending_stiffness: float, tension: float) -> np.ndarray:
@@ -60,7 +61,7 @@ def uniform_load(length: np.ndarray) -> np.ndarray:
     return np.stack([half, moment, half, -moment], axis=1)
 
 
-@njit(cache=True)
+@compiled
 def shape_values(xi, length):  # type: ignore[no-untyped-def]
     """Hermite functions N at ``xi`` in [0, 1], shape (4,): w(x) = N @ unknowns [m]."""
     square, cube = xi * xi, xi * xi * xi
@@ -74,7 +75,7 @@ def shape_values(xi, length):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
+@compiled
 def shape_slopes(xi, length):  # type: ignore[no-untyped-def]
     """Derivatives N' of the Hermite functions along x, shape (4,): dw/dx = N' @ unknowns [-]."""
     square = xi * xi

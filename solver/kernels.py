@@ -1,19 +1,13 @@
 """The loops of a time step over a line, compiled by Numba: state updates and droppers.
 
-Each works on this rank's arrays and knows nothing of MPI or PETSc. Not collective. Numba keeps
-the compiled code beside the sources (or in the user's cache), so that only the first run waits.
+Each works on this rank's arrays and knows nothing of MPI or PETSc. Not collective.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-# Cancellation-free arithmetic matters more than the last per cent: no fastmath, same answer as
-# the formulas and on every rank.
-compiled = njit(cache=True, error_model="numpy")
-# For the few lines that a loop is made of: no call is left of them.
-in_line = njit(cache=True, error_model="numpy", forceinline=True)
+from catenary.solver.base.compiled import compiled, in_line
 
 
 @compiled

@@ -29,6 +29,24 @@ def test_arguments_are_kept_by_reference_and_numbers_follow(kernel: object) -> N
     assert np.array_equal(values, [6.0, 6.0])
 
 
+def test_without_an_entry_point_the_dispatcher_is_called() -> None:
+    class Newer:
+        """A compiled loop of a Numba that has no ``entry_point``."""
+
+        def __init__(self) -> None:
+            self.loop, self.overloads = njit(scale), {}
+
+        def compile(self, types: tuple[object, ...]) -> None:
+            self.overloads[types] = object()
+
+        def __call__(self, *arguments: object) -> object:
+            return self.loop(*arguments)
+
+    values = np.array([1.0, 2.0])
+    scaled = bound(Newer(), values, (np.array([3.0, 5.0]),), later=(0.0,))
+    assert scaled(2.0) == 26.0 and np.array_equal(values, [6.0, 20.0])
+
+
 def test_records_and_views_are_what_they_are() -> None:
     """Other strides are another type: a bound loop reads every second number if it was given so."""
     given = np.array([2.0, 4.0, 8.0, 16.0])[::2]

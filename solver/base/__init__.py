@@ -1,0 +1,1 @@
+"""Foundations without imports from other parts: compiled loops and the folder that keeps them."""
