@@ -287,12 +287,19 @@ def _contacts(scene: Scene) -> list[Level]:
 
 def _droppers(scene: Scene) -> list[Level]:
     slack, kept = "effects.dropper_slackening", "effects.residual_dropper_stiffness"
+    slackens, damper = (f"{kept}=false", f"{slack}=true"), "line.dropper.slack_damping"
     return [
         Level("linear", (f"{kept}=false", f"{slack}=false"), quick=True),
-        Level("slackening", (f"{kept}=false", f"{slack}=true"), quick=True),
+        Level("slackening", (*slackens, f"{damper}=released"), quick=True),
+        Level("slackening_damped", (*slackens, f"{damper}=kept")),
         Level(
             "residual_0.01",
-            (f"{slack}=true", f"{kept}=true", "line.dropper.residual_stiffness_ratio=0.01"),
+            (
+                f"{slack}=true",
+                f"{kept}=true",
+                "line.dropper.residual_stiffness_ratio=0.01",
+                f"{damper}=released",
+            ),
         ),
     ]
 

@@ -101,6 +101,7 @@ def problem_of(scene: Scene) -> Problem:
         residual_stiffness_ratio=ratio,
         effects=frozenset(name for name, on in scene.switches().items() if on),
         incidents=line_incidents(scene.incidents, line, numerics.dt_s),
+        slack_dampers_act=scene.line.dropper.slack_damping == "kept",
     )
 
 

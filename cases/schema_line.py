@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -72,6 +72,11 @@ class DropperTable(Table):
     )
     residual_stiffness_ratio: float = Field(
         0.0, ge=0, lt=1, description="share of its stiffness that a compressed dropper keeps"
+    )
+    slack_damping: Literal["released", "kept"] = Field(
+        "released",
+        description="damper of a slack dropper: released with its spring, or kept in action as in "
+        "equation (2.7) of Ambrosio et al. (2012)",
     )
 
     @model_validator(mode="after")

@@ -52,7 +52,13 @@ CHANNELS: dict[str, Channel] = {
         Channel(
             "arm_uplift", "m", "uplift of the contact wire at a steady arm from equilibrium", ARM
         ),
-        Channel("dropper_force", "N", "tension of a dropper, negative in compression", DROPPER),
+        Channel(
+            "dropper_force",
+            "N",
+            "tension of a dropper, negative in compression; of its spring alone where "
+            "line.dropper.slack_damping keeps dampers in action",
+            DROPPER,
+        ),
     )
 }
 

@@ -128,7 +128,7 @@ def acceleration_jump(
     ends = after.model.dofs(after.model.mesh.droppers[new])
     stretch, rate = (values[ends[:, 0]] - values[ends[:, 1]] for values in (displacement, velocity))
     tension = form.dropper_force[new] + before.model.dropper_stiffness[new] * stretch
-    tension += before.model.dropper_damping[new] * rate
+    tension += before.model.released_damping[new] * rate
     compensation = (1.0 - pushed_share) * np.maximum(0.0, -tension)
     for side, sign in ((0, 1.0), (1, -1.0)):
         mine = ownership.owned(ends[:, side])

@@ -149,7 +149,7 @@ class FixedPoint:
         return (new if self.law.pulls else np.maximum(new, 0.0)), depth, speed
 
     def _compensation(self) -> np.ndarray:
-        """Forces that cancel what owned droppers push (eq. 2.7) [N]."""
+        """Forces that cancel what owned droppers push (eq. 2.7), as far as it is released [N]."""
         if not self.may_slacken:
             return np.zeros(0)
         tension = self.interaction.droppers.tension()

@@ -4,9 +4,11 @@ All forces act through the line's and the pantographs' compliance within the ste
 
     h_i = h0_i + sum_j B_ij f_j - sum_d P_di s_d          wire height at contact i
     z_i = z0_i - sum_j C_ij f_j                           height of a strip of the head
-    T_d = T0_d + sum_j Q_dj f_j - sum_e G_de s_e          tension of dropper d if it could push
+    T_d = T0_d + sum_j Q_dj f_j - sum_e G_de s_e          what dropper d would carry if it pushed
     f_i = max(0, law(delta_i, delta_i')),  delta = z - h  contact law
     s_d = (1 - r) max(0, -T_d)                            compensation of a slack dropper (2.7)
+
+T_d is the tension, or that of the spring alone where dampers of slack droppers are kept in action.
 
 With the law linear, or replaced by its tangent, this is a linear complementarity problem. Its
 matrix is a P-matrix, so that it has one solution, unless the convective part of a contact damper

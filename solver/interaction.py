@@ -20,7 +20,8 @@ from catenary.solver.response import LineResponse
 class Droppers:
     """The droppers that this rank owns, with their tension as if they could push.
 
-    Those that are broken take no part; they are only shown, carrying nothing.
+    Those that are broken take no part; they are only shown, carrying nothing. Of dampers that go on
+    acting when springs are slack nothing is here: they are a part of the line's damping.
 
     Attributes
     ----------
@@ -28,7 +29,8 @@ class Droppers:
     shown_ends, shown_laws : ``ends`` and ``laws`` of those
     numbers : (n,) numbers in the mesh of those that may carry
     ends : (n, 2) local unknowns of their upper and lower ends
-    laws : (n, 4) force at rest [N], stiffness [N/m], damping [N s/m], place along the track [m]
+    laws : (n, 4) force at rest [N], stiffness [N/m], damping that goes slack with it [N s/m], place
+        along the track [m]
     latest_tension : (n,) what was found last, here or by a free step of the line [N]
     """
 
@@ -44,7 +46,7 @@ class Droppers:
             [
                 np.where(intact, form.dropper_force[mine], 0.0),
                 model.dropper_stiffness[mine],
-                model.dropper_damping[mine],
+                model.released_damping[mine],
                 x,
             ]
         )
@@ -245,7 +247,7 @@ class Interaction:
 class SlackCoupling:
     """How the compensation of one dropper changes the tension of another, on rank 0.
 
-    Collective to make. G_de = (k sigma + c tau)_d L_d^T A^-1 L_e [-].
+    Collective to make. G_de = (k sigma + c tau)_d L_d^T A^-1 L_e [-], c being what is released.
 
     Attributes
     ----------

@@ -55,6 +55,7 @@ class Model:
     weight : (n_dofs,) gravity load [N], [N m]
     dropper_lengths : (n_droppers,) [m]
     dropper_stiffness, dropper_damping : (n_droppers,) [N/m], [N s/m], of the taut dropper
+    released_damping : (n_droppers,) the part of ``dropper_damping`` that goes slack with the spring
     broken : (n_droppers,) droppers that carry nothing; what they weigh stays on their clamps
     step_loads : loads that change with time
     terms_of : effect name -> number of terms that it added
@@ -100,6 +101,11 @@ class Model:
         if "structural_damping" not in self.terms_of:
             return np.zeros(self.mesh.droppers.shape[0])
         return self.damping_of("droppers")[0] * self.dropper_stiffness
+
+    @property
+    def released_damping(self) -> np.ndarray:
+        damping = self.dropper_damping
+        return np.zeros_like(damping) if self.problem.slack_dampers_act else damping
 
     def damping_of(self, component: str) -> tuple[float, float]:
         """Damping factors (alpha [s], beta [1/s]) of a component; zero without the effect."""

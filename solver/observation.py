@@ -71,7 +71,8 @@ class StepView:
     step, time : number of the step (0 is the initial state) and its time [s]
     contact_position : (n_pantographs,) along the track [m], all ranks
     contact_force, head_height, wire_height : (n_pantographs,) [N], [m], [m], rank 0 only
-    dropper_force : (n owned droppers,) tension, negative in compression [N]
+    dropper_force : (n owned droppers,) tension, negative in compression [N]; of the spring alone
+        where the dampers of slack droppers are kept in action
     arm_uplift : (n owned arms,) vertical displacement of the contact wire from equilibrium [m]
     node_uplift : () -> (n owned nodes,) vertical displacement [m]; not collective
     energies : () -> (kinetic, elastic) of the line relative to equilibrium [J]; collective

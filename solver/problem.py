@@ -109,6 +109,7 @@ class Problem:
 
     ``evaluation`` (from, to) [m] is the stretch whose statistics are judged;
     ``residual_stiffness_ratio`` is the share of its stiffness that a compressed dropper keeps;
+    ``slack_dampers_act`` whether the damper of a dropper goes on acting when its spring is slack;
     ``incidents`` are what happens to the line on the way.
     """
 
@@ -122,6 +123,7 @@ class Problem:
     effects: frozenset[str]
     gravity: float = 9.81
     incidents: tuple[LineIncident, ...] = ()
+    slack_dampers_act: bool = False
 
 
 def n_halvings(dt: float, smallest: float | None) -> int:

@@ -4,8 +4,9 @@
     m z'' + c z' + k z + f e = lift
 
 with f = k_c (z - h) + d_c (z' - h'), not below zero where contact can be lost, and s what a dropper
-would push. Of the solver's step nothing is used here, neither predictions nor compliances nor the
-small problem of contacts and droppers: it is a second opinion. M, C and K are the model's.
+would push, or its spring alone. Of the solver's step nothing is used here, neither predictions nor
+compliances nor the small problem of contacts and droppers: it is a second opinion. M, C and K are
+the model's.
 """
 
 from __future__ import annotations
@@ -92,7 +93,7 @@ class WholeSystem:
         self._set_matrices(model, data, ends)
 
         self._ends = model.dofs(model.mesh.droppers)
-        self._dropper = (form.dropper_force, model.dropper_stiffness, model.dropper_damping)
+        self._dropper = (form.dropper_force, model.dropper_stiffness, model.released_damping)
         self._pushed = 1.0 - kept_ratio
         upper, lower = self._ends.T
         pairs = [(i, j) for i in (upper, lower) for j in (upper, lower)]
@@ -166,7 +167,7 @@ class WholeSystem:
         return (force if self._pulls else np.maximum(force, 0.0)), depth, meets
 
     def tension(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Tension of all droppers as if they could push [N], (n_droppers,)."""
+        """What of all droppers goes slack, as if it could push [N], (n_droppers,)."""
         rest, stiffness, damping = self._dropper
         upper, lower = self._ends.T
         return np.asarray(

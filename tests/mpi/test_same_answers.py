@@ -129,6 +129,18 @@ def test_all_ranks_give_the_answer_of_one(case: tuple[Problem, LineMesh], scheme
     assert max(found.values()) < TOLERANCE
 
 
+def test_dampers_of_slack_droppers_act_on_all_ranks(case: tuple[Problem, LineMesh]) -> None:
+    """With the paper's average damping, and its law of a slack dropper."""
+    problem, mesh = case
+    train = replace(problem.train, end=problem.train.start + 120.0)
+    damping = replace(problem.damping, alpha=0.0275, beta=0.0)
+    kept = replace(problem, train=train, damping=damping, slack_dampers_act=True)
+    found = largest_difference(kept, mesh)
+    if MPI.COMM_WORLD.rank == 0:
+        print(f"{MPI.COMM_WORLD.size} ranks: {found}, expected below {TOLERANCE}")
+    assert max(found.values()) < TOLERANCE
+
+
 @pytest.mark.parametrize("integrator", ["hht", "generalized_alpha"])
 def test_methods_with_numerical_damping_in_parallel(
     case: tuple[Problem, LineMesh], integrator: str

@@ -1,0 +1,255 @@
+"""The damper of a slack dropper: released with the spring, or kept in action as the paper prints.
+
+With it kept a dropper carries max(E, r E) + c e', E = N0 + k e. Every state of marches is held
+against that law, and a whole march against dense matrices with every set of slack droppers tried.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from dense_line import DenseLine
+from measuring import COMM, History, check, march, matrix_of, start_march
+from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
+
+from catenary.meshgen.line import Line
+from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
+from catenary.solver.changed_line import acceleration_jump, changed_line, unchanged
+from catenary.solver.distribution import distribute
+from catenary.solver.elements import shape_values
+from catenary.solver.equilibrium import find_form
+from catenary.solver.incidents import DropperBreak
+from catenary.solver.model import Model
+from catenary.solver.problem import Damping, Problem
+
+EPS = np.finfo(float).eps
+# The damping of the paper's average line; the droppers' is 2.75 kN s/m with it.
+AVERAGE = Damping(alpha=0.0275, beta=0.0)
+RESIDUAL = frozenset({"residual_dropper_stiffness"})
+
+
+def short_line() -> Line:
+    """Two spans of 24 m with three droppers each."""
+    return replace(
+        en50318_line(2),
+        span_lengths=(24.0, 24.0),
+        dropper_positions=((4.0, 12.0, 20.0),) * 2,
+        pre_sag=((0.0,) * 3,) * 2,
+    )
+
+
+def problem_on(line: Line, **changes: Any) -> Problem:
+    """A head that rises into the wire, fast and strong enough to leave droppers slack."""
+    run = train(100.0, 6.0, 42.0, static_force=260.0, raise_time=0.0, nominal_height=5.5)
+    usual = problem_of(
+        line,
+        WHOLE,
+        damping=AVERAGE,
+        train=replace(run, start_below=0.02),
+        numerics=numerics(1e-3),
+        slack_dampers_act=True,
+    )
+    return replace(usual, **changes)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01])
+@pytest.mark.parametrize("dampers_act", [True, False], ids=["kept", "released"])
+def test_a_march_is_that_of_dense_matrices_with_every_set_tried(
+    dampers_act: bool, share: float
+) -> None:
+    line = short_line()
+    mesh = mesh_of(line, 2)
+    effects = WHOLE | (RESIDUAL if share else frozenset())
+    problem = problem_on(
+        line,
+        effects=effects,
+        damping=Damping(alpha=5e-3, beta=0.0),
+        slack_dampers_act=dampers_act,
+        residual_stiffness_ratio=share,
+    )
+    model, form = find_form(problem, mesh)
+    seen = march(problem, mesh, lambda view: view.checkpoint() if view.step == 0 else None)
+    dense = DenseLine(problem, mesh, form, dampers_act, share)
+    start = seen.watched[0]
+    dense.state = np.zeros((3, dense.size))
+    dense.state[:, -2:] = start["pantograph_0"].reshape(3, 2)
+    assert not any(start[name].any() for name in ("displacement", "velocity", "acceleration"))
+    slack, forces, droppers = set(), [], []
+    for number, x in enumerate(seen["contact_position"][1:, 0]):
+        whole = number % 100 == 50
+        force, carried = dense.step(x, every_set=whole)
+        assert not whole or dense.tried == 1  # of 128 sets
+        slack.add(dense.acting)
+        forces.append(force)
+        droppers.append(carried)
+    lost = sum(force == 0.0 for force in forces)
+    print(f"{len(slack)} sets met, contact lost in {lost} of {len(forces)} steps")
+    assert len(slack) > 7 and lost > 40 and any(len(acts - {-1}) > 2 for acts in slack)
+    for name, own, expected in (
+        ("contact force [N]", seen["contact_force"][1:, 0], forces),
+        ("dropper forces [N]", seen["dropper_force"][1:], droppers),
+    ):
+        check(name, own, expected, within=1e-9 * np.abs(expected).max())
+
+
+def test_the_laws_differ_by_the_damper_of_slack_droppers_only() -> None:
+    """Without damping in the droppers both are the same, bit for bit."""
+    line = short_line()
+    mesh = mesh_of(line, 2)
+    own = replace(AVERAGE, per_component={"droppers": (0.0, 0.0)})
+    for damping, same in ((own, True), (AVERAGE, False)):
+        kept, released = (
+            march(problem_on(line, damping=damping, slack_dampers_act=acts), mesh)
+            for acts in (True, False)
+        )
+        assert (released["dropper_force"] == 0.0).any()
+        apart = np.abs(kept["contact_force"] - released["contact_force"]).max()
+        print(f"contact forces differ by up to {apart:.3g} N")
+        assert (apart == 0.0) == same and (same or apart > 10.0)
+
+
+LINE = replace(en50318_line(3), dropper_positions=((6.0, 18.0, 30.0, 42.0, 54.0),) * 3,
+               pre_sag=((0.0,) * 5,) * 3)  # fmt: skip
+WAYS: dict[str, dict[str, Any]] = {
+    "implicit": {},
+    "iterated": {"coupling": "iterated"},
+    "explicit": {"coupling": "explicit"},
+    "hht": {"integrator": "hht", "spectral_radius": 0.8},
+    "generalized alpha": {"integrator": "generalized_alpha", "spectral_radius": 0.6},
+    "newmark 0.6": {"gamma": 0.6, "beta": 0.3025},
+    "fixed point": {"scheme": "fixed_point"},
+    "adaptive": {"adaptive_tolerance": 0.5, "smallest_dt": 2.5e-4},
+}
+
+
+def on_its_way(**changes: Any) -> Problem:
+    """One pantograph over the middle span."""
+    run = train(70.0, 62.0, 97.0, static_force=300.0, raise_time=0.0, nominal_height=5.5)
+    return problem_on(LINE, train=run, **changes)
+
+
+def off_by(problem: Problem, mesh: LineMesh) -> tuple[float, float, int, History]:
+    """What states leave of the equation of motion [N], what the dropper forces shown are off by
+    [N], how often a dropper was slack; and the march. All but the first state are looked at."""
+    model, form = find_form(problem, mesh)
+    seen = march(problem, mesh, lambda view: view.checkpoint())
+    upper, lower = model.dofs(mesh.droppers).T
+    kept = problem.residual_stiffness_ratio if RESIDUAL <= problem.effects else 0.0
+    names = {"mass": "acceleration", "damping": "velocity", "stiffness": "displacement"}
+    matrices = [(matrix_of(model, **{name: 1.0}), of) for name, of in names.items()]
+    left = shown = 0.0
+    n_slack = 0
+    for step, state in enumerate(seen.watched[1:], start=1):
+        u = state["displacement"]
+        elastic = form.dropper_force + model.dropper_stiffness * (u[upper] - u[lower])
+        carries = np.where(elastic < 0.0, kept * elastic, elastic)
+        residual = sum(matrix @ state[of] for matrix, of in matrices)
+        np.add.at(residual, upper, carries - elastic)
+        np.subtract.at(residual, lower, carries - elastic)
+        press(residual, model, seen["contact_position"][step, 0], seen["contact_force"][step, 0])
+        left = max(left, np.abs(residual).max())
+        shown = max(shown, np.abs(carries - seen["dropper_force"][step]).max())
+        n_slack += int((elastic < 0.0).sum())
+    return left, shown, n_slack, seen
+
+
+def press(residual: np.ndarray, model: Model, x: float, force: float) -> None:
+    """Take a contact force [N] off a residual, and what holds the anchors."""
+    nodes = model.mesh.wires[CONTACT_WIRE]
+    places = model.mesh.x(nodes)
+    e = int(np.searchsorted(places, x)) - 1
+    length = places[e + 1] - places[e]
+    own = nodes[e : e + 2]
+    unknowns = np.stack([model.dofs(own), model.dofs(own, "theta_y")], axis=1).ravel()
+    residual[unknowns] -= force * shape_values((x - places[e]) / length, length)
+    residual[model.constrained] = 0.0
+
+
+@pytest.mark.parametrize("share", [0.0, 0.05], ids=["", "residual stiffness"])
+@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
+def test_every_scheme_satisfies_the_law(way: dict[str, Any], share: float) -> None:
+    effects = WHOLE | (RESIDUAL if share else frozenset())
+    problem = on_its_way(
+        numerics=numerics(1e-3, **way), effects=effects, residual_stiffness_ratio=share
+    )
+    left, shown, n_slack, _ = off_by(problem, mesh_of(LINE, 2))
+    print(f"{n_slack} times a slack dropper")
+    assert n_slack > 40
+    # The correction stops when displacements change by eps_d and velocities by eps_v.
+    loose = 1e5 * 1e-13 + 2.75e3 * 1e-10 if "scheme" in way else 0.0
+    check("residual of motion [N]", left, 0.0, within=1e-7 + loose)
+    check("forces of droppers [N]", shown, 0.0, within=1e-8 + loose)
+
+
+@pytest.mark.parametrize("scheme", ["one_solve", "fixed_point"])
+def test_a_slack_dropper_that_breaks_takes_its_damper_along(scheme: str) -> None:
+    """It breaks while its spring is slack and its damper acts."""
+    mesh = mesh_of(LINE, 2)
+    problem = on_its_way(numerics=numerics(1e-3, scheme))
+    whole = march(problem, mesh, lambda view: view.checkpoint())
+    number = int((whole["dropper_force"] == 0.0).sum(axis=0).argmax())
+    step = int(np.flatnonzero(whole["dropper_force"][:, number] == 0.0)[5])
+    model, form = find_form(problem, mesh)
+    state = whole.watched[step]
+    upper, lower = model.dofs(mesh.droppers[number])
+    rate = state["velocity"][upper] - state["velocity"][lower]
+    pushed = model.dropper_damping[number] * rate
+    assert abs(pushed) > 10.0
+    incident = DropperBreak(step * 1e-3, float(mesh.x(mesh.droppers[number, 1])))
+    broken = replace(problem, effects=WHOLE | {"dropper_break"}, incidents=(incident,))
+    first, later = unchanged(model), changed_line(model, form, (incident,))
+    ownership = distribute(model, COMM.size, COMM.rank)
+    moving = state["displacement"], state["velocity"]
+    jump = acceleration_jump(COMM, ownership, first, later, form, moving, 0.0)
+    # The line loses the damper's force and nothing else: the spring carried none.
+    force = np.zeros(model.n_dofs)
+    force[upper], force[lower] = pushed, -pushed
+    mass = matrix_of(model, mass=1.0)
+    lost = mass @ jump - force
+    lost[model.constrained] = 0.0
+    check("force lost [N]", lost, 0.0, within=1e-9 * abs(pushed))
+    after = march(broken, mesh)
+    assert np.array_equal(after["contact_force"][: step + 1], whole["contact_force"][: step + 1])
+    assert not after["dropper_force"][step + 1 :, number].any()
+
+
+@pytest.mark.parametrize("way", ["implicit", "generalized alpha", "fixed point", "adaptive"])
+def test_a_continued_run_is_the_uninterrupted_one(way: str) -> None:
+    mesh, at = mesh_of(LINE, 2), 222
+    problem = on_its_way(numerics=numerics(1e-3, **WAYS[way]))
+    whole = march(problem, mesh, lambda view: view.checkpoint() if view.step == at else None)
+    run, _ = start_march(problem, mesh)
+    history = History()
+    with run:
+        run.restore(whole.watched[at])
+        run.run([history])
+    for name in ("contact_force", "dropper_force"):
+        assert np.array_equal(history[name], whole[name][at:]), name
+
+
+def test_petsc_steps_the_same_law() -> None:
+    """TSALPHA2 shares the matrices alone; differences of second-order methods fall by four."""
+    mesh = mesh_of(short_line(), 2)
+    alpha: dict[str, Any] = {"integrator": "generalized_alpha", "spectral_radius": 0.8}
+    errors = []
+    for dt in (5e-4, 2.5e-4, 1.25e-4):
+        run = train(100.0, 6.0, 36.0, static_force=400.0, raise_time=0.05, nominal_height=5.5)
+        own, second = (
+            march(
+                problem_on(
+                    short_line(), train=run, effects=WHOLE - {"contact_loss"},
+                    numerics=numerics(dt, scheme, **alpha),
+                ),
+                mesh,
+            )
+            for scheme in ("one_solve", "ts_alpha2")
+        )  # fmt: skip
+        apart = (own["contact_force"] - second["contact_force"])[:: round(5e-4 / dt)]
+        errors.append(float(np.sqrt((apart**2).mean())))
+        slack = (own["dropper_force"] == 0.0).sum()
+    print(f"rms differences [N]: {errors}; {slack} slack droppers")
+    assert slack > 100
+    assert errors[0] / errors[-1] > 10.0
