@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from catenary.cases.accuracy_analysis import Found, Row, compare
+from catenary.cases.accuracy_analysis import Found, Row, compare, separate, uncertainties
 from catenary.cases.accuracy_plan import Plan, PlannedAxis, again
 from catenary.cases.jobs import Ended
 from catenary.cases.sweep import run_jobs
@@ -37,14 +37,14 @@ class Measured:
     ----------
     plan : what was run
     rows : all levels, axis by axis
-    converged : by axis name, the reference beside its check (percent by quantity), only of
-        discretisation axes
+    uncertainty : by axis name, of the reference itself (percent by quantity, infinite where it is
+        not known), only of discretisation axes
     wall : time of all runs [s]
     """
 
     plan: Plan
     rows: Sequence[Row]
-    converged: Mapping[str, dict[str, float]]
+    uncertainty: Mapping[str, dict[str, float]]
     wall: float
 
     def rows_of(self, axis: str) -> list[Row]:
@@ -118,16 +118,13 @@ def evaluate(
     """Rows of all axes from their runs. Not collective."""
     runs = {one.variant.name: one for one in ended}
     rows: list[Row] = []
-    converged: dict[str, dict[str, float]] = {}
+    uncertainty: dict[str, dict[str, float]] = {}
     for planned in plan.axes:
         rows += [_row(planned, name, runs, times) for name in _names(planned)]
-        if planned.check is not None:
-            reference, check = _found(runs[planned.reference]), _found(runs[planned.check])
-            name = planned.axis.name
-            converged[name] = {}
-            if reference is not None and check is not None:
-                converged[name] = compare(reference, check)[1]
-    return Measured(plan, rows, converged, wall)
+        if planned.chains:
+            chains = [[_found(runs[name]) for name in chain] for chain in planned.chains]
+            uncertainty[planned.axis.name] = uncertainties(_found(runs[planned.reference]), chains)
+    return Measured(plan, rows, uncertainty, wall)
 
 
 def _names(planned: PlannedAxis) -> list[str]:
@@ -150,6 +147,8 @@ def _row(
         outcome = one.outcome if found is None else "its reference broke"
         return Row(*head, outcome, dict(level.sizes))
     errors, percent = compare(found, reference)
+    fine = planned.step_alone.get(name)
+    by_step, by_mesh = separate(found, None if fine is None else _found(runs[fine]), reference)
     summary, walls = one.summary, times[one.variant.name]
     counted = summary["inner_iterations"]
     return Row(
@@ -162,6 +161,8 @@ def _row(
         len(walls),
         _estimate(summary),
         counted["rounds"] / counted["steps"],
+        by_step,
+        by_mesh,
     )
 
 

@@ -1,9 +1,9 @@
 """The axes of ``catenary accuracy``: one table, to which an axis is added with one entry.
 
 An axis of *discretisation* changes how exactly the scene's equations are solved: its levels are
-compared with a reference that is finer, and that is itself compared with a finer one still. An
-axis of *models* changes the equations: its levels differ from the scene as it is, and no
-difference is an error.
+compared with a reference that is finer in all that the axis refines, and whose own uncertainty
+coarser ones tell. An axis of *models* changes the equations: its levels differ from the scene as it
+is, and no difference is an error.
 """
 
 from __future__ import annotations
@@ -46,10 +46,17 @@ class Level:
 
 @dataclass(frozen=True)
 class Reference:
-    """What the levels of a discretisation axis are compared with, and what that is checked by."""
+    """What the levels of a discretisation axis are compared with, and what it is measured by.
+
+    Attributes
+    ----------
+    level : finer than every level of the axis in all that it refines
+    chains : for each size three levels, of which each has half the fineness of the one before it;
+        the first is the reference, or has its fineness in that size
+    """
 
     level: Level
-    check: Level
+    chains: tuple[tuple[Level, Level, Level], ...]
 
 
 @dataclass(frozen=True)
@@ -64,6 +71,9 @@ class Axis:
     reference : for a scene, the reference of a discretisation axis; None for models, which are
         compared with the scene as it is
     refined : which of the levels' sizes an observed order belongs to, "" if none
+    step_alone : for a level of step and mesh, the one with its mesh and the reference's step: what
+        the two differ by is the error of the step, what is left that of the mesh; None if the axis
+        does not refine both
     """
 
     name: str
@@ -72,6 +82,7 @@ class Axis:
     levels: Callable[[Scene], Sequence[Level]]
     reference: Callable[[bool], Reference] | None = None
     refined: str = ""
+    step_alone: Callable[[Level], Level] | None = None
 
     def chosen(self, scene: Scene, quick: bool) -> list[Level]:
         """The levels of the axis for a scene, in the long or the short form."""
@@ -119,10 +130,12 @@ def mesh(elements: int, quick: bool = False, dt: float | None = None) -> Level:
 
 
 _STEPS = ((2e-4, False), (5e-4, False), (1e-3, True), (2e-3, True), (4e-3, False), (8e-3, False))
-_ELEMENTS = ((1, False), (2, False), (3, True), (4, False), (5, True), (6, False), (8, False))
-# Meshes are compared at this step [s]: a fine mesh and a long step do not go together, see
-# ``solver/compliance.py``.
-_MESH_STEP = 2e-4
+_ELEMENTS = (1, 2, 3, 4, 5, 6, 8, 12, 16)
+_FEW_ELEMENTS = (3, 5)
+# Step [s] and elements per gap, in the long form and the short one, of the reference for step and
+# mesh together. Meshes are compared at
+# this step: a fine mesh and a long step do not go together, see ``solver/compliance.py``.
+_FINEST_STEP, _FINEST_MESH, _QUICK_MESH = 2e-4, 40, 24
 
 
 def _steps(scene: Scene) -> list[Level]:
@@ -130,7 +143,9 @@ def _steps(scene: Scene) -> list[Level]:
 
 
 def _fine_step(quick: bool) -> Reference:
-    return Reference(step(2.5e-4), step(1.25e-4)) if quick else Reference(step(1e-4), step(5e-5))
+    """On the scene's own mesh: of the error of the step alone."""
+    dt = 1.25e-4 if quick else 5e-5
+    return Reference(step(dt), ((step(dt), step(2 * dt), step(4 * dt)),))
 
 
 def _own_mesh(scene: Scene) -> bool:
@@ -140,34 +155,36 @@ def _own_mesh(scene: Scene) -> bool:
 def _meshes(scene: Scene) -> list[Level]:
     if _own_mesh(scene):
         return []
-    return [mesh(n, quick, _MESH_STEP) for n, quick in _ELEMENTS]
+    return [mesh(n, n in _FEW_ELEMENTS, _FINEST_STEP) for n in _ELEMENTS]
 
 
-def _fine_mesh(quick: bool) -> Reference:
-    # Twelve elements a gap; checked with half the step and a third more elements.
-    n, more = (8, 10) if quick else (12, 16)
-    return Reference(mesh(n, dt=_MESH_STEP), mesh(more, dt=0.5 * _MESH_STEP))
+def _fine_both(quick: bool) -> Reference:
+    dt, n = _FINEST_STEP, _QUICK_MESH if quick else _FINEST_MESH
+    meshes = step(dt, n), step(dt, n // 2), step(dt, n // 4)
+    # Steps on the coarsest of these meshes: fine meshes and long steps do not go together.
+    steps = meshes[-1], step(2 * dt, n // 4), step(4 * dt, n // 4)
+    return Reference(meshes[0], (meshes, steps))
+
+
+def _at_the_finest_step(level: Level) -> Level:
+    h = level.size("h")
+    assert h is not None
+    return step(_FINEST_STEP, round(1.0 / h))
 
 
 # Fine meshes with long steps are left out of the grid, as above [s].
-_LONGEST_STEP = {8: 1e-3, 12: 5e-4}
+_LONGEST_STEP = {8: 1e-3, 12: 5e-4, 16: 5e-4}
 
 
 def _grid(scene: Scene) -> list[Level]:
     if _own_mesh(scene):
         return []
     return [
-        step(dt, n, dt in (1e-3, 2e-3) and n in (3, 5))
+        step(dt, n, dt in (1e-3, 2e-3) and n in _FEW_ELEMENTS)
         for dt in (5e-4, 1e-3, 2e-3, 4e-3)
-        for n in (1, 2, 3, 4, 5, 6, 8, 12)
+        for n in _ELEMENTS
         if dt <= _LONGEST_STEP.get(n, 1.0)
     ]
-
-
-def _fine_grid(quick: bool) -> Reference:
-    if quick:
-        return Reference(step(2.5e-4, 8), step(1.25e-4, 10))
-    return Reference(step(2e-4, 12), step(1e-4, 16))
 
 
 # ---- scheme and coupling ------------------------------------------------------------------------
@@ -337,9 +354,16 @@ def _fitted(scene: Scene, kind: str, n_masses: int) -> Level:
 
 
 _ALL = (
-    Axis("dt", "time step", DISCRETISATION, _steps, _fine_step, "dt"),
-    Axis("elements", "elements per gap, step 0.2 ms", DISCRETISATION, _meshes, _fine_mesh, "h"),
-    Axis("grid", "time step and elements per gap", DISCRETISATION, _grid, _fine_grid),
+    Axis("dt", "time step, on the case's mesh", DISCRETISATION, _steps, _fine_step, "dt"),
+    Axis("elements", "elements per gap, step 0.2 ms", DISCRETISATION, _meshes, _fine_both, "h"),
+    Axis(
+        "grid",
+        "time step and elements per gap",
+        DISCRETISATION,
+        _grid,
+        _fine_both,
+        step_alone=_at_the_finest_step,
+    ),
     Axis("scheme", "scheme, at the case's step", DISCRETISATION, _schemes, _fine_step),
     Axis("coupling", "coupling, at the case's step", DISCRETISATION, _couplings, _fine_step),
     Axis("adaptive", "steps halved where a force is wrong", DISCRETISATION, _adaptive, _fine_step),

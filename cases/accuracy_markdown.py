@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from catenary.cases.accuracy import Measured
 from catenary.cases.accuracy_analysis import HISTORY, QUANTITIES, Row
 from catenary.cases.accuracy_axes import DISCRETISATION, Axis
+from catenary.cases.accuracy_plan import PlannedAxis
 
+_SEPARATE = ("history by step", "history by mesh")
 _LAST_COLUMNS = ("est/true", "rounds", "s/s")
 
 
@@ -31,7 +33,9 @@ def page(
         "mean, deviations and uplift, of its standard deviation for maximum, minimum and the force "
         '"history" (rms). "est/true" is the error that a run estimates itself over the true one, '
         '"rounds" the solves of the small problem a step, "s/s" wall time of the march per '
-        "simulated second.",
+        "simulated second: read times as ratios. Where step and mesh are refined together, errors "
+        "of the history by the step and by the mesh alone stand beside the whole error, in which "
+        "they may cancel.",
     ]
     if picture:
         parts.append(f"![work and precision]({picture})")
@@ -40,7 +44,8 @@ def page(
         axis = planned.axis
         parts.append(f"## {axis.title[0].upper()}{axis.title[1:]}")
         if axis.kind == DISCRETISATION:
-            parts.append(_reference(found, planned.reference, planned.check or "", axis.name))
+            told = uncertainty_text(planned, found.uncertainty[axis.name])
+            parts.append(f"Reference: {planned.reference}. {told[0].upper()}{told[1:]}.")
         else:
             parts.append("Differences from the case as it is: of models, not errors.")
         parts.append(_table(axis, found.rows_of(axis.name)))
@@ -48,31 +53,36 @@ def page(
     return "\n\n".join(parts) + "\n"
 
 
-def _reference(found: Measured, reference: str, check: str, name: str) -> str:
-    told = found.converged.get(name, {})
-    if not told:
-        return f"Reference: {reference}; it could not be compared with {check}."
-    differences = ", ".join(f"{what} {_short(value)}" for what, value in told.items())
-    return f"Reference: {reference}. It differs from {check} by [%]: {differences}."
+def uncertainty_text(planned: PlannedAxis, percent: Mapping[str, float]) -> str:
+    """How far the reference itself may be wrong, and from which runs that is known."""
+    from_runs = " and from ".join(", ".join(chain) for chain in planned.chains)
+    known = {what: value for what, value in percent.items() if math.isfinite(value)}
+    if not known:
+        return f"the uncertainty of the reference is not known from {from_runs}"
+    told = ", ".join(f"{what} {_short(value)}" for what, value in known.items())
+    return f"uncertainty of the reference, from {from_runs} [%]: {told}"
 
 
 def _table(axis: Axis, rows: Sequence[Row]) -> str:
-    names = [*QUANTITIES, *_LAST_COLUMNS]
+    both = any(row.by_step for row in rows)
+    names = [*QUANTITIES, *(_SEPARATE if both else ()), *_LAST_COLUMNS]
     lines = [
         "| " + " | ".join([axis.name, *names]) + " |",
         "|" + "---|" * (len(names) + 1),
     ]
     for row in rows:
-        cells = _cells(axis, row) if row.done else [row.outcome] + [""] * (len(names) - 1)
+        cells = _cells(axis, row, both) if row.done else [row.outcome] + [""] * (len(names) - 1)
         level = row.level.replace("_", " ")
         lines.append("| " + " | ".join([level, *cells]) + " |")
     return "\n".join(lines)
 
 
-def _cells(axis: Axis, row: Row) -> list[str]:
+def _cells(axis: Axis, row: Row, both: bool) -> list[str]:
     true = row.errors.get(HISTORY, math.nan)
     ratio = row.estimate / true if axis.refined == "dt" and true else math.nan
     figures = [row.percent.get(name, math.nan) for name in QUANTITIES]
+    if both:
+        figures += [row.by_step.get(HISTORY, math.nan), row.by_mesh.get(HISTORY, math.nan)]
     return [_short(value) for value in (*figures, ratio, row.iterations, row.cost)]
 
 

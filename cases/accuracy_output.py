@@ -23,6 +23,7 @@ from catenary.cases.accuracy_analysis import (
     pareto,
 )
 from catenary.cases.accuracy_axes import DISCRETISATION, Axis
+from catenary.cases.accuracy_markdown import uncertainty_text
 from catenary.postproc import plots
 from catenary.postproc.storage import plain, write_all
 
@@ -62,6 +63,9 @@ def as_table(row: Row) -> dict[str, Any]:
     for name, quantity in QUANTITIES.items():
         table[f"error_{name}_{quantity.unit}"] = row.errors.get(name)
         table[f"error_{name}_percent"] = row.percent.get(name)
+    for name in _ADVISED:
+        table[f"error_{name}_by_step_percent"] = row.by_step.get(name)
+        table[f"error_{name}_by_mesh_percent"] = row.by_mesh.get(name)
     table["estimated_history_N"] = _known(row.estimate)
     table["rounds_per_step"] = _known(row.iterations)
     table["march_s_per_s"] = _known(row.cost)
@@ -76,7 +80,7 @@ def as_text(found: Measured, target: float) -> str:
         axis, rows = planned.axis, found.rows_of(planned.axis.name)
         parts.append(_axis_text(axis, planned.reference, rows))
         if axis.kind == DISCRETISATION:
-            parts.append(_check_text(planned.check or "", found.converged[axis.name]))
+            parts.append(f"  {uncertainty_text(planned, found.uncertainty[axis.name])}")
         parts += _order_lines(axis, rows)
         parts.append("")
     return "\n".join([*parts, *advices(found, target)])
@@ -85,7 +89,13 @@ def as_text(found: Measured, target: float) -> str:
 def advices(found: Measured, target: float) -> list[str]:
     """A sentence for each quantity that settings are chosen by."""
     return [
-        advice(found.rows_of(axis.name), quantity, target)
+        advice(
+            found.rows_of(axis.name),
+            quantity,
+            target,
+            found.uncertainty[axis.name][quantity],
+            {"dt": "mesh", "h": "step"}.get(axis.refined, ""),
+        )
         for axis in _precise(found)
         for quantity in _ADVISED
     ]
@@ -161,8 +171,8 @@ def _record(found: Measured, target: float) -> dict[str, Any]:
                 "title": planned.axis.title,
                 "kind": planned.axis.kind,
                 "reference": planned.reference,
-                "check": planned.check,
-                "reference_against_check_percent": found.converged.get(planned.axis.name),
+                "reference_chains": planned.chains,
+                "reference_uncertainty_percent": found.uncertainty.get(planned.axis.name),
                 "orders": {q: observed_orders(rows, size, q) for q in _ADVISED} if size else {},
                 "pareto": [row.level for row in pareto(rows)],
             }
@@ -184,6 +194,8 @@ def _axis_text(axis: Axis, reference: str, rows: Sequence[Row]) -> str:
     width = max(len(row.level) for row in rows)
     names = list(QUANTITIES)
     head = "".join(f"{name:>9}" for name in names)
+    both = any(row.by_step for row in rows)
+    head += f"{'by step':>9}{'by mesh':>9}" if both else ""
     lines = [
         f"{axis.title}: {what} {reference} [%]",
         f"  {'':{width}}{head}{'est/true':>10}{'rounds':>8}{'s/s':>9}",
@@ -193,6 +205,9 @@ def _axis_text(axis: Axis, reference: str, rows: Sequence[Row]) -> str:
             lines.append(f"  {row.level:{width}}  {row.outcome}")
             continue
         figures = "".join(f"{_short(row.percent.get(name)):>9}" for name in names)
+        if both:
+            alone = (row.by_step.get(HISTORY), row.by_mesh.get(HISTORY))
+            figures += "".join(f"{_short(value):>9}" for value in alone)
         true = row.errors.get(HISTORY, math.nan)
         ratio = row.estimate / true if axis.refined == "dt" and true else math.nan
         lines.append(
@@ -200,13 +215,6 @@ def _axis_text(axis: Axis, reference: str, rows: Sequence[Row]) -> str:
             f"{row.cost:>9.4f}"
         )
     return "\n".join(lines)
-
-
-def _check_text(check: str, percent: dict[str, float]) -> str:
-    if not percent:
-        return f"  the reference could not be compared with {check}"
-    told = ", ".join(f"{name} {_short(value)}" for name, value in percent.items())
-    return f"  the reference against {check} [%]: {told}"
 
 
 def _order_lines(axis: Axis, rows: Sequence[Row]) -> list[str]:

@@ -23,8 +23,8 @@ AS_IT_IS = Level("as_it_is", ())
 class PlannedAxis:
     """An axis with its levels, the name of each one's run, and why others are not possible.
 
-    ``runs`` and ``refused`` are by level name; ``reference`` and ``check`` are names of runs, the
-    latter None for models.
+    ``runs`` and ``refused`` are by level name; ``reference`` and ``chains`` are names of runs, the
+    latter none for models. ``step_alone`` are names of runs by level name, see ``Axis``.
     """
 
     axis: Axis
@@ -32,7 +32,8 @@ class PlannedAxis:
     runs: dict[str, str]
     refused: dict[str, str]
     reference: str
-    check: str | None
+    chains: tuple[tuple[str, ...], ...] = ()
+    step_alone: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ def make_plan(
     case : name, file or folder
     overrides : ``key=value`` each, for all runs
     shortened : apply the case's ``[test]`` table
-    quick : few levels, coarser references
+    quick : few levels, a coarser reference
     repeats : how often a short run is timed, at least 1
 
     Raises
@@ -112,18 +113,22 @@ def _planned(axis: Axis, scene: Scene, jobs: _Jobs, quick: bool) -> Iterator[Pla
     if axis.reference is not None:
         pair: Reference = axis.reference(quick)
         reference = jobs.add(axis.name, pair.level)
-        check = jobs.add(axis.name, pair.check)
+        chains = tuple(
+            tuple(jobs.add(axis.name, level) for level in chain) for chain in pair.chains
+        )
     else:
-        reference, check = jobs.add(axis.name, AS_IT_IS), None
-    runs, refused = {}, {}
+        reference, chains = jobs.add(axis.name, AS_IT_IS), ()
+    runs, refused, step_alone = {}, {}, {}
     file = find_case(jobs.case).absolute()  # a study is read by others, elsewhere
     for level in levels:
         try:
             runs[level.name] = jobs.add(axis.name, level)
+            if axis.step_alone is not None:
+                step_alone[level.name] = jobs.add(axis.name, axis.step_alone(level))
         except InputError as error:
             refused[level.name] = str(error).replace(f" in {file}", "")
-    assert axis.kind == MODEL or check is not None
-    yield PlannedAxis(axis, levels, runs, refused, reference, check)
+    assert axis.kind == MODEL or chains
+    yield PlannedAxis(axis, levels, runs, refused, reference, chains, step_alone)
 
 
 def again(job: Job, number: int) -> Job:

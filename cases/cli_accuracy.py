@@ -40,7 +40,10 @@ def accuracy(
         str, typer.Option("--target", metavar="PERCENT", help="Wanted accuracy.")
     ] = "1%",
     quick: Annotated[
-        bool, typer.Option("--quick", help="Few levels and coarser references.")
+        bool,
+        typer.Option(
+            "--quick", help="Few levels and a coarser reference, good for targets from 2%."
+        ),
     ] = False,
     repeats: Annotated[
         int, typer.Option("--repeats", metavar="N", help="How often short runs are timed.")

@@ -28,7 +28,7 @@ def test_all_levels_of_the_reference_model_make_scenes(plan: Plan) -> None:
         assert not planned.refused, planned.axis.name
         names = [level.name for level in planned.levels]
         assert len(set(names)) == len(names)
-        assert (planned.check is not None) == (planned.axis.kind == DISCRETISATION)
+        assert bool(planned.chains) == (planned.axis.kind == DISCRETISATION)
     names = [job.variant.name for job in plan.jobs]
     assert len(set(names)) == len(names)
 
@@ -44,18 +44,50 @@ def test_settings_that_make_the_same_scene_are_run_once(plan: Plan) -> None:
     assert runs["dropper"]["slackening"] == own
 
 
-def test_references_are_finer_than_all_levels_and_checks_finer_still() -> None:
+def test_references_are_finer_than_all_levels_in_all_that_is_refined() -> None:
+    """The grid, from which settings are recommended: strictly, in step and in mesh."""
     scene = load_scene(CASE)
     for quick in (False, True):
         for axis in AXES.values():
             if axis.reference is None:
                 continue
+            finest = axis.reference(quick).level
+            for level in axis.chosen(scene, quick):
+                for name, size in level.sizes:
+                    assert size > (finest.size(name) or 0.0), axis.name
+        grid = AXES["grid"]
+        assert grid.reference is not None
+        assert {name for name, _ in grid.reference(quick).level.sizes} == {"dt", "h"}
+
+
+def test_the_reference_is_measured_by_ones_of_half_its_fineness() -> None:
+    for quick in (False, True):
+        for axis in AXES.values():
+            if axis.reference is None:
+                continue
             pair = axis.reference(quick)
-            for name, size in pair.level.sizes:
-                sizes = [level.size(name) for level in axis.chosen(scene, quick)]
-                assert all(other is None or other >= size for other in sizes), axis.name
-                assert (pair.check.size(name) or 0.0) < size
-            assert pair.level.sizes not in [level.sizes for level in axis.chosen(scene, quick)]
+            refined = [name for name, _ in pair.level.sizes]
+            assert len(pair.chains) == len(refined)
+            for chain in pair.chains:
+                (own,) = {name for level in chain for name, size in level.sizes if size} & {
+                    name for name in refined if chain[0].size(name) != chain[1].size(name)
+                }
+                assert chain[0].size(own) == pair.level.size(own)
+                sizes = [level.size(own) for level in chain]
+                assert sizes == pytest.approx([sizes[0], 2 * sizes[0], 4 * sizes[0]])
+                others = [[one for one in level.sizes if one[0] != own] for level in chain]
+                assert others[0] == others[1] == others[2]
+
+
+def test_errors_of_step_and_mesh_are_measured_apart(plan: Plan) -> None:
+    planned = next(one for one in plan.axes if one.axis.name == "grid")
+    scenes = {job.variant.name: job.scene for job in plan.jobs}
+    reference = scenes[planned.reference]
+    for level, run in planned.runs.items():
+        own, alone = scenes[run], scenes[planned.step_alone[level]]
+        assert alone.mesh.elements_per_gap == own.mesh.elements_per_gap
+        assert alone.numerics.dt_s == reference.numerics.dt_s < own.numerics.dt_s
+        assert own.mesh.elements_per_gap < reference.mesh.elements_per_gap
 
 
 def test_a_mechanism_is_varied_as_one() -> None:
