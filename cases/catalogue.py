@@ -6,6 +6,7 @@ import difflib
 from dataclasses import dataclass
 from pathlib import Path
 
+from catenary.cases.input.plain_text import plain
 from catenary.cases.loading import read_toml
 from catenary.solver.errors import InputError
 
@@ -47,6 +48,10 @@ def find_case(case: str) -> Path:
         If there is none.
     """
     known = shipped()
+    if not case.strip():
+        raise InputError(
+            "the case has no name: name a shipped case (`catenary list`), a case.toml or its folder"
+        )
     if case in known:
         return known[case]
     try:
@@ -66,4 +71,4 @@ def find_case(case: str) -> Path:
 
 
 def _printable(text: str) -> str:
-    return "".join(c if c.isprintable() else "?" for c in text[:200])
+    return plain(text, 200)

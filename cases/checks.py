@@ -22,8 +22,11 @@ from catenary.cases.checks_pantograph import check_mechanisms, check_pantographs
 from catenary.cases.checks_scheme import check_scheme
 from catenary.cases.checks_vehicle import check_vehicle
 from catenary.cases.input.faults import Fault, SceneError
+from catenary.cases.input.size import size_faults
+from catenary.cases.input.usual import usual_faults
 from catenary.cases.keys import is_known, known_keys
 from catenary.cases.messages import refusal, shown, unknown_key
+from catenary.meshgen.geometry import SHORTEST_GAP
 from catenary.meshgen.line import Line
 from catenary.solver import effects
 from catenary.solver.errors import InputError
@@ -59,7 +62,9 @@ def faults_of(scene: Scene) -> list[Fault]:
     if found.nothing_by(_pantograph_names, scene):
         found.nothing_by(check_pantographs, scene)
         found.nothing_by(check_scheme, scene)
-    line = _line(scene, found)
+    # What is too large is not even made, and what follows from a wrong unit is not told.
+    sound = found.nothing_by(size_faults, scene) and found.nothing_by(usual_faults, scene)
+    line = _line(scene, found) if sound else None
     if line is None:
         return found.faults
     for of_line in (_dropper_lengths, _speed):
@@ -231,9 +236,15 @@ def _droppers_inside_spans(scene: Scene, line: Line) -> Iterator[Fault]:
         )
         return
     for span, positions in zip(line.span_lengths, line.dropper_positions, strict=True):
-        outside = [x for x in positions if not _TINY < x < span - _TINY]
-        if not outside:
+        outside = [x for x in positions if not SHORTEST_GAP <= x <= span - SHORTEST_GAP]
+        close = [pair for pair in zip(positions, positions[1:], strict=False)
+                 if pair[1] - pair[0] < SHORTEST_GAP]  # fmt: skip
+        if not outside and not close:
             continue
+        if kind.count is not None and not outside:
+            why = f"droppers must be at least {SHORTEST_GAP:g} m apart"
+            yield _refusal(scene, "line.dropper.spacing_m", kind.spacing_m, why)
+            return
         if kind.count is not None:
             yield _refusal(
                 scene,
@@ -244,11 +255,14 @@ def _droppers_inside_spans(scene: Scene, line: Line) -> Iterator[Fault]:
             return
         which = "positions_m" if kind.positions_m is not None else "patterns"
         key = f"line.dropper.{which}"
-        yield Fault(
-            key,
-            f"{key} {scene.origin.of(key)} puts a dropper at {outside[0]:g} m; it must lie inside "
-            f"the span, between 0 and {span:g} m",
-        )
+        if outside:
+            what = f"a dropper at {outside[0]:g} m; it must lie inside the span, between 0 and "
+            what += f"{span:g} m"
+        else:
+            left, right = close[0]
+            what = f"droppers at {left:.10g} and {right:.10g} m; they must be at least "
+            what += f"{SHORTEST_GAP:g} m apart"
+        yield Fault(key, f"{key} {scene.origin.of(key)} puts {what}")
         return
 
 
@@ -260,11 +274,13 @@ def estimated_dropper_lengths(line: Line, gravity: float) -> list[np.ndarray]:
     centimetres: it serves to refuse the impossible, the form finding gives the lengths.
     """
     lengths = []
-    masts = line.support_positions
-    for i, span in enumerate(line.span_lengths):
-        x = np.asarray(line.dropper_positions[i])
+    places = [np.asarray(positions, dtype=float) for positions in line.dropper_positions]
+    ends = np.cumsum([place.size for place in places])[:-1]
+    masts = np.repeat(line.support_positions[:-1], [place.size for place in places])
+    heights = np.split(line.target_height(masts + np.concatenate(places)), ends)
+    for i, (span, x) in enumerate(zip(line.span_lengths, places, strict=True)):
         pre_sag = np.asarray(line.pre_sag[i])
-        height = line.target_height(masts[i] + x) - pre_sag
+        height = heights[i] - pre_sag
         mid_sag = float(pre_sag.max(initial=0.0))
         carried = 8 * mid_sag * line.contact_wire.tension / span**2
         weight = gravity * (line.contact_wire.mass_per_length + line.messenger_wire.mass_per_length)
@@ -296,8 +312,10 @@ def _speed(scene: Scene, line: Line) -> Iterator[Fault]:
             scene,
             "train.speed_km_h",
             speed,
-            f"it must be below the wave speed of the contact wire ({wave:.1f} km/h) unless "
-            "effects.supercritical_speed = true",
+            f"it must be below the wave speed of the contact wire ({wave:.1f} km/h, which "
+            f"tension_N = {line.contact_wire.tension:g} and mass_kg_per_m = "
+            f"{line.contact_wire.mass_per_length:g} give it) unless effects.supercritical_speed = "
+            "true",
         )
 
 

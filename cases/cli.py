@@ -31,6 +31,12 @@ app: typer.Typer = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
+RunFolder = Annotated[
+    Path,
+    typer.Argument(
+        parser=console.run_folder, metavar="FOLDER", help="Folder of a run, or its run.h5."
+    ),
+]
 Case = Annotated[
     str, typer.Argument(help="Name of a shipped case, or a case.toml, or a folder with one.")
 ]
@@ -164,7 +170,7 @@ def run(
 )
 @console.guarded
 def restart(
-    folder: Annotated[Path, typer.Argument(help="Folder of the run, with its run.h5.")],
+    folder: RunFolder,
     extras: PetscOptions = None,
     strict: Strict = False,
     verbose: Verbose = False,
@@ -388,7 +394,7 @@ def static(
 @console.guarded
 @console.serial
 def report(
-    folder: Annotated[Path, typer.Argument(help="Folder of a run, with its run.h5.")],
+    folder: RunFolder,
 ) -> None:
     """Serial."""
     from catenary.postproc.report import write_report
@@ -426,6 +432,18 @@ from catenary.cases import (  # noqa: E402
 )
 
 
+def _complain_of_usage(error: Any) -> None:
+    """A mistake in the options in one sentence; for a command without any word its help."""
+    context = getattr(error, "ctx", None)
+    if type(error).__name__ == "NoArgsIsHelpError":
+        if console.speaks():
+            error.show()
+        return
+    said = error.format_message().rstrip(".")
+    command = context.command_path if context is not None else "catenary"
+    console.complain(f"{said}; see `{command} --help`")
+
+
 def main() -> None:
     """Entry point. Exit codes: 0 done, 1 the run broke, 2 bad input, 3 not accepted (--strict)."""
     from catenary.solver.parallel import launched_by_mpirun
@@ -445,9 +463,8 @@ def main() -> None:
     except typer.Abort:
         code = console.BROKEN
     except Exception as error:
-        if not hasattr(error, "show") or not hasattr(error, "exit_code"):
+        if not hasattr(error, "format_message") or not hasattr(error, "exit_code"):
             raise
-        if console.speaks():  # a mistake in the options, told with the command's usage
-            error.show()
+        _complain_of_usage(error)
         code = console.BAD_INPUT
     sys.exit(code if isinstance(code, int) else console.DONE)

@@ -65,6 +65,12 @@ def folder(text: str) -> Path:
     return Path(text)
 
 
+def run_folder(text: str) -> Path:
+    """The folder of a run, for which its result file may stand. Not collective."""
+    path = Path(text)
+    return path.parent if path.name == "run.h5" and path.is_file() else path
+
+
 def world() -> Any:
     """The communicator of all processes; starts MPI. Not collective."""
     from mpi4py import MPI

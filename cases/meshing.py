@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
+from catenary.cases.input.size import MANY_NODES, size_of
 from catenary.cases.output_files import new_file
 from catenary.cases.scene import Scene
 from catenary.meshgen.build import make_mesh, use_mesh
@@ -24,6 +26,9 @@ def mesh_of(scene: Scene, path: Path | None = None) -> LineMesh:
     line, own = scene.to_line(), scene.mesh_file()
     if own is not None:
         return use_mesh(line, own)
+    size = size_of(scene)
+    if size is not None and size.nodes > MANY_NODES:
+        logging.getLogger("catenary.mesh").warning("%s", size.sentence())
     return make_mesh(
         line,
         scene.mesh.elements_per_gap,

@@ -12,6 +12,7 @@ from pydantic.fields import FieldInfo
 from catenary.cases.input.faults import MOST_TOLD, Fault, SceneError
 from catenary.cases.input.petsc_table import ELSEWHERE
 from catenary.cases.input.plain_text import plain
+from catenary.cases.input.usual import unit_guess, usual_range
 from catenary.cases.keys import is_known, known_keys, nearest, without_kinds
 from catenary.cases.units import unit_of
 
@@ -54,8 +55,6 @@ def _as_toml(value: Any, depth: int = 0) -> str:
         return "true" if value else "false"
     if isinstance(value, str):
         return f'"{value}"'
-    if isinstance(value, float):
-        return f"{value:.12g}"
     if isinstance(value, list | tuple | dict) and depth == _DEEP:
         return "..."
     if isinstance(value, list | tuple):
@@ -128,6 +127,12 @@ _WANTED: dict[str, Callable[[dict[str, Any]], str]] = {
     ),
     "union_tag_not_found": lambda c: "must have a type",
 }
+
+
+def _something_else(limits: dict[str, Any]) -> str:
+    return "must be something else"
+
+
 _OF_A_NUMBER = (
     "greater_than",
     "greater_than_equal",
@@ -171,13 +176,32 @@ def _sentence(
     if kind == "missing":
         meaning = field.description if field is not None else ""
         return f"{key}{f' ({meaning})' if meaning else ''} is missing {where}"
-    wanted = _WANTED.get(kind, lambda c: fault["msg"])(fault.get("ctx") or {})
+    wanted = _WANTED.get(kind, _something_else)(fault.get("ctx") or {})
     value = fault["input"]
     if isinstance(value, dict | BaseModel):
         return f"{key} {where} {wanted}"
     unit = unit_of(key)
     shown_unit = f" [{unit}]" if unit and kind in _OF_A_NUMBER else ""
-    return f"{key} is {shown(value)} {where}; it {wanted}{shown_unit}"
+    guess = ""
+    if (
+        kind in (*_OF_A_NUMBER, "value_error")
+        and isinstance(value, int | float)
+        and not isinstance(value, bool)
+    ):
+        guess = _guess(key, value)
+    return f"{key} is {shown(value)} {where}; it {wanted}{shown_unit}{guess}"
+
+
+def _guess(key: str, value: float) -> str:
+    """The usual range of a number that is out of bounds, and which unit it probably has."""
+    try:
+        guess, usual = unit_guess(key, value), usual_range(key)
+    except OverflowError:  # an integer that no float can hold
+        return ""
+    if guess or usual is None:
+        return f"; {guess}" if guess else ""
+    unit = unit_of(key)
+    return f"; usual are {usual[0]:.12g} to {usual[1]:.12g} {unit}".rstrip()
 
 
 def _kind(loc: Sequence[int | str], parts: Sequence[int | str]) -> str:

@@ -62,10 +62,10 @@ class ContactTable(Table):
         for key, laws in _ACTS_WITH.items():
             if key in self.model_fields_set and self.law not in laws:
                 raise ValueError(
-                    f"must not give {key}, which does not act with law {self.law!r}{TAKE_AWAY}"
+                    f"must not give {key}, which does not act with law {self.law}{TAKE_AWAY}"
                 )
         if self.law in WITH_RESTITUTION and self.restitution is None:
-            raise ValueError(f"must give restitution, which law {self.law!r} is made of")
+            raise ValueError(f"must give restitution, which law {self.law} is made of")
         both = {"stiffness_N_per_m", "hertz_stiffness_N_per_m1_5"} & self.model_fields_set
         if len(both) == 2 and self.hertz_stiffness_N_per_m1_5 is not None:
             raise ValueError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict
 
@@ -45,4 +45,3 @@ def ascending(values: Sequence[float], what: str) -> None:
 
 # A list for which a person may write one number.
 OneOrMore = BeforeValidator(_as_list)
-LengthList = Annotated[list[float], OneOrMore]

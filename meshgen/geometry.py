@@ -117,8 +117,8 @@ def _check_span(span: int, length: float, places: tuple[float, ...]) -> None:
     for left, right in zip(places[:-1], places[1:], strict=True):
         if right - left < SHORTEST_GAP:
             raise InputError(
-                f"the droppers at {left:g} and {right:g} m of span {span + 1} are not in ascending "
-                f"order at least {SHORTEST_GAP:g} m apart"
+                f"the droppers at {left:.10g} and {right:.10g} m of span {span + 1} are not in "
+                f"ascending order at least {SHORTEST_GAP:g} m apart"
             )
 
 

@@ -18,6 +18,9 @@ from catenary.solver.errors import InputError
 _LINE_GROUPS = (names.CONTACT_WIRE, names.MESSENGER_WIRE, names.DROPPERS)
 _POINT_GROUPS = (names.STEADY_ARMS, names.SUPPORTS, names.ANCHORS)
 _MAY_BE_EMPTY = (names.DROPPERS, names.STEADY_ARMS, names.SUPPORTS)
+# The mesh of 40 000 spans takes half of it.
+MOST_BYTES = 500_000_000
+_SHOWN, _SOME = 60, 12  # of the names of groups that a file has
 _KINDS = {0: "points", 1: "lines", 2: "surfaces", 3: "volumes"}
 
 
@@ -54,6 +57,9 @@ def read_mesh(path: Path) -> LineMesh:
 def _load(path: Path) -> meshio.Mesh:
     if not path.is_file():
         raise InputError(f"the mesh file {path} does not exist")
+    size = path.stat().st_size
+    if size > MOST_BYTES:
+        raise InputError(f"the mesh file {path} has {size} bytes; at most {MOST_BYTES} are allowed")
     try:
         # meshio prints what it does not understand; what matters to us is checked below.
         with warnings.catch_warnings(), contextlib.redirect_stderr(io.StringIO()):
@@ -65,14 +71,17 @@ def _load(path: Path) -> meshio.Mesh:
                 f"{path}: some elements are in no physical group: save the mesh in Gmsh without "
                 "the option to save all elements (Mesh.SaveAll = 0), or as MSH 2.2"
             ) from error
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(f"{path} cannot be read as a Gmsh mesh file: {reason}") from error
+        # Its own words may repeat what the file holds, and a scene may name any file.
+        raise InputError(
+            f"{path} cannot be read as a Gmsh mesh file: it is none (MSH 2.2 or 4.1), or damaged"
+        ) from error
 
 
 def _members(content: meshio.Mesh, name: str, dimension: int, path: Path) -> np.ndarray:
     """Elements of a physical group, shape (n, 2) for lines; node numbers, (n,), for points."""
     if name not in content.field_data:
-        present = ", ".join(sorted(content.field_data)) or "none"
+        names_there = sorted(str(found)[:_SHOWN] for found in content.field_data)[:_SOME]
+        present = ", ".join(names_there) or "none"
         raise InputError(
             f"{path}: the physical group {name} of {_KINDS[dimension]} is missing (present: "
             f"{present})"
