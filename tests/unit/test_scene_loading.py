@@ -216,7 +216,8 @@ def test_a_sentence_says_whether_the_file_or_the_command_line_is_wrong(tmp_path:
     with pytest.raises(InputError) as caught:
         load_scene(file)
     assert str(caught.value) == (
-        f"line.contact_wire.tension_N is -5 in {file}; it must be greater than 0 [N]"
+        f"line.contact_wire.tension_N is -5 in {file}; it must be greater than 0 [N]; usual are "
+        "5000 to 40000 N"
     )
     with pytest.raises(InputError, match=r"is -6 on the command line \(--set\)"):
         load_scene(file, ["line.contact_wire.tension_N=-6"])
