@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from catenary.cases import console
+from catenary.cases.run.output_folder import refuse_impossible
 from catenary.solver.errors import InputError
 
 if TYPE_CHECKING:
@@ -151,8 +152,7 @@ def run(
 
     def read() -> tuple[Scene, list[str]]:
         more, options = split_extras(extras or [])
-        if out.exists() and not out.is_dir():
-            raise InputError(f"-o {out} is a file; name a folder for the results")
+        refuse_impossible(out)
         return load_scene(case, [*(assignments or []), *more], shortened), options
 
     comm, scene, arguments = begin(read, verbose, lambda scene: scene)
@@ -186,6 +186,7 @@ def restart(
         more, options = split_extras(extras or [])
         if more:
             raise InputError(f"{more[0]} cannot be changed when a run is continued")
+        refuse_impossible(folder)
         if not folder.is_dir():
             raise InputError(f"{folder} is no folder; name the folder of a run")
         with Results(folder) as results:

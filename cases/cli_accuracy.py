@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.cases import cli, console
+from catenary.cases.run.output_folder import refuse_impossible
 from catenary.solver.errors import InputError
 
 if TYPE_CHECKING:
@@ -63,8 +64,7 @@ def accuracy(
 
     def read() -> tuple[Plan, list[str]]:
         more, options = split_extras(extras or [])
-        if out.exists() and not out.is_dir():
-            raise InputError(f"-o {out} is a file; name a folder for the results")
+        refuse_impossible(out)
         if not 1 <= repeats <= _MOST_REPEATS:
             raise InputError(f"--repeats {repeats} must be between 1 and {_MOST_REPEATS}")
         overrides = [*(assignments or []), *more]
@@ -75,15 +75,17 @@ def accuracy(
     comm, plan, arguments = cli.begin(read, verbose, lambda made: made.jobs[0].scene)
     from catenary.cases import accuracy as study
     from catenary.cases import accuracy_output
+    from catenary.cases.run.folder_lock import held
     from catenary.solver.parallel import on_root
 
-    found, ended = study.run(
-        plan, out, comm, force=force, petsc_options=arguments, tell=console.say
-    )
-    if found is None:
-        console.complain("the study was interrupted; the same command continues it")
-        return console.BROKEN
-    files = on_root(comm, lambda: accuracy_output.write(found, out, wanted))
+    with held(out, comm, f"catenary accuracy {case}"):
+        found, ended = study.run(
+            plan, out, comm, force=force, petsc_options=arguments, tell=console.say
+        )
+        if found is None:
+            console.complain("the study was interrupted; the same command continues it")
+            return console.BROKEN
+        files = on_root(comm, lambda: accuracy_output.write(found, out, wanted))
     console.say("\n" + accuracy_output.as_text(found, wanted))
     console.say(f"\n{len(ended)} runs, {found.wall:.0f} s\n" + "\n".join(map(str, files)))
     return console.DONE

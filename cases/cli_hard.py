@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.cases import cli, console
+from catenary.cases.run.output_folder import refuse_impossible
 from catenary.solver.errors import InputError
 
 if TYPE_CHECKING:
@@ -138,8 +139,7 @@ def _line(row: Criterion) -> str:
 def _refuse_to_write(out: Path | None, force: bool) -> None:
     if out is None:
         return
-    if out.exists() and not out.is_dir():
-        raise InputError(f"-o {out} is a file; name a folder for the results")
+    refuse_impossible(out)
     if (out / TABLES[0]).exists() and not force:
         raise InputError(
             f"{out / TABLES[0]} is there already; name another folder with -o, or give --force"

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from catenary.cases import cli, console
+from catenary.cases.run.output_folder import refuse_impossible
 from catenary.solver.errors import InputError
 
 TABLE, PICTURE = "stability_map.csv", "stability_map.png"
@@ -39,8 +40,7 @@ def stability_map(
     from catenary.postproc import plots
     from catenary.postproc.storage import write_all
 
-    if out.exists() and not out.is_dir():
-        raise InputError(f"-o {out} is a file; name a folder for the results")
+    refuse_impossible(out)
     if (out / TABLE).exists() and not force:
         raise InputError(
             f"{out / TABLE} is there already; name another folder with -o, or give --force"

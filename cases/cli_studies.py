@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from catenary.cases import cli, console
+from catenary.cases.run.output_folder import refuse_impossible
 from catenary.solver.errors import InputError
 
 if TYPE_CHECKING:
@@ -84,13 +85,15 @@ def sweep(
 
     comm, jobs, arguments = cli.begin(read, verbose, lambda made: made[0].scene)
     from catenary.cases import sweep_output
+    from catenary.cases.run.folder_lock import held
     from catenary.cases.sweep import run_jobs
     from catenary.solver.parallel import on_root
 
-    ended = run_jobs(jobs, out, comm, force=force, petsc_options=arguments, tell=console.say)
     name = jobs[0].scene.case.name
     show = _names(plotted) or sweep_output.PLOTTED
-    files = on_root(comm, lambda: sweep_output.write(out, name, ended, show))
+    with held(out, comm, f"catenary sweep {case}"):
+        ended = run_jobs(jobs, out, comm, force=force, petsc_options=arguments, tell=console.say)
+        files = on_root(comm, lambda: sweep_output.write(out, name, ended, show))
     console.say("\n" + sweep_output.as_text(ended))
     console.say("\n" + "\n".join(str(path) for path in files))
     return verdict(ended, "sweep")
@@ -110,16 +113,19 @@ def run_study(
     from catenary.cases.study import Plan, find_study, make_plan
 
     def read() -> tuple[Plan, list[str]]:
+        refuse_impossible(out)
         more, options = split_extras(extras)
         console.say(f"--study runs the program {find_study(case)}, which may do all that you may")
         return make_plan(case, [*assignments, *more], shortened), options
 
     comm, plan, arguments = cli.begin(read, verbose, lambda made: made.jobs[0].scene)
     from catenary.cases import study
+    from catenary.cases.run.folder_lock import held
 
-    report, ended = study.run(
-        plan, out, comm, force=force, petsc_options=arguments, tell=console.say
-    )
+    with held(out, comm, f"catenary run {case} --study"):
+        report, ended = study.run(
+            plan, out, comm, force=force, petsc_options=arguments, tell=console.say
+        )
     if report is not None:
         console.say("\n" + report)
     return verdict(ended, "study")
@@ -149,8 +155,7 @@ def _names(text: str | None) -> list[str]:
 
 def _refuse_other_sweep(out: Path, jobs: Sequence[Any], force: bool) -> None:
     """Refuse to replace the table of a sweep that had variants which this one has not."""
-    if out.exists() and not out.is_dir():
-        raise InputError(f"-o {out} is a file; name a folder for the results")
+    refuse_impossible(out)
     path = out / "sweep.json"
     if force or not path.is_file():
         return

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.cases.pantograph_study import PantographStudy, fit_error
+from catenary.cases.run.output_folder import refuse_impossible
 from catenary.postproc.plots import COLOURS, LIGHT, legend_above, new_figure, png, tidy
 from catenary.postproc.storage import write_whole
 from catenary.solver.errors import InputError, RunBroken
@@ -18,8 +19,7 @@ FILES = ("receptance.csv", "receptance.png", "lumped.toml")
 
 def new_files(folder: Path, force: bool) -> None:
     """Raise ``InputError`` unless the files can be written into ``folder``."""
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"-o {folder} is a file; name a folder for the results")
+    refuse_impossible(folder)
     there = [name for name in FILES if (folder / name).exists()]
     if there and not force:
         raise InputError(f"-o {folder} has {there[0]} already; give --force to replace it")

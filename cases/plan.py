@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.cases.incident_facts import incident_facts
 from catenary.cases.pantograph_facts import kind_lines
+from catenary.cases.run.output_folder import RunSize
 from catenary.cases.scene import Scene
 from catenary.mbs.build import has_joints
 from catenary.mbs.multibody import MultibodyData
 from catenary.solver import effects
 from catenary.solver.problem import Numerics, Problem, n_halvings
+
+if TYPE_CHECKING:
+    from catenary.meshgen.mesh import LineMesh
 
 # Cost model of the march on one rank, records included: overhead of a step, and time per unknown.
 # Runs of the case ambrosio2012 on 25, 100 and 1000 spans, 4.5e3 to 1.8e5 unknowns, on a two-core
@@ -120,15 +124,21 @@ def effect_rows(scene: Scene, problem: Problem) -> tuple[list[EffectRow], list[E
     return on, off
 
 
-def make_plan(scene: Scene) -> Plan:
-    """The plan of a scene; makes the mesh to count its nodes. Not collective."""
+def run_size(scene: Scene, mesh: LineMesh) -> RunSize:
+    """What a run of a scene takes, by its plan. Not collective."""
+    plan = make_plan(scene, mesh)
+    return RunSize(plan.file_size, plan.march, plan.n_steps)
+
+
+def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
+    """The plan of a scene; makes the mesh if it is not given. Not collective."""
     import numpy as np
 
     from catenary.cases.meshing import mesh_of
     from catenary.meshgen.mesh import CONTACT_WIRE
 
     problem = scene.to_problem()
-    mesh = mesh_of(scene)
+    mesh = mesh_of(scene) if mesh is None else mesh
     on, off = effect_rows(scene, problem)
     unknowns = effects.unknowns_per_node(effects.active(problem))
     n_dofs = mesh.n_nodes * len(unknowns)

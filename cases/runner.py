@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import logging
-import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -22,7 +21,9 @@ from catenary.cases.incident_facts import incident_facts
 from catenary.cases.interrupts import StopRequest
 from catenary.cases.meshing import mesh_of
 from catenary.cases.pantograph_facts import header_facts
-from catenary.cases.plan import effect_rows, flush_cadence
+from catenary.cases.plan import effect_rows, flush_cadence, run_size
+from catenary.cases.run.folder_lock import held
+from catenary.cases.run.output_folder import RunSize, check_size, prepare
 from catenary.cases.scene import Scene
 from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.fields import FieldRecorder
@@ -107,6 +108,7 @@ def run_case(
     petsc_options: Sequence[str] = (),
     tell: Callable[[str], None] = lambda outcome: None,
     only_summary: bool = False,
+    large: bool | None = None,
 ) -> RunOutcome:
     """Simulate a scene and write results, fields and report into ``out_dir``. Collective.
 
@@ -118,31 +120,37 @@ def run_case(
     tell : called with the outcome on all ranks when the result file is closed, before the report
         is drawn: an MPI launcher that is interrupted leaves its processes a second
     only_summary : of the report write ``summary.json`` alone, which costs no time
+    large : whether a run may pass the bounds on its size; as ``force`` if not given
 
     Raises
     ------
     InputError
-        If the line or an option of PETSc is impossible, if results are there already or the
-        folder cannot be written to; nothing is written then.
+        If the line or an option of PETSc is impossible, if results are there already, if the
+        folder cannot be written to or is another run's, or if the run is too large; nothing is
+        written then.
     RunBroken
         If files cannot be written.
     """
-    on_root(comm, lambda: refuse_to_write(out_dir, force))
-    phases = Phases(Progress(comm))
-    problem = scene.to_problem()
-    at_rest = _at_rest(scene, problem, comm, phases)
-    return _march(
-        scene,
-        problem,
-        at_rest,
-        out_dir,
-        comm,
-        phases,
-        petsc_options,
-        tell,
-        resume=False,
-        only_summary=only_summary,
-    )
+    with held(out_dir, comm, f"catenary run {scene.case.name}"):
+        on_root(comm, lambda: prepare(out_dir, force))
+        phases = Phases(Progress(comm))
+        problem = scene.to_problem()
+        allowed = force if large is None else large
+        at_rest = _at_rest(
+            scene, problem, comm, phases, lambda size: check_size(out_dir, size, allowed)
+        )
+        return _march(
+            scene,
+            problem,
+            at_rest,
+            out_dir,
+            comm,
+            phases,
+            petsc_options,
+            tell,
+            resume=False,
+            only_summary=only_summary,
+        )
 
 
 def restart_case(
@@ -161,13 +169,16 @@ def restart_case(
     Raises
     ------
     InputError
-        If there is nothing to continue.
+        If there is nothing to continue, or if another process writes into the folder.
     """
-    on_root(comm, lambda: _refuse_to_continue(out_dir))
-    phases = Phases(Progress(comm))
-    problem = scene.to_problem()
-    at_rest = _at_rest(scene, problem, comm, phases)
-    return _march(scene, problem, at_rest, out_dir, comm, phases, petsc_options, tell, resume=True)
+    with held(out_dir, comm, f"catenary restart {out_dir}"):
+        on_root(comm, lambda: _refuse_to_continue(out_dir))
+        phases = Phases(Progress(comm))
+        problem = scene.to_problem()
+        at_rest = _at_rest(scene, problem, comm, phases)
+        return _march(
+            scene, problem, at_rest, out_dir, comm, phases, petsc_options, tell, resume=True
+        )
 
 
 def static_table(scene: Scene) -> dict[str, np.ndarray]:
@@ -184,10 +195,25 @@ def static_table(scene: Scene) -> dict[str, np.ndarray]:
     return {name.rsplit("/", 1)[-1]: values for name, values in data.items()}
 
 
-def _at_rest(scene: Scene, problem: Problem, comm: Any, phases: Phases) -> AtRest:
-    """Mesh and equilibrium, found on rank 0 and given to all. Collective."""
+def _at_rest(
+    scene: Scene,
+    problem: Problem,
+    comm: Any,
+    phases: Phases,
+    judge: Callable[[RunSize], None] = lambda size: None,
+) -> AtRest:
+    """Mesh and equilibrium, found on rank 0 and given to all. Collective.
+
+    ``judge`` sees the size of the run as soon as the mesh is there, on rank 0.
+    """
+
+    def make_mesh() -> LineMesh:
+        mesh = mesh_of(scene)
+        judge(run_size(scene, mesh))
+        return mesh
+
     with phases("mesh"):
-        mesh: LineMesh = on_root(comm, lambda: mesh_of(scene))
+        mesh: LineMesh = on_root(comm, make_mesh)
     with phases("equilibrium"):
 
         def rest() -> tuple[Equilibrium, np.ndarray, Elasticity]:
@@ -346,22 +372,6 @@ def _cadence(every: float, dt: float) -> int | None:
 def _checkpoint(out_dir: Path) -> dict[str, Any]:
     with Results(out_dir / RESULT) as results:
         return results.checkpoint
-
-
-def refuse_to_write(out_dir: Path, force: bool) -> None:
-    """Raise InputError if a folder cannot be written to or holds a run; ``force`` allows that."""
-    place = next(p for p in (out_dir, *out_dir.absolute().parents) if p.exists())
-    if not place.is_dir() or not os.access(place, os.W_OK | os.X_OK):
-        raise InputError(
-            f"the folder {out_dir} for the results cannot be made or written to, because {place} "
-            f"is {'read-only' if place.is_dir() else 'no folder'}; name another one with -o"
-        )
-    result = out_dir / RESULT
-    if result.exists() and not force:
-        raise InputError(
-            f"{result} holds the results of an earlier run; name another folder with -o, or give "
-            "--force to replace them"
-        )
 
 
 def _refuse_to_continue(out_dir: Path) -> None:

@@ -13,14 +13,15 @@ from pathlib import Path
 from typing import Any
 
 from catenary.cases.jobs import Ended, Job
-from catenary.cases.runner import RESULT, refuse_to_write, run_case
+from catenary.cases.run.output_folder import refuse_earlier, refuse_impossible
+from catenary.cases.runner import RESULT, run_case
+from catenary.postproc.record.own_files import VARIANT_FILE as RECORD
 from catenary.postproc.result_file import DONE, INTERRUPTED
 from catenary.postproc.results import Results
 from catenary.postproc.storage import plain, write_all
 from catenary.solver.errors import CatenaryError, InputError
 from catenary.solver.parallel import on_root
 
-RECORD = "variant.json"
 # What is taken from an open result file beside the summary: plain values by name.
 Measure = Callable[[Results], dict[str, Any]]
 
@@ -42,7 +43,7 @@ def run_jobs(
     Parameters
     ----------
     jobs : the same on all ranks
-    force : run all anew, whatever is there
+    force : run all anew, whatever is there, and however large the runs are
     petsc_options : the options that PETSc was started with, for the record
     measure : takes figures from each result file, on rank 0
     tell : called with a line before and after each run
@@ -66,7 +67,7 @@ def run_jobs(
             ended.append(found)
             continue
         tell(place)
-        one = _run(job, out_dir / job.variant.name, comm, petsc_options, measure)
+        one = _run(job, out_dir / job.variant.name, comm, petsc_options, measure, force)
         ended.append(one)
         if one.outcome == INTERRUPTED:
             break
@@ -83,10 +84,10 @@ def _run(
     comm: Any,
     petsc_options: Sequence[str],
     measure: Measure | None,
+    large: bool,
 ) -> Ended:
     """Run one job and leave its record. Collective; raises only if that cannot be written."""
     clock = time.perf_counter()
-    on_root(comm, lambda: (folder / RECORD).unlink(missing_ok=True))
     try:
         result = run_case(
             job.scene,
@@ -95,6 +96,7 @@ def _run(
             force=True,
             petsc_options=petsc_options,
             only_summary=not job.full_report,
+            large=large,
         )
         outcome, summary = result.outcome, result.summary
     except CatenaryError as error:  # the same on all ranks
@@ -127,7 +129,8 @@ def _leave_record(job: Job, folder: Path, measure: Measure | None, wall: float) 
 
 def _earlier(jobs: Sequence[Job], out_dir: Path, force: bool, measured: bool) -> list[Ended | None]:
     """What is there of each job: how it ended, None if it is to be run."""
-    refuse_to_write(out_dir, force)
+    refuse_impossible(out_dir)
+    refuse_earlier(out_dir, force)
     if force:
         return [None] * len(jobs)
     return [_found(job, out_dir / job.variant.name, measured) for job in jobs]

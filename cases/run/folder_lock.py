@@ -133,8 +133,13 @@ class FolderLock:
             os.rename(LOCK_FILE, aside, src_dir_fd=self._directory, dst_dir_fd=self._directory)
             if not os.path.samestat(self._stat(aside), os.fstat(old)):
                 here = self._directory
-                with contextlib.suppress(FileExistsError):
+                try:
                     os.link(aside, LOCK_FILE, src_dir_fd=here, dst_dir_fd=here)
+                except FileExistsError:
+                    pass
+                except OSError:  # a file system without links
+                    os.rename(aside, LOCK_FILE, src_dir_fd=here, dst_dir_fd=here)
+                    return
             os.unlink(aside, dir_fd=self._directory)
         except FileNotFoundError:
             return
@@ -176,7 +181,7 @@ def held(folder: Path, comm: Any, command: str) -> Iterator[None]:
 
 def refusal(folder: Path, error: OSError) -> InputError:
     """The sentence for a folder that cannot be made or written to."""
-    said = reason(error)
+    said, advice = reason(error), remedy(error)
     if code_of(error) in (errno.ENOTDIR, errno.EEXIST):
         blocked = next(
             (one for one in (folder, *folder.parents) if os.path.lexists(one) and not one.is_dir()),
@@ -184,9 +189,9 @@ def refusal(folder: Path, error: OSError) -> InputError:
         )
         broken_link = blocked.is_symlink() and not blocked.exists()
         said = f"{blocked} is {'a link that leads nowhere' if broken_link else 'no folder'}"
+        advice = "choose another output folder"
     return InputError(
-        f"the folder {folder} for the results cannot be made or written to ({said}): "
-        f"{remedy(error)}"
+        f"the folder {folder} for the results cannot be made or written to ({said}): {advice}"
     )
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import logging
 import os
+import stat
 from pathlib import Path
 from typing import NamedTuple
 
@@ -70,6 +72,22 @@ def prepare(folder: Path, force: bool) -> None:
             trial.unlink()
 
 
+def refuse_impossible(folder: Path) -> None:
+    """Raise InputError if a folder of this name cannot be, without making it. Not collective."""
+    try:
+        found = os.stat(folder)
+    except FileNotFoundError:
+        # Whether it can be made is seen when the folder is locked; this takes no time.
+        above = next(path for path in folder.absolute().parents if path.exists())
+        if not os.access(above, os.W_OK | os.X_OK):
+            raise refusal(folder, PermissionError(errno.EACCES, "")) from None
+        return
+    except OSError as error:
+        raise refusal(folder, error) from error
+    if not stat.S_ISDIR(found.st_mode):
+        raise InputError(f"-o {folder} is a file; name a folder for the results")
+
+
 def refuse_earlier(folder: Path, force: bool) -> None:
     """Raise InputError if a folder holds a run's results and ``force`` is not given."""
     result = folder / RUN_FILE
@@ -103,19 +121,20 @@ def check_size(folder: Path, size: RunSize, force: bool) -> None:
         f"{size.n_steps} steps take about {duration(size.seconds)} and {volume(size.n_bytes)} in "
         f"{folder}, where {volume(room)} are free"
     )
+    beyond = size.n_bytes > MOST_BYTES or size.seconds > MOST_SECONDS or size.n_steps > MOST_STEPS
     if not force:
         if size.n_bytes > room:
             raise InputError(
                 f"there is no room for the results: {takes}; free some space, name another folder "
                 "with -o, record less, or give --force to run until the disk is full"
             )
-        if size.n_bytes > MOST_BYTES or size.seconds > MOST_SECONDS or size.n_steps > MOST_STEPS:
+        if beyond:
             raise InputError(
                 f"the run is very large: {takes}; beyond {volume(MOST_BYTES)}, "
                 f"{duration(MOST_SECONDS)} or {MOST_STEPS} steps give --force to run it all the "
                 "same"
             )
-    if size.n_bytes > LARGE or size.seconds > LONG:
+    if beyond or size.n_bytes > LARGE or size.seconds > LONG:
         logger.info(takes)
 
 

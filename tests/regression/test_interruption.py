@@ -199,7 +199,8 @@ def test_a_full_disk_ends_the_run_with_a_sentence(room: str, ranks: int, tmp_pat
     disk, kept = tmp_path / "disk", tmp_path / "kept"
     disk.mkdir()
     out = disk / "out"
-    words = short_run(out, SHORT_FLUSHES, "numerics.dt_s=1e-4")
+    # Without --force the lack of room is seen before anything is computed.
+    words = [*short_run(out, SHORT_FLUSHES, "numerics.dt_s=1e-4"), "--force"]
     # The disk is there for these processes only.
     script = tmp_path / "on_a_small_disk.sh"
     script.write_text(

@@ -1,0 +1,51 @@
+"""A result folder in use is refused to all others, by every verb that writes results."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+import pytest
+from program import MPIRUN, assert_sound, catenary, catenary_started, n_rows, short_run
+
+LOCK = ".catenary.lock"
+LONG = ("numerics.dt_s=1e-5", "output.flush_every_steps=500")
+
+
+def test_a_live_run_is_left_alone_and_can_be_looked_at(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with catenary_started(*short_run(out, *LONG), cwd=tmp_path) as program:
+        program.wait_for(lambda: n_rows(out / "run.h5") > 500)
+        for other in ([*short_run(out), "--force"], ["restart", str(out)]):
+            refused = catenary(*other, cwd=tmp_path)
+            assert refused.code == 2, refused.stderr
+            (sentence,) = refused.stderr.splitlines()
+            pid = program.process.pid
+            assert f"{out} is in use by process {pid} on " in sentence
+            assert "`catenary run en50318_2002`" in sentence and "sign of life" in sentence
+        looked = catenary("report", str(out), cwd=tmp_path)
+        assert looked.code == 0, looked.stderr
+        rows = n_rows(out / "run.h5")
+        program.wait_for(lambda: n_rows(out / "run.h5") > rows)
+        program.send(signal.SIGTERM)
+        done = program.end()
+    assert done.code == 1 and "was interrupted" in done.stderr
+    assert assert_sound(out / "run.h5") > rows
+    assert not (out / LOCK).exists()
+
+
+@pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
+def test_several_ranks_hold_one_lock_and_leave_it_when_killed(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with catenary_started(*short_run(out, *LONG), cwd=tmp_path, ranks=2) as program:
+        program.wait_for(lambda: n_rows(out / "run.h5") > 500)
+        refused = catenary(*short_run(out), "--force", cwd=tmp_path, ranks=2)
+        assert refused.code == 2, refused.stderr
+        (sentence,) = refused.sentences
+        assert f"{out} is in use by process {program.pid_of_rank(0)} on " in sentence
+        program.send(signal.SIGKILL)  # with mpirun go its processes
+        program.end()
+    assert (out / LOCK).exists()
+    again = catenary(*short_run(out), "--force", cwd=tmp_path)
+    assert again.code == 0, again.stderr
+    assert not (out / LOCK).exists()
