@@ -67,7 +67,7 @@ def _statistics(a: Results, b: Results) -> list[str]:
         _row("  max dropper force [N]", of_a.droppers.maximum, of_b.droppers.maximum),
         _row("  min dropper force [N]", of_a.droppers.minimum, of_b.droppers.minimum),
     ]
-    return lines + of_a.complaints + of_b.complaints
+    return lines + of_a.complaints + of_b.complaints + a.damage + b.damage
 
 
 def _row(label: str, first: float, second: float) -> str:

@@ -193,7 +193,7 @@ def _html(
         droppers=export.dropper_table(results),
         reference_span=results.reference_span + 1,
         elasticity=1e3 * results.static("elasticity"),
-        remarks=[*indicators.warnings, *remarks(results)],
+        remarks=[*results.damage, *indicators.warnings, *remarks(results)],
         facts=_facts(results) + _mesh_facts(indicators),
         phases=about.get("phase_wall_s", {}),
         config=json.dumps(about["config"], indent=2, ensure_ascii=False),

@@ -3,39 +3,26 @@
 from __future__ import annotations
 
 import itertools
-import json
+import logging
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import h5py
 import numpy as np
 
 from catenary.postproc import channels
+from catenary.postproc.evaluate.records import Records
+from catenary.postproc.evaluate.sound_file import SoundFile
 from catenary.postproc.record import reading
-from catenary.postproc.record.checked import text_of
-from catenary.postproc.record.kept_extremes import extremes_at
 from catenary.postproc.record.line_record import LineRecord, from_table
 from catenary.postproc.result_file import DONE, FORMAT, LINE_TIME, RUNNING, complete_rows
 from catenary.solver.errors import InputError
 
+logger = logging.getLogger("catenary.results")
+
 RESULT_FILE = "run.h5"
-# Files whose line channels stand beside the others, at every step, without extremes.
-EARLIER_FORMAT = "catenary-run-1"
-_JSON_ATTRIBUTES = (
-    "incidents",
-    "versions",
-    "config",
-    "effects_on",
-    "effects_off",
-    "phase_wall_s",
-    "inner_iterations",
-    "pantographs",
-    "n_strips",
-    "line_record",
-)
 
 
 class Results:
@@ -47,30 +34,21 @@ class Results:
     Parameters
     ----------
     path : the result file or the folder that holds it as ``run.h5``
+    records : what ``evaluate.guard`` found in it, None to look for damage here
 
     Raises
     ------
     InputError
-        If there is no such file, or if it is not a result file of this program.
+        If there is no such file, if it is not a result file of this program, or if it is damaged
+        so that no report can be made of it.
     """
 
-    def __init__(self, path: Path | str) -> None:
+    def __init__(self, path: Path | str, records: Records | None = None) -> None:
         path = Path(path)
         self.path = path / RESULT_FILE if path.is_dir() else path
         if not self.path.is_file():
             raise InputError(f"{self.path} does not exist: name a result file or its folder")
-        try:
-            # Without a lock, so that a run that is still going on can be looked at.
-            self._file = h5py.File(self.path, "r", locking=False)
-        except OSError as error:
-            raise InputError(f"{self.path} cannot be read as HDF5 ({error})") from error
-        found = text_of(self._file.attrs.get("format"))
-        if found not in (FORMAT, EARLIER_FORMAT):
-            self._file.close()
-            raise InputError(
-                f'{self.path} is no result file of this program: its attribute "format" is '
-                f"{found!r}, not {FORMAT!r}"
-            )
+        self._file = SoundFile(self.path, records)
 
     def __enter__(self) -> Results:
         return self
@@ -89,16 +67,15 @@ class Results:
 
     # ---- what the run was -------------------------------------------------------------------
 
-    @cached_property
+    @property
     def attributes(self) -> dict[str, Any]:
         """Root attributes, lists and tables decoded, numbers as Python's."""
-        decoded: dict[str, Any] = {}
-        for name, value in self._file.attrs.items():
-            if name in _JSON_ATTRIBUTES:
-                decoded[name] = json.loads(value)
-            else:
-                decoded[name] = text_of(value)
-        return decoded
+        return self._file.attrs
+
+    @property
+    def damage(self) -> list[str]:
+        """A sentence that names the file's damage and what is used of it, none if it is sound."""
+        return self._file.told
 
     @property
     def outcome(self) -> str:
@@ -130,16 +107,14 @@ class Results:
 
     @cached_property
     def _length(self) -> int:
-        lengths = [dataset.shape[0] for dataset in self._file["channels"].values()]
-        return min(complete_rows(self._file)[0], *lengths)
+        return complete_rows(self._file)[0]
 
     @cached_property
     def _line_length(self) -> int:
         """Rows of the line's channels, none of which is later than the last step."""
         if LINE_TIME not in self._file:
             return self._length
-        tables = self._file["line_channels"].values()
-        n = min(complete_rows(self._file)[2], *(table.shape[0] for table in tables))
+        n = complete_rows(self._file)[2]
         return min(n, (self._length - 1) // self.line_record.every + 1) if self._length else 0
 
     @cached_property
@@ -235,7 +210,7 @@ class Results:
         """
         if name not in channels.LINE_CHANNELS:
             return reading.extremes(self._file[f"channels/{name}"], self._length)
-        kept = extremes_at(self._file, self._length)
+        kept = self._file.extremes(self._length)
         if kept is not None:
             return kept[name]
         table = self._table(name)
@@ -243,11 +218,11 @@ class Results:
             return np.full((2, self._n_places(name)), np.nan)
         return reading.extremes(table, self._line_length)
 
-    def _table(self, name: str) -> h5py.Dataset | None:
+    def _table(self, name: str) -> Any:
         """The table of a channel, None if the channel was not recorded."""
         if name in channels.LINE_CHANNELS and f"line_channels/{name}" in self._file:
             return self._file[f"line_channels/{name}"]
-        return self._file.get(f"channels/{name}")
+        return self._file[f"channels/{name}"] if f"channels/{name}" in self._file else None
 
     def _n_places(self, name: str) -> int:
         """Columns that a channel of the line has if all are recorded."""
@@ -291,7 +266,7 @@ class Results:
     @property
     def has_violations(self) -> bool:
         """Whether a pantograph has joints in the time loop."""
-        return channels.CONSTRAINT_VIOLATION.name in self._file["channels"]
+        return f"channels/{channels.CONSTRAINT_VIOLATION.name}" in self._file
 
     def constraint_violations(self) -> np.ndarray | None:
         """Largest open joint of each pantograph at each record, (n, n_pantographs) [m].
@@ -336,10 +311,8 @@ class Results:
         """Energies by name, each (m,), empty if the run did not record them."""
         if "energy" not in self._file:
             return {}
-        group = self._file["energy"]
-        lengths = [group[name].shape[0] for name in channels.ENERGIES]
-        n = min(complete_rows(self._file)[1], *lengths)
-        return {name: np.asarray(group[name][:n]) for name in channels.ENERGIES}
+        n = complete_rows(self._file)[1]
+        return {name: np.asarray(self._file[f"energy/{name}"][:n]) for name in channels.ENERGIES}
 
     # ---- constants --------------------------------------------------------------------------
 
@@ -370,25 +343,19 @@ class Results:
 
     @property
     def checkpoint(self) -> dict[str, Any]:
-        """The latest state to continue from.
+        """The latest sound state to continue from.
 
         Raises
         ------
         InputError
-            If the file holds none.
+            If the file holds none, or is of an earlier version.
         """
-        group = self._file.get("checkpoint")
-        if group is None or "latest" not in group.attrs:
-            raise InputError(f"{self.path} holds no state to continue from")
         if self.attributes["format"] != FORMAT:
             raise InputError(
                 f"{self.path} was written by an earlier version of Catenary, which this one reads "
                 "but cannot continue; start the run anew"
             )
-        slot = group[text_of(group.attrs["latest"])]
-        return {name: _value(dataset) for name, dataset in slot.items()}
-
-
-def _value(dataset: h5py.Dataset) -> Any:
-    value = dataset[()]
-    return value.decode() if isinstance(value, bytes) else value
+        state, told = self._file.state()
+        for sentence in told:
+            logger.warning("%s", sentence)
+        return state

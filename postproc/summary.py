@@ -59,7 +59,7 @@ def summarise(
         "acceptance": [_criterion(c) for c in criteria],
         "passed": verdict(criteria) if results.complete else None,
         "indicators": indicators.as_table(indicators.indicate(results)),
-        "complaints": statistics.complaints,
+        "complaints": statistics.complaints + results.damage,
         "effects_on": [name for name, _, _ in attributes["effects_on"]],
         "effects_off": [name for name, _, _ in attributes["effects_off"]],
         "versions": attributes["versions"],
@@ -77,8 +77,8 @@ def real_time_factor(results: Results) -> float | None:
 
     Of a resumed run this is the speed of its last part.
     """
-    wall = results.attributes.get("march_wall_s")
-    return results.attributes["marched_s"] / wall if wall else None
+    wall, marched = (results.attributes.get(name) for name in ("march_wall_s", "marched_s"))
+    return marched / wall if wall and marched is not None else None
 
 
 def _pantograph(

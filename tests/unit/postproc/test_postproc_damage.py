@@ -1,0 +1,272 @@
+"""Damaged result files: one sentence for what cannot be used, the rest is read.
+
+Each row of the tables is a way to damage a file and what is told of it. FUZZ_DAMAGE says how many
+of the random mutations are tried of each kind; FUZZ_SEED where they begin.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from damaging import attribute_mutations, dataset_mutations, flip, raw_ranges, unseal
+
+from catenary.postproc import report
+from catenary.postproc.compare import compare
+from catenary.postproc.results import Results
+from catenary.solver.errors import InputError
+
+SEED = int(os.environ.get("FUZZ_SEED", "1"))
+MUTATIONS = int(os.environ.get("FUZZ_DAMAGE", "15"))
+FLUSH = 200
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory, make_march: Any, record_run: Any) -> Path:
+    """A finished run of 1601 records, with statistics."""
+    folder = tmp_path_factory.mktemp("sound")
+    march = make_march(n_steps=1600, dt=5e-3)
+    return Path(record_run(folder / "run.h5", march, energy_every=100, flush_every=FLUSH))
+
+
+@pytest.fixture
+def copy(sound: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copy(sound, tmp_path / "run.h5"))
+
+
+def removed(name: str) -> Callable[[h5py.File], None]:
+    return lambda file: file.attrs.__delitem__(name)
+
+
+def put(name: str, value: Any) -> Callable[[h5py.File], None]:
+    return lambda file: file.attrs.__setitem__(name, value)
+
+
+def value(path: str, row: int, number: float) -> Callable[[h5py.File], None]:
+    def apply(file: h5py.File) -> None:
+        file[path][row] = number
+
+    return apply
+
+
+def gone(path: str) -> Callable[[h5py.File], None]:
+    return lambda file: file.__delitem__(path)
+
+
+# Damage after which there is no report, and what is told. The checksums of attributes are taken
+# away first, as in a file of an earlier version.
+REFUSED: dict[str, tuple[Callable[[h5py.File], None], str]] = {
+    "no case": (removed("case"), 'its attribute "case" is missing'),
+    "edition 2099": (put("edition", "2099"), '"edition" is not one of 2006, 2012'),
+    "no step": (put("dt_s", 0.0), '"dt_s" is not a number above 0'),
+    "step NaN": (put("dt_s", np.nan), '"dt_s" is not a number above 0'),
+    "speed as text": (put("speed_m_per_s", "fast"), '"speed_m_per_s" is not a number'),
+    "half a scene": (put("config", '{"line": {'), '"config" is not a scene as JSON'),
+    "scene without damping": (put("config", '{"line": {}}'), "(see line.contact_wire.tension_N)"),
+    "unknowns": (put("n_dofs", np.arange(3)), '"n_dofs" is not a whole number'),
+    "no times": (gone("time"), "time is missing or cannot be read"),
+    "no forces": (gone("channels/contact_force"), "channels/contact_force is missing"),
+    "no channels": (gone("channels"), "channels/contact_position is missing"),
+    "masts": (value("line/support_x", 3, -1e3), "line/support_x does not ascend"),
+    "node beyond": (value("line/droppers", 0, 10**7), "line/droppers names number 10000000"),
+    "NaN at rest": (value("static/elasticity", 2, np.nan), "static/elasticity holds nan"),
+    "evaluation": (
+        value("line/evaluation_range", 1, -5e6),
+        "line/evaluation_range does not ascend",
+    ),
+}
+
+
+@pytest.mark.parametrize("how", REFUSED)
+def test_what_no_report_can_be_made_of_is_refused(how: str, copy: Path) -> None:
+    damage, words = REFUSED[how]
+    with h5py.File(copy, "r+") as file:
+        unseal(file)
+        damage(file)
+    with pytest.raises(InputError) as refused:
+        Results(copy)
+    sentence = str(refused.value)
+    assert sentence.startswith(f"{copy} is damaged: ") and "\n" not in sentence
+    assert words in sentence
+    # What is left of it is told too.
+    assert "its records up to t = 8.000 s are sound" in sentence or "no part of it" in sentence
+
+
+# Damage after which there is a report: what is told, and how many records are used.
+USED: dict[str, tuple[Callable[[h5py.File], None], str, int]] = {
+    "force of 1e156 N": (
+        value("channels/contact_force", 700, 1e156),
+        "record 700 on; 700 of 1601 records are sound; its records up to t = 3.495 s are sound",
+        700,
+    ),
+    "force NaN": (value("channels/contact_force", 40, np.nan), "from record 40 on", 40),
+    "time that jumps": (value("time", 900, 1.0), "time is damaged from record 900 on", 900),
+    "dropper NaN": (
+        value("line_channels/dropper_force", 9, np.nan),
+        "line_channels/dropper_force is damaged in 1 of 1601 records, which are left out",
+        1601,
+    ),
+    "no arms": (
+        gone("line_channels/arm_uplift"),
+        "line_channels/arm_uplift is missing or cannot be read",
+        1601,
+    ),
+    "energies": (value("energy/kinetic", 3, 1e300), "energy/kinetic is damaged from", 1601),
+    "no rows told": (value("complete_rows", 0, 0), "0 of 1601 records are sound", 0),
+    "more rows": (value("complete_rows", 0, 10**9), "complete_rows is damaged", 1601),
+    "title": (put("title", np.arange(3)), 'its attribute "title" is not text', 1601),
+    "facts": (put("pantographs", "[3]"), '"pantographs" is not a list of tables', 1601),
+}
+
+
+@pytest.mark.parametrize("how", USED)
+def test_what_is_sound_is_used_and_the_rest_told(how: str, copy: Path, sound: Path) -> None:
+    damage, words, n_rows = USED[how]
+    with h5py.File(copy, "r+") as file:
+        unseal(file)
+        damage(file)
+    with Results(copy) as results, Results(sound) as before:
+        (sentence,) = results.damage
+        assert before.damage == []
+        assert sentence.startswith("run.h5 is damaged: ") and words in sentence
+        assert results.time.size == n_rows
+        force = results.channel("contact_force")
+        np.testing.assert_array_equal(force, before.channel("contact_force")[:n_rows])
+    report.write_summary(copy, copy.parent)
+    assert words in (copy.parent / "summary.json").read_text().replace('\\"', '"')
+    assert words in compare(sound, copy)
+
+
+@pytest.mark.parametrize("how", ["no arms", "force of 1e156 N"])
+def test_a_report_is_drawn_around_the_damage(how: str, copy: Path) -> None:
+    with h5py.File(copy, "r+") as file:
+        USED[how][0](file)
+    report.write_report(copy, copy.parent)
+    assert "run.h5 is damaged: " in (copy.parent / "report.html").read_text()
+
+
+def test_a_damaged_chunk_costs_its_rows_alone(copy: Path, sound: Path) -> None:
+    with h5py.File(copy) as file:
+        info = file["line_channels/dropper_force"].id.get_chunk_info(3)
+    spoil(copy, info.byte_offset + 100)
+    with Results(copy) as results, Results(sound) as before:
+        (sentence,) = results.damage
+        assert "line_channels/dropper_force is damaged in 200 of 1601 records" in sentence
+        found, expected = (r.channel("dropper_force") for r in (results, before))
+        lost = np.isnan(found).any(axis=1)
+        assert lost.sum() == 200
+        np.testing.assert_array_equal(found[~lost], expected[~lost])
+        np.testing.assert_array_equal(  # they are kept apart
+            results.extremes("dropper_force"), before.extremes("dropper_force")
+        )
+
+
+def test_damaged_forces_end_the_record_before_them(copy: Path) -> None:
+    with h5py.File(copy) as file:
+        table = file["channels/contact_force"].id
+        info = next(
+            table.get_chunk_info(n)
+            for n in range(table.get_num_chunks())
+            if table.get_chunk_info(n).chunk_offset[0] == 2 * FLUSH
+        )
+    spoil(copy, info.byte_offset)
+    with Results(copy) as results:
+        assert results.time.size == 2 * FLUSH
+        assert "its records up to t = 1.995 s are sound" in results.damage[0]
+
+
+def spoil(path: Path, at: int) -> None:
+    """Flip a bit of the byte at a place of a file."""
+    with path.open("r+b") as file:
+        file.seek(at)
+        byte = file.read(1)[0]
+        file.seek(at)
+        file.write(bytes([byte ^ 4]))
+
+
+@pytest.mark.parametrize("slot", ["0", "1"])
+def test_the_sound_one_of_two_states_is_taken(
+    slot: str, copy: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    with h5py.File(copy, "r+") as file:
+        latest = file["checkpoint"].attrs["latest"].decode()
+        file[f"checkpoint/{slot}/state"][3] = np.nan
+        steps = {name: int(group["step"][()]) for name, group in file["checkpoint"].items()}
+    other = "1" if slot == "0" else "0"
+    with Results(copy) as results, caplog.at_level("WARNING", "catenary.results"):
+        state = results.checkpoint
+    assert state["step"] == steps[other]
+    assert (slot == latest) == bool(caplog.records)
+    if caplog.records:
+        assert "differs from its checksum; the one of step" in caplog.records[0].getMessage()
+
+
+# A state that cannot be continued from, in both slots.
+STATES: dict[str, tuple[str, Any, str]] = {
+    "NaN": ("state", np.nan, "state holds NaN or infinity"),
+    "step": ("step", -3, "it has no step"),
+    "step beyond": ("step", 10**6, "it is of step 1000000, and the records before it end"),
+}
+
+
+@pytest.mark.parametrize("how", STATES)
+def test_a_state_that_cannot_be_is_refused(how: str, copy: Path) -> None:
+    name, number, words = STATES[how]
+    with h5py.File(copy, "r+") as file:
+        unseal(file)
+        for slot in file["checkpoint"].values():
+            slot[name][...] = number
+    with Results(copy) as results, pytest.raises(InputError) as refused:
+        results.checkpoint  # noqa: B018
+    assert words in str(refused.value) and "start the run anew" in str(refused.value)
+
+
+def test_a_state_without_the_records_before_it_is_refused(copy: Path) -> None:
+    with h5py.File(copy, "r+") as file:
+        file["complete_rows"][0] = 0
+    with Results(copy) as results, pytest.raises(InputError, match="none of its records"):
+        results.checkpoint  # noqa: B018
+
+
+@pytest.mark.parametrize("sealed", [True, False])
+@pytest.mark.parametrize("mutations", [attribute_mutations, dataset_mutations])
+def test_random_damage_is_told_in_a_sentence(
+    mutations: Any, sealed: bool, sound: Path, tmp_path: Path
+) -> None:
+    every = list(mutations(sound))
+    chosen = random.Random(SEED).sample(every, min(MUTATIONS, len(every)))
+    path = tmp_path / "run.h5"
+    told = 0
+    for mutation in chosen:
+        shutil.copy(sound, path)
+        with h5py.File(path, "r+") as file:
+            mutation.apply(file)
+            if not sealed:
+                unseal(file)
+        try:
+            report.write_summary(path, tmp_path)
+            with Results(path) as results:
+                results.checkpoint  # noqa: B018
+        except InputError as error:
+            assert "\n" not in str(error) and len(str(error)) < 1500, mutation.name
+            told += 1
+        except Exception as error:
+            raise AssertionError(f"{mutation.name}, sealed: {sealed}") from error
+    print(f"{told} of {len(chosen)} refused")
+    assert told
+
+
+def test_numbers_cover_most_of_a_file_and_tables_the_rest(sound: Path, copy: Path) -> None:
+    """What the bit flips of test_fuzz_damage rest on."""
+    covered = sum(end - begin for begin, end in raw_ranges(sound))
+    assert 0.5 < covered / sound.stat().st_size < 1.0
+    at = flip(copy, random.Random(SEED), tables=True)
+    assert all(not begin <= at < end for begin, end in raw_ranges(sound))
+    assert copy.read_bytes() != sound.read_bytes()
