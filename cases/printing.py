@@ -15,6 +15,7 @@ from catenary.cases.catalogue import CaseEntry
 from catenary.cases.keys import ANY, kind_of, tables_in
 from catenary.cases.units import unit_of
 from catenary.meshgen.line import Line
+from catenary.postproc.evaluate.comparing import decimals_that_tell
 from catenary.solver import effects
 
 
@@ -116,9 +117,11 @@ def summary_text(summary: Mapping[str, Any], folder: Path) -> str:
     ]
     words = {True: "passed", False: "FAILED", None: "not judged"}
     for row in summary["acceptance"]:
+        value, limit = row["value"], row["limit"]
+        digits = decimals_that_tell(value, limit, 2)
         lines.append(
-            f"  {words[row['passed']]:10}  {row['criterion']}: {_number(row['value'], 2)}, limit "
-            f"{_number(row['limit'], 2)} {row.get('unit', '')}".rstrip()
+            f"  {words[row['passed']]:10}  {row['criterion']}: {_number(value, digits)}, limit "
+            f"{_number(limit, digits)} {row.get('unit', '')}".rstrip()
         )
     warnings = summary.get("indicators", {}).get("warnings", [])  # older runs have none
     lines += ["", *(f"  WARNING     {text}" for text in warnings)]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import linalg, signal
+from scipy import linalg, optimize, signal
 
 from catenary.postproc import filters
 from catenary.postproc.results import Results
@@ -53,8 +53,8 @@ class Indicators:
     relative_error : (n_pantographs,) the same over the force's standard deviation
     resolved_frequency : highest frequency of a wave on the contact wire that the elements carry
         with less than 1 % error in frequency [Hz]
-    required_frequency : that of the wave ahead of the train which 20 Hz at the pantograph excite,
-        20 Hz / (1 - v / c) [Hz]; infinite where the train is as fast as the wave
+    required_frequency : what the elements have to carry, ``required_frequency`` of 20 Hz [Hz];
+        infinite where the train is as fast as the wave
     warnings : sentences, empty if the settings are fine enough
     """
 
@@ -98,7 +98,7 @@ def indicate(results: Results) -> Indicators:
         relative = error / deviation
     resolved = _resolved(results)
     speed = float(about["speed_m_per_s"]) / float(about["wave_speed_m_per_s"])
-    required = filters.CUT_OFF / (1.0 - speed) if speed < 1.0 else np.inf
+    required = required_frequency(filters.CUT_OFF, speed, method.alpha)
     told = (*_step_warning(relative, results.dt), *_mesh_warning(resolved, required))
     return Indicators(error, relative, resolved, required, told)
 
@@ -155,6 +155,34 @@ def memory(omega: np.ndarray, alpha: float, beta: float) -> np.ndarray:
         - 0.5j * alpha / (1.0 + 1j * alpha * omega)
     )
     return np.asarray(NEAR_MEMORY + 1.0 / (1.0 / LINE_MEMORY + np.abs(number.imag) / np.abs(slope)))
+
+
+def required_frequency(felt: float, speed: float, alpha: float) -> float:
+    """Frequency of the undamped wave that is as long as those which run ahead of the train [Hz].
+
+    A pantograph that moves with v and feels w_0 excites, ahead of itself, w = w_0 + v Re k; on a
+    string with C = alpha K the wave number is k = (w / c) / sqrt(1 + i alpha w). Without damping
+    that is w_0 / (1 - v / c); damping lets what dies out be longer, so that fewer elements carry
+    it. What they have to carry is the length 2 pi / |k|.
+
+    Parameters
+    ----------
+    felt : highest frequency that is felt at the pantograph [Hz]
+    speed : of the train over that of the waves [-]; at 1 and above there is no such wave: infinite
+    alpha : damping on stiffness of the contact wire [s]
+    """
+    if speed >= 1.0:
+        return float("inf")
+    own = 2.0 * np.pi * felt
+
+    def slowness(omega: float) -> complex:
+        return complex(1.0 / np.sqrt(1.0 + 1j * alpha * omega))
+
+    undamped = own / (1.0 - speed)
+    omega = optimize.brentq(
+        lambda w: w * (1.0 - speed * slowness(w).real) - own, own, undamped * (1.0 + 1e-9)
+    )
+    return float(omega * abs(slowness(omega)) / (2.0 * np.pi))
 
 
 def resolved_frequency(
@@ -249,7 +277,7 @@ def _mesh_warning(resolved: float, required: float) -> list[str]:
     if resolved >= required:
         return []
     needs = (
-        f"20 Hz at the pantograph send waves of {required:.0f} Hz ahead of the train"
+        f"20 Hz at the pantograph send waves ahead that are as short as those of {required:.0f} Hz"
         if np.isfinite(required)
         else "the train is as fast as the waves, which no mesh resolves"
     )

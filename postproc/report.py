@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 
 from catenary.postproc import export, plots, standards
 from catenary.postproc import statistics as stats
+from catenary.postproc.evaluate.comparing import decimals_that_tell
 from catenary.postproc.indicators import Indicators, indicate
 from catenary.postproc.record.line_record import says
 from catenary.postproc.remarks import remarks
@@ -183,7 +184,7 @@ def _html(
         + _error_rows(indicators)
         + _violation_row(results),
         criteria=criteria,
-        digits=lambda criterion: 3 if criterion.unit == "%" else 1,
+        digits=lambda c: decimals_that_tell(c.value, c.limit, 3 if c.unit == "%" else 1),
         failed=[c for c in criteria if c.passed is False],
         verdict=standards.verdict(criteria),
         edition=standards.EDITIONS[about["edition"]].title,
@@ -227,8 +228,8 @@ def _mesh_facts(found: Indicators) -> list[tuple[str, str]]:
     return [
         (
             "waves on the contact wire that the mesh carries within 1 %",
-            f"up to {found.resolved_frequency:.0f} Hz; ahead of the train 20 Hz at the pantograph "
-            f"excite {required}",
+            f"up to {found.resolved_frequency:.0f} Hz; waves that 20 Hz at the pantograph excite "
+            f"ahead of the train are as short as those of {required}",
         )
     ]
 

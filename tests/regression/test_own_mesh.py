@@ -94,9 +94,10 @@ def test_a_mesh_of_another_program_gives_nearly_the_same_forces(
         moved = np.abs(np.sort(x) - np.sort(reference)).max()
     assert 0.5 * ROUNDING < moved <= 1.1 * ROUNDING
     differences = largest_differences(out, made)
-    # The shortest element, 1 m, is wrong by two roundings, its bending stiffness (1 / length^3) by
-    # six: 6e-9. Forces and uplifts answer in proportion, by no more than about ten times as much.
-    allowed = 10 * 6 * ROUNDING
+    # The shortest element, 0.625 m, is wrong by two roundings, its bending stiffness (1 / length^3)
+    # by 6 / 0.625: 1e-8. Forces and uplifts answer in proportion, by no more than about ten times
+    # as much.
+    allowed = 10 * 6 / 0.625 * ROUNDING
     print(f"{differences}, allowed {allowed:.0e}")
     assert max(differences.values()) < allowed
 

@@ -16,6 +16,7 @@ from catenary.postproc.indicators import (
     as_table,
     indicate,
     memory,
+    required_frequency,
     resolved_frequency,
     step_error,
 )
@@ -120,6 +121,26 @@ def test_resolved_waves_are_the_modes_that_a_hinged_wire_gets_right(
         exact[last] / (2.0 * np.pi),
         within=1.5 * spacing,
     )
+
+
+def test_waves_ahead_of_the_train_are_shortened_by_its_motion() -> None:
+    """Doppler: 20 Hz / (1 - v / c)."""
+    check("required [Hz]", required_frequency(20.0, 0.6, 0.0), 50.0, within=1e-6)
+    assert required_frequency(20.0, 1.0, 0.0) == np.inf
+
+
+def test_waves_on_a_damped_line_need_no_more_than_their_length() -> None:
+    """The root itself: w - v Re k = w_0 and f = |k| c / 2 pi with k = (w / c) / sqrt(1 + i a w).
+
+    On a heavily damped line at rest k tends to sqrt(w / a) / c.
+    """
+    alpha = 50.0
+    own = 2.0 * np.pi * 20.0
+    expected = np.sqrt(own / alpha) / (2.0 * np.pi)
+    # The next term of the root is 1 / (4 (alpha w)^2) = 6e-9 of it.
+    check("required [Hz]", required_frequency(20.0, 0.0, alpha), expected, within=1e-6 * expected)
+    found = [required_frequency(20.0, 0.7, alpha) for alpha in (0.0, 1e-4, 1e-3, 1e-2, 1e-1)]
+    assert sorted(found, reverse=True) == found
 
 
 def test_finer_elements_resolve_more() -> None:

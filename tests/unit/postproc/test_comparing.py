@@ -1,0 +1,58 @@
+"""Numbers that differ look different."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from catenary.cases.printing import summary_text
+from catenary.postproc.evaluate.comparing import decimals_that_tell
+
+
+@pytest.mark.parametrize(
+    ("value", "limit", "fewest", "expected"),
+    [
+        (67.25, 45.29, 2, 2),
+        (143.359, 143.356, 2, 3),
+        (143.3563, 143.3562, 1, 4),
+        (143.356, 143.356, 2, 2),
+        (math.nan, 143.356, 2, 2),
+        (None, 143.356, 2, 2),
+        (math.inf, 350.0, 1, 1),
+        (1.0, math.nextafter(1.0, 2.0), 2, 11),
+    ],
+)
+def test_decimals_go_on_until_two_numbers_differ(
+    value: float | None, limit: float, fewest: int, expected: int
+) -> None:
+    assert decimals_that_tell(value, limit, fewest) == expected
+
+
+def test_a_summary_shows_by_how_little_a_limit_is_missed() -> None:
+    one = {"name": "pantograph", "loss_percent": 0.0}
+    one |= {f"{name}_N": 1.0 for name in ("mean", "std", "max", "min", "stat_max", "stat_min")}
+    summary = {
+        "case": "made_up",
+        "speed_km_h": 275.0,
+        "evaluation_m": [0.0, 1.0],
+        "pantographs": [one],
+        "droppers": {"n_slackened": 0},
+        "supports": {"max_uplift_mm": 1.0},
+        "n_steps": 1,
+        "n_dofs": 1,
+        "n_ranks": 1,
+        "real_time_factor": 1.0,
+        "acceptance": [
+            {
+                "criterion": "mean contact force",
+                "value": 143.3591,
+                "limit": 143.35625,
+                "unit": "N",
+                "passed": False,
+            }
+        ],
+    }
+    text = summary_text(summary, Path("results"))
+    assert "FAILED      mean contact force: 143.359, limit 143.356 N" in text
