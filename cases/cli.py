@@ -252,7 +252,7 @@ def _end(result: RunOutcome, folder: Path, strict: bool) -> int:
 @app.command(
     "list",
     help="List the shipped cases, or all keys of a scene.",
-    epilog="Example: catenary list --keys",
+    epilog="Example: catenary list --keys damping",
 )
 @console.guarded
 @console.serial
@@ -260,12 +260,27 @@ def list_cases(
     keys: Annotated[
         bool, typer.Option("--keys", help="Every key of a scene, its unit, default and meaning.")
     ] = False,
+    wanted: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="FILTER",
+            help="With --keys: a part of a key, or a pattern with * and ?; tells also bounds, the "
+            "words that a key accepts, and typical values.",
+        ),
+    ] = None,
 ) -> None:
     """Serial."""
+    if keys:
+        from catenary.cases.commands.key_list import key_details, key_table
+
+        console.say(key_table() if wanted is None else key_details(wanted))
+        return
+    if wanted is not None:
+        raise InputError(f"{wanted} filters keys: write `catenary list --keys {wanted}`")
     from catenary.cases import printing
     from catenary.cases.catalogue import entries
 
-    console.say(printing.key_table() if keys else printing.case_table(entries()))
+    console.say(printing.case_table(entries()))
 
 
 @app.command(

@@ -7,77 +7,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel
-from pydantic.fields import FieldInfo
-from pydantic_core import PydanticUndefined
 
 from catenary.cases.catalogue import CaseEntry
-from catenary.cases.keys import ANY, kind_of, tables_in
-from catenary.cases.units import unit_of
 from catenary.meshgen.line import Line
 from catenary.postproc.evaluate.comparing import decimals_that_tell
-from catenary.solver import effects
 
 
 def case_table(cases: Sequence[CaseEntry]) -> str:
     """Names and titles of cases, one line each."""
     width = max((len(entry.name) for entry in cases), default=0)
     return "\n".join(f"{entry.name:{width}}  {entry.title}" for entry in cases)
-
-
-def key_table() -> str:
-    """Every key of a scene: name, unit, default, meaning; one line each."""
-    from catenary.cases.scene import Scene
-
-    return "\n".join(_key_rows(Scene, ""))
-
-
-def _key_rows(model: type[BaseModel], prefix: str) -> list[str]:
-    rows = []
-    for name, field in model.model_fields.items():
-        key = f"{prefix}{name}"
-        inner, wildcard = tables_in(field.annotation)
-        if key == "effects":
-            rows += [
-                _key_row(f"effects.{effect.name}", str(effect.default).lower(), effect.title)
-                for effect in effects.registry().values()
-            ]
-        elif inner:
-            below = f"{key}.{ANY}." if wildcard else f"{key}."
-            rows += _key_rows(inner[0], below) if len(inner) == 1 else _kinds_rows(inner, below)
-        else:
-            rows.append(_key_row(key, _default(field), field.description or ""))
-    return rows
-
-
-def _kinds_rows(tables: Sequence[type[BaseModel]], prefix: str) -> list[str]:
-    """Rows of a table of which there are kinds: what only some have names them."""
-    kinds = [kind_of(table) for table in tables]
-    owners: dict[str, list[str]] = {}
-    for table, kind in zip(tables, kinds, strict=True):
-        for row in _key_rows(table, prefix):
-            if not row.startswith(f"{prefix}type "):
-                owners.setdefault(row, []).append(kind)
-    rows = [_key_row(f"{prefix}type", "-", f"one of {', '.join(kinds)}")]
-    for row, having in owners.items():
-        nested = "." in row[len(prefix) :].split()[0]
-        rows.append(row if nested or having == kinds else f"{row} ({', '.join(having)})")
-    return rows
-
-
-def _key_row(key: str, default: str, meaning: str) -> str:
-    unit = unit_of(key)
-    return f"{key:52} {f'[{unit}]' if unit else '':8} {default:12} {meaning}"
-
-
-def _default(field: FieldInfo) -> str:
-    if field.is_required():
-        return "required"
-    if field.default is PydanticUndefined:
-        return "empty"
-    if field.default is None or field.default == "":
-        return "-"
-    return str(field.default)
 
 
 def summary_text(summary: Mapping[str, Any], folder: Path) -> str:

@@ -11,12 +11,12 @@ from measuring import check
 from paper_pantograph import corrections, data, number_at, table
 
 from catenary.cases.checks_pantograph import check_pantographs
+from catenary.cases.commands.key_list import key_table
 from catenary.cases.convert_pantograph import static_force
 from catenary.cases.input.convert_mechanism import multibody_of
 from catenary.cases.keys import is_known, known_keys
 from catenary.cases.loading import read_toml
 from catenary.cases.pantograph_facts import header_facts, kind_lines
-from catenary.cases.printing import key_table
 from catenary.cases.scene import Scene, load_scene
 from catenary.cases.schema_pantograph import MultibodyTable
 from catenary.mbs.bodies import SPACE, Body

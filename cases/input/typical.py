@@ -1,0 +1,46 @@
+"""What keys without a default usually hold, in words, for somebody who sets up a line.
+
+Ranges for recognising a wrong unit stand in ``usual``. Where a figure comes from a formula or from
+a shipped case, the text names it.
+"""
+
+from __future__ import annotations
+
+# By key; a * stands for a name that the scene chooses. Values are in the key's unit.
+TYPICAL: dict[str, str] = {
+    "line.n_spans": "12 to 30: the evaluated spans, and on either side enough for no reflection",
+    "line.span_m": "40 to 65",
+    "line.encumbrance_m": "1.2 to 1.8",
+    "line.contact_wire.tension_N": "10000 to 20000, high speed 20000 to 31500",
+    "line.contact_wire.mass_kg_per_m": "copper of 107 mm2 0.95, 120 mm2 1.07, 150 mm2 1.33",
+    "line.contact_wire.bending_stiffness_N_m2": (
+        "E A^2 / (4 pi) of a round copper wire: 107 mm2 110, 120 mm2 140, 150 mm2 215"
+    ),
+    "line.messenger_wire.tension_N": "10000 to 20000, high speed up to 28000",
+    "line.messenger_wire.mass_kg_per_m": "bronze strand of 65 mm2 0.6, 120 mm2 1.07",
+    "line.messenger_wire.bending_stiffness_N_m2": (
+        "45 (65 mm2) to 130 (120 mm2); a strand has less than a solid wire"
+    ),
+    "line.dropper.stiffness_N_per_m": "100000 (EN 50318)",
+    "line.dropper.axial_stiffness_N": "1.2e6 (bronze rope of 12 mm2 at 100 GPa)",
+    "line.dropper.count": "5 to 9",
+    "line.dropper.spacing_m": "4 to 10",
+    "line.dropper.pre_sag_mid_mm": "0 to 1/1000 of the span, 55 for 55 m",
+    "line.steady_arm.length_m": "1 to 1.3",
+    "line.damping.alpha_s": (
+        "0.0001 (shipped en50318_2002, ac_simple); 0.0275 and 0.00275 (Ambrosio et al., 2012)"
+    ),
+    "line.damping.beta_per_s": "0.0125 (shipped en50318_2002, ac_simple); 0 (Ambrosio et al., 2012)",
+    "pantographs.*.static_force_N": "AC 60 to 90, DC 3 kV 90 to 120, DC 1.5 kV 70 to 140",
+    "pantographs.*.masses_kg": "two masses [7.2, 15] (EN 50318); head 5 to 10, frame 10 to 20",
+    "pantographs.*.stiffnesses_N_per_m": "[4200, 50] for two masses (EN 50318)",
+    "pantographs.*.dampings_N_s_per_m": "[10, 90] for two masses (EN 50318)",
+    "pantographs.*.strips.length_m": "0.8 to 1.2",
+    "train.speed_km_h": "below 0.7 of the contact wire's wave speed",
+    "train.start_m": "two spans after the start of the line",
+    "evaluation.from_m": "after the run-in, where a span begins",
+    "evaluation.to_m": "whole spans after evaluation.from_m",
+    "contact.restitution": "0.1 to 0.9",
+    "numerics.spectral_radius": "0.8 to 0.9",
+    "numerics.adaptive_tolerance_N": "0.1 to 10",
+}
