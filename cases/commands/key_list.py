@@ -122,6 +122,9 @@ def key_details(wanted: str) -> str:
 
 def _chosen(wanted: str) -> list[Key]:
     every, low = keys_of_a_scene(), wanted.strip().lower()
+    whole = [key for key in every if key.name.lower() == low]
+    if whole:
+        return whole
     if any(letter in low for letter in _GLOB):
         found = [key for key in every if fnmatch.fnmatchcase(key.name.lower(), low)]
     else:
