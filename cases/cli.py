@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from catenary.cases import console
+from catenary.cases.commands import completion
 from catenary.cases.run.output_folder import refuse_impossible
 from catenary.solver.errors import InputError
 
@@ -39,7 +40,11 @@ RunFolder = Annotated[
     ),
 ]
 Case = Annotated[
-    str, typer.Argument(help="Name of a shipped case, or a case.toml, or a folder with one.")
+    str,
+    typer.Argument(
+        help="Name of a shipped case, or a case.toml, or a folder with one.",
+        autocompletion=completion.cases,
+    ),
 ]
 Assignments = Annotated[
     list[str] | None,
@@ -47,6 +52,7 @@ Assignments = Annotated[
         "--set",
         metavar="KEY=VALUE",
         help="Replace a key of the scene, KEY= takes it away; repeatable.",
+        autocompletion=completion.assignments,
     ),
 ]
 Out = Annotated[
@@ -57,7 +63,11 @@ Out = Annotated[
 ]
 MoreAssignments = Annotated[
     list[str] | None,
-    typer.Argument(metavar="KEY=VALUE", help="Further assignments after --set."),
+    typer.Argument(
+        metavar="KEY=VALUE",
+        help="Further assignments after --set.",
+        autocompletion=completion.assignments,
+    ),
 ]
 Shortened = Annotated[
     bool, typer.Option("--short", help="Apply the case's [test] table, which shortens it.")
@@ -87,6 +97,7 @@ MoreAndPetscOptions = Annotated[
     typer.Argument(
         metavar="KEY=VALUE -- PETSC_OPTION",
         help="Further assignments after --set, and after -- options for PETSc.",
+        autocompletion=completion.assignments,
     ),
 ]
 Strict = Annotated[
@@ -247,40 +258,6 @@ def _end(result: RunOutcome, folder: Path, strict: bool) -> int:
         return console.BROKEN
     console.say(printing.summary_text(result.summary, folder))
     return console.NOT_ACCEPTED if strict and result.accepted is False else console.DONE
-
-
-@app.command(
-    "list",
-    help="List the shipped cases, or all keys of a scene.",
-    epilog="Example: catenary list --keys damping",
-)
-@console.guarded
-@console.serial
-def list_cases(
-    keys: Annotated[
-        bool, typer.Option("--keys", help="Every key of a scene, its unit, default and meaning.")
-    ] = False,
-    wanted: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="FILTER",
-            help="With --keys: a part of a key, or a pattern with * and ?; tells also bounds, the "
-            "words that a key accepts, and typical values.",
-        ),
-    ] = None,
-) -> None:
-    """Serial."""
-    if keys:
-        from catenary.cases.commands.key_list import key_details, key_table
-
-        console.say(key_table() if wanted is None else key_details(wanted))
-        return
-    if wanted is not None:
-        raise InputError(f"{wanted} filters keys: write `catenary list --keys {wanted}`")
-    from catenary.cases import printing
-    from catenary.cases.catalogue import entries
-
-    console.say(printing.case_table(entries()))
 
 
 @app.command(
@@ -446,6 +423,7 @@ from catenary.cases import (  # noqa: E402
     cli_stability,  # noqa: F401
     cli_studies,  # noqa: F401
 )
+from catenary.cases.commands import lists  # noqa: E402, F401
 
 
 def _complain_of_usage(error: Any) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.cases import cli, console
+from catenary.cases.commands import completion
 from catenary.cases.run.output_folder import refuse_impossible
 from catenary.solver.errors import InputError
 
@@ -33,6 +34,7 @@ def accuracy(
         typer.Option(
             "--axes",
             metavar="NAME,...",
+            autocompletion=completion.axes,
             help="Out of dt, elements, grid, scheme, coupling, contact, dropper, pantograph; all "
             "if absent.",
         ),

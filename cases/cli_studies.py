@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from catenary.cases import cli, console
+from catenary.cases.commands import completion
 from catenary.cases.run.output_folder import refuse_impossible
 from catenary.solver.errors import InputError
 
@@ -37,6 +38,7 @@ def sweep(
         typer.Option(
             "--vary",
             metavar="KEY=V1,V2,...",
+            autocompletion=completion.assignments,
             help="Values that a key takes; repeatable, all combinations are run.",
         ),
     ] = None,

@@ -160,12 +160,29 @@ def _details(key: Key) -> str:
     return "\n".join([head, *wrapped])
 
 
+def words_of(key: Key) -> list[str]:
+    """The words that a key accepts, none if it takes anything else."""
+    if key.name in _WORDS:
+        return _WORDS[key.name]
+    if key.field is None:
+        return ["true", "false"] if key.name.startswith("effects.") else []
+    return _words_in(TypeAdapter(key.field.rebuild_annotation()).json_schema())
+
+
+def _words_in(schema: dict[str, Any]) -> list[str]:
+    if "anyOf" in schema:
+        return [word for one in schema["anyOf"] for word in _words_in(one)]
+    if schema.get("type") == "boolean":
+        return ["true", "false"]
+    only = [schema["const"]] if "const" in schema else []
+    return [str(word) for word in schema.get("enum", only)]
+
+
 def _allowed(key: Key) -> str:
     """Bounds and words that a key accepts."""
-    if key.name in _WORDS:
-        return f"one of {', '.join(_WORDS[key.name])}"
-    if key.name.startswith("effects."):
-        return "true or false"
+    words = words_of(key)
+    if words:
+        return " or ".join(words) if words == ["true", "false"] else f"one of {', '.join(words)}"
     if key.field is None:
         return ""
     return _of_schema(TypeAdapter(key.field.rebuild_annotation()).json_schema())
@@ -176,12 +193,10 @@ def _of_schema(schema: dict[str, Any]) -> str:
     if "anyOf" in schema:
         options = [_of_schema(one) for one in schema["anyOf"] if one.get("type") != "null"]
         return " or ".join(dict.fromkeys(text for text in options if text))
-    words = schema.get("enum", [schema["const"]] if "const" in schema else [])
+    words = _words_in(schema)
     if words:
-        return f"one of {', '.join(map(str, words))}"
+        return f"one of {', '.join(words)}"
     kind = schema.get("type")
-    if kind == "boolean":
-        return "true or false"
     if kind in ("number", "integer"):
         noun = "whole number" if kind == "integer" else "number"
         return f"{noun}{_range(schema)}"

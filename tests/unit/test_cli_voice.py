@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import pytest
@@ -42,3 +43,30 @@ def test_version_names_the_libraries(library: str) -> None:
     assert done.exit_code == 0
     assert library in done.output
     assert done.output.startswith("catenary ")
+
+
+def completed(typed: str) -> list[str]:
+    """What zsh is offered for a command line, without the descriptions."""
+    environment = {"_CATENARY_COMPLETE": "complete_zsh", "_TYPER_COMPLETE_ARGS": typed}
+    done = CliRunner().invoke(app, [], prog_name="catenary", env=environment)
+    return re.findall(r'^(?:_arguments .*?\(\()?"((?:[^":\\]|\\.)+)"', done.stdout, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("catenary swe", ["sweep"]),
+        ("catenary run en50", ["en50318_2002"]),
+        ("catenary sweep ac_simple --qu", ["--quiet"]),
+        ("catenary check ac_simple --set train.sp", ["train.speed_km_h="]),
+        ("catenary check ac_simple --set numerics.integrator=h", ["numerics.integrator=hht"]),
+        ("catenary check ac_simple --set effects.head_roll=", ["effects.head_roll=true",
+                                                                "effects.head_roll=false"]),
+        ("catenary sweep ac_simple --vary line.encumb", ["line.encumbrance_m="]),
+        ("catenary accuracy ac_simple --axes dt,co", ["dt,coupling", "dt,contact"]),
+        ("catenary list --keys line.damping.al", ["line.damping.alpha_s"]),
+        ("catenary check ac_simple --set no_such_key=", []),
+    ],
+)  # fmt: skip
+def test_the_shell_is_offered_what_fits(typed: str, offered: list[str]) -> None:
+    assert completed(typed) == offered
