@@ -5,8 +5,6 @@ Imported by ``cli``, whose app it extends.
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +12,7 @@ import typer
 
 from catenary.cases import cli, console
 from catenary.cases.run.output_folder import refuse_impossible
+from catenary.postproc.record.csv_text import csv_text
 from catenary.solver.errors import InputError
 
 if TYPE_CHECKING:
@@ -98,15 +97,16 @@ def hard(
 
 def as_csv(found: list[Criterion]) -> str:
     """All that was measured, a line each."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["case", "criterion", "value", "limit", "kept", "note"])
-    for row in found:
-        kept = "yes" if row.passed else "no"
-        writer.writerow(
-            [row.case, row.name, f"{row.value:.3g}", f"{row.limit:.3g}", kept, row.note]
-        )
-    return text.getvalue()
+    heads = ("case", "criterion", "value", "limit", "kept", "note")
+    rows = (
+        (row.case, row.name, f"{row.value:.3g}", f"{row.limit:.3g}", _yes(row.passed), row.note)
+        for row in found
+    )
+    return csv_text(heads, rows)
+
+
+def _yes(passed: bool) -> str:
+    return "yes" if passed else "no"
 
 
 def as_markdown(cases: list[HardCase], found: list[Criterion]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 from collections.abc import Mapping
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from catenary.postproc.record.csv_text import csv_text
 from catenary.solver.errors import InputError, RunBroken
 
 DROPPER_COLUMNS = ("dropper_span", "dropper_x", "dropper_length", "dropper_force")
@@ -40,10 +40,11 @@ def write_static(path: Path, table: Mapping[str, Any]) -> None:
                 json.dump(plain, stream, indent=1)
                 stream.write("\n")
                 return
-            writer = csv.writer(stream, lineterminator="\n")
-            writer.writerow(_DROPPER_HEADS)
             columns = [np.asarray(table[name]) for name in DROPPER_COLUMNS]
-            for span, x, length, force in zip(*columns, strict=True):
-                writer.writerow([int(span) + 1, f"{x:.4f}", f"{length:.5f}", f"{force:.3f}"])
+            rows = (
+                (int(span) + 1, f"{x:.4f}", f"{length:.5f}", f"{force:.3f}")
+                for span, x, length, force in zip(*columns, strict=True)
+            )
+            stream.write(csv_text(_DROPPER_HEADS, rows))
     except OSError as error:
         raise RunBroken(f"{path} could not be written: {error.strerror}") from error

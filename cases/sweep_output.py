@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,6 +13,7 @@ from matplotlib.figure import Figure
 from catenary.cases.jobs import LINE_COLUMNS, PANTOGRAPH_COLUMNS, Ended
 from catenary.cases.units import unit_of
 from catenary.postproc import plots
+from catenary.postproc.record.csv_text import csv_text
 from catenary.postproc.storage import plain, write_all
 
 TABLE, RECORD, PICTURE = "sweep.csv", "sweep.json", "sweep.png"
@@ -61,12 +60,8 @@ def varied_keys(ended: Sequence[Ended]) -> list[str]:
 
 def as_csv(table: Sequence[dict[str, Any]]) -> str:
     """The rows as CSV text; what is unknown is empty. ``table`` has at least one row."""
-    stream = io.StringIO()
-    writer = csv.DictWriter(stream, list(table[0]), lineterminator="\n")
-    writer.writeheader()
-    for row in table:
-        writer.writerow({key: _cell(value) for key, value in row.items()})
-    return stream.getvalue()
+    heads = list(table[0])
+    return csv_text(heads, ([_cell(row[key]) for key in heads] for row in table))
 
 
 def _cell(value: Any) -> Any:

@@ -5,17 +5,21 @@ from __future__ import annotations
 import hashlib
 import itertools
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from catenary.cases.input.plain_text import steers
 from catenary.cases.keys import is_known, known_keys
 from catenary.cases.loading import parse_assignment, read_toml
 from catenary.cases.messages import shown, unknown_key
+from catenary.postproc.record.csv_text import begins_formula
 from catenary.solver.errors import InputError
 
 MAX_VARIANTS = 10_000
+MOST_LETTERS = 200  # in a variant's name
 _LONGEST_SLUG = 100  # folder names may have 255 bytes; room for what a user puts around them
 _OPENING, _CLOSING, _QUOTES = "[{", "]}", "\"'"
 
@@ -64,9 +68,11 @@ def parse_vary(text: str) -> VariedKey:
             f"--vary {shown(key)[1:-1]} is not possible: PETSc takes its options once, when the "
             "program starts"
         )
-    for value in values:
-        if values.count(value) > 1:
-            raise InputError(f"--vary {shown(key)[1:-1]} names {shown(value)[1:-1]} twice")
+    if any(steers(letter) for letter in text):
+        raise InputError(f"--vary {shown(text)} holds a control character")
+    value, times = Counter(values).most_common(1)[0]
+    if times > 1:
+        raise InputError(f"--vary {shown(key)[1:-1]} names {shown(value)[1:-1]} twice")
     return VariedKey(key, values)
 
 
@@ -167,6 +173,12 @@ def read_named(path: Path) -> dict[str, list[str]]:
     if not table:
         raise InputError(f'{path} names no variant; a line of it is: name = ["key=value", ...]')
     for name, assignments in table.items():
+        odd = begins_formula(name) or any(steers(letter) for letter in name)
+        if odd or not 0 < len(name) <= MOST_LETTERS:
+            raise InputError(
+                f"{shown(name)} in {path} cannot name a variant: a name has 1 to {MOST_LETTERS} "
+                "characters, none of them a control character, and begins with none of = + - @"
+            )
         if not isinstance(assignments, list) or not all(isinstance(a, str) for a in assignments):
             raise InputError(
                 f'{shown(name)[1:-1]} in {path} must be a list of assignments: ["key=value", ...]'

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from typing import NamedTuple, TextIO
 
 import numpy as np
 
 from catenary.postproc import channels
+from catenary.postproc.record.csv_text import csv_text
 from catenary.postproc.results import Results
 
 # Steps that are written at once.
@@ -51,15 +51,19 @@ def dropper_table(results: Results) -> list[DropperRow]:
 
 def droppers_csv(results: Results) -> str:
     """The dropper table as CSV text, lengths to a tenth of a millimetre."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(
-        ["span", "dropper", "position in span [m]", "position [m]", "length [m]", "force [N]"]
+    heads = ("span", "dropper", "position in span [m]", "position [m]", "length [m]", "force [N]")
+    rows = (
+        (
+            row.span,
+            row.number,
+            f"{row.position:.4f}",
+            f"{row.x:.4f}",
+            f"{row.length:.4f}",
+            f"{row.force:.2f}",
+        )
+        for row in dropper_table(results)
     )
-    for row in dropper_table(results):
-        figures = (f"{row.position:.4f}", f"{row.x:.4f}", f"{row.length:.4f}", f"{row.force:.2f}")
-        writer.writerow([row.span, row.number, *figures])
-    return stream.getvalue()
+    return csv_text(heads, rows)
 
 
 def pantographs_csv(results: Results) -> str:
@@ -84,7 +88,7 @@ def write_pantographs_csv(results: Results, stream: TextIO) -> None:
             for number, column in enumerate(columns if len(columns) > 1 else []):
                 heads.append(f"{prefix}strip {number + 1} {channels.STRIP_FORCE.label}")
                 strips.append(column)
-    csv.writer(stream, lineterminator="\n").writerow(heads)
+    stream.write(csv_text(heads, ()))
     for start in range(0, results.n_rows("time"), _ROWS):
         part = slice(start, min(start + _ROWS, results.n_rows("time")))
         blocks = [results.times(part)[:, None]]

@@ -6,8 +6,6 @@ A study compares many runs with what a source states of its own; who made it fil
 from __future__ import annotations
 
 import base64
-import csv
-import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -19,6 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from catenary.postproc import plots
+from catenary.postproc.record.csv_text import csv_text
 from catenary.postproc.storage import plain, write_all
 
 REPRODUCED, NOT_REPRODUCED, UNDECIDED = "reproduced", "not reproduced", "cannot be decided"
@@ -118,13 +117,12 @@ def write_study(
 
 def columns_csv(columns: Mapping[str, Sequence[Any] | np.ndarray]) -> str:
     """Columns side by side as CSV text; shorter ones end in empty cells."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(columns)
     values = [list(column) for column in columns.values()]
-    for i in range(max((len(column) for column in values), default=0)):
-        writer.writerow([_cell(column[i]) if i < len(column) else "" for column in values])
-    return stream.getvalue()
+    longest = max((len(column) for column in values), default=0)
+    rows = (
+        [_cell(column[i]) if i < len(column) else "" for column in values] for i in range(longest)
+    )
+    return csv_text(list(columns), rows)
 
 
 def _cell(value: Any) -> Any:
