@@ -17,6 +17,7 @@ from catenary.cases.keys import is_known, known_keys, nearest, without_kinds
 from catenary.cases.units import unit_of
 
 _SHOWN, _SOME, _DEEP = 60, 8, 3
+_LONGEST_KEY = 200  # of one in a sentence
 COMMAND_LINE = "on the command line (--set)"
 
 
@@ -153,7 +154,7 @@ def schema_faults(
     faults: list[Fault] = []
     for one in found[:MOST_TOLD]:
         parts, field = without_kinds(one["loc"], model)
-        key = ".".join(_location(parts, raw)) or "the scene"
+        key = plain(".".join(_location(parts, raw)), _LONGEST_KEY) or "the scene"
         faults.append(Fault(key, _sentence(dict(one), key, parts, field, model, origin)))
     return faults, max(0, len(found) - MOST_TOLD)
 

@@ -23,6 +23,7 @@ from catenary.cases.messages import Origin, schema_faults, unknown_key
 from catenary.cases.schema_contact import ContactTable
 from catenary.cases.schema_incidents import Incident
 from catenary.cases.schema_line import LineTable, MeshTable
+from catenary.cases.schema_mechanism import Name
 from catenary.cases.schema_pantograph import PantographTable
 from catenary.cases.schema_run import (
     CaseTable,
@@ -48,8 +49,8 @@ class Scene(Table):
     case: CaseTable = Field(default_factory=CaseTable, description="what the case is")
     line: LineTable = Field(description="the line from anchor to anchor")
     mesh: MeshTable = Field(default_factory=MeshTable, description="the finite-element mesh")
-    pantographs: dict[str, PantographTable] = Field(
-        min_length=1, description="the kinds of pantograph, by name"
+    pantographs: dict[Name, PantographTable] = Field(
+        min_length=1, max_length=100, description="the kinds of pantograph, by name"
     )
     train: TrainTable = Field(description="the train and its pantographs")
     vehicle: VehicleTable | None = Field(

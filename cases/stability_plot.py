@@ -118,7 +118,7 @@ def _panel(
 
 
 def _key() -> list[Line2D]:
-    lines = (("-", r"explicit, theory ($\omega\,dt = 2$)"), ("--", "exchanges, theory"))
+    lines = (("-", "explicit, theory (ω dt = 2)"), ("--", "exchanges, theory"))
     keys = [Line2D([], [], color=plots.GREY, lw=1.2, ls=style, label=name) for style, name in lines]
     for name, marker in _MARKERS.items():
         told = f"{name}, marched"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import warnings
 from pathlib import Path
 
@@ -20,6 +21,7 @@ _POINT_GROUPS = (names.STEADY_ARMS, names.SUPPORTS, names.ANCHORS)
 _MAY_BE_EMPTY = (names.DROPPERS, names.STEADY_ARMS, names.SUPPORTS)
 # The mesh of 40 000 spans takes half of it.
 MOST_BYTES = 500_000_000
+_HEAD = 65536  # [B], comments may stand first
 _SHOWN, _SOME = 60, 12  # of the names of groups that a file has
 _KINDS = {0: "points", 1: "lines", 2: "surfaces", 3: "volumes"}
 
@@ -60,6 +62,9 @@ def _load(path: Path) -> meshio.Mesh:
     size = path.stat().st_size
     if size > MOST_BYTES:
         raise InputError(f"the mesh file {path} has {size} bytes; at most {MOST_BYTES} are allowed")
+    refused = f"{path} cannot be read as a Gmsh mesh file"
+    if b"$MeshFormat" not in _head(path, refused):
+        raise InputError(f"{refused}: it does not begin with $MeshFormat")
     try:
         # meshio prints what it does not understand; what matters to us is checked below.
         with warnings.catch_warnings(), contextlib.redirect_stderr(io.StringIO()):
@@ -72,9 +77,19 @@ def _load(path: Path) -> meshio.Mesh:
                 "the option to save all elements (Mesh.SaveAll = 0), or as MSH 2.2"
             ) from error
         # Its own words may repeat what the file holds, and a scene may name any file.
-        raise InputError(
-            f"{path} cannot be read as a Gmsh mesh file: it is none (MSH 2.2 or 4.1), or damaged"
-        ) from error
+        raise InputError(f"{refused}: it is no MSH 2.2 or 4.1, or damaged") from error
+
+
+def _head(path: Path, refused: str) -> bytes:
+    """The beginning of a file; never waits, as files of the kernel may make one."""
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        try:
+            return os.read(handle, _HEAD)
+        finally:
+            os.close(handle)
+    except OSError as error:
+        raise InputError(f"{refused}: {(error.strerror or '').lower()}") from error
 
 
 def _members(content: meshio.Mesh, name: str, dimension: int, path: Path) -> np.ndarray:

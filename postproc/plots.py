@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from catenary.postproc import channels, filters
@@ -28,7 +29,17 @@ _MOST_ARMS = 60
 
 
 def png(figure: Figure) -> bytes:
-    """``figure`` as the bytes of a PNG file."""
+    """``figure`` as the bytes of a PNG file. A dollar sign in a text is one, and no formula."""
+    ticks = {
+        label
+        for axes in figure.axes
+        for axis in (axes.xaxis, axes.yaxis)
+        for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks())
+        for label in (tick.label1, tick.label2)
+    }
+    for text in figure.findobj(Text):
+        if isinstance(text, Text) and text not in ticks and "$" in text.get_text():
+            text.set_parse_math(False)
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=_RESOLUTION)
     return stream.getvalue()

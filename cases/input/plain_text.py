@@ -41,14 +41,17 @@ def read_whole(path: Path, name: str) -> bytes:
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except (OSError, ValueError) as error:
         raise InputError(f"{name} cannot be read: {_why(error)}") from error
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        raise InputError(f"{name} cannot be read: it is no regular file")
     with os.fdopen(handle, "rb") as stream:
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
-            raise InputError(f"{name} cannot be read: it is no regular file")
         try:
             content = stream.read(MOST_BYTES + 1)
         except OSError as error:
             raise InputError(f"{name} cannot be read: {_why(error)}") from error
-    if content is None or len(content) > MOST_BYTES:
+    if content is None:  # nothing is there yet, as in some files of the kernel
+        raise InputError(f"{name} cannot be read: it is no regular file")
+    if len(content) > MOST_BYTES:
         raise InputError(f"{name} is too large for an input file ({MOST_BYTES} bytes allowed)")
     return content
 

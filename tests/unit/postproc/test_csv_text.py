@@ -1,4 +1,4 @@
-"""CSV text: no cell begins as a formula, numbers stay what they are, and every writer is this one."""
+"""CSV text: no cell begins as a formula, numbers stay as they are, every file is written so."""
 
 from __future__ import annotations
 
@@ -32,7 +32,9 @@ def test_what_is_read_back_is_never_a_formula(row: list[str]) -> None:
     _, back = csv.reader(io.StringIO(csv_text(["a"] * len(row), [row]), newline=""))
     for cell in back:
         number = cell[:1] in "+-" and cell.strip("+-").replace(".", "").replace("e", "").isdigit()
-        assert not cell.startswith(("=", "@", "\t", "\r")) and (cell[:1] not in ("+", "-") or number)
+        assert not cell.startswith(("=", "@", "\t", "\r")) and (
+            cell[:1] not in ("+", "-") or number
+        )
 
 
 def test_no_other_file_writes_csv() -> None:

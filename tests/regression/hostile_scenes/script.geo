@@ -1,0 +1,2 @@
+SystemCall "touch canary";
+Point(1) = {0, 0, 0};
