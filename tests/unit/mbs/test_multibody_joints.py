@@ -62,7 +62,11 @@ def some_motion(seed: int = 5) -> Motion:
     return start.moved(random.uniform(-1, 1, 12)).with_velocities(random.uniform(-1, 1, 12))
 
 
-@pytest.mark.parametrize(("joint", "n_rows"), list(zip(JOINTS, N_ROWS, strict=True)), ids=str)
+@pytest.mark.parametrize(
+    ("joint", "n_rows"),
+    list(zip(JOINTS, N_ROWS, strict=True)),
+    ids=lambda p: getattr(p, "name", str(p)),
+)
 def test_jacobian_rate_and_drift_are_derivatives_of_the_constraint(
     joint: Joint, n_rows: int
 ) -> None:
