@@ -21,6 +21,7 @@ from catenary.cases.checks_incidents import check_incidents
 from catenary.cases.checks_pantograph import check_mechanisms, check_pantographs
 from catenary.cases.checks_scheme import check_scheme
 from catenary.cases.checks_vehicle import check_vehicle
+from catenary.cases.input.checks_output import check_output
 from catenary.cases.input.faults import Fault, SceneError
 from catenary.cases.input.size import size_faults
 from catenary.cases.input.usual import usual_faults
@@ -412,4 +413,5 @@ _OF_TABLES: tuple[Callable[[Scene], Iterator[Fault]], ...] = (
     _separations,
     _standard,
     _mesh_file,
+    check_output,
 )

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.cases.incident_facts import incident_facts
 from catenary.cases.pantograph_facts import kind_lines
-from catenary.cases.run.output_folder import RunSize
+from catenary.cases.run.file_sizes import FileSizes, estimate_files
+from catenary.cases.run.output_folder import RunSize, volume
+from catenary.cases.run.recording import Recording, recording_of
 from catenary.cases.scene import Scene
-from catenary.mbs.build import has_joints
 from catenary.mbs.multibody import MultibodyData
 from catenary.solver import effects
 from catenary.solver.problem import Numerics, Problem, n_halvings
@@ -35,12 +36,15 @@ ALL_BODIES_SUBSTEP = 3.0e-4  # [s]
 # for one in memory [B].
 FLUSH_EVERY = 0.5
 FLUSH_MEMORY = 1e8
+LEAST_FLUSH = 256
 
 # Resident memory of the same runs, report included: program and libraries, then per unknown.
-MEMORY_BASE = 2.3e8  # [B]
+MEMORY_BASE = 3.7e8  # [B]
 MEMORY_PER_UNKNOWN = 3400.0  # [B]
+# What a step adds, as the report takes the history of one pantograph after the other.
+MEMORY_PER_STEP = 40.0  # [B]
 _BYTES = 8
-_PER_PANTOGRAPH = 4  # channels of a pantograph in the result file
+_PER_PANTOGRAPH = 6  # channels of a pantograph at most
 
 
 class EffectRow(NamedTuple):
@@ -72,7 +76,8 @@ class Plan:
     halved : what is said of steps that adapt, empty if none do
     memory : estimate of the resident memory on one rank [B]
     march : estimate of the wall time of the time loop on one rank [s]
-    file_size : size of the channels in the result file [B]
+    files : sizes of the files
+    recorded : what is recorded of line and snapshots, in sentences by what it is
     """
 
     case: str
@@ -101,7 +106,8 @@ class Plan:
     simulated: float
     memory: float
     march: float
-    file_size: float
+    files: FileSizes
+    recorded: dict[str, str]
 
 
 def effect_rows(scene: Scene, problem: Problem) -> tuple[list[EffectRow], list[EffectRow]]:
@@ -127,7 +133,7 @@ def effect_rows(scene: Scene, problem: Problem) -> tuple[list[EffectRow], list[E
 def run_size(scene: Scene, mesh: LineMesh) -> RunSize:
     """What a run of a scene takes, by its plan. Not collective."""
     plan = make_plan(scene, mesh)
-    return RunSize(plan.file_size, plan.march, plan.n_steps)
+    return RunSize(plan.files.total, plan.march, plan.n_steps)
 
 
 def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
@@ -147,11 +153,8 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
     n_steps = max(1, math.floor(simulated / dt + 1e-9))
     length = np.diff(mesh.x(mesh.wires[CONTACT_WIRE]))
     n_droppers, n_arms = mesh.droppers.shape[0], mesh.steady_arms.size
-    columns = 1 + _PER_PANTOGRAPH * len(train.placements) + n_droppers + n_arms
-    joints = any(has_joints(place.data) for place in train.placements)
-    columns += len(train.placements) if joints else 0
-    strips = [len(place.data.strip_offsets) for place in train.placements]
-    columns += sum(strips) if max(strips) > 1 else 0
+    recording = recording_of(scene.output, problem, mesh, n_steps)
+    flush_every = scene.output.flush_every_steps or flush_cadence(problem, n_dofs, recording)
     return Plan(
         case=scene.case.name,
         title=scene.case.title,
@@ -177,15 +180,16 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
         scheme=problem.numerics.scheme,
         halved=_halved(problem.numerics),
         simulated=simulated,
-        memory=estimate_memory(n_dofs),
+        memory=estimate_memory(n_dofs, n_steps),
         march=estimate_march(n_dofs, n_steps, problem.numerics.scheme, _substeps(problem)),
-        file_size=float(_BYTES * columns * (n_steps + 1)),
+        files=estimate_files(scene, problem, recording, n_dofs, flush_every),
+        recorded=recording.sentences(dt),
     )
 
 
-def estimate_memory(n_dofs: int) -> float:
-    """Resident memory of a run on one rank [B]."""
-    return MEMORY_BASE + MEMORY_PER_UNKNOWN * n_dofs
+def estimate_memory(n_dofs: int, n_steps: int = 0) -> float:
+    """Resident memory of a run on one rank, its report included [B]."""
+    return MEMORY_BASE + MEMORY_PER_UNKNOWN * n_dofs + MEMORY_PER_STEP * n_steps
 
 
 def estimate_march(n_dofs: int, n_steps: int, scheme: str, n_substeps: int = 0) -> float:
@@ -216,14 +220,21 @@ def _substeps(problem: Problem) -> int:
     return sum(way.substeps for way in ways if way is not None)
 
 
-def flush_cadence(problem: Problem, n_dofs: int) -> int:
+def flush_cadence(problem: Problem, n_dofs: int, recording: Recording) -> int:
     """Steps between two flushes: about half a second of wall time, and what fits into memory.
 
-    The same on any number of ranks, so that their files are.
+    Not so few that the file is made of small chunks, and whole chunks of them. The same on any
+    number of ranks, so that their files are.
     """
     step = estimate_march(n_dofs, 1, problem.numerics.scheme, _substeps(problem))
-    # There are fewer channels than unknowns.
-    return max(1, min(round(FLUSH_EVERY / step), int(FLUSH_MEMORY / (_BYTES * n_dofs))))
+    columns = _PER_PANTOGRAPH * len(problem.train.placements)
+    columns += recording.arm_x.size + recording.dropper_x.size
+    wanted = max(round(FLUSH_EVERY / step), LEAST_FLUSH)
+    steps = max(1, min(wanted, int(FLUSH_MEMORY / (_BYTES * columns))))
+    for part in (LEAST_FLUSH * recording.line.every, LEAST_FLUSH, recording.line.every):
+        if steps >= part:
+            return steps - steps % part
+    return steps
 
 
 def plan_text(plan: Plan) -> str:
@@ -263,7 +274,13 @@ def plan_text(plan: Plan) -> str:
             f"about {_duration(plan.march)} on one rank, real-time factor "
             f"{plan.simulated / plan.march:.1f} (estimate)",
         ),
-        ("results", f"about {plan.file_size / 1e6:.1f} MB of channels"),
+        (
+            "results",
+            f"about {volume(plan.files.result)} in run.h5, "
+            f"{volume(plan.files.film)} in fields.h5, {volume(plan.files.report)} of report "
+            "(estimate)",
+        ),
+        ("recorded", "; ".join(plan.recorded.values())),
     ]
     lines = [f"{plan.case}: {plan.title}", ""]
     lines += [f"  {label:10} {text}" for label, text in rows]

@@ -24,6 +24,7 @@ from catenary.cases.pantograph_facts import header_facts
 from catenary.cases.plan import effect_rows, flush_cadence, run_size
 from catenary.cases.run.folder_lock import held
 from catenary.cases.run.output_folder import RunSize, check_size, prepare
+from catenary.cases.run.recording import recording_of
 from catenary.cases.scene import Scene
 from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.fields import FieldRecorder
@@ -244,18 +245,22 @@ def _march(
             march.restore(on_root(comm, lambda: _checkpoint(out_dir)))
     header = _header(scene, problem, at_rest, petsc_options) if comm.rank == 0 else None
     dt, output = problem.numerics.dt, scene.output
-    flush_every = output.flush_every_steps or flush_cadence(problem, at_rest.model.n_dofs)
+    recording = recording_of(output, problem, at_rest.mesh, march.n_steps)
+    for sentence in recording.told(dt):
+        logger.info(sentence)
+    flush_every = output.flush_every_steps or flush_cadence(
+        problem, at_rest.model.n_dofs, recording
+    )
     # The recorder is the last to write: the state to continue from stands for all before it.
     observers: list[Observer] = [phases.progress]
     fields: FieldRecorder | None = None
-    field_every = _cadence(output.field_every_s, dt)
-    if field_every:
+    if recording.field_every:
         fields = FieldRecorder(
             comm,
             out_dir / "fields.xdmf",
             at_rest.mesh.wires,
             at_rest.mesh.droppers,
-            every=field_every,
+            every=recording.field_every,
             flush_every=flush_every,
             resume=resume,
             wait=True,
@@ -272,7 +277,8 @@ def _march(
         out_dir / RESULT,
         header,
         flush_every=flush_every,
-        energy_every=_cadence(output.energy_every_s, dt),
+        energy_every=recording.energy_every,
+        record=recording.line,
         resume=resume,
         on_begun=begun,
     )
@@ -362,11 +368,6 @@ def _performance(outcome: Outcome, phases: Phases, n_ranks: int) -> dict[str, An
         "phase_wall_s": phases.wall,
         "inner_iterations": counted,
     }
-
-
-def _cadence(every: float, dt: float) -> int | None:
-    """Steps between two records that are to be ``every`` [s] apart; None for none."""
-    return max(1, round(every / dt)) if every > 0 else None
 
 
 def _checkpoint(out_dir: Path) -> dict[str, Any]:

@@ -260,10 +260,14 @@ class EvaluationTable(Table):
 
 
 class OutputTable(Table):
-    """What is written besides the channels."""
+    """What is written, and how much of it."""
 
-    field_every_s: float = Field(
-        0.05, ge=0, le=1e4, description="cadence of field snapshots; 0 writes none"
+    field_every_s: float | None = Field(
+        None,
+        ge=0,
+        le=1e4,
+        description="cadence of field snapshots; 0 writes none; 0.05 s if absent, or as much "
+        "longer as keeps them within 500 MB",
     )
     energy_every_s: float = Field(
         0.05, ge=0, le=1e4, description="cadence of the line's energy; 0 writes none"
@@ -275,3 +279,66 @@ class OutputTable(Table):
         description="steps after which the result file is brought up to date; about half a "
         "second's worth if absent",
     )
+    line_channels: list[Literal["arm_uplift", "dropper_force"]] | None = Field(
+        None,
+        max_length=2,
+        description="channels of the line that are recorded, of arm_uplift and dropper_force; both "
+        "if absent. Their extremes are kept of every step, whatever is recorded",
+    )
+    line_channels_every_s: float | None = Field(
+        None,
+        ge=0,
+        le=1e4,
+        description="cadence of the line's channels; 0 records every step. Of this key and the "
+        "next four none: every step up to 500 MB, beyond it every 5 ms from 300 m behind to 200 m "
+        "ahead of the train",
+    )
+    line_channels_every_m: float | None = Field(
+        None, ge=0, le=1e4, description="the same as a distance that the train travels"
+    )
+    line_channels_window_m: list[Annotated[float, Field(ge=0, le=1e6)]] | None = Field(
+        None,
+        min_length=2,
+        max_length=2,
+        description="how far behind the last and ahead of the first pantograph the line's channels "
+        "are recorded; the whole line if absent",
+    )
+    line_channels_spans: list[Annotated[int, Field(ge=1, le=10**6)]] | None = Field(
+        None,
+        min_length=2,
+        max_length=2,
+        description="first and last span whose channels are recorded, counted from 1; all if "
+        "absent",
+    )
+    line_channels_compression: Literal["none", "gzip"] | None = Field(
+        None,
+        description="compression of the line's channels; gzip where their size has thinned them, "
+        "none otherwise, if absent",
+    )
+
+    @property
+    def chooses_line_channels(self) -> bool:
+        """Whether the scene says what is recorded of the line's channels."""
+        own = (
+            self.line_channels,
+            self.line_channels_every_s,
+            self.line_channels_every_m,
+            self.line_channels_window_m,
+            self.line_channels_spans,
+        )
+        return any(value is not None for value in own)
+
+    @model_validator(mode="after")
+    def _can_be_recorded(self) -> OutputTable:
+        if self.line_channels_every_s is not None and self.line_channels_every_m is not None:
+            raise ValueError(
+                "takes line_channels_every_s or line_channels_every_m, but both are given"
+                + TAKE_AWAY
+            )
+        spans = self.line_channels_spans
+        if spans is not None and spans[0] > spans[1]:
+            raise ValueError(
+                f"must have line_channels_spans from a span to a later one, not {spans[0]} to "
+                f"{spans[1]}"
+            )
+        return self

@@ -203,8 +203,7 @@ class FieldRecorder:
 
     def _size(self) -> int:
         """What the file takes at most [bytes]."""
-        mesh = self._n_nodes * 3 * 8 + self._cells.nbytes + self._component.nbytes
-        return mesh + self._n_snapshots * (4 * 4 * self._n_nodes + 8 + 2 * _TABLES) + MARGIN
+        return _film_bytes(self._n_nodes, len(self._cells), self._n_snapshots)
 
     def _make_places(self, file: h5py.File) -> None:
         # Room in the file now, and no zeros written into it.
@@ -267,6 +266,12 @@ class FieldRecorder:
             self._xdmf,
             xdmf(self._h5.name, self._n_nodes, self._cells.shape[0], self._written),
         )
+
+
+def _film_bytes(n_nodes: int, n_cells: int, n_snapshots: int) -> int:
+    """What the file of the numbers takes at most [B]."""
+    mesh = 3 * 8 * n_nodes + 3 * 4 * n_cells
+    return mesh + n_snapshots * (4 * 4 * n_nodes + 8 + 2 * _TABLES) + MARGIN
 
 
 def line_cells(

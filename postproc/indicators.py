@@ -37,7 +37,7 @@ COARSE_STEP = 0.05
 RESOLVED = 0.01
 _WAVE_NUMBERS = 400
 # Records longer than this are thinned before their spectrum is taken, to this rate at least [Hz].
-_SPECTRUM, _SAMPLED_HZ = 500_000, 1000.0
+_SPECTRUM, _SAMPLED_HZ = 100_000, 1000.0
 # Waves of two elements belong to the lower branch, whatever rounding says.
 _ZONE = np.pi * (1.0 + 1e-9)
 

@@ -126,22 +126,21 @@ def contact_force(results: Results) -> Figure:
     panels = figure.subplots(n, 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for p, axes in enumerate(panels):
         mark_line(axes, results, start, end)
-        position, force = results.column("contact_position", p), results.column("contact_force", p)
-        axes.plot(
-            *thinned(position, force),
-            color=colour(p),
-            alpha=0.3,
-            linewidth=0.6,
-            label="unfiltered",
-        )
+        force = results.column("contact_force", p)
+        chosen = thinned(force)
+        curves = [(chosen, force[chosen], {"alpha": 0.3, "linewidth": 0.6, "label": "unfiltered"})]
         try:
             force = filters.low_pass(force, results.dt)
         except InputError:  # sampled too slowly; the report says so
             pass
         else:
-            label = "20 Hz low-pass"
-            axes.plot(*thinned(position, force), color=colour(p), linewidth=1.5, label=label)
-        del position, force
+            chosen = thinned(force)
+            curves.append((chosen, force[chosen], {"linewidth": 1.5, "label": "20 Hz low-pass"}))
+        del force
+        position = results.column("contact_position", p)
+        for chosen, values, style in curves:
+            axes.plot(position[chosen], values, color=colour(p), **style)
+        del position
         tidy(axes, "", "contact force [N]", names[p].capitalize())
         legend_above(axes)
     panels[-1].set_xlabel("position along the track [m]")
@@ -157,14 +156,15 @@ def strip_forces(results: Results) -> Figure:
     panels = figure.subplots(len(shown), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for axes, (p, columns) in zip(panels, shown, strict=True):
         mark_line(axes, results, start, end)
-        position = results.column("contact_position", p)
         for number, column in enumerate(columns):
             force = results.column(channels.STRIP_FORCE.name, column)
             with contextlib.suppress(InputError):  # sampled too slowly; the report says so
                 force = filters.low_pass(force, results.dt)
             label = ("leading strip", "trailing strip")[number]
-            curve = thinned(position, force)
-            axes.plot(*curve, color=colour(number), linewidth=1.2, label=label)
+            chosen = thinned(force)
+            force = force[chosen]
+            position = results.column("contact_position", p)[chosen]
+            axes.plot(position, force, color=colour(number), linewidth=1.2, label=label)
         name = results.pantograph_names()[p]
         tidy(axes, "", "force of a strip [N]", name.capitalize())
         legend_above(axes)
@@ -260,7 +260,8 @@ def _passing_train(axes: Axes, results: Results, statistics: RunStatistics) -> N
         from_to = np.searchsorted(position, supports.x[arm] + np.array([before, after]))
         rows = slice(*np.clip(from_to, 0, results.n_rows("arm_uplift")).tolist())
         uplift = results.column("arm_uplift", arm, rows)
-        return thinned(position[rows] - supports.x[arm], 1e3 * uplift)
+        chosen = thinned(uplift)
+        return position[rows][chosen] - supports.x[arm], 1e3 * uplift[chosen]
 
     worst = int(evaluated[np.argmax(supports.uplift[evaluated])]) if evaluated.size else None
     others = evaluated[evaluated != worst]
@@ -302,11 +303,11 @@ def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
         worst = int(evaluated[np.argmin(droppers.lowest[evaluated])])
         if worst != middle:
             chosen.insert(0, (worst, f"lowest force, dropper at {x[worst]:.1f} m", "#222222"))
-    time = results.line_time
     for dropper, label, line_colour in chosen:
-        curve = thinned(time, results.column("dropper_force", dropper))
-        history.plot(*curve, color=line_colour, linewidth=1.2, label=label)
-    del time
+        force = results.column("dropper_force", dropper)
+        shown = thinned(force)
+        force = force[shown]
+        history.plot(results.line_time[shown], force, color=line_colour, linewidth=1.2, label=label)
     history.axhline(0.0, color=LIMIT, linewidth=1.0, linestyle="--", label="slack")
     history.margins(x=0.0)
     tidy(history, "time [s]", "dropper force [N]")
@@ -378,7 +379,8 @@ def energies(results: Results) -> Figure | None:
     figure = new_figure(3.0)
     axes = figure.subplots()
     for number, name in enumerate(("kinetic", "elastic")):
-        curve = thinned(recorded["time"], recorded[name])
+        chosen = thinned(recorded[name])
+        curve = recorded["time"][chosen], recorded[name][chosen]
         axes.plot(*curve, color=COLOURS[number], label=name)
     axes.margins(x=0.0)
     tidy(axes, "time [s]", "energy [J]", "Energies of the line relative to equilibrium")

@@ -1,1 +1,1 @@
-"""Running a case: the folder of its results, who may write there, and how a run is stopped."""
+"""Running a case: its folder and who may write there, what it records, how it is stopped."""

@@ -23,6 +23,8 @@ from catenary.postproc.result_file import COMPLETE
 
 # A time may be this share of a step off its place.
 _OFF = 1e-3
+# Times that are looked at together.
+_TIMES = 1 << 18
 
 
 class Records(NamedTuple):
@@ -140,12 +142,18 @@ def _rows(
 def _disorder(table: h5py.Dataset, n: int, dt: float | None) -> list[tuple[int, int]]:
     """From the first time on that is not a step of ``dt`` [s] after the one before, or not after
     it."""
-    time = np.asarray(table[:n])
-    if dt is None:
-        wrong = np.flatnonzero(np.diff(time) <= 0.0) + 1
-    else:
-        wrong = np.flatnonzero(np.abs(time - time[:1] - dt * np.arange(n)) > _OFF * dt)
-    return [(int(wrong[0]), n)] if wrong.size else []
+    first, before = (float(table[0]) if n else 0.0), -np.inf
+    for start in range(0, n, _TIMES):
+        time = np.asarray(table[start : min(start + _TIMES, n)])
+        if dt is None:
+            wrong = np.diff(time, prepend=before) <= 0.0
+        else:
+            steps = start + np.arange(time.size)
+            wrong = np.abs(time - first - dt * steps) > _OFF * dt
+        if wrong.any():
+            return [(start + int(np.argmax(wrong)), n)]
+        before = time[-1]
+    return []
 
 
 def _complete(file: h5py.File) -> tuple[list[int], str]:

@@ -61,6 +61,8 @@ class PartialTable:
         start, stop, step = first.indices(self.shape[0])
         if step < 1:
             raise ValueError("rows are read in order")
+        if len(others) == 1 and isinstance(others[0], int | np.integer):
+            return self._column(int(others[0]), start, max(start, stop))[::step]
         return self._rows(start, max(start, stop))[(slice(None, None, step), *others)]
 
     def _rows(self, start: int, stop: int) -> np.ndarray:
@@ -68,6 +70,14 @@ class PartialTable:
         for begin, end in sound_parts(self._damaged, start, stop):
             assert self._table is not None
             values[begin - start : end - start] = self._table[begin:end]
+        return values
+
+    def _column(self, index: int, start: int, stop: int) -> np.ndarray:
+        """Rows of one column, without those of the others in memory."""
+        values = np.full(stop - start, np.nan)
+        for begin, end in sound_parts(self._damaged, start, stop):
+            assert self._table is not None
+            values[begin - start : end - start] = self._table[begin:end, index]
         return values
 
 

@@ -11,26 +11,24 @@ import numpy as np
 MOST_POINTS, _BINS = 20_000, 5_000
 
 
-def thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A curve as it looks with few points, both arrays of the same length.
+def thinned(y: np.ndarray) -> np.ndarray | slice:
+    """Which points of a curve are drawn, as an index for ``x`` and ``y``.
 
     Parameters
     ----------
-    x, y : (n,) in order; values of ``y`` that are NaN leave a gap where all of a bin are
+    y : (n,) in order; NaN leaves a gap where all values of a bin are
     """
-    if x.size <= MOST_POINTS:
-        return x, y
-    size = -(-x.size // _BINS)
-    n_whole = x.size // size
-    places = np.empty((n_whole, 2), dtype=np.int64)
+    if y.size <= MOST_POINTS:
+        return slice(None)
+    size = -(-y.size // _BINS)
+    n_whole = y.size // size
     blocks = y[: n_whole * size].reshape(n_whole, size)
     first = size * np.arange(n_whole)
-    places[:, 0] = first + _place(blocks, np.argmin, np.inf)
-    places[:, 1] = first + _place(blocks, np.argmax, -np.inf)
-    places.sort(axis=1)
-    chosen = np.concatenate([[0], places.ravel(), np.arange(n_whole * size, x.size)])
-    chosen = np.unique(np.append(chosen, x.size - 1))
-    return x[chosen], y[chosen]
+    lowest, highest = _place(blocks, np.argmin, np.inf), _place(blocks, np.argmax, -np.inf)
+    ends = [0, y.size - 1]
+    return np.unique(
+        np.concatenate([ends, first + lowest, first + highest, np.arange(n_whole * size, y.size)])
+    )
 
 
 def _place(

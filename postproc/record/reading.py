@@ -9,6 +9,8 @@ import numpy as np
 
 # What a block of rows takes at most [B].
 BLOCK_BYTES = 16e6
+# Rows of a column that are read at once.
+_SLICE = 1 << 18
 
 
 def row_blocks(n_rows: int, n_columns: int, step: int = 1) -> Iterator[slice]:
@@ -25,10 +27,15 @@ def row_blocks(n_rows: int, n_columns: int, step: int = 1) -> Iterator[slice]:
 
 
 def column(dataset: h5py.Dataset, part: slice, index: int) -> np.ndarray:
-    """One column of some rows of a table, (rows,); HDF5 reads it chunk by chunk."""
+    """One column of some rows of a table, (rows,).
+
+    In slices: of all chunks that it reads at once HDF5 makes tables, and keeps their memory.
+    """
     values = np.empty(part.stop - part.start)
-    if values.size:
-        dataset.read_direct(values, np.s_[part.start : part.stop, index])
+    for start in range(0, values.size, _SLICE):
+        own = slice(start, min(start + _SLICE, values.size))
+        rows = np.s_[part.start + own.start : part.start + own.stop, index]
+        dataset.read_direct(values[own], rows)
     return values
 
 

@@ -1,0 +1,131 @@
+"""From a scene's ``[output]`` to what is recorded and how often: the same in plan and run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from catenary.meshgen.mesh import LineMesh
+from catenary.postproc import channels
+from catenary.postproc.record.line_record import GZIP, NONE, LineRecord, says
+from catenary.solver.problem import Problem
+
+if TYPE_CHECKING:
+    from catenary.cases.schema_run import OutputTable
+
+# Size up to which the line's channels are recorded at every step, and snapshots at their usual
+# cadence, unless the scene says otherwise [B].
+WHOLE_UP_TO = 500e6
+# What is recorded of the line's channels beyond it: every so often [s], so far behind and ahead of
+# the train [m].
+THINNED_EVERY, THINNED_WINDOW = 5e-3, (300.0, 200.0)
+FIELD_EVERY = 0.05  # [s]
+# Bytes of a node in a snapshot.
+PER_NODE = 16
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What a run records.
+
+    Attributes
+    ----------
+    line : of the line's channels
+    field_every, energy_every : steps between two records, None for none
+    field_by_size : whether snapshots are rarer because of their size
+    arm_x, dropper_x : positions [m]
+    n_nodes, n_cells : of the snapshots
+    n_steps : steps after step 0
+    """
+
+    line: LineRecord
+    field_every: int | None
+    energy_every: int | None
+    field_by_size: bool
+    arm_x: np.ndarray
+    dropper_x: np.ndarray
+    n_nodes: int
+    n_cells: int
+    n_steps: int
+
+    def sentences(self, dt: float) -> dict[str, str]:
+        """What is recorded in words, by what it is, at a time step of ``dt`` [s]."""
+        told = {"line": f"arm uplift and dropper forces {says(self.line, dt)}"}
+        if self.field_every:
+            chosen = " (chosen by size)" if self.field_by_size else ""
+            told["film"] = f"a snapshot of the line every {self.field_every * dt:.3g} s{chosen}"
+        return told
+
+    def told(self, dt: float) -> list[str]:
+        """The sentences of what its size has thinned, for the log."""
+        chosen = {"line": self.line.by_size, "film": self.field_by_size}
+        return [text for name, text in self.sentences(dt).items() if chosen[name]]
+
+
+def recording_of(output: OutputTable, problem: Problem, mesh: LineMesh, n_steps: int) -> Recording:
+    """What a run of a problem records. Not collective.
+
+    Parameters
+    ----------
+    output : the scene's table
+    n_steps : steps after step 0
+    """
+    arm_x, dropper_x = mesh.x(mesh.steady_arms), mesh.x(mesh.droppers[:, 1])
+    n_cells = sum(len(nodes) - 1 for nodes in mesh.wires.values()) + len(mesh.droppers)
+    field_every, by_size = _field_every(output, problem.numerics.dt, mesh.n_nodes, n_steps)
+    return Recording(
+        _line_record(output, problem, arm_x.size + dropper_x.size, n_steps),
+        field_every,
+        cadence(output.energy_every_s, problem.numerics.dt),
+        by_size,
+        arm_x,
+        dropper_x,
+        mesh.n_nodes,
+        n_cells,
+        n_steps,
+    )
+
+
+def cadence(every: float, dt: float) -> int | None:
+    """Steps between two records that are to be ``every`` [s] apart; None for none."""
+    return max(1, round(every / dt)) if every > 0 else None
+
+
+def _line_record(output: OutputTable, problem: Problem, n_columns: int, n_steps: int) -> LineRecord:
+    dt, given = problem.numerics.dt, output.chooses_line_channels
+    if not given and 8.0 * n_columns * (n_steps + 1) > WHOLE_UP_TO:
+        return LineRecord(
+            every=cadence(THINNED_EVERY, dt) or 1,
+            window=THINNED_WINDOW,
+            compression=output.line_channels_compression or GZIP,
+            by_size=True,
+        )
+    every_s = output.line_channels_every_s or 0.0
+    if output.line_channels_every_m is not None:
+        every_s = output.line_channels_every_m / problem.train.speed
+    window, spans = output.line_channels_window_m, output.line_channels_spans
+    masts = problem.line.support_positions
+    names = output.line_channels
+    return LineRecord(
+        every=cadence(every_s, dt) or 1,
+        window=None if window is None else (window[0], window[1]),
+        stretch=None if spans is None else (float(masts[spans[0] - 1]), float(masts[spans[1]])),
+        names=channels.LINE_CHANNELS
+        if names is None
+        else tuple(name for name in channels.LINE_CHANNELS if name in names),
+        compression=output.line_channels_compression or NONE,
+    )
+
+
+def _field_every(
+    output: OutputTable, dt: float, n_nodes: int, n_steps: int
+) -> tuple[int | None, bool]:
+    """Steps between two snapshots, None for none, and whether their size has made them rarer."""
+    if output.field_every_s is not None:
+        return cadence(output.field_every_s, dt), False
+    usual = cadence(FIELD_EVERY, dt) or 1
+    most = max(1.0, WHOLE_UP_TO / (PER_NODE * n_nodes))
+    needed = int(np.ceil(n_steps / most))
+    return max(usual, needed), needed > usual

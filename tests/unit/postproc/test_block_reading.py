@@ -1,0 +1,166 @@
+"""Reading by blocks and thinning for pictures: the same numbers, in bounded memory."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from scipy import signal
+
+from catenary.postproc import export, filters
+from catenary.postproc.pages import envelope
+from catenary.postproc.record import reading
+from catenary.postproc.record.kept_extremes import store_extremes
+from catenary.postproc.result_file import COMPLETE
+from catenary.postproc.results import Results
+
+
+@pytest.mark.parametrize("shape", [(1,), (2,), (300,), (150_000,), (70_000, 2)])
+@pytest.mark.parametrize("band", [(filters.low_pass, 20.0), (filters.band_5_20, 5.0)])
+def test_filters_in_blocks_are_those_of_scipy_to_the_last_bit(
+    shape: tuple[int, ...], band: tuple[Any, float]
+) -> None:
+    apply, slowest = band
+    values = 140.0 + np.random.default_rng(3).normal(size=shape)
+    kind: Any = ("low", 20.0) if apply is filters.low_pass else ("bandpass", (5.0, 20.0))
+    sos = signal.butter(filters.ORDER, kind[1], btype=kind[0], fs=1e3, output="sos")
+    padding = min(shape[0] - 1, int(np.ceil(6.0 / (slowest * 1e-3))))
+    expected = signal.sosfiltfilt(sos, values, axis=0, padlen=padding)
+    np.testing.assert_array_equal(apply(values, 1e-3), expected)
+
+
+def test_columns_and_extremes_are_those_of_the_whole_table(
+    run_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reading, "BLOCK_BYTES", 1e5)
+    monkeypatch.setattr(reading, "_SLICE", 1000)
+    with Results(run_folder) as results:
+        for name in ("contact_force", "contact_position", "arm_uplift", "dropper_force"):
+            whole = results.channel(name)
+            low, high = results.extremes(name)
+            np.testing.assert_array_equal(low, whole.min(axis=0))
+            np.testing.assert_array_equal(high, whole.max(axis=0))
+            blocks = list(results.blocks(name))
+            assert len(blocks) > 1
+            np.testing.assert_array_equal(np.concatenate([rows for _, rows in blocks]), whole)
+            part = slice(1234, 5678)
+            np.testing.assert_array_equal(results.column(name, 1, part), whole[part, 1])
+
+
+def test_a_table_is_the_same_whatever_its_blocks(
+    run_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Results(run_folder) as results:
+        whole = export.pantographs_csv(results)
+        monkeypatch.setattr(export, "_ROWS", 777)
+        assert export.pantographs_csv(results) == whole
+
+
+def test_a_thinned_curve_keeps_every_peak() -> None:
+    y = np.random.default_rng(5).normal(size=1_000_003)
+    y[[17, 500_000, 1_000_002]] = 50.0, -60.0, 70.0
+    y[200_000:300_000] = np.nan
+    chosen = envelope.thinned(y)
+    assert isinstance(chosen, np.ndarray) and chosen.size < 12_000
+    assert {0, 17, 500_000, 1_000_002} <= set(chosen.tolist())
+    assert (np.diff(chosen) > 0).all()
+    # Each two hundredth of the picture shows the range that it has.
+    for place in np.array_split(np.arange(y.size), 200):
+        shown = y[chosen[(chosen >= place[0]) & (chosen <= place[-1])]]
+        inner = place[1000:-1000]
+        if np.isnan(y[inner]).any():
+            continue
+        assert np.nanmax(shown) >= np.nanmax(y[inner])
+        assert np.nanmin(shown) <= np.nanmin(y[inner])
+    assert envelope.thinned(y[:100]) == slice(None)
+
+
+def test_files_of_the_earlier_layout_are_read(
+    run_folder: Path, tmp_path: Path, make_march: Any, record_run: Any
+) -> None:
+    path = record_run(tmp_path / "run.h5", make_march(n_steps=200))
+    with Results(path) as results:
+        known = {name: results.channel(name) for name in ("arm_uplift", "dropper_force")}
+        extremes = {name: results.extremes(name) for name in known}
+    with h5py.File(path, "r+") as file:
+        for name in known:
+            file.move(f"line_channels/{name}", f"channels/{name}")
+        for name in ("line_channels", "line_columns", "extremes"):
+            del file[name]
+        for name in ("line_record", "attribute_crc32"):
+            del file.attrs[name]
+        rows = file[COMPLETE][:2]
+        del file[COMPLETE]
+        file[COMPLETE] = rows
+        file.attrs["format"] = "catenary-run-1"
+    with Results(path) as results:
+        for name, values in known.items():
+            np.testing.assert_array_equal(results.channel(name), values)
+            np.testing.assert_array_equal(results.extremes(name), extremes[name])
+
+
+REPORT = """
+import resource, sys
+from catenary.postproc.report import write_report
+write_report(sys.argv[1], sys.argv[2])
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+N_LONG = 600_000
+
+
+def make_long(path: Path, make_march: Any, record_run: Any) -> None:
+    """A run of 600 000 steps on a line of 144 droppers and 15 arms: 0.8 GB if all were there.
+
+    Its line channels are stored where the first steps were; all else of them is a hole.
+    """
+    march = make_march(n_steps=N_LONG, dt=8.0 / N_LONG, separations=(0.0,))
+    recorder_options = {"flush_every": 4096}
+    from catenary.postproc.recorder import Recorder
+
+    recorder = Recorder(march.comm, path, march.header(), **recorder_options)
+    march.drive(recorder, last=20)
+    recorder.close({})
+    rows = N_LONG + 1
+    time = march.dt * np.arange(rows)
+    force = 150.0 + 30.0 * np.sin(10.0 * time) + 15.0 * np.sin(56.0 * time)
+    made = {
+        "contact_position": march.start + 83.333 * time,
+        "contact_force": force,
+        "head_height": 5.3 + 1e-4 * force,
+        "wire_height": 5.3 + 1e-4 * force,
+    }
+    with h5py.File(path, "r+") as file:
+        for name, values in made.items():
+            file[f"channels/{name}"].resize(rows, axis=0)
+            file[f"channels/{name}"][:, 0] = values
+        for clock in ("time", "line_channels/time"):
+            file[clock].resize(rows, axis=0)
+            file[clock][:] = time
+        for name in ("arm_uplift", "dropper_force"):
+            file[f"line_channels/{name}"].resize(rows, axis=0)
+        kept = {name: file[f"extremes/0/{name}"][...] for name in ("arm_uplift", "dropper_force")}
+        for _ in range(2):
+            store_extremes(file, rows, kept)
+        file[COMPLETE][...] = [rows, 0, rows]
+
+
+def test_a_report_on_a_long_run_takes_bounded_memory(
+    tmp_path: Path, make_march: Any, record_run: Any
+) -> None:
+    path = tmp_path / "run.h5"
+    make_long(path, make_march, record_run)
+    done = subprocess.run(
+        [sys.executable, "-c", REPORT, str(path), str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    resident = int(done.stdout.split()[-1]) * (1 if sys.platform == "darwin" else 1024)
+    print(f"resident {resident / 1e6:.0f} MB")
+    assert resident < 400e6
+    assert (tmp_path / "report.html").stat().st_size > 100_000
