@@ -55,6 +55,11 @@ class Reading:
     changes: Sequence[str]
     findings: Sequence[Finding]
 
+    @property
+    def n_reproduced(self) -> int:
+        """How many statements are reproduced."""
+        return sum(one.verdict == REPRODUCED for one in self.findings)
+
 
 @dataclass(frozen=True)
 class StudyTable:

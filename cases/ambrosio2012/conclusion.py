@@ -6,9 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from catenary.cases.ambrosio2012 import figures, ranking, ringing, statements
+from catenary.cases.ambrosio2012 import figures, ranking, ringing, search, statements
 from catenary.cases.ambrosio2012.statements import AVERAGE, DAMPINGS, LIGHT, Force, Run, Runs, Slack
-from catenary.cases.ambrosio2012.study import VARIED, run_name, variations
+from catenary.cases.ambrosio2012.study import (
+    VARIED,
+    run_name,
+    searched,
+    variations,
+)
 from catenary.cases.study import StudyRun
 from catenary.postproc.study_report import (
     NOT_REPRODUCED,
@@ -16,6 +21,7 @@ from catenary.postproc.study_report import (
     Finding,
     Reading,
     Study,
+    StudyFigure,
     StudyTable,
 )
 
@@ -23,7 +29,8 @@ _FORCES = ("mean_N", "std_N", "max_N", "min_N", "loss_percent", "std_0_5_N", "st
 
 
 def conclude(runs: Mapping[str, StudyRun], table: Mapping[str, Any]) -> Study:
-    """The study of the paper: verdicts under each reading, ranking of inputs, figures 8 to 14.
+    """The study of the paper: verdicts under each reading, ranking and search of inputs, figures 8
+    to 14.
 
     Parameters
     ----------
@@ -57,22 +64,79 @@ def conclude(runs: Mapping[str, StudyRun], table: Mapping[str, Any]) -> Study:
             for one in readings
         ],  # fmt: skip
         tables=[
+            _side_by_side([one for one in readings if one.get("figures")], found),
+            _searched(runs, table),
             *(_table_of(one, judged[one["name"]]) for one in readings),
             ringing.table(_bands(runs, readings, judged)),
             ranking.table(ranked),
         ],
-        figures=figures.draw(
-            {
-                damping: {
-                    train["name"]: runs[run_name(first["name"], damping, train["name"])].folder
-                    for train in table["trains"]
-                    if _done(runs.get(run_name(first["name"], damping, train["name"])))
-                }
-                for damping in DAMPINGS
-            },
-            judged[first["name"]],
-        ),
+        figures=_drawn(runs, table, readings, judged),
     )  # fmt: skip
+
+
+def _drawn(
+    runs: Mapping[str, StudyRun],
+    table: Mapping[str, Any],
+    readings: Sequence[Mapping[str, Any]],
+    judged: Mapping[str, Runs],
+) -> list[StudyFigure]:
+    """The paper's figures of all readings that are to be shown, beside each other."""
+    drawn = []
+    for number, reading in enumerate(one for one in readings if one.get("figures")):
+        folders = {
+            damping: {
+                train["name"]: runs[run_name(reading["name"], damping, train["name"])].folder
+                for train in table["trains"]
+                if _done(runs.get(run_name(reading["name"], damping, train["name"])))
+            }
+            for damping in DAMPINGS
+        }
+        own = figures.draw(folders, judged[reading["name"]])
+        if number:
+            own = [
+                replace(
+                    one,
+                    name=f"{one.name}_{reading['name']}",
+                    caption=f"{one.caption[:-1]}: {reading['title']}.",
+                )
+                for one in own
+            ]
+        drawn += own
+    return sorted(drawn, key=lambda one: one.name[: len("figure_00")])
+
+
+def _side_by_side(
+    readings: Sequence[Mapping[str, Any]], found: Mapping[str, Sequence[Finding]]
+) -> StudyTable:
+    """All statements under the readings that the figures show, each with its figures."""
+    columns = [found[one["name"]] for one in readings]
+    met = [sum(one.verdict == REPRODUCED for one in column) for column in columns]
+    return StudyTable(
+        "The nine statements beside each other",
+        "; ".join(
+            f"{reading['title']}: {n} of {len(column)} reproduced"
+            for reading, n, column in zip(readings, met, columns, strict=True)
+        )
+        + ".",
+        ["", "statement", *(reading["title"] for reading in readings)],
+        [
+            [str(row[0].number), row[0].statement, *(f"{one.verdict}: {one.found}" for one in row)]
+            for row in zip(*columns, strict=True)
+        ],
+    )
+
+
+def _searched(runs: Mapping[str, StudyRun], table: Mapping[str, Any]) -> StudyTable:
+    """The readings of the search and the one that it is around, the best first."""
+    around = [one for one in table["readings"] if one["name"] == table["search"]["around"]]
+    names = {one["title"]: one["name"] for one in around}
+    names |= {title: one["name"] for title, one in searched(table).items()}
+    judged = [
+        search.judge(title, _runs_of(runs, table, name))
+        for title, name in names.items()
+        if _was_run(runs, name)
+    ]
+    return search.table(search.rank(judged))
 
 
 def _bands(

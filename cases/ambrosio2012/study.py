@@ -1,7 +1,8 @@
 """The paper's study: two pantographs at several separations, with light and average damping.
 
 ``study.toml`` lists the runs, ``statements.py`` judges them, ``figures.py`` redraws the paper's
-figures 8 to 14, ``ranking.py`` says which open input moves what.
+figures 8 to 14, ``ranking.py`` says which open input moves what, ``search.py`` which reading meets
+most statements.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 TABLE = Path(__file__).with_name("study.toml")
 VARIED = "vary"
+SEARCHED = "search"
 
 
 def run_name(reading: str, damping: str, train: str) -> str:
@@ -32,9 +34,28 @@ def run_name(reading: str, damping: str, train: str) -> str:
 
 def variations(table: Mapping[str, Any]) -> dict[str, list[str]]:
     """Assignments of all variations by "group: title"."""
+    return _by_title(table["variations"])
+
+
+def searched(table: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """The readings of the search by "input: option", each one option off the one searched around.
+
+    Empty if the latter is not among the readings.
+    """
+    search = table["search"]
+    return {
+        title: {**centre, "name": f"{SEARCHED}-{title}", "set": [*centre["set"], *assignments],
+                "figures": False}
+        for centre in table["readings"]
+        if centre["name"] == search["around"]
+        for title, assignments in _by_title(search["inputs"]).items()
+    }  # fmt: skip
+
+
+def _by_title(groups: Mapping[str, Mapping[str, list[str]]]) -> dict[str, list[str]]:
     return {
         f"{group}: {title}": assignments
-        for group, entries in table["variations"].items()
+        for group, entries in groups.items()
         for title, assignments in entries.items()
     }
 
@@ -46,27 +67,32 @@ def read_table(shortened: bool = False) -> dict[str, Any]:
         short = table["short"]
         for name in ("trains", "readings"):
             table[name] = [one for one in table[name] if one["name"] in short[name]]
-        kept: dict[str, dict[str, list[str]]] = {}
-        for name in short["variations"]:
-            group, title = name.split(": ")
-            kept.setdefault(group, {})[title] = table["variations"][group][title]
-        table["variations"] = kept
+        table["variations"] = _chosen(table["variations"], short["variations"])
+        table["search"]["inputs"] = _chosen(table["search"]["inputs"], short["search"])
     return table
 
 
+def _chosen(groups: Mapping[str, Any], titles: Sequence[str]) -> dict[str, dict[str, list[str]]]:
+    kept: dict[str, dict[str, list[str]]] = {}
+    for group, title in (name.split(": ") for name in titles):
+        kept.setdefault(group, {})[title] = groups[group][title]
+    return kept
+
+
 def variants(scene: Scene, shortened: bool) -> list[StudyVariant]:
-    """All runs; only those of the first reading, which the figures show, keep their results."""
+    """All runs; only those of the readings that the figures show keep their results."""
     table = read_table(shortened)
     own = scene.train.pantographs[0].name
     planned = []
-    for number, reading in enumerate(table["readings"]):
+    for reading in [*table["readings"], *searched(table).values()]:
         for damping, alpha in table["dampings"].items():
             for train in table["trains"]:
                 name = run_name(reading["name"], damping, train["name"])
                 assignments = (*table["always"], *alpha, *reading["set"], *train["set"])
                 keys = {"reading": reading["name"], "damping": damping, "train": train["name"]}
                 filled = _with_kind(assignments, reading.get("kind", own))
-                planned.append(StudyVariant(Variant(name, filled, keys), number == 0))
+                shown = reading.get("figures", False)
+                planned.append(StudyVariant(Variant(name, filled, keys), shown))
     for title, changes in variations(table).items():
         for damping, alpha in table["dampings"].items():
             name = run_name(VARIED, damping, title)

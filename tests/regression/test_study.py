@@ -34,7 +34,7 @@ def test_every_statement_has_a_verdict_under_every_reading(done: tuple[Path, str
     out, said = done
     page = html.unescape((out / "study.html").read_text())
     study = json.loads((out / "study.json").read_text())
-    assert [reading["name"] for reading in study["readings"]] == ["case", "smooth"]
+    assert [reading["name"] for reading in study["readings"]] == ["case", "best", "smooth"]
     for reading in study["readings"]:
         assert [one["number"] for one in reading["findings"]] == list(range(1, 10))
         for one in reading["findings"]:
@@ -78,9 +78,31 @@ def test_figures_show_what_the_runs_hold(done: tuple[Path, str]) -> None:
     assert mean == pytest.approx(alone["pantographs"][0]["mean_N"], rel=1e-5)
 
 
-def test_only_the_first_reading_keeps_its_result_files(done: tuple[Path, str]) -> None:
+def test_readings_and_the_search_stand_beside_each_other(done: tuple[Path, str]) -> None:
+    study = json.loads((done[0] / "study.json").read_text())
+    beside, searched = study["tables"][:2]
+    assert len(beside["rows"]) == 9 and len(beside["head"]) == 2 + 2
+    assert "reproduced" in beside["note"]
+    for row, one in zip(beside["rows"], study["readings"][1]["findings"], strict=True):
+        assert row[3] == f"{one['verdict']}: {one['found']}"
+    titles = [row[0] for row in searched["rows"]]
+    assert sorted(titles) == sorted([study["readings"][1]["title"], "spans: 54 m"])
+    best = searched["rows"][titles.index(study["readings"][1]["title"])]
+    met = [one["number"] for one in study["readings"][1]["findings"]
+           if one["verdict"] == "reproduced"]  # fmt: skip
+    assert best[1:3] == [str(len(met)), ", ".join(map(str, met))]
+    for number in range(8, 15):
+        assert (done[0] / f"figure_{number:02}_best.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_only_the_readings_of_the_figures_keep_their_result_files(done: tuple[Path, str]) -> None:
     kept = {path.parent.name for path in (done[0] / "runs").glob("*/run.h5")}
-    assert kept == {f"case__{d}__{t}" for d in ("light", "average") for t in ("single", "31m")}
+    assert kept == {
+        f"{r}__{d}__{t}"
+        for r in ("case", "best")
+        for d in ("light", "average")
+        for t in ("single", "31m")
+    }
     for name in kept:
         with Results(done[0] / "runs" / name) as results:
             assert results.complete

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import sys
 from pathlib import Path
@@ -12,11 +13,11 @@ import pytest
 from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
-from catenary.cases.ambrosio2012.study import read_table
+from catenary.cases.ambrosio2012.study import read_table, searched, variants
 from catenary.cases.catalogue import shipped
 from catenary.cases.cli import app
-from catenary.cases.scene import load_scene
-from catenary.cases.study import Plan, find_study, make_plan
+from catenary.cases.scene import Scene, load_scene
+from catenary.cases.study import StudyVariant, make_plan
 from catenary.postproc.study_report import (
     NOT_REPRODUCED,
     REPRODUCED,
@@ -77,42 +78,76 @@ def test_a_study_that_cannot_be_used_is_told(study: str, sentence: str, tmp_path
 
 
 @pytest.fixture(scope="module")
-def plan() -> Plan:
-    """The paper's study, all its scenes checked."""
-    return make_plan("ambrosio2012")
+def planned() -> list[StudyVariant]:
+    """The runs of the paper's study."""
+    return variants(load_scene("ambrosio2012"), False)
 
 
-def test_every_train_runs_under_both_dampings_and_so_does_every_variation(plan: Plan) -> None:
+def scene_of(one: StudyVariant) -> Scene:
+    return load_scene("ambrosio2012", one.variant.assignments)
+
+
+def test_every_train_runs_under_both_dampings_and_so_does_every_variation(
+    planned: list[StudyVariant],
+) -> None:
     table = read_table()
     variations = sum(len(group) for group in table["variations"].values())
-    assert len(plan.jobs) == 2 * (len(table["readings"]) * len(table["trains"]) + variations)
-    assert plan.path == find_study("ambrosio2012")
-    first = [job for job in plan.jobs if job.keep_results]
-    assert {job.scene.line.damping.alpha_s for job in first} == {0.00275, 0.0275}
-    assert sorted(max(p.behind_m for p in job.scene.train.pantographs) for job in first) == sorted(
+    options = sum(len(group) for group in table["search"]["inputs"].values())
+    readings = len(table["readings"]) + options
+    assert len(planned) == 2 * (readings * len(table["trains"]) + variations)
+    kept = [one for one in planned if one.keep_results]
+    assert {one.variant.varied["reading"] for one in kept} == {"case", "printed", "best"}
+    first = [scene_of(one) for one in kept if one.variant.varied["reading"] == "case"]
+    assert {scene.line.damping.alpha_s for scene in first} == {0.00275, 0.0275}
+    assert sorted(max(p.behind_m for p in scene.train.pantographs) for scene in first) == sorted(
         2 * [0.0, 31.0, 85.0, 100.0, 200.0, 400.0]
     )
 
 
-def test_all_trains_start_and_are_judged_at_the_same_place_of_a_span(plan: Plan) -> None:
+def test_all_trains_start_and_are_judged_at_the_same_place_of_a_span(
+    planned: list[StudyVariant],
+) -> None:
     # The trailing pantograph starts at 110 m; the stretch lies a whole number of spans of 54 m on.
-    for job in plan.jobs:
-        if job.keep_results:
-            scene = job.scene
+    for one in planned:
+        if one.variant.varied["reading"] == "case":
+            scene = scene_of(one)
             behind = max(one.behind_m for one in scene.train.pantographs)
             assert scene.train.start_m - behind == 110.0
             assert scene.evaluation.to_m - scene.evaluation.from_m == 400.0
             assert (scene.evaluation.from_m - 400.0) % 54.0 == 0.0
 
 
-def test_the_kind_of_pantograph_is_the_cases_own_or_the_readings(plan: Plan) -> None:
+def test_the_kind_of_pantograph_is_the_cases_own_or_the_readings(
+    planned: list[StudyVariant],
+) -> None:
     own = load_scene("ambrosio2012").train.pantographs[0].name
     kinds = {reading["name"]: reading.get("kind", own) for reading in read_table()["readings"]}
     assert {own, "lumped"} == set(kinds.values())
-    for job in plan.jobs:
-        reading = job.variant.varied["reading"]
-        if reading in kinds:
-            assert {one.name for one in job.scene.train.pantographs} == {kinds[reading]}
+    for one in planned:
+        reading, train = (one.variant.varied[key] for key in ("reading", "train"))
+        if reading in kinds and train in ("single", "200m"):
+            assert {place.name for place in scene_of(one).train.pantographs} == {kinds[reading]}
+
+
+def test_the_search_takes_each_option_in_the_place_of_the_best_readings(
+    planned: list[StudyVariant],
+) -> None:
+    chosen = {"damping": "light", "train": "single"}
+    scenes = {
+        one.variant.varied["reading"]: scene_of(one)
+        for one in planned
+        if one.variant.varied == chosen | {"reading": one.variant.varied["reading"]}
+        and one.variant.varied["reading"].startswith(("best", "search"))
+    }
+    best = scenes.pop("best")
+    del scenes["best_released"]
+    assert len(scenes) == len(searched(read_table()))
+    records = [json.dumps(scene.resolved(), sort_keys=True, default=str) for scene in
+               (best, *scenes.values())]  # fmt: skip
+    assert len(set(records)) == len(records)
+    for scene in scenes.values():
+        assert scene.line.dropper.slack_damping == "kept"
+        assert scene.train.pantographs[0].name == best.train.pantographs[0].name == "lumped"
 
 
 def test_the_users_kind_takes_the_place_of_the_cases() -> None:
