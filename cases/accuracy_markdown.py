@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 
 from catenary.cases.accuracy import Measured
 from catenary.cases.accuracy_analysis import HISTORY, QUANTITIES, Row
-from catenary.cases.accuracy_axes import DISCRETISATION, Axis
+from catenary.cases.accuracy_axes import AXES, DISCRETISATION, Axis
 from catenary.cases.accuracy_plan import PlannedAxis
+from catenary.postproc.pages.wording import counted
 
 _SEPARATE = ("history by step", "history by mesh")
 _LAST_COLUMNS = ("est/true", "rounds", "s/s")
@@ -28,12 +29,12 @@ def page(
     """
     parts = [
         f"# Accuracy and cost: {found.plan.case}",
-        f"`catenary accuracy {found.plan.case}`; {len(found.rows)} settings, "
-        f"{found.wall / 60.0:.0f} minutes. Errors in percent: of the reference's own value for "
-        "mean, deviations and uplift, of its standard deviation for maximum, minimum and the force "
-        '"history" (rms). "est/true" is the error that a run estimates itself over the true one, '
-        '"rounds" the solves of the small problem a step, "s/s" wall time of the march per '
-        "simulated second: read times as ratios. Where step and mesh are refined together, errors "
+        f"`{_command(found)}`; {counted(len(found.rows), 'setting')}, "
+        f"{counted(round(found.wall / 60.0), 'minute')}. Errors in percent: of the reference's own "
+        "value for mean, deviations and uplift, of its standard deviation for maximum, minimum and "
+        'the force "history" (rms). "est/true" is the error that a run estimates itself over the '
+        'true one, "rounds" the solves of the small problem a step, "s/s" wall time of the march '
+        "per simulated second: read times as ratios. Where step and mesh are refined together, errors "
         "of the history by the step and by the mesh alone stand beside the whole error, in which "
         "they may cancel.",
     ]
@@ -51,6 +52,13 @@ def page(
         parts.append(_table(axis, found.rows_of(axis.name)))
         parts += [line.strip()[0].upper() + line.strip()[1:] + "." for line in orders[axis.name]]
     return "\n\n".join(parts) + "\n"
+
+
+def _command(found: Measured) -> str:
+    """The words that make this study again, the folder left out."""
+    names = [planned.axis.name for planned in found.plan.axes]
+    some = "" if names == list(AXES) else f" --axes {','.join(names)}"
+    return f"catenary accuracy {found.plan.case}{some}"
 
 
 def uncertainty_text(planned: PlannedAxis, percent: Mapping[str, float]) -> str:

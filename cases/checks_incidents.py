@@ -16,6 +16,7 @@ from catenary.cases.schema_incidents import (
     TensionLossTable,
 )
 from catenary.meshgen.line import Line
+from catenary.postproc.pages.wording import counted
 
 if TYPE_CHECKING:
     from catenary.cases.scene import Scene
@@ -97,11 +98,13 @@ def _hangs(scene: Scene, i: int, table: DropperBreakTable | TensionLossTable) ->
 def _dropper(scene: Scene, i: int, table: DropperBreakTable, line: Line) -> Iterator[Fault]:
     yield from _hangs(scene, i, table)
     if table.span > line.n_spans:
-        yield _refusal(scene, i, "span", table.span, f"the line has {line.n_spans} spans")
+        yield _refusal(
+            scene, i, "span", table.span, f"the line has {counted(line.n_spans, 'span')}"
+        )
         return
     n = len(line.dropper_positions[table.span - 1])
     if table.dropper > n:
-        why = f"span {table.span} has {n} droppers"
+        why = f"span {table.span} has {counted(n, 'dropper')}"
         yield _refusal(scene, i, "dropper", table.dropper, why)
 
 
@@ -126,7 +129,7 @@ def _tension(scene: Scene, i: int, table: TensionLossTable, line: Line) -> Itera
 def _lowering(scene: Scene, i: int, table: LoweringTable, line: Line) -> Iterator[Fault]:
     n = len(scene.train.pantographs)
     if table.pantograph > n:
-        noun = "1 pantograph" if n == 1 else f"{n} pantographs"
+        noun = counted(n, "pantograph")
         yield _refusal(scene, i, "pantograph", table.pantograph, f"the train has {noun}")
         return
     why = ""

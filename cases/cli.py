@@ -13,6 +13,7 @@ import typer
 from catenary.cases import console
 from catenary.cases.commands import completion
 from catenary.cases.run.output_folder import refuse_impossible
+from catenary.postproc.pages.wording import counted
 from catenary.solver.errors import InputError
 
 if TYPE_CHECKING:
@@ -312,8 +313,8 @@ def check(
     mesh = mesh_of(scene)
     find_form(problem, mesh)
     console.say(
-        f"{scene.case.name} is sound: {problem.line.n_spans} spans, "
-        f"{problem.line.support_positions[-1]:g} m, {mesh.droppers.shape[0]} droppers, "
+        f"{scene.case.name} is sound: {counted(problem.line.n_spans, 'span')}, "
+        f"{problem.line.support_positions[-1]:g} m, {counted(mesh.droppers.shape[0], 'dropper')}, "
         f"{mesh.n_nodes} nodes"
     )
     for name, lines in kind_lines(scene, problem).items():
@@ -340,7 +341,7 @@ def mesh(
     from catenary.cases.meshing import write_mesh_of
 
     made = write_mesh_of(scene, out, force)
-    console.say(f"{out}: {made.n_nodes} nodes, {made.droppers.shape[0]} droppers")
+    console.say(f"{out}: {made.n_nodes} nodes, {counted(made.droppers.shape[0], 'dropper')}")
 
 
 @app.command(

@@ -78,6 +78,7 @@ def accuracy(
     from catenary.cases import accuracy as study
     from catenary.cases import accuracy_output
     from catenary.cases.run.folder_lock import held
+    from catenary.postproc.pages.wording import counted
     from catenary.solver.parallel import on_root
 
     with held(out, comm, f"catenary accuracy {case}"):
@@ -89,5 +90,7 @@ def accuracy(
             return console.BROKEN
         files = on_root(comm, lambda: accuracy_output.write(found, out, wanted))
     console.say("\n" + accuracy_output.as_text(found, wanted))
-    console.say(f"\n{len(ended)} runs, {found.wall:.0f} s\n" + "\n".join(map(str, files)))
+    console.say(
+        f"\n{counted(len(ended), 'run')}, {found.wall:.0f} s\n" + "\n".join(map(str, files))
+    )
     return console.DONE

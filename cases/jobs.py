@@ -10,7 +10,7 @@ from catenary.cases.keys import nearest
 from catenary.cases.loading import Assigned
 from catenary.cases.messages import shown
 from catenary.cases.scene import Scene, load_scene
-from catenary.cases.variants import Variant
+from catenary.cases.variants import NAMES, Variant
 from catenary.solver.errors import InputError
 
 # Columns of a sweep's table: of a row's pantograph, and of the line.
@@ -83,7 +83,7 @@ class Ended:
 
 def _assigned(variant: Variant) -> list[Assigned]:
     """The assignments of a variant, each with what gave it."""
-    own = len(variant.assignments) - sum(key != "variant" for key in variant.varied)
+    own = len(variant.assignments) - sum(key != NAMES for key in variant.varied)
     by_name = f"by the variant {variant.name}"
     return [
         Assigned(text, "--vary", "on the command line (--vary)")

@@ -13,6 +13,7 @@ from catenary.cases.run.output_folder import RunSize, volume
 from catenary.cases.run.recording import Recording, recording_of
 from catenary.cases.scene import Scene
 from catenary.mbs.multibody import MultibodyData
+from catenary.postproc.pages.wording import counted
 from catenary.solver import effects
 from catenary.solver.problem import Numerics, Problem, n_halvings
 
@@ -241,7 +242,7 @@ def plan_text(plan: Plan) -> str:
     """The plan as text for a terminal."""
     ratio = plan.speed / plan.wave_speed
     forces = ", ".join(f"{force:.1f}" for force in plan.static_forces)
-    pantographs = "1 pantograph" if plan.n_pantographs == 1 else f"{plan.n_pantographs} pantographs"
+    pantographs = counted(plan.n_pantographs, "pantograph")
     rows = [
         ("train", f"{3.6 * plan.speed:g} km/h, {pantographs}, static force {forces} N"),
         *(("pantograph", f"{name}, {told}") for name, told in plan.kinds),
@@ -254,7 +255,8 @@ def plan_text(plan: Plan) -> str:
         *(("incident", f"at {time:.4g} s: {says}") for time, says in plan.incidents),
         (
             "mesh",
-            f"{plan.n_nodes} nodes, {plan.n_droppers} droppers, {plan.n_arms} steady arms, "
+            f"{plan.n_nodes} nodes, {counted(plan.n_droppers, 'dropper')}, "
+            f"{counted(plan.n_arms, 'steady arm')}, "
             f"elements of {plan.element_lengths[0]:.2f} to {plan.element_lengths[1]:.2f} m",
         ),
         (
@@ -264,8 +266,8 @@ def plan_text(plan: Plan) -> str:
         ),
         (
             "time",
-            f"{plan.simulated:.2f} s in {plan.n_steps} steps of {1e3 * plan.dt:g} ms, scheme "
-            f"{plan.scheme}",
+            f"{plan.simulated:.2f} s in {counted(plan.n_steps, 'step')} of {1e3 * plan.dt:g} ms, "
+            f"scheme {plan.scheme}",
         ),
         *([("adapted", plan.halved)] if plan.halved else []),
         ("memory", f"about {plan.memory / 1e6:.0f} MB on one rank (estimate)"),

@@ -11,6 +11,7 @@ import numpy as np
 from catenary.cases.catalogue import CaseEntry
 from catenary.meshgen.line import Line
 from catenary.postproc.evaluate.comparing import decimals_that_tell
+from catenary.postproc.pages.wording import counted, fixed
 
 
 def case_table(cases: Sequence[CaseEntry]) -> str:
@@ -48,8 +49,9 @@ def summary_text(summary: Mapping[str, Any], folder: Path) -> str:
     lines += [
         "",
         f"  largest uplift at a steady arm {_number(summary['supports']['max_uplift_mm'])} mm; "
-        f"{droppers['n_slackened']} droppers slackened",
-        f"  {summary['n_steps']} steps, {summary['n_dofs']} unknowns, {summary['n_ranks']} ranks, "
+        f"{counted(droppers['n_slackened'], 'dropper')} slackened",
+        f"  {counted(summary['n_steps'], 'step')}, {counted(summary['n_dofs'], 'unknown')}, "
+        f"{counted(summary['n_ranks'], 'rank')}, "
         f"real-time factor {_number(summary['real_time_factor'], 2)}",
         *_sizes_of_steps(summary.get("inner_iterations", {})),
         "",
@@ -85,7 +87,7 @@ def _sizes_of_steps(counted: Mapping[str, Any]) -> list[str]:
 
 
 def _number(value: float | None, digits: int = 1) -> str:
-    return "-" if value is None else f"{value:.{digits}f}"
+    return "-" if value is None else fixed(value, digits)
 
 
 def static_text(table: Mapping[str, Any], line: Line) -> str:
@@ -114,7 +116,8 @@ def static_text(table: Mapping[str, Any], line: Line) -> str:
             continue
         shown[pattern] = int(span) + 1
         lines += [
-            f"{span + 1:5d} {x[i]:12.3f} {length[i]:11.4f} {force[i]:10.1f}" for i in range(x.size)
+            f"{span + 1:5d} {x[i]:12.3f} {length[i]:11.4f} {fixed(force[i], 1):>10}"
+            for i in range(x.size)
         ]
     height, lift = data["contact_height"], 1e3 * data["elasticity"]
     first, last = line.running_range

@@ -155,7 +155,7 @@ def _conclude(
         "runs": f"{len(ended)}, of which {sum(not one.done for one in ended)} broke",
         "time of all runs": f"{wall:.0f} s",
         "time of this call": f"{time.perf_counter() - begin:.0f} s, "
-        f"{sum(one.skipped for one in ended)} runs were done already",
+        f"{sum(one.skipped for one in ended)} of the runs had been done before",
     }
     files = write_study(study, out_dir, table, facts)
     files += write_all(out_dir, {"study.csv": sweep_output.as_csv(table)})

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from catenary.cases.commands.axis_words import (
+    STATISTICS_IN_WORDS,
+    key_in_words,
+    value_in_words,
+)
 from catenary.cases.jobs import LINE_COLUMNS, PANTOGRAPH_COLUMNS, Ended
-from catenary.cases.units import unit_of
+from catenary.cases.loading import parse_assignment
+from catenary.cases.variants import NAMES
 from catenary.postproc import plots
+from catenary.postproc.pages.wording import fixed
 from catenary.postproc.record.csv_text import csv_text
 from catenary.postproc.storage import plain, write_all
 
@@ -24,22 +31,40 @@ _MOST_LABELS = 10  # curves that a legend can name
 def rows(ended: Sequence[Ended]) -> list[dict[str, Any]]:
     """One row per variant and pantograph; a variant that broke has one without figures.
 
-    Columns: ``variant``, the varied keys, ``outcome``, ``pantograph``, ``STATISTICS``, ``passed``
-    (the standard's verdict), ``wall_s``.
+    Columns: ``variant``, the varied keys with values of their own types, ``outcome``,
+    ``pantograph``, ``STATISTICS``, ``passed`` (the standard's verdict, None if not judged),
+    ``failed`` (the criteria that failed), ``wall_s``.
     """
     keys = varied_keys(ended)
     table = []
     for one in ended:
         head = {"variant": one.variant.name}
-        head |= {key: one.variant.varied.get(key, "") for key in keys}
+        head |= {key: _typed(key, one.variant.varied.get(key)) for key in keys}
         head["outcome"] = one.outcome
-        tail: dict[str, Any] = {"passed": one.summary.get("passed"), "wall_s": one.wall}
+        tail: dict[str, Any] = {
+            "passed": one.summary.get("passed"),
+            "failed": failed_criteria(one.summary),
+            "wall_s": one.wall,
+        }
         for pantograph in one.summary.get("pantographs", [{}]):
             row: dict[str, Any] = {**head, "pantograph": pantograph.get("name", "")}
             row |= {name: pantograph.get(name) for name in PANTOGRAPH_COLUMNS}
             row |= _of_line(one.summary)
             table.append(row | tail)
     return table
+
+
+def _typed(key: str, text: str | None) -> Any:
+    """The value that a varied key takes, as a scene reads it; None if the variant has none."""
+    if text is None or key == NAMES:
+        return text
+    return parse_assignment(f"{key}={text}", "--vary")[1]
+
+
+def failed_criteria(summary: Mapping[str, Any]) -> list[str]:
+    """Names of the acceptance criteria that a run failed, each once."""
+    rows = summary.get("acceptance", [])
+    return list(dict.fromkeys(row["criterion"] for row in rows if row["passed"] is False))
 
 
 def _of_line(summary: dict[str, Any]) -> dict[str, Any]:
@@ -67,6 +92,12 @@ def as_csv(table: Sequence[dict[str, Any]]) -> str:
 def _cell(value: Any) -> Any:
     if value is None:
         return ""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list) and all(isinstance(entry, str) for entry in value):
+        return "; ".join(value)
+    if isinstance(value, list | dict):
+        return json.dumps(value)
     return f"{value:.6g}" if isinstance(value, float) else value
 
 
@@ -75,7 +106,7 @@ def as_text(ended: Sequence[Ended]) -> str:
     width = max(len(one.variant.name) for one in ended)
     lines = [
         f"{'variant':{width}}  {'pantograph':12}{'mean':>8}{'std':>8}{'max':>8}{'min':>8}  [N]"
-        f"{'loss [%]':>10}{'uplift [mm]':>13}{'slackened':>11}"
+        f"{'loss [%]':>10}{'uplift [mm]':>13}{'slackened':>11}  accepted"
     ]
     for row in rows(ended):
         if row["outcome"] != "done":
@@ -87,13 +118,19 @@ def as_text(ended: Sequence[Ended]) -> str:
         lines.append(
             f"{row['variant']:{width}}  {row['pantograph']:12}{forces}     "
             f"{_short(row['loss_percent'], 3):>10}{_short(row['max_uplift_mm']):>13}"
-            f"{_short(row['n_slackened'], 0):>11}"
+            f"{_short(row['n_slackened'], 0):>11}  {_verdict(row)}"
         )
     return "\n".join(lines)
 
 
+def _verdict(row: Mapping[str, Any]) -> str:
+    if row["failed"]:
+        return f"FAILED {', '.join(row['failed'])}"
+    return "passed" if row["passed"] else "not judged"
+
+
 def _short(value: float | None, digits: int = 1) -> str:
-    return "-" if value is None else f"{value:.{digits}f}"
+    return "-" if value is None else fixed(value, digits)
 
 
 def write(out_dir: Path, case: str, ended: Sequence[Ended], plotted: Sequence[str]) -> list[Path]:
@@ -135,15 +172,15 @@ def draw(table: Sequence[dict[str, Any]], keys: Sequence[str], plotted: Sequence
     others = [k for k in keys if k != axis]
     curves: dict[str, list[dict[str, Any]]] = {}
     for row in done:
-        label = ", ".join([*(f"{k.rsplit('.', 1)[-1]} {row[k]}" for k in others)])
+        label = ", ".join(value_in_words(k, row[k]) for k in others)
         label = ", ".join(part for part in (row["pantograph"], label) if part)
         curves.setdefault(label, []).append(row)
-    places = list(dict.fromkeys(row[axis] for row in done))
+    places = list(dict.fromkeys(_cell(row[axis]) for row in done))
     figure = plots.new_figure(0.6 + 2.0 * len(plotted))
     panels = figure.subplots(len(plotted), 1, sharex=True, squeeze=False)[:, 0]
     for name, axes in zip(plotted, panels, strict=True):
         for number, (label, own) in enumerate(curves.items()):
-            x = [float(row[axis]) if key else places.index(row[axis]) for row in own]
+            x = [float(row[axis]) if key else places.index(_cell(row[axis])) for row in own]
             y = [np.nan if row[name] is None else float(row[name]) for row in own]
             order = np.argsort(x, kind="stable")
             axes.plot(
@@ -155,18 +192,15 @@ def draw(table: Sequence[dict[str, Any]], keys: Sequence[str], plotted: Sequence
                 color=plots.colour(number),
                 label=label,
             )
-        plots.tidy(axes, "", name)
+        plots.tidy(axes, "", STATISTICS_IN_WORDS[name])
     if len(curves) <= _MOST_LABELS:
         plots.legend_above(panels[0], columns=min(len(curves), 3))
     if key is None:
         panels[-1].set_xticks(range(len(places)), places, rotation=30, ha="right")
-    unit = unit_of(axis)
-    panels[-1].set_xlabel(f"{axis} [{unit}]" if unit else axis)
+    panels[-1].set_xlabel(key_in_words(axis))
     return figure
 
 
-def _is_number(text: Any) -> bool:
-    try:
-        return bool(np.isfinite(float(text)))
-    except (TypeError, ValueError):
-        return False
+def _is_number(value: Any) -> bool:
+    real = isinstance(value, int | float) and not isinstance(value, bool)
+    return real and bool(np.isfinite(value))

@@ -21,6 +21,8 @@ from catenary.solver.errors import InputError
 MAX_VARIANTS = 10_000
 MOST_LETTERS = 200  # in a variant's name
 _LONGEST_SLUG = 100  # folder names may have 255 bytes; room for what a user puts around them
+# The column of the names of variants in a file, beside those of the varied keys.
+NAMES = "variant"
 _OPENING, _CLOSING, _QUOTES = "[{", "]}", "\"'"
 
 
@@ -121,7 +123,7 @@ def product(varied: Sequence[VariedKey], named: Mapping[str, Sequence[str]]) -> 
             words = [name] if name else []
             words += [f"{labels[key]}_{value}" for key, value in chosen.items()]
             own = tuple(f"{key}={value}" for key, value in chosen.items())
-            columns = {"variant": name, **chosen} if name and chosen else chosen
+            columns = {NAMES: name, **chosen} if name and chosen else chosen
             variants.append(Variant("__".join(words), (*assignments, *own), columns))
     return _with_own_folders(variants)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from catenary.postproc import statistics as stats
+from catenary.postproc.pages.wording import counted, fixed
 from catenary.postproc.results import Results
 
 _FORCES = (
@@ -43,7 +44,8 @@ def _heads(a: Results, b: Results) -> list[str]:
         about = run.attributes
         lines.append(
             f"{letter}: {run.path} ({about['case']}, {3.6 * about['speed_m_per_s']:.0f} km/h, "
-            f"dt {run.dt:g} s, {about['n_ranks']} ranks, {run.n_steps} steps, {run.outcome})"
+            f"dt {run.dt:g} s, {counted(about['n_ranks'], 'rank')}, "
+            f"{counted(run.n_steps, 'step')}, {run.outcome})"
         )
     return lines
 
@@ -57,7 +59,8 @@ def _statistics(a: Results, b: Results) -> list[str]:
             lines.append(_row("  " + label, factor * getattr(p, name), factor * getattr(q, name)))
     if len(of_a.pantographs) != len(of_b.pantographs):
         lines.append(
-            f"A has {len(of_a.pantographs)} pantographs, B has {len(of_b.pantographs)}: "
+            f"A has {counted(len(of_a.pantographs), 'pantograph')}, B has "
+            f"{len(of_b.pantographs)}: "
             "only the first are compared."
         )
     lines += [
@@ -71,7 +74,8 @@ def _statistics(a: Results, b: Results) -> list[str]:
 
 
 def _row(label: str, first: float, second: float) -> str:
-    return f"{label:34}{first:14.4f}{second:14.4f}{second - first:14.3e}"
+    difference = second - first + 0.0  # which makes no negative zero
+    return f"{label:34}{fixed(first, 4):>14}{fixed(second, 4):>14}{difference:14.3e}"
 
 
 def _histories(a: Results, b: Results) -> str:

@@ -19,6 +19,7 @@ from catenary.postproc import export, plots, standards
 from catenary.postproc import statistics as stats
 from catenary.postproc.evaluate.comparing import decimals_that_tell
 from catenary.postproc.indicators import Indicators, indicate
+from catenary.postproc.pages.wording import counted, fixed
 from catenary.postproc.record.line_record import says
 from catenary.postproc.remarks import remarks
 from catenary.postproc.results import Results
@@ -250,9 +251,10 @@ def _facts(results: Results) -> list[tuple[str, str]]:
     facts = [
         (
             "line",
-            f"{results.line('support_x').size - 1} spans, "
+            f"{counted(results.line('support_x').size - 1, 'span')}, "
             f"{results.line('support_x')[-1] - results.line('support_x')[0]:.0f} m, "
-            f"{results.line('dropper_x').size} droppers, {results.line('arm_x').size} steady arms",
+            f"{counted(results.line('dropper_x').size, 'dropper')}, "
+            f"{counted(results.line('arm_x').size, 'steady arm')}",
         ),
         *(
             (name, f"{told['kind']}, {told['description']}")
@@ -290,4 +292,4 @@ def _number(value: Any, digits: int = 1) -> str:
     """``value`` with ``digits`` decimals, a dash for NaN and None."""
     if value is None or value != value:
         return "–"
-    return f"{value:.{digits}f}"
+    return fixed(value, digits)

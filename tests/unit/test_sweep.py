@@ -14,10 +14,11 @@ from measuring import COMM
 from typer.testing import CliRunner
 
 from catenary.cases.cli import app
+from catenary.cases.commands.axis_words import STATISTICS_IN_WORDS, key_in_words
 from catenary.cases.jobs import STATISTICS, Ended, Job, make_jobs
 from catenary.cases.runner import run_case
 from catenary.cases.sweep import run_jobs
-from catenary.cases.sweep_output import as_text, draw, rows
+from catenary.cases.sweep_output import as_text, draw, rows, write
 from catenary.cases.variants import Variant, parse_vary, product
 from catenary.postproc.results import Results
 from catenary.solver.errors import InputError
@@ -233,7 +234,17 @@ def fake(name: str, varied: dict[str, str], *sigmas: float | None) -> Ended:
         {**dict.fromkeys(STATISTICS, 1.0), "name": people[i], "std_N": sigma, "loss_percent": 0.0}
         for i, sigma in enumerate(sigmas)
     ]
-    summary = {"pantographs": pantographs, "supports": {"max_uplift_mm": 5.0}, "passed": True}
+    acceptance = [
+        {"criterion": "mean contact force", "passed": True},
+        {"criterion": "maximum contact force", "passed": name != "hard250"},
+        {"criterion": "arcing NQ", "passed": None},
+    ]
+    summary = {
+        "pantographs": pantographs,
+        "supports": {"max_uplift_mm": 5.0},
+        "acceptance": acceptance,
+        "passed": name != "hard250",
+    }
     return Ended(Variant(name, (), varied), "done", summary)
 
 
@@ -241,7 +252,7 @@ def test_rows_have_one_line_per_pantograph_and_one_per_broken_variant() -> None:
     ended = [fake("a", {"k": "1"}, 10.0, None), Ended(Variant("b", (), {"k": "2"}), "it broke")]
     table = rows(ended)
     assert [(row["variant"], row["k"], row["pantograph"]) for row in table] == [
-        ("a", "1", "leading"), ("a", "1", "trailing"), ("b", "2", ""),
+        ("a", 1, "leading"), ("a", 1, "trailing"), ("b", 2, ""),
     ]  # fmt: skip
     assert [row["std_N"] for row in table] == [10.0, None, None]
     assert "BROKE: it broke" in as_text(ended)
@@ -266,7 +277,9 @@ def test_statistics_are_drawn_over_the_key_with_numbers() -> None:
         "leading, law hard": [(200.0, 200.0), (300.0, 300.0)],
         "leading, law soft": [(200.0, 200.0), (300.0, 300.0)],
     }
-    assert figure.axes[1].get_xlabel() == "train.speed_km_h [km/h]"
+    assert figure.axes[1].get_xlabel() == "train speed [km/h]"
+    assert figure.axes[0].get_ylabel() == "standard deviation, 0-20 Hz [N]"
+    assert figure.axes[1].get_ylabel() == "largest uplift at arms [mm]"
 
 
 def test_words_stand_on_the_axis_where_no_key_has_numbers() -> None:
@@ -274,3 +287,48 @@ def test_words_stand_on_the_axis_where_no_key_has_numbers() -> None:
     figure = draw(rows(ended), ["contact.law"], ["std_N"])
     assert curves_of(figure) == {"leading": [(0.0, 3.0), (1.0, 4.0)]}
     assert [label.get_text() for label in figure.axes[0].get_xticklabels()] == ["hard", "soft"]
+
+
+def test_varied_values_keep_their_types(tmp_path: Path) -> None:
+    """Numbers, truth values, words and lists in JSON; plain text in CSV."""
+    varied = {
+        "train.speed_km_h": "250", "numerics.dt_s": "5e-4", "effects.head_roll": "true",
+        "contact.law": "hertz", "line.span_m": "[50, 60]", "variant": "007",
+    }  # fmt: skip
+    write(tmp_path, CASE, [fake("a", varied, 3.0)], ["std_N"])
+    (row,) = json.loads((tmp_path / "sweep.json").read_text())["rows"]
+    assert [row[key] for key in varied] == [250, 5e-4, True, "hertz", [50, 60], "007"]
+    assert type(row["train.speed_km_h"]) is int
+    (cells,) = csv.DictReader((tmp_path / "sweep.csv").read_text().splitlines())
+    assert [cells[key] for key in varied] == ["250", "0.0005", "true", "hertz", "[50, 60]", "007"]
+
+
+def test_what_failed_is_told_by_name(tmp_path: Path) -> None:
+    ended = [fake("hard250", {"k": "1"}, 3.0), fake("b", {"k": "2"}, 3.0)]
+    failed, passed = rows(ended)
+    assert failed["failed"] == ["maximum contact force"] and not failed["passed"]
+    assert passed["failed"] == [] and passed["passed"]
+    said = as_text(ended).splitlines()
+    assert said[1].endswith("FAILED maximum contact force") and said[2].endswith("passed")
+    write(tmp_path, CASE, ended, ["std_N"])
+    first, second = csv.DictReader((tmp_path / "sweep.csv").read_text().splitlines())
+    assert (first["failed"], second["failed"]) == ("maximum contact force", "")
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("line.contact_wire.tension_N", "contact wire: tension [N]"),
+        ("contact.stiffness_N_per_m", "contact: stiffness [N/m]"),
+        ("pantographs.lumped.static_force_N", "lumped: force on the wire at rest [N]"),
+        ("mesh.elements_per_gap", "mesh: elements per gap"),
+        ("variant", "variant"),
+    ],
+)
+def test_axes_are_in_the_fields_words(key: str, words: str) -> None:
+    assert key_in_words(key) == words
+
+
+def test_every_statistic_has_words_with_a_unit() -> None:
+    assert set(STATISTICS_IN_WORDS) == set(STATISTICS)
+    assert all(words.endswith("]") and "_" not in words for words in STATISTICS_IN_WORDS.values())

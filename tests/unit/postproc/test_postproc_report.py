@@ -273,4 +273,5 @@ def test_runs_of_different_step_are_compared_by_statistics_only(
     record_run(tmp_path / "run.h5", make_march(dt=2e-3, n_steps=4000, separations=(0.0,)))
     text = compare(run_folder, tmp_path)
     assert "A has 2 pantographs, B has 1" in text
+    assert ", 1 rank, " in text and "-0.0000" not in text
     assert "force histories are not compared" in text

@@ -1,0 +1,31 @@
+"""Numbers as people read them."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from catenary.postproc.pages.wording import counted, fixed
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [
+        (-1e-9, 4, "0.0000"),
+        (-0.0, 0, "0"),
+        (-0.04, 1, "0.0"),
+        (-0.05001, 1, "-0.1"),
+        (-10.0, 1, "-10.0"),
+        (100.0, 0, "100"),
+        (math.nan, 2, "nan"),
+        (-math.inf, 2, "-inf"),
+    ],
+)
+def test_zero_has_no_sign(value: float, digits: int, text: str) -> None:
+    assert fixed(value, digits) == text
+
+
+def test_one_is_singular() -> None:
+    assert [counted(n, "rank") for n in (0, 1, 2)] == ["0 ranks", "1 rank", "2 ranks"]
+    assert counted(2, "mass", "masses") == "2 masses"
