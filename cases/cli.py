@@ -168,8 +168,11 @@ def run(
         return load_scene(case, [*(assignments or []), *more], shortened), options
 
     comm, scene, arguments = begin(read, verbose, lambda scene: scene)
+    from catenary.cases.run.arrival_facts import arrival_warnings
     from catenary.cases.runner import run_case
 
+    for text in arrival_warnings(scene):
+        console.say(f"WARNING {text}")
     tell = _teller(out)
     result = run_case(scene, out, comm, force=force, petsc_options=arguments, tell=tell)
     return _end(result, out, strict)
@@ -307,6 +310,7 @@ def check(
     # What a refusal does not need is imported once the scene is sound.
     from catenary.cases.meshing import mesh_of
     from catenary.cases.pantograph_facts import kind_lines
+    from catenary.cases.run.arrival_facts import arrival_facts
     from catenary.solver.equilibrium import find_form
 
     problem = scene.to_problem()
@@ -319,6 +323,11 @@ def check(
     )
     for name, lines in kind_lines(scene, problem).items():
         console.say(f"pantograph {name}, " + "\n  ".join(lines))
+    waves = arrival_facts(scene, problem)
+    for fact in waves["pantographs"]:
+        console.say(fact["says"])
+    for text in waves["warnings"]:
+        console.say(f"WARNING {text}")
     return console.DONE
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.cases.incident_facts import incident_facts
 from catenary.cases.pantograph_facts import kind_lines
+from catenary.cases.run.arrival_facts import arrival_facts
 from catenary.cases.run.file_sizes import FileSizes, estimate_files
 from catenary.cases.run.output_folder import RunSize, volume
 from catenary.cases.run.recording import Recording, recording_of
@@ -73,6 +74,8 @@ class Plan:
     kinds : name and description of each kind of pantograph on the train
     start, end, evaluation : stretch that the leading pantograph runs, and that is judged [m]
     incidents : time [s] and sentence of each, in order of time
+    arrivals : sentences about run-in and waves from the ends of the line
+    warnings : sentences about them, empty if the line is long enough
     dt, simulated : time step and simulated time [s]
     halved : what is said of steps that adapt, empty if none do
     memory : estimate of the resident memory on one rank [B]
@@ -101,6 +104,8 @@ class Plan:
     end: float
     evaluation: tuple[float, float]
     incidents: tuple[tuple[float, str], ...]
+    arrivals: tuple[str, ...]
+    warnings: tuple[str, ...]
     dt: float
     scheme: str
     halved: str
@@ -156,6 +161,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
     n_droppers, n_arms = mesh.droppers.shape[0], mesh.steady_arms.size
     recording = recording_of(scene.output, problem, mesh, n_steps)
     flush_every = scene.output.flush_every_steps or flush_cadence(problem, n_dofs, recording)
+    waves = arrival_facts(scene, problem)
     return Plan(
         case=scene.case.name,
         title=scene.case.title,
@@ -177,6 +183,8 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
         end=train.end,
         evaluation=problem.evaluation,
         incidents=tuple((fact["time_s"], fact["says"]) for fact in incident_facts(scene, problem)),
+        arrivals=tuple(fact["says"] for fact in waves["pantographs"]),
+        warnings=tuple(waves["warnings"]),
         dt=dt,
         scheme=problem.numerics.scheme,
         halved=_halved(problem.numerics),
@@ -253,6 +261,7 @@ def plan_text(plan: Plan) -> str:
         ("runs", f"from {plan.start:g} to {plan.end:g} m (leading pantograph)"),
         ("evaluated", f"from {plan.evaluation[0]:g} to {plan.evaluation[1]:g} m"),
         *(("incident", f"at {time:.4g} s: {says}") for time, says in plan.incidents),
+        *(("waves", says) for says in plan.arrivals),
         (
             "mesh",
             f"{plan.n_nodes} nodes, {counted(plan.n_droppers, 'dropper')}, "
@@ -286,6 +295,7 @@ def plan_text(plan: Plan) -> str:
     ]
     lines = [f"{plan.case}: {plan.title}", ""]
     lines += [f"  {label:10} {text}" for label, text in rows]
+    lines += [""] * bool(plan.warnings) + [f"  WARNING    {text}" for text in plan.warnings]
     lines += ["", "Simulated:", *_effect_lines(plan.on)]
     lines += ["", "Not simulated:", *_effect_lines(plan.off)]
     return "\n".join(lines)

@@ -64,7 +64,12 @@ def summary_text(summary: Mapping[str, Any], folder: Path) -> str:
             f"  {words[row['passed']]:10}  {row['criterion']}: {_number(value, digits)}, limit "
             f"{_number(limit, digits)} {row.get('unit', '')}".rstrip()
         )
-    warnings = summary.get("indicators", {}).get("warnings", [])  # older runs have none
+    # Older runs have neither.
+    warnings = [
+        text
+        for part in ("indicators", "arrivals")
+        for text in summary.get(part, {}).get("warnings", [])
+    ]
     lines += ["", *(f"  WARNING     {text}" for text in warnings)]
     lines += [""] * bool(warnings) + [f"Results: {folder}"]
     return "\n".join(lines)

@@ -22,6 +22,7 @@ from catenary.cases.interrupts import StopRequest
 from catenary.cases.meshing import mesh_of
 from catenary.cases.pantograph_facts import header_facts
 from catenary.cases.plan import effect_rows, flush_cadence, run_size
+from catenary.cases.run.arrival_facts import arrival_facts
 from catenary.cases.run.folder_lock import held
 from catenary.cases.run.output_folder import RunSize, check_size, prepare
 from catenary.cases.run.recording import recording_of
@@ -328,6 +329,7 @@ def _header(
             "edition": scene.evaluation.edition,
             "pantographs": header_facts(scene, problem),
             "incidents": incident_facts(scene, problem),
+            "arrivals": arrival_facts(scene, problem),
             "versions": _versions(),
             "config": scene.resolved(),
             "petsc_options": list(petsc_options),

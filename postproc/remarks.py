@@ -39,6 +39,7 @@ def remarks(results: Results) -> list[str]:
     """Sentences about settings that shape the results, none if none do. Not collective."""
     config = results.attributes["config"]
     return [
+        *results.attributes.get("arrivals", {}).get("warnings", []),
         *_about_incidents(results),
         *_about_contact(results, config),
         *_about_droppers(config),

@@ -270,6 +270,10 @@ def _facts(results: Results) -> list[tuple[str, str]]:
             (f"incident at {fact['time_s']:.4g} s", fact["says"])
             for fact in about.get("incidents", [])
         ),
+        *(
+            ("waves and run-in", fact["says"])
+            for fact in about.get("arrivals", {}).get("pantographs", [])
+        ),
         ("arm uplift and dropper forces", says(results.line_record, results.dt)),
         ("time step", f"{1e3 * results.dt:g} ms"),
         ("steps", f"{results.n_steps} of {about['n_steps_planned']}"),

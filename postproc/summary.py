@@ -50,6 +50,7 @@ def summarise(
         ],
         "supports": _supports(statistics),
         "incidents": attributes.get("incidents", []),
+        "arrivals": attributes.get("arrivals", {}),
         "droppers": {
             "n_slackened": statistics.droppers.n_slackened,
             "max_force_N": statistics.droppers.maximum,

@@ -143,6 +143,18 @@ def _incidents(value: Any) -> bool:
     )
 
 
+def _arrivals(value: Any) -> bool:
+    if not isinstance(value, dict):
+        return False
+    rows, warnings = value.get("pantographs", []), value.get("warnings", [])
+    return (
+        isinstance(rows, list)
+        and all(isinstance(row, dict) and isinstance(row.get("says"), str) for row in rows)
+        and isinstance(warnings, list)
+        and all(isinstance(text, str) for text in warnings)
+    )
+
+
 _FACT_TEXTS, _FACT_NUMBERS = ("kind", "description"), ("static_force_N",)
 
 
@@ -223,6 +235,7 @@ ATTRIBUTES: dict[str, Attribute] = {
     "effects_off": Attribute("a list of names with titles and reasons", _effects, True),
     "pantographs": Attribute("a list of tables of facts", _pantographs, True, []),
     "incidents": Attribute("a list of times with sentences", _incidents, True, []),
+    "arrivals": Attribute("facts of waves from the ends, with sentences", _arrivals, True, {}),
     "petsc_options": Attribute("a list", lambda v: isinstance(v, list), True, []),
     "n_strips": Attribute(
         "a list of whole numbers",

@@ -1,0 +1,147 @@
+"""Arrivals of waves against what is found by hand, and the sentences that tell them."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+from measuring import check
+
+from catenary.cases.run.arrival_facts import arrival_facts, wave_line
+from catenary.cases.run.wave_arrivals import (
+    Course,
+    WaveLine,
+    arrivals,
+    end_for,
+    far_share,
+    from_far_end,
+    reflection_felt,
+    run_in_for,
+    start_share,
+)
+from catenary.cases.scene import load_scene
+
+# One string, 1000 m, waves of 100 m/s.
+STRING = WaveLine(0.0, 1000.0, 50.0, 100.0, 100.0, 0.0, 0.0)
+ALONE = Course(100.0, 900.0, 50.0, (300.0, 500.0), 100.0, 100.0)
+
+
+def test_a_reflected_wave_meets_the_train_where_the_ways_add_up() -> None:
+    """900 m to the end and d back while the train runs 900 - d: (900 + d) / 100 = (900 - d) / 50,
+    d = 300: at 700 m after 12 s."""
+    found = arrivals(STRING, ALONE)
+    assert found.far_end is not None and found.near_end is not None
+    check("met at [m]", found.far_end.at, 700.0, within=1e-9)
+    check("after [s]", found.far_end.time, 12.0, within=1e-12)
+    # Back 100 m to the end and 100 + 50 t forward again: 100 t = 200 + 50 t.
+    check("from the near end at [m]", found.near_end.at, 300.0, within=1e-9)
+    check("after [s]", found.near_end.time, 4.0, within=1e-12)
+    check("run-in [m]", found.run_in, 200.0, within=1e-12)
+    check("run-in [spans]", found.run_in_spans, 4.0, within=1e-12)
+    assert not reflection_felt(STRING, ALONE)
+
+
+def test_a_trailing_pantograph_meets_the_wave_of_the_leading_one_first() -> None:
+    """The leader's wave from 300 m: 700 m to the end, d back; the trailing one runs 900 - d from
+    100 m: (700 + d) / 100 = (900 - d) / 50, d = 366.7."""
+    trailing = ALONE._replace(leader=300.0)
+    met = from_far_end(STRING, trailing)
+    assert met is not None
+    check("met at [m]", met.at, 1000.0 - 1100.0 / 3.0, within=1e-9)
+
+
+def test_the_shortest_line_without_a_reflection_is_met_at_the_end_of_the_stretch() -> None:
+    course = ALONE._replace(stretch=(300.0, 800.0))
+    assert reflection_felt(STRING, course)
+    end = end_for(STRING, course)
+    met = from_far_end(STRING._replace(end=end), course)
+    assert met is not None
+    check("met at [m]", met.at, 800.0, within=1e-9)
+    assert not reflection_felt(STRING._replace(end=end + 1.0), course)
+    assert reflection_felt(STRING._replace(end=end - 1.0), course)
+
+
+def test_damping_takes_amplitude_on_the_way() -> None:
+    """Mass damping alone: exp(-beta t / 2). What is met at 800 m left the leader at x with
+    (1000 - x + 200) / 100 = (800 - x) / 50: x = 400, 8 s before."""
+    course = ALONE._replace(stretch=(300.0, 800.0))
+    check("share", far_share(STRING._replace(beta=0.5), course), math.exp(-2.0), within=1e-12)
+    heavy = STRING._replace(beta=2.0)
+    assert far_share(heavy, course) < 1e-3
+    assert not reflection_felt(heavy, course)
+    # ln(1000) / 1 s at 50 m/s, there and back: 172.7 m behind the stretch they have faded.
+    check("end [m]", end_for(heavy, course), 800.0 + 25.0 * math.log(1000.0), within=1e-9)
+    # On stiffness: alpha w^2 / 2 with w = pi c / span = 2 pi 1/s.
+    damped = STRING._replace(alpha=0.02)
+    expected = math.exp(-0.01 * (2.0 * math.pi) ** 2 * 8.0)
+    check("share", far_share(damped, course), expected, within=1e-12)
+
+
+def test_a_train_as_fast_as_the_waves_meets_none() -> None:
+    fast = ALONE._replace(speed=100.0, stretch=(300.0, 800.0))
+    found = arrivals(STRING, fast)
+    assert found.far_end is None and found.near_end is None and found.far_share == 0.0
+    assert not reflection_felt(STRING, fast)
+
+
+def test_the_run_in_that_is_asked_for_leaves_the_limit() -> None:
+    assert start_share(STRING, 50.0, 0.0) == 1.0
+    check("four spans", start_share(STRING, 50.0, 200.0), 0.2, within=1e-12)
+    check("undamped [m]", run_in_for(STRING, 50.0), 200.0, within=1e-6)
+    damped = STRING._replace(beta=0.5)
+    needed = run_in_for(damped, 50.0)
+    assert 0.0 < needed < 200.0
+    check("damped", start_share(damped, 50.0, needed), 0.2, within=1e-9)
+
+
+def test_a_line_for_waves_has_both_wires_and_what_hangs_on_them() -> None:
+    """EN 50318 has massless droppers without clamps: (20 + 16) kN / (1.35 + 1.07) kg/m."""
+    line = wave_line(load_scene("en50318_2002").to_problem())
+    check("both wires [m/s]", line.speed, math.sqrt(36000.0 / 2.42), within=1e-9)
+    check("faster wire [m/s]", line.fastest, math.sqrt(16000.0 / 1.07), within=1e-9)
+    assert (line.start, line.end, line.span) == (0.0, 1320.0, 60.0)
+    assert (line.alpha, line.beta) == (1e-4, 0.0125)
+    bare = load_scene("en50318_2002", ["effects.structural_damping=false"]).to_problem()
+    assert wave_line(bare).decay == 0.0
+    # Clamps of 0.36 kg and droppers every 6.1 m make the wires of ac_simple 3 % heavier.
+    heavy = wave_line(load_scene("ac_simple").to_problem())
+    assert 0.975 < heavy.speed / math.sqrt(38000.0 / 2.43) < 0.99
+
+
+TWO = 'train.pantographs=[{name="reference"}, {name="reference", behind_m=200}]'
+
+
+@pytest.mark.parametrize(
+    ("assignments", "words"),
+    [
+        ([], []),
+        (["line.n_spans=14"], []),
+        (["line.n_spans=13"], ["reflects at 591 m (7.2 s)", "line.n_spans = 14,"]),
+        (["line.n_spans=12"], ["reflects at 547 m (6.6 s)", "evaluation.to_m = 547 at most"]),
+        (["train.start_m=290", TWO], ["Pantograph 1 starts 70 m, 1.2 spans", "from_m = 524"]),
+        (["train.start_m=200"], ["starts 160 m, 2.7 spans", "train.start_m = 126 at most"]),
+        (["evaluation.to_m=400"], ["stretch of 40 m is shorter than a span (60 m)", "= 420"]),
+    ],
+    ids=lambda words: " ".join(words) or "nothing",
+)
+def test_warnings_name_what_would_do(assignments: list[str], words: list[str]) -> None:
+    scene = load_scene("en50318_2002", assignments)
+    facts = arrival_facts(scene, scene.to_problem())
+    json.dumps(facts, allow_nan=False)
+    print(facts["warnings"])
+    assert len(facts["warnings"]) == bool(words)
+    for word in words:
+        assert word in facts["warnings"][0]
+    assert len(facts["pantographs"]) == len(scene.train.pantographs)
+
+
+@pytest.mark.parametrize("remedy", [["line.n_spans=14"], ["evaluation.to_m=547"]])
+def test_what_a_warning_advises_ends_it(remedy: list[str]) -> None:
+    scene = load_scene("en50318_2002", ["line.n_spans=12", *remedy])
+    assert arrival_facts(scene, scene.to_problem())["warnings"] == []
+
+
+def test_the_start_that_is_advised_ends_the_warning() -> None:
+    scene = load_scene("en50318_2002", ["train.start_m=126"])
+    assert arrival_facts(scene, scene.to_problem())["warnings"] == []
