@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -86,7 +88,7 @@ def lumped_toml(found: PantographStudy) -> str:
         f"{found.speed:g} km/h)",
         f"# from {fit.lowest:g} to {fit.highest:g} Hz at {fit.n_points} frequencies: "
         f"{fit_error(fit)}",
-        f"[pantographs.{name}]",
+        f"[pantographs.{_key(name)}]",
         'type = "lumped"',
         f"masses_kg = {_list(fit.data.masses)}",
         f"stiffnesses_N_per_m = {_list(fit.data.stiffnesses)}",
@@ -111,6 +113,11 @@ def inline_table(found: PantographStudy) -> str:
     if found.nominal_height is not None:
         parts.append(f"nominal_height_m = {found.nominal_height!r}")
     return "{" + ", ".join(parts) + "}"
+
+
+def _key(name: str) -> str:
+    """A name as TOML has it in a key."""
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)
 
 
 def _list(values: tuple[float, ...]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import warnings
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,10 @@ def png(figure: Figure) -> bytes:
         if isinstance(text, Text) and text not in ticks and "$" in text.get_text():
             text.set_parse_math(False)
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=_RESOLUTION)
+    with warnings.catch_warnings():
+        # Names may be written in letters that the font has not; boxes stand for them.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        figure.savefig(stream, format="png", dpi=_RESOLUTION)
     return stream.getvalue()
 
 

@@ -19,8 +19,8 @@ _Norm = Literal["none", "preconditioned", "unpreconditioned", "natural"]
 _Local = Literal["none", "jacobi", "sor", "icc", "ilu", "cholesky", "lu"]
 _Pc = Literal["none", "jacobi", "bjacobi", "asm", "sor", "icc", "ilu", "cholesky", "lu"]
 _Ordering = Literal["natural", "nd", "1wd", "rcm", "qmd"]
-_Package = Literal["petsc", "mumps", "umfpack"]
-_Shift = Literal["none", "nonzero", "positive_definite", "inblocks"]
+_Package = Literal["petsc", "mumps"]
+_Shift = Literal["none", "inblocks"]
 _Asm = Literal["basic", "restrict", "interpolate", "none"]
 
 

@@ -6,6 +6,7 @@ Each row of a table is an input that broke the program, by the name of what it d
 from __future__ import annotations
 
 import json
+import logging
 import os
 import sys
 from pathlib import Path
@@ -14,9 +15,13 @@ import pytest
 from program import catenary, short_run
 from typer.testing import CliRunner
 
+from catenary.cases import meshing
 from catenary.cases.cli import app
+from catenary.cases.input.size import size_of
+from catenary.cases.meshing import mesh_of
 from catenary.cases.messages import Origin
 from catenary.cases.scene import load_scene, scene_from
+from catenary.cases.variants import read_named
 from catenary.solver.errors import InputError
 
 SOUND = Path(__file__).parent / "broken_scenes" / "sound.toml"
@@ -65,6 +70,61 @@ PETSC = {
     "was text": (['petsc.march_ksp_rtol="1e-8"'], "must be a number"),
     "pushed a prefix": (["petsc.prefix_push=march_"], NOT_FOR_A_SCENE),
 }
+# What it did; the assignments; a part of the sentence now.
+REPORTED = {
+    "ended in a traceback after run.h5 was gone": (
+        ['case.name="a\\u0000b"'],
+        'case.name is "a\\u0000b" on the command line (--set); it must not hold the control '
+        "character \\u0000",
+    ),
+    "coloured the terminal": (['case.title="\\u001b[31mred"'], "control character \\u001b"),
+    "ended in a RecursionError": (
+        ["line." + ".".join(["a"] * 3000) + "=1"],
+        "has a key of more than 32 parts",
+    ),
+    "worked for minutes without a word": (
+        ["line.n_spans=20000", "mesh.elements_per_gap=64"],
+        "25600002 nodes and 51200004 unknowns",
+    ),
+    "told a tension in kN as a speed": (
+        ["line.contact_wire.tension_N=20"],
+        "line.contact_wire.tension_N is 20 N on the command line (--set); usual are 5000 to "
+        "40000 N: is it 20 kN? write 20000",
+    ),
+    "told a low tension as a speed alone": (
+        ["line.contact_wire.tension_N=2000"],
+        "which tension_N = 2000 and mass_kg_per_m = 1.35 give it",
+    ),
+    "told metres of pre-sag as nothing": (
+        ["line.dropper.pre_sag_mid_mm=0.05"],
+        "is it 0.05 m? write 50",
+    ),
+    "told millimetres as a bound alone": (
+        ["line.contact_height_m=5080"],
+        "usual are 4 to 7 m: is it 5080 mm? write 5.08",
+    ),
+    "told milliseconds as a bound alone": (["numerics.dt_s=1"], "is it 1 ms? write 0.001"),
+    "told grams as a bound alone": (
+        ["line.contact_wire.mass_kg_per_m=1350"],
+        "is it 1350 g/m? write 1.35",
+    ),
+    "blamed a pre-sag that is none": (
+        ["effects.gravity=false"],
+        "effects.dropper_slackening is on by default and requires effects.gravity",
+    ),
+    "showed two droppers at one place": (
+        ["line.dropper.positions_m=[5, 5.0000001, 20]"],
+        "droppers at 5 and 5.0000001 m; they must be at least 0.001 m apart",
+    ),
+    "showed a list in Python": (
+        ["train.speed_km_h=['a', true]"],
+        'train.speed_km_h is ["a", true] on',
+    ),
+    "showed a table in Python": (["train.speed_km_h={a=1}"], "train.speed_km_h on"),
+    "found the seed of a track": (["train.sped=300"], "did you mean train.speed_km_h?"),
+    "told a whole number as one that is not": (["line.n_spans=1e3"], "line.n_spans is 1000.0 on"),
+    "named no span": (["line.span_m=[60, 4]"], "line.span_m.1 is 4 on"),
+}
 
 
 @pytest.fixture(autouse=True)
@@ -92,6 +152,109 @@ def test_a_scene_gives_petsc_no_option_that_acts_on_files_or_programs(name: str,
     assignments, expected = PETSC[name]
     out = ["-o", "out"] if verb == "run" else []
     assert expected in refusal(verb, str(SOUND), *out, "--set", *assignments)
+
+
+@pytest.mark.parametrize("name", REPORTED)
+def test_what_was_reported_ends_in_one_sentence(name: str) -> None:
+    assignments, expected = REPORTED[name]
+    assert expected in refusal("run", str(SOUND), "-o", "out", "--set", *assignments)
+
+
+def test_the_option_that_gave_a_value_is_named() -> None:
+    words = ["sweep", str(SOUND), "-o", "out", "--vary"]
+    assert "train.sped on the command line (--vary)" in refusal(*words, "train.sped=200,300")
+    told = refusal(*words, "train.speed_km_h=200,-3")
+    assert "is -3 on the command line (--vary)" in told and "--set" not in told
+    told = refusal(*words, "train.speed_km_h=200,300", "--set", "line.n_spans=0")
+    assert "line.n_spans is 0 on the command line (--set)" in told
+    Path("v.toml").write_text('fast = ["train.speed_km_h=-3"]\n')
+    told = refusal("sweep", str(SOUND), "-o", "out", "--variants", "v.toml")
+    assert "is -3 by the variant fast" in told
+
+
+@pytest.mark.parametrize("name", ["=1+1", "+1+1", "-x", "@A1", "a\\u0007b", ""])
+def test_a_variant_is_not_named_like_a_formula(name: str) -> None:
+    Path("v.toml").write_text(f'"{name}" = ["train.speed_km_h=200"]\n')
+    told = refusal("sweep", str(SOUND), "-o", "out", "--variants", "v.toml")
+    assert "cannot name a variant" in told
+
+
+@pytest.mark.parametrize("value", ['"a\x1b[2Jb"', '"a\tb"', '"\u202ex"'])
+def test_a_varied_value_holds_no_control_character(value: str) -> None:
+    words = ["sweep", str(SOUND), "-o", "out", "--vary", f"case.title={value},x"]
+    assert "holds a control character" in refusal(*words)
+
+
+@pytest.mark.parametrize("case", ["", "  "])
+def test_a_case_without_a_name_is_told(case: str) -> None:
+    assert "the case has no name" in refusal("check", case)
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["run", "ac_simple"], "Missing option"),
+        (["run", "ac_simple", "-o", "out", "--no-such"], "No such option: --no-such"),
+        (["nonsense"], "No such command 'nonsense'"),
+        (["plan"], "Missing argument"),
+    ],
+)
+def test_a_usage_error_is_one_sentence(words: list[str], expected: str, tmp_path: Path) -> None:
+    done = catenary(*words, cwd=tmp_path)
+    assert done.code == 2 and done.stdout == ""
+    (sentence,) = done.stderr.splitlines()
+    assert sentence.startswith(f"catenary: {expected}") and "--help`" in sentence
+
+
+def test_a_byte_order_mark_is_taken(tmp_path: Path) -> None:
+    mark = b"\xef\xbb\xbf"
+    Path("case.toml").write_bytes(mark + SOUND.read_bytes())
+    Path("v.toml").write_bytes(mark + b'slow = ["train.speed_km_h=200"]\n')
+    Path("course.csv").write_bytes(mark + b"0,0\r\n9,0.01\r\n18,0\r\n999,0\r\n")
+    scene = load_scene(
+        tmp_path, ["vehicle.vertical.by_time_file=course.csv", "effects.vehicle_motion=true"]
+    )
+    assert scene.vehicle is not None and scene.vehicle.vertical is not None
+    assert scene.vehicle.vertical.by_time == [[0, 0], [9, 0.01], [18, 0], [999, 0]]
+    assert read_named(Path("v.toml")) == {"slow": ["train.speed_km_h=200"]}
+
+
+@pytest.mark.parametrize("edition", ["2012", '"2012"'])
+def test_an_edition_may_be_a_number(edition: str) -> None:
+    assert load_scene(SOUND, [f"evaluation.edition={edition}"]).evaluation.edition == "2012"
+
+
+@pytest.mark.parametrize("case", ["en50318_2002", "ambrosio2012", "ac_simple"])
+def test_a_mesh_is_counted_before_it_is_made(case: str) -> None:
+    for change in ("mesh.support_refinement=3", "line.n_spans=31"):
+        scene = load_scene(case, [change])
+        size, mesh = size_of(scene), mesh_of(scene)
+        assert size is not None
+        assert (size.nodes, size.droppers) == (mesh.n_nodes, mesh.droppers.shape[0])
+        assert size.unknowns == 2 * mesh.n_nodes
+
+
+def test_ten_thousand_spans_are_allowed_and_their_size_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    told: list[str] = []
+    logger = logging.getLogger("catenary.mesh")
+    monkeypatch.setattr(logger, "warning", lambda form, *values: told.append(form % values))
+    monkeypatch.setattr(meshing, "make_mesh", lambda *given, **more: None)
+    mesh_of(load_scene(SOUND, ["line.n_spans=10000"]))
+    (sentence,) = told
+    assert "1000002 nodes and 2000004 unknowns" in sentence and "GB of memory" in sentence
+
+
+def test_fifos_and_devices_are_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo("pipe")
+    for name in ("pipe", "/dev/zero", "/dev/tty", "."):
+        words = [f'vehicle.vertical.by_time_file="{name}"', "effects.vehicle_motion=true"]
+        told = refusal("plan", str(SOUND), "--set", *words)
+        assert "cannot be read: it is no regular file" in told or "no such device" in told
+        words = [f'mesh.file="{name}"', "mesh.elements_per_gap="]
+        assert "there is no such file" in refusal("plan", str(SOUND), "--set", *words)
+        assert "no case file" in refusal("plan", name)
 
 
 def test_the_scene_of_a_result_file_is_judged_like_any_other() -> None:
