@@ -34,9 +34,9 @@ def page(
         "value for mean, deviations and uplift, of its standard deviation for maximum, minimum and "
         'the force "history" (rms). "est/true" is the error that a run estimates itself over the '
         'true one, "rounds" the solves of the small problem a step, "s/s" wall time of the march '
-        "per simulated second: read times as ratios. Where step and mesh are refined together, errors "
-        "of the history by the step and by the mesh alone stand beside the whole error, in which "
-        "they may cancel.",
+        "per simulated second: read times as ratios. Where step and mesh are refined together, "
+        "errors of the history by the step and by the mesh alone stand beside the whole error, in "
+        "which they may cancel.",
     ]
     if picture:
         parts.append(f"![work and precision]({picture})")
