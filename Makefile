@@ -42,7 +42,7 @@ setup-newest: ## the same with the newest packages that pyproject.toml allows; s
 compile: setup ## compile the loops of the shipped cases ahead, for an installation that others share
 	@work=$$(mktemp -d) && trap 'rm -rf "$$work"' EXIT && \
 	for case in $$(.venv/bin/catenary list | cut -d' ' -f1); do \
-	    .venv/bin/catenary run $$case --short -o "$$work/$$case" >/dev/null || exit 1; \
+	    .venv/bin/catenary run $$case --short --quiet -o "$$work/$$case" || exit 1; \
 	done
 
 update-versions: ## write what is installed into .setup/tested, from where make setup takes it

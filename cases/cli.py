@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from catenary.cases import console
-from catenary.cases.commands import completion
+from catenary.cases.commands import completion, matplotlib_folder
 from catenary.cases.run.output_folder import refuse_impossible
 from catenary.postproc.pages.wording import counted
 from catenary.solver.errors import InputError
@@ -457,6 +457,7 @@ def main() -> None:
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     logging.getLogger("catenary").addHandler(console.LogHandler())
+    matplotlib_folder.settle()
     if launched_by_mpirun():
         # From here on the end of each rank waits for the others', so that a sentence of rank 0
         # is out before the launcher sees the exit code of another.

@@ -117,7 +117,8 @@ class LinearModel:
             for root, share in zip(roots, shares, strict=True)
             if root.imag >= 0.0
         ]
-        return tuple(sorted(found, key=lambda mode: abs(mode.root)))
+        # Opposite roots differ by round-off only.
+        return tuple(sorted(found, key=lambda one: (float(f"{abs(one.root):.6g}"), one.root.real)))
 
 
 def of_chain(data: LumpedData) -> LinearModel:

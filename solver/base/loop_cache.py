@@ -36,13 +36,13 @@ def folder(numba_version: str) -> Path | None:
     Not collective. Loops that a read-only installation brings for these sources are copied.
     """
     name = f"loops-{digest(sources(_PACKAGE), numba_version)}"
-    for base in _candidates():
+    for base in bases():
         target = base / name
-        if target.is_dir() and _is_writable(target):
+        if target.is_dir() and is_writable(target):
             with contextlib.suppress(OSError):
                 os.utime(target)
             return target
-        if _is_writable(base):
+        if is_writable(base):
             _remove_unused(base)
             return _filled(target, _IN_TREE / name)
     chosen = os.environ.get(VARIABLE)
@@ -83,8 +83,8 @@ def digest(files: list[Path], numba_version: str) -> str:
     return text.hexdigest()[:12]
 
 
-def _candidates() -> Iterator[Path]:
-    """Folders to try, the best first."""
+def bases() -> Iterator[Path]:
+    """Folders to try for what is kept between runs, the best first. Not collective."""
     if chosen := os.environ.get(VARIABLE):
         yield Path(chosen).absolute()
         return
@@ -108,7 +108,7 @@ def _is_private(path: Path) -> bool:
     return owned and stat.S_ISDIR(status.st_mode) and not status.st_mode & 0o077
 
 
-def _is_writable(path: Path) -> bool:
+def is_writable(path: Path) -> bool:
     """Whether files can be made in a folder, which is made if need be, with room for them."""
     try:
         path.mkdir(parents=True, exist_ok=True)

@@ -7,6 +7,8 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -52,6 +54,14 @@ def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in ("XDG_CACHE_HOME", loop_cache.VARIABLE):
         monkeypatch.delenv(name, raising=False)
     return tmp_path
+
+
+@pytest.fixture
+def open_folder() -> Iterator[Path]:
+    """A folder to which every user may write; those of pytest are closed to others."""
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder).chmod(0o1777)
+        yield Path(folder)
 
 
 def chosen() -> Path | None:
@@ -155,17 +165,14 @@ def test_numbas_own_folder_is_left_to_others(monkeypatch: pytest.MonkeyPatch) ->
     os.geteuid() != 0 or not shutil.which("setpriv"), reason="another user takes root and setpriv"
 )
 @pytest.mark.parametrize("kept", [True, False])
-def test_a_user_without_home_and_without_write_access(tmp_path: Path, kept: bool) -> None:
+def test_a_user_without_home_and_without_write_access(open_folder: Path, kept: bool) -> None:
     nobody = ("setpriv", "--reuid=65534", "--regid=65534", "--clear-groups")
     if subprocess.run([*nobody, "test", "-r", loop_cache.__file__], check=False).returncode:
         pytest.skip("another user cannot read this checkout")
-    for folder in (tmp_path, *tmp_path.parents[:2]):
-        folder.chmod(0o755)
-    tmp_path.chmod(0o1777)
     chosen = {} if kept else {loop_cache.VARIABLE: "/nonexistent/loops"}
     done = subprocess.run(
         [*nobody, sys.executable, "-c", COMPILE],
-        env={"HOME": "/nonexistent", "TMPDIR": str(tmp_path), **chosen},
+        env={"HOME": "/nonexistent", "TMPDIR": str(open_folder), **chosen},
         cwd="/",
         capture_output=True,
         text=True,
@@ -178,4 +185,4 @@ def test_a_user_without_home_and_without_write_access(tmp_path: Path, kept: bool
         assert done.stderr.count("\n") == 1
     else:
         assert done.stderr == ""
-        assert list(tmp_path.glob("catenary-65534/loops-*/solver_*/kernels.shift-*.nbc"))
+        assert list(open_folder.glob("catenary-65534/loops-*/solver_*/kernels.shift-*.nbc"))

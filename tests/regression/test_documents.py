@@ -1,0 +1,253 @@
+"""What README and docs show is what the program does: every block with a command and its output.
+
+All blocks of all documents are run in one folder, which has ``cases`` as a checkout has; runs that
+several need are made once. The notes before blocks are explained in ``tests/support/documents.py``.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from shlex import split
+from typing import Any
+
+import pytest
+import typer
+from documents import (
+    Block,
+    Shown,
+    blocks_of,
+    difference,
+    edited,
+    inline_commands,
+    make_targets,
+    numbers_agree,
+)
+
+from catenary.cases.catalogue import shipped
+from catenary.cases.cli import app
+from catenary.cases.scene import load_scene
+
+ROOT = Path(__file__).parents[2]
+DOCUMENTS = sorted(
+    path.relative_to(ROOT)
+    for pattern in ("*.md", "docs/**/*.md", "cases/*/README.md")
+    for path in ROOT.glob(pattern)
+    if path.name != "CHANGELOG.md"
+)
+LIMIT = 250.0  # for one command on a busy machine [s]
+RUNS = {"run", "after", "edit", "append"}
+_ENTRY = "from catenary.cases.cli import main; main()"
+
+
+def read(document: Path) -> str:
+    return (ROOT / document).read_text(encoding="utf-8")
+
+
+def is_run(block: Block) -> bool:
+    return block.has_prompt or block.verb in RUNS
+
+
+RUN_DOCUMENTS = [path for path in DOCUMENTS if any(map(is_run, blocks_of(read(path))))]
+
+
+def out_of(command: str) -> str:
+    """Folder after -o in a command, empty if there is none."""
+    match = re.search(r"\s-o\s+(\S+)", command)
+    return match[1] if match else ""
+
+
+@dataclass
+class Workshop:
+    """The folder in which commands are run, and the commands that make its runs."""
+
+    folder: Path
+    makers: dict[str, str]
+
+    def call(self, command: str) -> subprocess.CompletedProcess[str]:
+        """Run a command as a user's shell does."""
+        path = f"{self.folder / 'bin'}:{os.environ['PATH']}"
+        return subprocess.run(
+            ["bash", "-c", command],
+            cwd=self.folder,
+            env={**os.environ, "PATH": path},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=LIMIT,
+        )
+
+    def make(self, command: str) -> None:
+        """Run a command unless the folder that it makes is there."""
+        if not out_of(command) or not (self.folder / out_of(command)).exists():
+            done = self.call(command)
+            assert done.returncode == 0, f"{command}\n{done.stderr}"
+
+    def compare(self, shown: Shown, with_numbers: bool) -> str:
+        """How a command's output differs from what is shown, empty if it does not."""
+        done = self.call(shown.command)
+        refused = shown.output.startswith("catenary: ")
+        if done.returncode != (2 if refused else 0):
+            return f"exit code {done.returncode}\n{done.stderr}"
+        if not shown.output:
+            return ""
+        return difference(shown.output, done.stderr if refused else done.stdout, with_numbers)
+
+    def work_on(self, block: Block) -> list[str]:
+        """Do what a block says and return what is wrong with it."""
+        if block.verb == "after":
+            for folder in block.rest.split():
+                self.make(self.makers[folder])
+        elif block.verb == "run":
+            for command in block.commands():
+                self.make(command)
+        elif block.verb in ("edit", "append"):
+            file = self.folder / block.rest
+            before = file.read_text()
+            change = edited if block.verb == "edit" else (lambda text, more: f"{text}\n{more}")
+            file.write_text(change(before, block.body))
+        wrong = []
+        for shown in block.shown() if block.has_prompt else []:
+            if found := self.compare(shown, block.verb != "words"):
+                wrong.append(f"$ {shown.command}\n{found}")
+        return wrong
+
+
+@pytest.fixture(scope="module")
+def workshop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
+    folder = tmp_path_factory.mktemp("documents")
+    (folder / "cases").symlink_to(ROOT / "cases")
+    (folder / ".venv").symlink_to(sys.prefix)
+    program = folder / "bin" / "catenary"
+    program.parent.mkdir()
+    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -W error -c "{_ENTRY}" "$@"\n')
+    program.chmod(0o755)
+    makers = {
+        out_of(command): command
+        for document in DOCUMENTS
+        for block in blocks_of(read(document))
+        if block.verb == "run"
+        for command in block.commands()
+    }
+    return Workshop(folder, makers)
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("document", RUN_DOCUMENTS, ids=str)
+def test_what_is_shown_is_what_happens(document: Path, workshop: Workshop) -> None:
+    wrong = [
+        f"{document}:{block.line}\n{text}"
+        for block in blocks_of(read(document))
+        if is_run(block)
+        for text in workshop.work_on(block)
+    ]
+    assert not wrong, "\n\n".join(wrong)
+
+
+def test_blocks_with_output_are_found() -> None:
+    assert Path("README.md") in RUN_DOCUMENTS and len(RUN_DOCUMENTS) > 3
+
+
+# --- commands that are not run -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=str)
+def test_every_command_is_understood(document: Path) -> None:
+    text = read(document)
+    plain = [
+        command
+        for block in blocks_of(text)
+        if not block.has_prompt and not block.kind
+        for command in block.commands()
+    ]
+    for command in (*plain, *inline_commands(text)):
+        judge(command)
+
+
+def judge(command: str) -> None:
+    """Fail if a command of ours has a verb, an option, a case, a key or a target that is not."""
+    if command.startswith("make "):
+        assert set(split(command, comments=True)[1:]) <= make_targets(ROOT / "Makefile"), command
+    match = re.match(r"(?:mpirun [^\n]*?)?(?:\.venv/bin/)?catenary (.*)", command)
+    if match:
+        verb, *words = split(match[1], comments=True)
+        if not verb.startswith("-"):
+            judge_words(command, verb, words)
+
+
+def judge_words(command: str, verb: str, words: list[str]) -> None:
+    group: Any = typer.main.get_command(app)
+    assert verb in group.commands, f"no verb {verb}: {command}"
+    ours = words[: words.index("--")] if "--" in words else words  # the rest is PETSc's
+    try:
+        with group.commands[verb].make_context(verb, ours) as context:
+            values = dict(context.params)
+    except Exception as error:
+        # Prose may name a verb without what it takes.
+        assert type(error).__name__ == "MissingParameter", f"{command}: {error}"
+        return
+    if values.get("case") in shipped():
+        assignments = [*(values.get("assignments") or []), *(values.get("extras") or [])]
+        varied = [f"{one.partition('=')[0]}={first_of(one)}" for one in values.get("vary") or []]
+        load_scene(values["case"], [*assignments, *varied])
+
+
+def first_of(variation: str) -> str:
+    return variation.partition("=")[2].partition(",")[0]
+
+
+# --- tables ------------------------------------------------------------------------------------
+
+
+def rows_of_table(text: str, first: str) -> list[list[str]]:
+    """Cells of the table whose header begins with a word, the header left out."""
+    table = re.search(rf"^\| {first} \|.*\n\|[-| ]+\n((?:\|.*\n)+)", text, re.M)
+    assert table is not None
+    lines = table[1].splitlines()
+    return [[cell.strip() for cell in line.strip("| ").split("|")] for line in lines]
+
+
+TABLES = ["README.md", "cases/en50318_2002/README.md"]
+QUANTITIES = {
+    "mean contact force [N]": "mean_N",
+    "standard deviation [N]": "std_N",
+    "statistical maximum [N]": "stat_max_N",
+    "statistical minimum [N]": "stat_min_N",
+    "actual maximum [N]": "max_N",
+    "actual minimum [N]": "min_N",
+    "largest uplift at a support [mm]": "max_uplift_mm",
+    "loss of contact [%]": "loss_percent",
+}
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("document", TABLES)
+def test_the_table_of_en_50318(document: str, workshop: Workshop) -> None:
+    summaries: list[dict[str, Any]] = []
+    for folder in ("results/en250", "results/en300"):
+        workshop.make(workshop.makers[folder])
+        summary = json.loads((workshop.folder / folder / "summary.json").read_text())
+        summaries.append({**summary["pantographs"][0], **summary["supports"]})
+    rows = rows_of_table(read(Path(document)), "quantity")
+    assert {row[0] for row in rows} == set(QUANTITIES)
+    for name, *cells in rows:
+        for shown, summary in zip((cells[0], cells[2]), summaries, strict=True):
+            value = summary[QUANTITIES[name]]
+            assert numbers_agree(shown, f"{value:.6f}"), f"{name}: shown {shown}, is {value}"
+
+
+@pytest.mark.parametrize("document", TABLES)
+def test_accepted_ranges_are_those_of_the_case(document: str) -> None:
+    with open(ROOT / "cases/en50318_2002/reference/accepted_ranges.csv", newline="") as file:
+        ranges = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    shown = rows_of_table(read(Path(document)), "quantity")
+    for column, speed in ((2, "250"), (4, "300")):
+        accepted = [f"{r['lower']} - {r['upper']}" for r in ranges if r["speed_km_h"] == speed]
+        cells = [row[column] for row in shown]
+        assert [cell for cell in cells if " - " in cell] == [a for a in accepted if a != "0 - 0"]

@@ -1,0 +1,49 @@
+"""Matplotlib's own cache: its default if that can be written, else a folder of the program."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from catenary.cases.commands import matplotlib_folder
+from catenary.solver.base import loop_cache
+
+
+@pytest.fixture(autouse=True)
+def no_choice(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setenv(matplotlib_folder.VARIABLE, "")  # so that it is put back at the end
+    monkeypatch.delenv(matplotlib_folder.VARIABLE)
+    level = logging.getLogger("matplotlib").level
+    yield
+    logging.getLogger("matplotlib").setLevel(level)
+
+
+def test_a_home_that_can_be_written_is_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "not" / "yet"))
+    matplotlib_folder.settle()
+    assert matplotlib_folder.VARIABLE not in os.environ
+
+
+def test_without_a_home_it_is_beside_the_loops(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "file"))
+    monkeypatch.setenv(loop_cache.VARIABLE, str(tmp_path / "kept"))
+    matplotlib_folder.settle()
+    assert os.environ[matplotlib_folder.VARIABLE] == str(tmp_path / "kept" / "matplotlib")
+
+
+def test_without_any_folder_it_is_silent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "file"))
+    monkeypatch.setenv(loop_cache.VARIABLE, str(tmp_path / "file" / "x"))
+    matplotlib_folder.settle()
+    assert matplotlib_folder.VARIABLE not in os.environ
+    assert not logging.getLogger("matplotlib").isEnabledFor(logging.WARNING)
