@@ -78,6 +78,8 @@ bench: setup ## what steps cost: against their floor, by phase, spans and ranks
 fuzz: setup ## random scenes: 4000 that run, 4000 refused, 50 sweeps, 25 killed, 25 on 2 to 4 ranks; SEED=...
 	@echo "seeds from $(SEED); FUZZ_SEED=<seed> FUZZ_CASES=1 $(PYTEST) tests/regression/test_fuzz.py replays one"
 	FUZZ_SEED=$(SEED) FUZZ_CASES=2000 $(PYTEST) -q tests/regression/test_fuzz.py
+	FUZZ_SEED=$(SEED) FUZZ_FLIPS=120 $(PYTEST) -q tests/regression/test_fuzz_damage.py
+	FUZZ_SEED=$(SEED) FUZZ_DAMAGE=2000 $(PYTEST) -q tests/unit/postproc/test_postproc_damage.py
 	FUZZ_SEED=$(SEED) FUZZ_SWEEPS=50 $(PYTEST) -q tests/regression/test_fuzz_sweeps.py
 	FUZZ_SEED=$(SEED) FUZZ_PROCESSES=25 $(PYTEST) -q tests/regression/test_fuzz_processes.py
 	FUZZ_SEED=$(SEED) FUZZ_CASES=100 timeout 1800 mpirun -n 2 $(MPI_SHARED) $(MPI_PYTEST) -q tests/regression/test_fuzz.py

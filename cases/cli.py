@@ -196,6 +196,7 @@ def restart(
     from catenary.cases.scene import scene_from
 
     def read() -> tuple[Scene, list[str]]:
+        from catenary.postproc.evaluate.guard import examined
         from catenary.postproc.results import Results
 
         more, options = split_extras(extras or [])
@@ -204,7 +205,7 @@ def restart(
         refuse_impossible(folder)
         if not folder.is_dir():
             raise InputError(f"{folder} is no folder; name the folder of a run")
-        with Results(folder) as results:
+        with Results(folder, examined(folder)) as results:
             config = results.attributes["config"]
         return scene_from(config, Origin(str(results.path))), options
 
@@ -400,11 +401,12 @@ def report(
     folder: RunFolder,
 ) -> None:
     """Serial."""
+    from catenary.postproc.evaluate.guard import examined
     from catenary.postproc.report import write_report
 
     if not folder.is_dir():
         raise InputError(f"{folder} is no folder; name the folder of a run")
-    written = write_report(folder, folder)
+    written = write_report(folder, folder, examined(folder))
     console.say("\n".join(str(path) for path in written.files))
 
 
@@ -421,8 +423,10 @@ def compare(
 ) -> None:
     """Serial."""
     from catenary.postproc.compare import compare as compare_runs
+    from catenary.postproc.evaluate.guard import examined
 
-    console.say(compare_runs(first, second).rstrip())
+    found = examined(first), examined(second)
+    console.say(compare_runs(first, second, found).rstrip())
 
 
 # The verbs of other files, which take what is above.
@@ -456,6 +460,8 @@ def main() -> None:
     # small here, and MPI is what runs in parallel.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    # A crash ends the process: Open MPI's handler, which prints a trace, may wait for ever.
+    os.environ.setdefault("OMPI_MCA_opal_signal", "")
     logging.getLogger("catenary").addHandler(console.LogHandler())
     matplotlib_folder.settle()
     if launched_by_mpirun():

@@ -23,6 +23,7 @@ from catenary.cases.meshing import mesh_of
 from catenary.cases.pantograph_facts import header_facts
 from catenary.cases.plan import effect_rows, flush_cadence, run_size
 from catenary.cases.run.arrival_facts import arrival_facts
+from catenary.cases.run.continuing import refuse_other_run, state_to_continue
 from catenary.cases.run.folder_lock import held
 from catenary.cases.run.output_folder import RunSize, check_size, prepare
 from catenary.cases.run.recording import recording_of
@@ -34,7 +35,6 @@ from catenary.postproc.progress import Progress
 from catenary.postproc.record.own_files import remove_stale
 from catenary.postproc.recorder import Recorder
 from catenary.postproc.report import write_report, write_summary
-from catenary.postproc.results import Results
 from catenary.solver.equilibrium import (
     Elasticity,
     Equilibrium,
@@ -42,7 +42,7 @@ from catenary.solver.equilibrium import (
     find_form,
     middle_span,
 )
-from catenary.solver.errors import CatenaryError, InputError, RunBroken
+from catenary.solver.errors import CatenaryError, RunBroken
 from catenary.solver.march import March, Outcome
 from catenary.solver.model import Model, build
 from catenary.solver.observation import Observer
@@ -150,7 +150,6 @@ def run_case(
             phases,
             petsc_options,
             tell,
-            resume=False,
             only_summary=only_summary,
         )
 
@@ -174,13 +173,11 @@ def restart_case(
         If there is nothing to continue, or if another process writes into the folder.
     """
     with held(out_dir, comm, f"catenary restart {out_dir}"):
-        on_root(comm, lambda: _refuse_to_continue(out_dir))
+        state = on_root(comm, lambda: state_to_continue(out_dir / RESULT))
         phases = Phases(Progress(comm))
         problem = scene.to_problem()
         at_rest = _at_rest(scene, problem, comm, phases)
-        return _march(
-            scene, problem, at_rest, out_dir, comm, phases, petsc_options, tell, resume=True
-        )
+        return _march(scene, problem, at_rest, out_dir, comm, phases, petsc_options, tell, state)
 
 
 def static_table(scene: Scene) -> dict[str, np.ndarray]:
@@ -237,14 +234,18 @@ def _march(
     phases: Phases,
     petsc_options: Sequence[str],
     tell: Callable[[str], None],
-    resume: bool,
+    state: dict[str, Any] | None = None,
     only_summary: bool = False,
 ) -> RunOutcome:
+    """Run the time loop, from ``state`` if there is one, and write its results. Collective."""
+    resume = state is not None
+    header = _header(scene, problem, at_rest, petsc_options) if comm.rank == 0 else None
+    if resume:
+        on_root(comm, lambda: _refuse_other_run(out_dir, header, problem))
     with phases("distribute"):
         march = March(comm, problem, at_rest.model, at_rest.form, at_rest.lift)
-        if resume:
-            march.restore(on_root(comm, lambda: _checkpoint(out_dir)))
-    header = _header(scene, problem, at_rest, petsc_options) if comm.rank == 0 else None
+        if state is not None:
+            march.restore(state)
     dt, output = problem.numerics.dt, scene.output
     recording = recording_of(output, problem, at_rest.mesh, march.n_steps)
     for sentence in recording.told(dt):
@@ -372,15 +373,7 @@ def _performance(outcome: Outcome, phases: Phases, n_ranks: int) -> dict[str, An
     }
 
 
-def _checkpoint(out_dir: Path) -> dict[str, Any]:
-    with Results(out_dir / RESULT) as results:
-        return results.checkpoint
-
-
-def _refuse_to_continue(out_dir: Path) -> None:
-    result = out_dir / RESULT
-    if not result.exists():
-        raise InputError(f"there is no {result} to continue; start the case with `catenary run`")
-    with Results(result) as results:
-        if results.complete:
-            raise InputError(f"the run in {result} is done; there is nothing to continue")
+def _refuse_other_run(out_dir: Path, header: Header | None, problem: Problem) -> None:
+    assert header is not None
+    n_strips = tuple(len(place.data.strip_offsets) for place in problem.train.placements)
+    refuse_other_run(out_dir / RESULT, header, problem.numerics.dt, n_strips)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from catenary.postproc import statistics as stats
+from catenary.postproc.evaluate.records import Records
 from catenary.postproc.pages.wording import counted, fixed
 from catenary.postproc.results import Results
 
@@ -22,19 +23,24 @@ _FORCES = (
 )
 
 
-def compare(first: Path | str, second: Path | str) -> str:
+def compare(
+    first: Path | str,
+    second: Path | str,
+    records: tuple[Records | None, Records | None] = (None, None),
+) -> str:
     """A table of the differences of two runs, as text. Not collective.
 
     Parameters
     ----------
     first, second : result folders or files
+    records : what ``evaluate.guard`` found in each, None to look for damage here
 
     Raises
     ------
     InputError
         If one of them is no result.
     """
-    with Results(first) as a, Results(second) as b:
+    with Results(first, records[0]) as a, Results(second, records[1]) as b:
         return "\n".join([*_heads(a, b), "", *_statistics(a, b), "", _histories(a, b)]) + "\n"
 
 

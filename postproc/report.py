@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 import json
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from matplotlib.figure import Figure
 from catenary.postproc import export, plots, standards
 from catenary.postproc import statistics as stats
 from catenary.postproc.evaluate.comparing import decimals_that_tell
+from catenary.postproc.evaluate.records import Records
 from catenary.postproc.indicators import Indicators, indicate
 from catenary.postproc.pages.wording import counted, fixed
 from catenary.postproc.record.line_record import says
@@ -27,6 +29,8 @@ from catenary.postproc.standards import KMH, Criterion
 from catenary.postproc.statistics import RunStatistics
 from catenary.postproc.storage import write_into
 from catenary.postproc.summary import as_json, real_time_factor, summarise
+
+logger = logging.getLogger("catenary.report")
 
 _TEMPLATES = Path(__file__).parent / "templates"
 _STATISTICS_ROWS = (
@@ -64,7 +68,9 @@ class _Picture:
         return "data:image/png;base64," + base64.b64encode(self.data).decode("ascii")
 
 
-def write_report(result_path: Path | str, out_dir: Path | str) -> Report:
+def write_report(
+    result_path: Path | str, out_dir: Path | str, records: Records | None = None
+) -> Report:
     """Write summary, report, pictures and dropper table of a run into a folder. Not collective.
 
     Each file appears whole or not at all.
@@ -73,16 +79,19 @@ def write_report(result_path: Path | str, out_dir: Path | str) -> Report:
     ----------
     result_path : result file or its folder
     out_dir : folder that exists
+    records : what ``evaluate.guard`` found in the file, None to look for damage here
 
     Raises
     ------
     InputError
-        If ``result_path`` is no result file.
+        If ``result_path`` is no result file, or too damaged.
     RunBroken
         If a file cannot be written.
     """
     out = Path(out_dir)
-    with Results(result_path) as results:
+    with Results(result_path, records) as results:
+        for sentence in results.damage:
+            logger.warning("%s", sentence)
         statistics = stats.evaluate(results)
         criteria = judge(results, statistics)
         pictures = _pictures(results, statistics)

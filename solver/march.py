@@ -179,8 +179,18 @@ class March:
         """Continue from what ``StepView.checkpoint`` gave, on any number of ranks.
 
         Collective; every rank passes the same checkpoint.
+
+        Raises
+        ------
+        InputError
+            On all ranks, if it is not one of this line, or beyond the end of the run.
         """
         self._first_step = int(checkpoint["step"])
+        if not 0 <= self._first_step <= self.n_steps:
+            raise InputError(
+                f"the state to continue from is of step {self._first_step}, and the run has "
+                f"{self.n_steps}; start the run anew"
+            )
         past = [happened for happened in self._ahead if happened.step < self._first_step]
         if past:
             self.destroy()

@@ -14,7 +14,12 @@ from catenary.solver.errors import InputError
 from catenary.solver.interaction import Interaction
 from catenary.solver.observation import Stage, StepView
 from catenary.solver.pantographs import Pantographs
+from catenary.solver.parallel import on_root
 from catenary.solver.schemes import Scheme
+
+# What every state of a line has, and what is kept of the pantographs beside their own states.
+_MOTION = ("displacement", "velocity", "acceleration")
+_OF_PANTOGRAPHS = ("contact_force", "head_height", "wire_height", "strip_force")
 
 
 class Showing:
@@ -114,12 +119,13 @@ class Showing:
         return view
 
     def restore(self, checkpoint: dict[str, Any]) -> None:
-        """Continue from a checkpoint, which all ranks pass. Not collective.
+        """Continue from a checkpoint, which all ranks pass. Collective.
 
         Raises
         ------
         InputError
-            If it does not say which node its unknowns belong to.
+            If it does not say which node its unknowns belong to, or is not one of this line with
+            these pantographs and methods; nothing was restored then.
         """
         line, pantographs, model = self._line, self._pantographs, self._model
         if "row_of_node" not in checkpoint:
@@ -127,23 +133,39 @@ class Showing:
                 "the state to continue from was written by an earlier version of Catenary, which "
                 "this one cannot continue; start the run anew"
             )
-        then = np.empty(model.mesh.n_nodes, dtype=np.int64)
-        then[model.row_of_node] = checkpoint["row_of_node"]
+        n_nodes = model.mesh.n_nodes
+        row_of_node = _like(checkpoint, "row_of_node", model.row_of_node)
+        if not np.array_equal(np.sort(row_of_node), np.arange(n_nodes)):
+            raise _impossible("row_of_node does not number the nodes of this line")
+        then = np.empty(n_nodes, dtype=np.int64)
+        then[model.row_of_node] = row_of_node
         rows = slice(line.ownership.first, line.ownership.last)
+        whole = np.empty(n_nodes * model.block_size)
         by_node = {
-            name: np.reshape(checkpoint[name], (-1, model.block_size))
+            name: np.reshape(_like(checkpoint, name, whole), (-1, model.block_size))
             for name in line.exact_state()
-            if name in checkpoint
+            if name in checkpoint or name in _MOTION
         }
+        told = {
+            name: _like(checkpoint, name, getattr(pantographs, name)) for name in _OF_PANTOGRAPHS
+        }
+        on_root(self._comm, lambda: self._refuse_other_states(checkpoint))
         line.restore({name: values[then].ravel()[rows] for name, values in by_node.items()})
-        pantographs.contact_force[:] = checkpoint["contact_force"]
-        pantographs.head_height[:] = checkpoint["head_height"]
-        pantographs.wire_height[:] = checkpoint["wire_height"]
-        pantographs.strip_force[:] = checkpoint["strip_force"]
+        for name, values in told.items():
+            getattr(pantographs, name)[:] = values
         self._scheme.restore(checkpoint["contacts"])
         for i, pantograph in enumerate(pantographs.models):
             pantograph.restore(checkpoint[f"pantograph_{i}"])
         pantographs.look_at_joints()
+
+    def _refuse_other_states(self, checkpoint: dict[str, Any]) -> None:
+        """Raise InputError unless the states of contacts and pantographs are of their kinds.
+
+        On rank 0, which has them.
+        """
+        _like(checkpoint, "contacts", self._scheme.state())
+        for i, pantograph in enumerate(self._pantographs.models):
+            _like(checkpoint, f"pantograph_{i}", pantograph.state())
 
     def _energies(self) -> tuple[float, float]:
         """Kinetic and elastic energy relative to the first rest, slack droppers as they are [J].
@@ -180,3 +202,21 @@ class Showing:
         for i, pantograph in enumerate(pantographs.models):
             result[f"pantograph_{i}"] = pantograph.state()
         return result
+
+
+def _like(checkpoint: dict[str, Any], name: str, wanted: np.ndarray) -> np.ndarray:
+    """The finite array of a checkpoint that is to have the shape of ``wanted``."""
+    if name not in checkpoint:
+        raise _impossible(f"{name} is missing")
+    values, shape = np.asarray(checkpoint[name]), np.shape(wanted)
+    if values.dtype.kind not in "fiub" or values.shape != shape:
+        raise _impossible(f"{name} has the shape {values.shape} in place of {shape}")
+    if not np.isfinite(values).all():
+        raise _impossible(f"{name} holds NaN or infinity")
+    return values
+
+
+def _impossible(what: str) -> InputError:
+    return InputError(
+        f"the state to continue from does not belong to this scene: {what}; start the run anew"
+    )

@@ -52,6 +52,14 @@ def read_attributes(file: h5py.File) -> tuple[dict[str, Any], list[str], list[st
     return values, fatal, partial
 
 
+def is_there(file: h5py.File, path: str) -> bool:
+    """Whether a file names a dataset or group, one that cannot be opened included."""
+    try:
+        return path in file
+    except HDF5_ERRORS:
+        return True
+
+
 def _raw(file: h5py.File) -> tuple[dict[str, Any], set[str]]:
     """Attributes as Python's own values, and the names of those that cannot be read."""
     values, unreadable = {}, set()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import h5py
 import numpy as np
 
-from catenary.postproc.evaluate.attributes import HDF5_ERRORS
+from catenary.postproc.evaluate.attributes import HDF5_ERRORS, is_there
 from catenary.postproc.evaluate.file_schema import CONSTANTS, LINE_COLUMNS, Constant
 
 
@@ -25,7 +25,7 @@ def constant_faults(file: h5py.File) -> tuple[list[str], dict[str, int]]:
         if fault:
             faults.append(f"{path} {fault}")
     for path, (recorded, all_of) in LINE_COLUMNS.items():
-        if path in file:
+        if is_there(file, path):
             faults += _columns(file, path, recorded, sizes)
         else:
             sizes[recorded] = sizes.get(all_of, 0)

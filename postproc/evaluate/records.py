@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import h5py
 import numpy as np
 
-from catenary.postproc.evaluate.attributes import HDF5_ERRORS
+from catenary.postproc.evaluate.attributes import HDF5_ERRORS, is_there
 from catenary.postproc.evaluate.file_schema import (
     CLOCK,
     ENERGIES,
@@ -23,6 +23,8 @@ from catenary.postproc.result_file import COMPLETE
 
 # A time may be this share of a step off its place.
 _OFF = 1e-3
+# Times looked at in one go.
+_TIMES = 1 << 16
 # Times that are looked at together.
 _TIMES = 1 << 18
 
@@ -69,7 +71,7 @@ def table_faults(file: h5py.File, about: dict[str, Any], sizes: dict[str, int]) 
             found.append(TableFault(path, fault, False))
     for path, declared in {**OPTIONAL, **ENERGIES}.items():
         fault = _shape_fault(file, path, declared, sizes)
-        if fault and _is_there(file, path.split("/")[0] if path in ENERGIES else path):
+        if fault and is_there(file, path.split("/")[0] if path in ENERGIES else path):
             found.append(TableFault(path, fault, False))
     return found
 
@@ -89,12 +91,12 @@ def scan(file: h5py.File, about: dict[str, Any], faults: list[TableFault]) -> Re
     complete, fault = _complete(file)
     told += [fault] if fault else []
     of_steps = {path: d for path, d in {**GROWING, **OPTIONAL, **with_steps}.items()}
-    there = {path: d for path, d in of_steps.items() if _is_there(file, path)}
+    there = {path: d for path, d in of_steps.items() if is_there(file, path)}
     rows = [0, 0, 0]
     parts = ({"time": CLOCK, **there}, ENERGIES, apart)
     for number, tables in enumerate(parts):
         clock = next(iter(tables), "")
-        if not clock or clock in unusable or not _is_there(file, clock):
+        if not clock or clock in unusable or not is_there(file, clock):
             continue
         if tables is ENERGIES and unusable & ENERGIES.keys():
             continue
@@ -140,18 +142,17 @@ def _rows(
 
 
 def _disorder(table: h5py.Dataset, n: int, dt: float | None) -> list[tuple[int, int]]:
-    """From the first time on that is not a step of ``dt`` [s] after the one before, or not after
-    it."""
-    first, before = (float(table[0]) if n else 0.0), -np.inf
+    """From the first time on that is not after the one before, or not a number of steps of
+    ``dt`` [s] after the first."""
+    first = float(table[0]) if n else 0.0
+    before = -np.inf
     for start in range(0, n, _TIMES):
         time = np.asarray(table[start : min(start + _TIMES, n)])
-        if dt is None:
-            wrong = np.diff(time, prepend=before) <= 0.0
-        else:
-            steps = start + np.arange(time.size)
-            wrong = np.abs(time - first - dt * steps) > _OFF * dt
+        wrong = np.diff(time, prepend=before) <= 0.0
+        if dt is not None:
+            wrong |= np.abs(time - first - dt * np.arange(start, start + time.size)) > _OFF * dt
         if wrong.any():
-            return [(start + int(np.argmax(wrong)), n)]
+            return [(start + int(wrong.argmax()), n)]
         before = time[-1]
     return []
 
@@ -159,7 +160,7 @@ def _disorder(table: h5py.Dataset, n: int, dt: float | None) -> list[tuple[int, 
 def _complete(file: h5py.File) -> tuple[list[int], str]:
     """Rows that are whole, all where that is not known, and what is wrong with the numbers."""
     there = [_length(file, clock) for clock in ("time", "energy/time", LINE_CLOCK)]
-    if not _is_there(file, COMPLETE):  # a file of an earlier version
+    if not is_there(file, COMPLETE):  # a file of an earlier version
         return there, ""
     try:
         found = np.asarray(file[COMPLETE][...])
@@ -188,13 +189,6 @@ def _length(file: h5py.File, path: str) -> int:
         return int(file[path].shape[0])
     except (*HDF5_ERRORS, IndexError):
         return 0
-
-
-def _is_there(file: h5py.File, path: str) -> bool:
-    try:
-        return path in file
-    except HDF5_ERRORS:
-        return True
 
 
 def _shape_fault(file: h5py.File, path: str, declared: Growing, sizes: dict[str, int]) -> str:

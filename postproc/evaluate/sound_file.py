@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -115,10 +116,22 @@ class SoundFile:
             f"{_up_to(self.records.last)} and can be reported; to go on, start the run anew"
         )
 
+    def read_states(self) -> None:
+        """Read all states and extremes once, sound or not."""
+        for slot in slots_of(self._file):
+            with contextlib.suppress(ValueError):
+                read_slot(self._file, slot, self.records.rows[0])
+        self.extremes(self.records.rows[0])
+
     def __contains__(self, path: str) -> bool:
         if path == "energy" and any(fault.path in ENERGIES for fault in self._faults):
             return False
-        return path == COMPLETE or path in self.records.damaged or path in self._file
+        if path == COMPLETE or path in self.records.damaged:
+            return True
+        try:
+            return path in self._file
+        except HDF5_ERRORS:  # `records` tells it
+            return False
 
     def __getitem__(self, path: str) -> Any:
         if path == COMPLETE:
@@ -175,7 +188,7 @@ class SoundFile:
                 return [f'its attribute "{name}" has {len(self.attrs[name])} entries for {n}']
         strips = sum(self.attrs["n_strips"] or [1] * n)
         path = "channels/strip_force"
-        if strips > n and (path not in self._file or self._sizes.get("S") != strips):
+        if strips > n and self._sizes.get("S") != strips:
             return [f"{path} does not have {strips} columns"]
         return []
 

@@ -98,7 +98,7 @@ def sound_parts(damaged: list[tuple[int, int]], start: int, stop: int) -> list[t
 
 
 # Values looked at in one go.
-_BLOCK = 1 << 20
+_BLOCK = 1 << 18
 
 
 def damaged_rows(

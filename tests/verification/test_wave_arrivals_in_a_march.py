@@ -70,8 +70,8 @@ def test_the_force_changes_where_the_wave_is_met(
     soonest = from_far_end(line, course, speed=BENDING * line.fastest)
     assert soonest is not None
     print(
-        f"{case}, {short} spans, {speed} km/h: differs from {first:.1f} m on, long waves are met at "
-        f"{told['far_end_met_at_m']:.1f} m, the fastest at {soonest.at:.1f} m at the earliest"
+        f"{case}, {short} spans, {speed} km/h: differs from {first:.1f} m on, long waves are met "
+        f"at {told['far_end_met_at_m']:.1f} m, the fastest at {soonest.at:.1f} m at the earliest"
     )
     assert soonest.at <= first
     # The three are -2.7, -3.9 and 5.9 m off, and the force's spacing of samples is 0.1 m.

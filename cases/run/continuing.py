@@ -1,0 +1,74 @@
+"""What a run can be continued from: a sound state of the same line, train and method."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catenary.postproc.header import Header
+from catenary.postproc.results import Results
+from catenary.solver.errors import InputError
+
+# What a restart finds again; the rest of the head may be another version's.
+_SAME = ("case", "n_dofs", "speed_m_per_s", "wave_speed_m_per_s", "system", "edition")
+# Another machine's rounding at rest, as a share and as a size [m], [N].
+_RELATIVE, _ABSOLUTE = 1e-6, 1e-6
+
+
+def state_to_continue(result: Path) -> dict[str, Any]:
+    """The latest sound state of an unfinished run. Not collective.
+
+    Raises
+    ------
+    InputError
+        If there is no result file, if it is done, or if it is too damaged.
+    """
+    if not result.exists():
+        raise InputError(f"there is no {result} to continue; start the case with `catenary run`")
+    with Results(result) as results:
+        if results.complete:
+            raise InputError(f"the run in {result} is done; there is nothing to continue")
+        return results.checkpoint
+
+
+def refuse_other_run(result: Path, header: Header, dt: float, n_strips: tuple[int, ...]) -> None:
+    """Raise InputError unless a result file is of the run that its scene makes. Not collective.
+
+    Parameters
+    ----------
+    header : of the scene in the file, made anew
+    dt : time step of the scene [s]
+    n_strips : strips of each pantograph
+    """
+    with Results(result) as results:
+        about = results.attributes
+        wanted = {name: header.attributes[name] for name in _SAME} | {"dt_s": dt}
+        for name, value in wanted.items():
+            if not _same(about[name], value):
+                raise _refusal(result, f"{name} is {about[name]}, its scene makes {value}")
+        if results.n_strips() != list(n_strips):
+            raise _refusal(result, f"its pantographs have {results.n_strips()} strips")
+        _refuse_other_line(result, results, header.datasets)
+
+
+def _refuse_other_line(result: Path, results: Results, datasets: Mapping[str, np.ndarray]) -> None:
+    for path, values in datasets.items():
+        group, _, name = path.partition("/")
+        there = results.line(name) if group == "line" else results.static(name)
+        if np.shape(there) != np.shape(values) or not np.allclose(
+            there, values, rtol=_RELATIVE, atol=_ABSOLUTE
+        ):
+            raise _refusal(result, f"its {path} is not that of its scene")
+
+
+def _same(one: Any, other: Any) -> bool:
+    if isinstance(one, float) or isinstance(other, float):
+        return bool(np.isclose(one, other, rtol=1e-12, atol=0.0))
+    return bool(one == other)
+
+
+def _refusal(result: Path, what: str) -> InputError:
+    return InputError(f"{result} cannot be continued: {what}; start the run anew")

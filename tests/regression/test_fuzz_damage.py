@@ -1,0 +1,190 @@
+"""Bits flipped in result files: each is told, or changes nothing that is read from the file.
+
+`make fuzz` flips many; FUZZ_SEED and FUZZ_FLIPS say where seeds begin and how many there are of
+each kind. Every file is first examined in a process of its own, as the program does.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from damaging import as_json, flip, raw_ranges, unseal
+from program import catenary, short_run
+
+from catenary.postproc import report, summary
+from catenary.postproc import statistics as stats
+from catenary.postproc.compare import compare
+from catenary.postproc.evaluate import guard
+from catenary.postproc.evaluate.guard import examined
+from catenary.postproc.results import Results
+from catenary.solver.errors import InputError
+
+FIRST = int(os.environ.get("FUZZ_SEED", "1"))
+FLIPS = int(os.environ.get("FUZZ_FLIPS", "3"))
+# A test of the program as a process, one flip each.
+VERBS = min(20, int(os.environ.get("FUZZ_FLIPS", "1")))
+# No file of these sizes takes longer to be examined, and no flip makes it [s].
+LIMIT = 60.0
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A run that is done and one that was interrupted after a thousand steps."""
+    folder = tmp_path_factory.mktemp("runs")
+    flush = "output.flush_every_steps=100"
+    done = catenary(*short_run(folder / "finished", flush), cwd=folder)
+    assert done.code == 0, done.stderr
+    words = [*short_run(folder / "interrupted", flush), "--", "-march_ts_max_steps", "1000"]
+    assert catenary(*words, cwd=folder).code == 1
+    return {name: folder / name for name in ("finished", "interrupted")}
+
+
+def figures(folder: Path, records: Any = None) -> dict[str, Any]:
+    """All that is read of a run: figures, histories, the state to continue from."""
+    with Results(folder, records) as results:
+        statistics = stats.evaluate(results)
+        told = summary.summarise(results, statistics, report.judge(results, statistics))
+        told["complaints"] = statistics.complaints
+        sums = {
+            name: results.channel(name).sum()
+            for name in ("contact_position", "contact_force", "arm_uplift", "dropper_force")
+        }
+        energies = {name: values.sum() for name, values in results.energies().items()}
+        points = results.line("node_points").sum(), results.static("contact_height").sum()
+        state = {k: np.sum(v) if k != "kind" else v for k, v in results.checkpoint.items()}
+        return {
+            "summary": told,
+            "sums": sums,
+            "energies": energies,
+            "points": points,
+            "config": results.attributes["config"],
+            "state": state,
+            "damage": results.damage,
+        }
+
+
+def ends(folder: Path, before: dict[str, Any], caplog: pytest.LogCaptureFixture) -> str:
+    """How reading a damaged file ends: refused, told, the same or SILENT."""
+    caplog.clear()
+    try:
+        records = examined(folder, LIMIT)
+        found = figures(folder, records)
+        compare(folder, folder, (records, records))
+    except InputError as error:
+        assert "\n" not in str(error) and str(error).startswith(str(folder / "run.h5"))
+        return "refused"
+    if found["damage"] or caplog.records:
+        return "told"
+    return "same" if as_json(found) == as_json(before) else "SILENT"
+
+
+@pytest.mark.parametrize("where", ["tables", "anywhere"])
+@pytest.mark.parametrize("which", ["finished", "interrupted"])
+def test_a_flipped_bit_is_told_or_changes_nothing(
+    which: str,
+    where: str,
+    runs: dict[str, Path],
+    tmp_path: Path,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    before = figures(runs[which])
+    found: Counter[str] = Counter()
+    for seed in range(FIRST, FIRST + FLIPS):
+        shutil.copy(runs[which] / "run.h5", tmp_path / "run.h5")
+        rng = random.Random(f"{which} {where} {seed}")
+        at = flip(tmp_path / "run.h5", rng, tables=where == "tables")
+        begin = time.monotonic()
+        try:
+            end = ends(tmp_path, before, caplog)
+        except Exception as error:
+            raise AssertionError(f"FUZZ_SEED={seed} FUZZ_FLIPS=1 replays it, byte {at}") from error
+        assert time.monotonic() - begin < LIMIT
+        assert end != "SILENT", f"FUZZ_SEED={seed} FUZZ_FLIPS=1 replays it, byte {at}"
+        found[end] += 1
+    print(dict(found))
+
+
+@pytest.mark.parametrize("verb", ["report", "compare", "restart"])
+@pytest.mark.parametrize("seed", range(FIRST, FIRST + VERBS))
+def test_verbs_end_in_a_sentence_or_do_their_work(
+    seed: int, verb: str, runs: dict[str, Path], tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(runs["interrupted"], out)
+    at = flip(out / "run.h5", random.Random(f"{verb} {seed}"), tables=True)
+    words = [verb, str(out), *([str(runs["finished"])] if verb == "compare" else [])]
+    done = catenary(*words, cwd=tmp_path)
+    assert done.code in (0, 2), (seed, at, done)
+    assert "Traceback" not in done.stderr and done.left == [], (seed, at, done)
+    if done.code == 2:
+        assert done.sentences[-1].startswith(f"catenary: {out / 'run.h5'} "), (seed, at, done)
+
+
+def in_both_states(name: str, number: float) -> Callable[[h5py.File], None]:
+    def apply(file: h5py.File) -> None:
+        for slot in file["checkpoint"].values():
+            slot[name][...] = number
+
+    return apply
+
+
+# What a restart refuses before it computes, in files whose checksums have gone.
+NOT_CONTINUED: dict[str, tuple[Callable[[h5py.File], None], str]] = {
+    "edition 2099": (
+        lambda file: file.attrs.__setitem__("edition", "2099"),
+        '"edition" is not one',
+    ),
+    "state NaN": (in_both_states("displacement", np.nan), "displacement holds NaN or infinity"),
+    "state of other nodes": (in_both_states("row_of_node", 3), "does not number the nodes"),
+    "no rows": (lambda file: file["complete_rows"].__setitem__(0, 0), "none of its records"),
+    "other line": (lambda file: file.attrs.__setitem__("n_dofs", 12), "n_dofs is 12, its scene"),
+}
+
+
+@pytest.mark.parametrize("how", NOT_CONTINUED)
+def test_what_cannot_be_is_not_continued(how: str, runs: dict[str, Path], tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(runs["interrupted"], out)
+    damage, words = NOT_CONTINUED[how]
+    with h5py.File(out / "run.h5", "r+") as file:
+        unseal(file)
+        damage(file)
+    before = (out / "run.h5").read_bytes()
+    done = catenary("restart", str(out), cwd=tmp_path)
+    assert done.code == 2, done
+    assert words in done.sentences[-1] and "Traceback" not in done.stderr
+    assert (out / "run.h5").read_bytes() == before
+
+
+def test_a_crash_and_an_endless_loop_of_hdf5_end_in_a_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What examines a file is replaced by what dies, and by what does not end."""
+    path = tmp_path / "run.h5"
+    path.write_bytes(b"")
+    crash = "import ctypes; ctypes.string_at(0)"
+    endless = "import time; time.sleep(1e3)"
+    for script, words in ((crash, "HDF5 crashes at its tables (SIGSEGV)"), (endless, "within 1 s")):
+        (tmp_path / "made_up_guard.py").write_text(script)
+        monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+        monkeypatch.setattr(guard, "__name__", "made_up_guard")
+        with pytest.raises(InputError) as refused:
+            examined(path, 1.0)
+        assert words in str(refused.value)
+
+
+def test_tables_lie_where_numbers_do_not(runs: dict[str, Path]) -> None:
+    path = runs["finished"] / "run.h5"
+    covered = sum(end - begin for begin, end in raw_ranges(path))
+    print(f"{path.stat().st_size - covered} bytes of tables in {path.stat().st_size}")
+    assert 0.5 < covered / path.stat().st_size < 0.99
