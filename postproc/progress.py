@@ -123,6 +123,8 @@ class Progress:
         """Close the bar, or end the lines of a march that had any."""
         self._next_look = _NEVER
         if self._bar is not None:
+            if outcome == DONE:
+                self._bar.update(max(self._total - self._done, 0.0))
             self._bar.close()
             self._bar = None
         elif self._shows and self._lines:

@@ -120,7 +120,7 @@ def test_a_terminal_shows_phases_and_a_bar(log: list[str]) -> None:
         clock.now += 5.0
     assert screen.getvalue().endswith("\r\x1b[K")
     march(progress, clock, 2000, 1e-3)
-    assert "s simulated" in screen.getvalue() and "x real time" in screen.getvalue()
+    assert "2.00/2.00 s simulated" in screen.getvalue() and "x real time" in screen.getvalue()
     assert not log
 
 
