@@ -15,6 +15,7 @@ from typing import Any
 from catenary.cases.jobs import Ended, Job
 from catenary.cases.run.output_folder import refuse_earlier, refuse_impossible
 from catenary.cases.runner import RESULT, run_case
+from catenary.cases.studies.done_before import read_record, read_summary, record_text
 from catenary.postproc.record.own_files import VARIANT_FILE as RECORD
 from catenary.postproc.result_file import DONE, INTERRUPTED
 from catenary.postproc.results import Results
@@ -123,7 +124,7 @@ def _leave_record(job: Job, folder: Path, measure: Measure | None, wall: float) 
     }
     if not job.keep_results:
         (folder / RESULT).unlink()
-    write_all(folder, {RECORD: json.dumps(plain(record), indent=1) + "\n"})
+    write_all(folder, {RECORD: record_text(record)})
     return measured
 
 
@@ -138,7 +139,7 @@ def _earlier(jobs: Sequence[Job], out_dir: Path, force: bool, measured: bool) ->
 
 def _found(job: Job, folder: Path, measured: bool) -> Ended | None:
     wanted = json.loads(json.dumps(plain(job.scene.resolved())))
-    record = _read(folder / RECORD)
+    record = read_record(folder / RECORD)
     if record is None:
         _refuse_other_run(folder, wanted)
         return None
@@ -147,7 +148,7 @@ def _found(job: Job, folder: Path, measured: bool) -> Ended | None:
             f"{folder} holds the results of {job.variant.name} with another configuration; name "
             "another folder with -o, or give --force to replace them"
         )
-    summary = _read(folder / "summary.json")
+    summary = read_summary(folder / "summary.json")
     missing = job.keep_results and not (folder / RESULT).is_file()
     missing = missing or (job.full_report and not (folder / "report.html").is_file())
     if summary is None or missing or (measured and not record.get("measured")):
@@ -170,15 +171,6 @@ def _refuse_other_run(folder: Path, wanted: dict[str, Any]) -> None:
             f"{folder / RESULT} holds the results of another run; name another folder with -o, or "
             "give --force to replace them"
         )
-
-
-def _read(path: Path) -> dict[str, Any] | None:
-    """A JSON table, None if there is no whole one."""
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    return content if isinstance(content, dict) else None
 
 
 def _figures(ended: Ended) -> str:

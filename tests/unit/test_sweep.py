@@ -17,6 +17,7 @@ from catenary.cases.cli import app
 from catenary.cases.commands.axis_words import STATISTICS_IN_WORDS, key_in_words
 from catenary.cases.jobs import STATISTICS, Ended, Job, make_jobs
 from catenary.cases.runner import run_case
+from catenary.cases.studies.done_before import read_record, read_summary
 from catenary.cases.sweep import run_jobs
 from catenary.cases.sweep_output import as_text, draw, rows, write
 from catenary.cases.variants import Variant, parse_vary, product
@@ -93,6 +94,33 @@ def test_a_variant_is_the_run_of_the_same_scene(swept: tuple[Path, str], tmp_pat
     run_case(job.scene, tmp_path / "alone", COMM, only_summary=True)
     with Results(tmp_path / "alone") as alone, Results(swept[0] / job.variant.name) as one:
         assert (alone.channel("contact_force") == one.channel("contact_force")).all()
+
+
+DAMAGED: dict[str, tuple[str, str, str, str]] = {
+    "half a summary": ("summary.json", "{", "[", "it is no JSON"),
+    "a summary with text": ("summary.json", '"std_N": ', '"std_N": "much", "x": ', "std_N is no"),
+    "a summary without uplift": ("summary.json", '"max_uplift_mm"', '"other"', "max_uplift_mm is"),
+    "a record of other figures": ("variant.json", '"wall_s": ', '"wall_s": 1', "its checksum"),
+}
+
+
+@pytest.mark.parametrize("how", DAMAGED)
+def test_what_an_earlier_variant_left_damaged_is_told(
+    how: str, swept: tuple[Path, str], tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    name, before, after, words = DAMAGED[how]
+    file = tmp_path / name
+    text = (swept[0] / "speed_km_h_250" / name).read_text()
+    read = read_summary if name == "summary.json" else read_record
+    file.write_text(text)
+    assert read(file)
+    assert before in text
+    file.write_text(text.replace(before, after, 1))
+    with caplog.at_level("WARNING", "catenary.sweep"):
+        assert read(file) is None
+    (told,) = caplog.records
+    assert f"{file} is damaged (" in told.getMessage() and words in told.getMessage()
+    assert told.getMessage().endswith("its variant is run again")
 
 
 def test_what_is_done_is_not_run_again(swept: tuple[Path, str]) -> None:

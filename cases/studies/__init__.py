@@ -1,0 +1,1 @@
+"""Running variants of a case: what is done, what is left."""
