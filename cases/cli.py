@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from catenary.cases import console
+from catenary.cases import console, interrupts
 from catenary.cases.commands import completion, matplotlib_folder
 from catenary.cases.run.output_folder import refuse_impossible
 from catenary.postproc.pages.wording import counted
@@ -463,6 +463,7 @@ def main() -> None:
     # A crash ends the process: Open MPI's handler, which prints a trace, may wait for ever.
     os.environ.setdefault("OMPI_MCA_opal_signal", "")
     logging.getLogger("catenary").addHandler(console.LogHandler())
+    interrupts.install(several_ranks=launched_by_mpirun())
     matplotlib_folder.settle()
     if launched_by_mpirun():
         # From here on the end of each rank waits for the others', so that a sentence of rank 0
@@ -471,6 +472,12 @@ def main() -> None:
     command: Any = typer.main.get_command(app)
     try:
         code = command(prog_name="catenary", standalone_mode=False)
+    except interrupts.Stopped as stopped:
+        console.complain(f"interrupted by {stopped.name}")
+        sys.stdout.flush()
+        sys.stderr.flush()
+        # What was in the making holds objects of PETSc, which is not to free them half made.
+        os._exit(console.BROKEN)
     except typer.Abort:
         code = console.BROKEN
     except Exception as error:

@@ -55,8 +55,11 @@ def start_petsc(arguments: Sequence[str]) -> None:
     """
     import petsc4py
 
+    from catenary.solver.python_signals import python_signals_kept
+
     running = "petsc4py.PETSc" in sys.modules
-    petsc4py.init(["catenary", "-skip_petscrc", *arguments])
+    with python_signals_kept():
+        petsc4py.init(["catenary", "-skip_petscrc", *arguments])
     from catenary.solver.petsc import PETSc
 
     if running and arguments:

@@ -9,7 +9,7 @@ import json
 import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.cases.incident_facts import incident_facts
-from catenary.cases.interrupts import StopRequest
+from catenary.cases.interrupts import Phase, StopRequest
 from catenary.cases.meshing import mesh_of
 from catenary.cases.pantograph_facts import header_facts
 from catenary.cases.plan import effect_rows, flush_cadence, run_size
@@ -133,25 +133,11 @@ def run_case(
     RunBroken
         If files cannot be written.
     """
+    allowed = force if large is None else large
+    order = _Order(scene, out_dir, comm, petsc_options, tell, None, only_summary)
     with held(out_dir, comm, f"catenary run {scene.case.name}"):
         on_root(comm, lambda: prepare(out_dir, force))
-        phases = Phases(Progress(comm))
-        problem = scene.to_problem()
-        allowed = force if large is None else large
-        at_rest = _at_rest(
-            scene, problem, comm, phases, lambda size: check_size(out_dir, size, allowed)
-        )
-        return _march(
-            scene,
-            problem,
-            at_rest,
-            out_dir,
-            comm,
-            phases,
-            petsc_options,
-            tell,
-            only_summary=only_summary,
-        )
+        return _run(order, lambda size: check_size(out_dir, size, allowed))
 
 
 def restart_case(
@@ -174,10 +160,8 @@ def restart_case(
     """
     with held(out_dir, comm, f"catenary restart {out_dir}"):
         state = on_root(comm, lambda: state_to_continue(out_dir / RESULT))
-        phases = Phases(Progress(comm))
-        problem = scene.to_problem()
-        at_rest = _at_rest(scene, problem, comm, phases)
-        return _march(scene, problem, at_rest, out_dir, comm, phases, petsc_options, tell, state)
+        order = _Order(scene, out_dir, comm, petsc_options, tell, state, False)
+        return _run(order, lambda size: None)
 
 
 def static_table(scene: Scene) -> dict[str, np.ndarray]:
@@ -194,107 +178,162 @@ def static_table(scene: Scene) -> dict[str, np.ndarray]:
     return {name.rsplit("/", 1)[-1]: values for name, values in data.items()}
 
 
+@dataclass(frozen=True)
+class _Order:
+    """A run that is wanted: the arguments of ``run_case``, and the state that it continues from."""
+
+    scene: Scene
+    out_dir: Path
+    comm: Any
+    petsc_options: Sequence[str]
+    tell: Callable[[str], None]
+    state: dict[str, Any] | None
+    only_summary: bool
+
+    @property
+    def resume(self) -> bool:
+        """Whether it continues another run."""
+        return self.state is not None
+
+    @property
+    def result(self) -> Path:
+        """The result file."""
+        return self.out_dir / RESULT
+
+
+def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
+    """All phases of a run whose folder is ready. Collective.
+
+    ``judge`` sees the size of the run as soon as the mesh is there, on rank 0.
+    """
+    scene, comm = order.scene, order.comm
+    phases = Phases(Progress(comm))
+    left = f"{order.result} is as it was" if order.resume else "nothing was written"
+    with ExitStack() as stack:
+        with Phase(comm, "the line was read", left) as phase:
+            problem = scene.to_problem()
+            at_rest = _at_rest(scene, problem, comm, phases, phase, judge)
+            header = _header(order, problem, at_rest) if comm.rank == 0 else None
+            if order.resume:
+                on_root(comm, lambda: _refuse_other_run(order.out_dir, header, problem))
+            phase.next("the line was distributed")
+            with phases("distribute"):
+                parts = problem, at_rest.model, at_rest.form, at_rest.lift
+                march = stack.enter_context(March(comm, *parts))
+                if order.state is not None:
+                    march.restore(order.state)
+            observers, recorder = _observers(
+                order, problem, at_rest, header, phases.progress, march.n_steps
+            )
+        with StopRequest() as stop:
+            with phases("march"):
+                outcome = march.run(observers, stop)
+            recorder.close(_performance(outcome, phases, comm.size))
+    if not recorder.begun:
+        raise RunBroken(outcome.outcome)
+    order.tell(outcome.outcome)
+    with phases("report"):
+        result = _reported(order, outcome)
+    logger.debug("phases [s]: %s", {name: round(wall, 3) for name, wall in phases.wall.items()})
+    return result
+
+
 def _at_rest(
     scene: Scene,
     problem: Problem,
     comm: Any,
     phases: Phases,
-    judge: Callable[[RunSize], None] = lambda size: None,
+    phase: Phase,
+    judge: Callable[[RunSize], None],
 ) -> AtRest:
-    """Mesh and equilibrium, found on rank 0 and given to all. Collective.
-
-    ``judge`` sees the size of the run as soon as the mesh is there, on rank 0.
-    """
+    """Mesh and equilibrium, found on rank 0 and given to all. Collective."""
 
     def make_mesh() -> LineMesh:
         mesh = mesh_of(scene)
         judge(run_size(scene, mesh))
         return mesh
 
+    def rest() -> tuple[Equilibrium, np.ndarray, Elasticity]:
+        model, form = find_form(problem, mesh)
+        lift = elasticity(model, *middle_span(problem.line))
+        return form, model.dropper_lengths, lift
+
+    phase.next("the mesh was made")
     with phases("mesh"):
-        mesh: LineMesh = on_root(comm, make_mesh)
+        mesh: LineMesh = on_root(comm, phase.alone(make_mesh))
+    phase.next("the equilibrium was found")
     with phases("equilibrium"):
-
-        def rest() -> tuple[Equilibrium, np.ndarray, Elasticity]:
-            model, form = find_form(problem, mesh)
-            lift = elasticity(model, *middle_span(problem.line))
-            return form, model.dropper_lengths, lift
-
-        form, lengths, lift = on_root(comm, rest)
+        form, lengths, lift = on_root(comm, phase.alone(rest))
         model = build(problem, mesh, lengths)
     return AtRest(mesh, model, form, lift)
 
 
-def _march(
-    scene: Scene,
+def _observers(
+    order: _Order,
     problem: Problem,
     at_rest: AtRest,
-    out_dir: Path,
-    comm: Any,
-    phases: Phases,
-    petsc_options: Sequence[str],
-    tell: Callable[[str], None],
-    state: dict[str, Any] | None = None,
-    only_summary: bool = False,
-) -> RunOutcome:
-    """Run the time loop, from ``state`` if there is one, and write its results. Collective."""
-    resume = state is not None
-    header = _header(scene, problem, at_rest, petsc_options) if comm.rank == 0 else None
-    if resume:
-        on_root(comm, lambda: _refuse_other_run(out_dir, header, problem))
-    with phases("distribute"):
-        march = March(comm, problem, at_rest.model, at_rest.form, at_rest.lift)
-        if state is not None:
-            march.restore(state)
-    dt, output = problem.numerics.dt, scene.output
-    recording = recording_of(output, problem, at_rest.mesh, march.n_steps)
+    header: Header | None,
+    progress: Progress,
+    n_steps: int,
+) -> tuple[list[Observer], Recorder]:
+    """All that watches the march, the recorder last. Not collective.
+
+    The state to continue from, which the recorder writes, stands for all before it. ``n_steps`` are
+    those of the whole run, ``header`` is needed on rank 0.
+    """
+    comm, dt, output = order.comm, problem.numerics.dt, order.scene.output
+    recording = recording_of(output, problem, at_rest.mesh, n_steps)
     for sentence in recording.told(dt):
         logger.info(sentence)
     flush_every = output.flush_every_steps or flush_cadence(
         problem, at_rest.model.n_dofs, recording
     )
-    # The recorder is the last to write: the state to continue from stands for all before it.
-    observers: list[Observer] = [phases.progress]
     fields: FieldRecorder | None = None
     if recording.field_every:
         fields = FieldRecorder(
             comm,
-            out_dir / "fields.xdmf",
+            order.out_dir / "fields.xdmf",
             at_rest.mesh.wires,
             at_rest.mesh.droppers,
             every=recording.field_every,
             flush_every=flush_every,
-            resume=resume,
+            resume=order.resume,
             wait=True,
         )
-        observers.insert(0, fields)
 
     def begun() -> None:
-        remove_stale(out_dir)
+        remove_stale(order.out_dir)
         if fields is not None:
             fields.publish()
 
     recorder = Recorder(
         comm,
-        out_dir / RESULT,
+        order.result,
         header,
         flush_every=flush_every,
         energy_every=recording.energy_every,
         record=recording.line,
-        resume=resume,
+        resume=order.resume,
         on_begun=begun,
     )
-    observers.append(recorder)
-    with march, phases("march"), StopRequest() as stop:
-        outcome = march.run(observers, stop)
-    recorder.close(_performance(outcome, phases, comm.size))
-    if not recorder.begun:
-        raise RunBroken(outcome.outcome)
-    tell(outcome.outcome)
-    with phases("report"):
-        result = on_root(comm, lambda: _report(out_dir, outcome, only_summary))
-    logger.debug("phases [s]: %s", {name: round(wall, 3) for name, wall in phases.wall.items()})
-    return result
+    first: list[Observer] = [] if fields is None else [fields]
+    return [*first, progress, recorder], recorder
+
+
+def _reported(order: _Order, outcome: Outcome) -> RunOutcome:
+    """Write the report on rank 0. Collective.
+
+    After an interruption the next signal ends the process, before one it leaves a whole result.
+    """
+
+    def work() -> RunOutcome:
+        return _report(order.out_dir, outcome, order.only_summary)
+
+    if outcome.outcome != "done":
+        return on_root(order.comm, work)
+    left = f"{order.result} is complete: `catenary report {order.out_dir}` writes the report again"
+    with Phase(order.comm, "the report was written", left) as phase:
+        return on_root(order.comm, phase.alone(work))
 
 
 def _report(out_dir: Path, outcome: Outcome, only_summary: bool) -> RunOutcome:
@@ -314,9 +353,8 @@ def _report(out_dir: Path, outcome: Outcome, only_summary: bool) -> RunOutcome:
     return RunOutcome(outcome.outcome, accepted, summary)
 
 
-def _header(
-    scene: Scene, problem: Problem, at_rest: AtRest, petsc_options: Sequence[str]
-) -> Header:
+def _header(order: _Order, problem: Problem, at_rest: AtRest) -> Header:
+    scene = order.scene
     on, off = effect_rows(scene, problem)
     line = problem.line
     return Header(
@@ -333,7 +371,7 @@ def _header(
             "arrivals": arrival_facts(scene, problem),
             "versions": _versions(),
             "config": scene.resolved(),
-            "petsc_options": list(petsc_options),
+            "petsc_options": list(order.petsc_options),
             "effects_on": [tuple(row) for row in on],
             "effects_off": [tuple(row) for row in off],
         },

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from catenary.cases.interrupts import Interrupted
 from catenary.cases.jobs import Ended, Job
 from catenary.cases.run.output_folder import refuse_earlier, refuse_impossible
 from catenary.cases.runner import RESULT, run_case
@@ -100,6 +101,8 @@ def _run(
             large=large,
         )
         outcome, summary = result.outcome, result.summary
+    except Interrupted:
+        outcome, summary = INTERRUPTED, {}
     except CatenaryError as error:  # the same on all ranks
         outcome, summary = str(error), {}
     if outcome != DONE:

@@ -13,6 +13,7 @@ from catenary.meshgen import mesh as names
 from catenary.meshgen.geometry import Stations, find_stations
 from catenary.meshgen.line import Line
 from catenary.solver.errors import InputError
+from catenary.solver.python_signals import python_signals_kept
 
 
 def write_mesh(
@@ -66,7 +67,8 @@ def _session(name: str) -> Iterator[None]:
     borrowed = bool(gmsh.isInitialized())
     if not borrowed:
         # No settings of the user's own: the mesh depends on the scene only. SIGINT stays Python's.
-        gmsh.initialize(readConfigFiles=False, interruptible=False)
+        with python_signals_kept():
+            gmsh.initialize(readConfigFiles=False, interruptible=False)
         gmsh.option.setNumber("General.Terminal", 0)
     gmsh.model.add(name)
     try:
@@ -74,7 +76,8 @@ def _session(name: str) -> Iterator[None]:
     finally:
         gmsh.model.remove()
         if not borrowed:
-            gmsh.finalize()
+            with python_signals_kept():
+                gmsh.finalize()
 
 
 def _describe(stations: Stations, elements_per_gap: int, support_refinement: int) -> None:

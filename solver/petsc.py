@@ -10,10 +10,12 @@ import sys
 
 import petsc4py
 
-if "petsc4py.PETSc" not in sys.modules:
-    # An argument, as PETSc looks for the files before it reads the variable PETSC_OPTIONS.
-    petsc4py.init(["catenary", "-skip_petscrc"])
+from catenary.solver.python_signals import python_signals_kept
 
-from petsc4py import PETSc  # noqa: E402  (starts PETSc unless it runs)
+with python_signals_kept():
+    if "petsc4py.PETSc" not in sys.modules:
+        # An argument, as PETSc looks for the files before it reads the variable PETSC_OPTIONS.
+        petsc4py.init(["catenary", "-skip_petscrc"])
+    from petsc4py import PETSc  # starts PETSc unless it runs
 
 __all__ = ["PETSc"]

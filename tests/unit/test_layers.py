@@ -23,6 +23,7 @@ LEAVES = {
     "catenary.solver.base.compiled",
     "catenary.solver.base.loop_cache",
     "catenary.solver.errors",
+    "catenary.solver.python_signals",
     "catenary.solver.parallel",
 }
 FILES = sorted(path for part in PARTS for path in (ROOT / part).rglob("*.py"))

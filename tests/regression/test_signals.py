@@ -1,0 +1,141 @@
+"""Signals to the program as a user, a terminal or a batch system sends them."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+from program import MPIRUN, Done, assert_sound, catenary, python, short_run, started
+
+# The program, which waits at a place until a file says that it may go on.
+WAITING = """
+import time
+from pathlib import Path
+from mpi4py import MPI
+from catenary.cases import {module}
+from catenary.cases.cli import main
+
+before = {module}.{name}
+
+def waits(*args, **kwargs):
+    if MPI.COMM_WORLD.rank == 0:
+        Path("waiting").touch()
+        while not Path("go_on").exists():
+            time.sleep(0.01)
+    return before(*args, **kwargs)
+
+{module}.{name} = waits
+main()
+"""
+needs_mpirun = pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
+
+
+def signalled(
+    folder: Path,
+    place: tuple[str, str],
+    words: list[str],
+    number: signal.Signals,
+    ranks: int = 1,
+    to_rank: int | None = None,
+) -> Done:
+    """Run the program, send it a signal where it waits; to mpirun if no rank is named."""
+    script = folder / "script.py"
+    script.write_text(WAITING.format(module=place[0], name=place[1]))
+    with started(python(str(script), *words), folder, ranks=ranks) as program:
+        program.wait_for((folder / "waiting").exists)
+        if to_rank is None:
+            program.send(number)
+        else:
+            os.kill(program.pid_of_rank(to_rank), number)
+        if to_rank:  # who is not rank 0 waits for it
+            (folder / "go_on").touch()
+        return program.end()
+
+
+MESH = ("runner", "mesh_of")
+EQUILIBRIUM = ("runner", "find_form")
+REPORT = ("runner", "write_report")
+
+
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGXCPU])
+def test_before_the_march(number: signal.Signals, tmp_path: Path) -> None:
+    done = signalled(tmp_path, MESH, short_run(tmp_path / "out"), number)
+    assert done.code == 1
+    assert done.stderr == (
+        f"catenary: interrupted by {number.name} while the mesh was made; nothing was written\n"
+    )
+    assert not (tmp_path / "out").exists()
+
+
+def test_after_the_march(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    done = signalled(tmp_path, REPORT, short_run(out), signal.SIGUSR1)
+    assert done.code == 1
+    (sentence,) = done.sentences
+    assert f"interrupted by SIGUSR1 while the report was written; {out / 'run.h5'} is" in sentence
+    assert_sound(out / "run.h5")
+    again = catenary("report", str(out), cwd=tmp_path)
+    assert again.code == 0 and (out / "report.html").exists()
+
+
+VERBS = {
+    "check": ("meshing", "mesh_of", ["check", "ac_simple"]),
+    "static": ("runner", "find_form", ["static", "ac_simple"]),
+    "hard": ("hard_runs", "March", ["hard", "--short"]),
+}
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_other_verbs(verb: str, tmp_path: Path) -> None:
+    module, name, words = VERBS[verb]
+    done = signalled(tmp_path, (module, name), words, signal.SIGTERM)
+    assert done.code == 1
+    assert done.stderr.splitlines()[-1] == "catenary: interrupted by SIGTERM"
+    assert "Traceback" not in done.stderr
+    assert done.left == []
+
+
+@needs_mpirun
+@pytest.mark.parametrize(
+    ("place", "to_rank"), [(MESH, 1), (EQUILIBRIUM, 0), (REPORT, 0)], ids=["mesh", "rest", "report"]
+)
+def test_a_signal_to_one_of_several_ranks(
+    place: tuple[str, str], to_rank: int, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    done = signalled(tmp_path, place, short_run(out), signal.SIGUSR2, 2, to_rank)
+    assert done.code == 1
+    assert done.left == []
+    (sentence,) = done.sentences
+    assert "interrupted by SIGUSR2 while " in sentence
+    if place == REPORT:
+        assert f"`catenary report {out}`" in sentence
+        assert_sound(out / "run.h5")
+    else:
+        assert sentence.endswith("nothing was written")
+        assert not out.exists()
+
+
+@needs_mpirun
+def test_a_signal_to_mpirun_before_the_march(tmp_path: Path) -> None:
+    # Open MPI hands it on, and kills what still runs a second after.
+    done = signalled(tmp_path, MESH, short_run(tmp_path / "out"), signal.SIGTERM, 2)
+    assert done.code != 0
+    assert done.left == []
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "out" / "run.h5").exists()
+
+
+def test_nohup_is_respected(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    script = tmp_path / "script.py"
+    script.write_text(WAITING.format(module=MESH[0], name=MESH[1]))
+    with started(["nohup", *python(str(script), *short_run(out))], tmp_path) as program:
+        program.wait_for((tmp_path / "waiting").exists)
+        program.send(signal.SIGHUP)
+        (tmp_path / "go_on").touch()
+        done = program.end()
+    assert done.code == 0, done.stderr
+    assert_sound(out / "run.h5")

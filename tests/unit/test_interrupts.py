@@ -1,0 +1,191 @@
+"""Signals in every phase of a run: a sentence, a whole folder, and the way to go on."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mpi4py import MPI
+from program import SHORT_SCENE
+
+from catenary.cases import interrupts, runner
+from catenary.cases.interrupts import STOPPING, Interrupted, Phase, Stopped, StopRequest
+from catenary.cases.jobs import make_jobs
+from catenary.cases.scene import Scene, load_scene
+from catenary.cases.sweep import run_jobs
+from catenary.cases.variants import parse_vary, product
+from catenary.postproc.results import Results
+
+# What is called in each phase of a run before its march.
+BEFORE = {
+    "the mesh was made": "mesh_of",
+    "the equilibrium was found": "find_form",
+    "the line was distributed": "March",
+}
+
+
+@pytest.fixture(autouse=True)
+def handlers() -> Iterator[None]:
+    before = {number: signal.getsignal(number) for number in STOPPING}
+    interrupts.install(several_ranks=False)
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+    interrupts._wish.__init__()  # type: ignore[misc]
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return load_scene("en50318_2002", SHORT_SCENE)
+
+
+def signalled(work: Callable[..., Any], number: int) -> Callable[..., Any]:
+    """``work``, in which a signal comes."""
+
+    def sends(*args: Any, **kwargs: Any) -> Any:
+        os.kill(os.getpid(), number)
+        return work(*args, **kwargs)
+
+    return sends
+
+
+@pytest.mark.parametrize("doing", BEFORE)
+@pytest.mark.parametrize("number", STOPPING)
+def test_a_signal_before_the_march_leaves_nothing(
+    number: signal.Signals,
+    doing: str,
+    scene: Scene,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    name = BEFORE[doing]
+    monkeypatch.setattr(runner, name, signalled(getattr(runner, name), number))
+    with pytest.raises(Interrupted) as caught:
+        runner.run_case(scene, tmp_path / "a" / "out", MPI.COMM_SELF)
+    assert str(caught.value) == f"interrupted by {number.name} while {doing}; nothing was written"
+    assert caught.value.exit_code == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_with_force_the_earlier_run_stays_as_it_was(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "run.h5").write_text("the earlier run")
+    (tmp_path / "summary.json").write_text("{}")
+    monkeypatch.setattr(runner, "find_form", signalled(runner.find_form, signal.SIGTERM))
+    with pytest.raises(Interrupted, match="nothing was written"):
+        runner.run_case(scene, tmp_path, MPI.COMM_SELF, force=True)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.h5", "summary.json"]
+    assert (tmp_path / "run.h5").read_text() == "the earlier run"
+
+
+@pytest.mark.parametrize("number", STOPPING)
+def test_a_signal_during_the_march_ends_it_in_good_order(
+    number: signal.Signals, scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = runner.March.run
+    monkeypatch.setattr(runner.March, "run", signalled(run, number))
+    told: list[str] = []
+    ended = runner.run_case(scene, tmp_path, MPI.COMM_SELF, tell=told.append, only_summary=True)
+    assert ended.outcome == "interrupted" and told == ["interrupted"]
+    with Results(tmp_path) as results:
+        assert results.outcome == "interrupted"
+        step = results.checkpoint["step"]
+        assert 0 < results.n_steps == step < results.attributes["n_steps_planned"]
+
+
+def test_a_signal_during_the_report_leaves_a_whole_result(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(runner, "write_report", signalled(runner.write_report, signal.SIGHUP))
+    with pytest.raises(Interrupted) as caught:
+        runner.run_case(scene, tmp_path, MPI.COMM_SELF)
+    assert str(caught.value) == (
+        f"interrupted by SIGHUP while the report was written; {tmp_path / 'run.h5'} is complete: "
+        f"`catenary report {tmp_path}` writes the report again"
+    )
+    with Results(tmp_path) as results:
+        assert results.complete
+
+
+def test_an_interrupted_variant_interrupts_its_sweep(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    variants = product([parse_vary("train.speed_km_h=200,250")], {})
+    jobs = make_jobs("en50318_2002", variants, SHORT_SCENE)
+    monkeypatch.setattr(runner, "mesh_of", signalled(runner.mesh_of, signal.SIGUSR1))
+    ended = run_jobs(jobs, tmp_path, MPI.COMM_SELF)
+    assert [one.outcome for one in ended] == ["interrupted"]
+
+
+def test_a_hang_up_that_is_ignored_stays_ignored() -> None:
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    interrupts.install(several_ranks=False)
+    with Phase(MPI.COMM_SELF, "nothing was done", "nothing was written"):
+        os.kill(os.getpid(), signal.SIGHUP)
+    assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+
+
+def test_what_a_terminal_sends_twice_is_one_wish() -> None:
+    with StopRequest() as stop:
+        for _ in range(3):
+            os.kill(os.getpid(), signal.SIGHUP)
+        assert stop()
+
+
+def test_a_signal_outside_of_a_run_is_raised_as_no_library_catches_it() -> None:
+    with pytest.raises(Stopped) as caught:
+        try:
+            os.kill(os.getpid(), signal.SIGUSR2)
+        except Exception:
+            pytest.fail("taken for an error")
+    assert caught.value.name == "SIGUSR2"
+
+
+def test_other_programs_get_their_handlers_back() -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    interrupts._wish.__init__()  # type: ignore[misc]
+    mine = {number: signal.getsignal(number) for number in STOPPING}
+    with StopRequest() as stop:
+        assert not stop()
+        os.kill(os.getpid(), signal.SIGTERM)
+        assert stop()
+    assert mine == {number: signal.getsignal(number) for number in STOPPING}
+    with StopRequest() as stop:
+        assert not stop()
+
+
+def test_libraries_leave_the_handlers_as_they_are(tmp_path: Path) -> None:
+    """PETSc and Gmsh set handlers of their own when they start."""
+    script = """
+import os, signal
+from catenary.cases import interrupts
+interrupts.install(several_ranks=False)
+def check(what):
+    for number in interrupts.STOPPING:
+        try:
+            os.kill(os.getpid(), number)
+        except interrupts.Stopped as stopped:
+            print(what, stopped.name)
+        interrupts._wish.number = 0
+from catenary.cases.petsc_options import start_petsc
+start_petsc([])
+check("petsc")
+from catenary.cases.meshing import mesh_of
+from catenary.cases.scene import load_scene
+mesh_of(load_scene("en50318_2002"))
+check("gmsh")
+os._exit(0)
+"""
+    done = subprocess.run(
+        [sys.executable, "-u", "-c", script], capture_output=True, text=True, cwd=tmp_path
+    )
+    names = [number.name for number in STOPPING]
+    expected = [f"{what} {name}" for what in ("petsc", "gmsh") for name in names]
+    assert done.stdout.splitlines() == expected, done.stderr
