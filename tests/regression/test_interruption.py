@@ -54,7 +54,7 @@ def test_a_signal_closes_the_file_and_restart_finishes_the_run(
         done = program.end()
     assert done.code == 1
     assert done.left == []
-    assert done.stdout == ""
+    assert "Results:" not in done.stdout  # warnings before it started may be there
     (sentence,) = done.sentences
     assert sentence == f"catenary: the run was interrupted; `catenary restart {out}` continues it"
     rows = assert_sound(out / "run.h5")
@@ -269,7 +269,7 @@ def test_a_step_that_breaks_ends_the_run_with_time_and_remedy(how: str, tmp_path
     out = tmp_path / "out"
     done = catenary(*short_run(out, *assignments), cwd=tmp_path)
     assert done.code == 1, done.stderr
-    assert done.stdout == ""
+    assert "Results:" not in done.stdout
     (sentence,) = done.sentences
     assert words in sentence
     assert 'take numerics.scheme = "one_solve" or a smaller numerics.dt_s' in sentence
