@@ -19,6 +19,7 @@ import numpy as np
 from h5py import h5d, h5p, h5s, h5t
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.postproc.evaluate.guard import survives
 from catenary.postproc.gathering import ColumnGather
 from catenary.postproc.record.own_files import part_of
 from catenary.postproc.storage import (
@@ -231,13 +232,16 @@ class FieldRecorder:
     def _cut(self, stage: Stage) -> bool:
         """Forget the snapshots from the stage's start on; False if the file is not as it was."""
         try:
+            if not survives(self._h5):
+                raise ValueError("HDF5 does not read it")
             with opened(self._h5, "r+") as file:
                 times = file["times"]
                 keep = int(np.sum(times[...] < stage.start_time - 0.5 * stage.dt))
-                times[keep:] = np.full(self._n_snapshots - keep, np.nan)
                 self._find_places(file)
+                self._check(file, times[:keep], stage)
+                times[keep:] = np.full(self._n_snapshots - keep, np.nan)
                 self._written = times[:keep].tolist()
-        except (OSError, KeyError, RuntimeError, TypeError):
+        except (OSError, KeyError, RuntimeError, TypeError, ValueError):
             logger.warning(
                 "%s cannot be continued, it is damaged or of another version: its snapshots now "
                 "begin at t = %.3f s",
@@ -246,6 +250,29 @@ class FieldRecorder:
             )
             return False
         return True
+
+    def _check(self, file: h5py.File, times: np.ndarray, stage: Stage) -> None:
+        """Raise ValueError if a file that is to be continued is not of this run and these places.
+
+        Parameters
+        ----------
+        times : of the snapshots that are kept [s]
+        """
+        apart = np.diff(times) - self._every * stage.dt
+        if not (np.abs(apart) <= 0.5 * stage.dt).all() or not np.isfinite(times).all():
+            raise ValueError("times")
+        points = file["mesh/points"][...]
+        if points.shape != stage.node_points.shape or not np.isfinite(points).all():
+            raise ValueError("mesh")
+        # Snapshots are written where they stand: none may reach into another, or beyond the file.
+        sizes = [4 * self._n_nodes, 12 * self._n_nodes]
+        places = np.array(self._places, dtype=np.int64)
+        ends = places + sizes
+        order = np.argsort(places, axis=None)
+        if (ends.flat[order[:-1]] > places.flat[order[1:]]).any() or (
+            ends.max(initial=0) > self._h5.stat().st_size
+        ):
+            raise ValueError("places")
 
     def _append(self, times: list[float], uplift: np.ndarray) -> None:
         first = len(self._written)

@@ -22,6 +22,11 @@ RESULT_FILE = "run.h5"
 LIMIT, PER_SECOND = 30.0, 10e6
 # The process is to be no rank of a run, with its launcher's variables.
 _OF_LAUNCHERS = ("OMPI_", "PMIX_", "PMI_")
+_WALK = """
+import sys, h5py
+with h5py.File(sys.argv[1], "r") as file:
+    file.visititems(lambda name, item: print(name, getattr(item, "shape", None)))
+"""
 
 
 def examined(path: Path, limit: float | None = None) -> Records | None:
@@ -43,11 +48,10 @@ def examined(path: Path, limit: float | None = None) -> Records | None:
         return None
     if limit is None:
         limit = LIMIT + path.stat().st_size / PER_SECOND
-    environment = {k: v for k, v in os.environ.items() if not k.startswith(_OF_LAUNCHERS)}
     try:
         done = subprocess.run(
             [sys.executable, "-P", "-m", __name__, str(path)],
-            env=environment,
+            env=_environment(),
             stdin=subprocess.DEVNULL,
             capture_output=True,
             timeout=limit,
@@ -77,6 +81,26 @@ def examined(path: Path, limit: float | None = None) -> Records | None:
         for name, parts in found["damaged"].items()
     }
     return Records(found["rows"], damaged, found["told"], float(found["last"]))
+
+
+def survives(path: Path, limit: float = LIMIT) -> bool:
+    """Whether HDF5 opens every dataset of a file, without a crash and within ``limit`` [s]."""
+    try:
+        done = subprocess.run(
+            [sys.executable, "-P", "-c", _WALK, str(path)],
+            env=_environment(),
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=limit,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return False
+    return done.returncode == 0
+
+
+def _environment() -> dict[str, str]:
+    return {k: v for k, v in os.environ.items() if not k.startswith(_OF_LAUNCHERS)}
 
 
 def examine(path: Path) -> str:

@@ -105,6 +105,41 @@ def test_a_snapshot_that_a_kill_left_half_written_is_replaced(
     np.testing.assert_allclose(reader.read().point_data["uplift"], expected, atol=1e-8)
 
 
+def other_times(path: Path) -> None:
+    with h5py.File(path, "r+") as file:
+        file["times"][3] = -1.0
+
+
+def other_mesh(path: Path) -> None:
+    with h5py.File(path, "r+") as file:
+        file["mesh/points"][2, 2] = np.nan
+
+
+def no_snapshots(path: Path) -> None:
+    with h5py.File(path, "r+") as file:
+        del file["uplift/000002"]
+
+
+def broken_tables(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[60:70] = b"x" * 10
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize("damage", [other_times, other_mesh, no_snapshots, broken_tables])
+def test_damaged_snapshots_are_begun_anew(
+    damage: Any, tmp_path: Path, make_march: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
+    march.drive(watch(march, path), outcome="interrupted", last=620)
+    damage(tmp_path / "fields.h5")
+    with caplog.at_level("WARNING", "catenary.fields"):
+        march.drive(watch(march, path, resume=True), first_step=600)
+    assert "its snapshots now begin at t = 0.600 s" in caplog.text
+    reader = pyvista.get_reader(path)
+    np.testing.assert_allclose(reader.time_values, 0.6 + 0.05 * np.arange(9), rtol=1e-12)
+
+
 def test_no_table_of_the_file_changes_once_the_run_goes_on(tmp_path: Path, make_march: Any) -> None:
     # What a kill could leave half done would be among the bytes outside the snapshots' places.
     march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
