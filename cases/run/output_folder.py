@@ -80,7 +80,9 @@ def refuse_impossible(folder: Path) -> None:
         # Whether it can be made is seen when the folder is locked; this takes no time.
         above = next(path for path in folder.absolute().parents if path.exists())
         if not os.access(above, os.W_OK | os.X_OK):
-            raise refusal(folder, PermissionError(errno.EACCES, "")) from None
+            read_only = os.statvfs(above).f_flag & os.ST_RDONLY
+            code = errno.EROFS if read_only else errno.EACCES
+            raise refusal(folder, OSError(code, os.strerror(code))) from None
         return
     except OSError as error:
         raise refusal(folder, error) from error

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -54,6 +55,16 @@ def test_a_folder_that_cannot_be_is_refused_in_true_words(what: str, tmp_path: P
         FolderLock(tmp_path / name, "catenary run case")
     assert "space" not in str(caught.value)
     assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize(("flag", "words"), [(0, "Permission denied"), (1, "Read-only file sys")])
+def test_a_read_only_disk_is_no_matter_of_permissions(
+    flag: int, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "access", lambda *args: False)
+    monkeypatch.setattr(os, "statvfs", lambda path: SimpleNamespace(f_flag=flag))
+    with pytest.raises(InputError, match=words):
+        refuse_impossible(tmp_path / "out")
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="there is no /proc")

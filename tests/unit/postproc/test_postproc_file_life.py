@@ -180,6 +180,21 @@ def test_a_reports_files_are_all_declared(tmp_path: Path, make_march: Any, recor
     assert set(REPORT_FILES) - written <= {"strip_forces.png"}
 
 
+def test_a_report_that_cannot_be_written_is_a_sentence(
+    tmp_path: Path, make_march: Any, record_run: Any
+) -> None:
+    from catenary.postproc.report import write_report, write_summary
+
+    path = record_run(tmp_path / "run.h5", make_march(n_steps=300))
+    (tmp_path / "summary.json").mkdir()
+    for write in (write_report, write_summary):
+        with pytest.raises(RunBroken, match="summary.json failed .Is a directory"):
+            write(path, tmp_path)
+        with pytest.raises(RunBroken, match="failed .No such file or directory"):
+            write(path, tmp_path / "gone")
+    assert not (tmp_path / "gone").exists()
+
+
 def test_room_is_asked_for_only_where_it_is_short() -> None:
     for code in (errno.ENOSPC, errno.EDQUOT):
         assert "free some space" in remedy(OSError(code, ""))
