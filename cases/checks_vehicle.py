@@ -182,20 +182,21 @@ def _farthest(scene: Scene, line: Line, number: int) -> tuple[float, float]:
 
         base = BaseMotion(vehicle_of(scene.vehicle), start, speed)
     # Extremes are at supports, unless the vehicle sways: then every 0.25 m and 20 ms are looked at.
-    times = [0.0, duration]
-    times += [(x - start - ahead) / speed for x in line.support_positions for ahead in offsets]
+    supports = line.support_positions
+    times = np.concatenate(
+        [[0.0, duration], *((supports - start - one) / speed for one in offsets)]
+    )
     if base is not None:
         n = math.ceil(duration / min(0.25 / speed, 0.02))
-        times += list(np.linspace(0.0, duration, n))
-    far, at = 0.0, start
-    for time in times:
-        if not 0.0 <= time <= duration:
-            continue
-        ahead = start + speed * time + offsets
-        places = np.interp(ahead, line.support_positions, line.stagger)
-        if base is not None:
-            places -= base.lateral(time).place
-        strip = int(np.argmax(np.abs(places)))
-        if abs(places[strip]) > abs(far):
-            far, at = float(places[strip]), start + speed * time
-    return far, at
+        times = np.concatenate([times, np.linspace(0.0, duration, n)])
+    times = times[(times >= 0.0) & (times <= duration)]
+    ahead = start + speed * times[:, None] + offsets
+    places = np.interp(ahead, supports, line.stagger)
+    if base is not None:
+        places -= np.array([base.lateral(time).place for time in times.tolist()])[:, None]
+    farthest = np.abs(places).max(axis=1)
+    first = int(np.argmax(farthest))
+    if farthest[first] == 0.0:
+        return 0.0, start
+    strip = int(np.argmax(np.abs(places[first])))
+    return float(places[first, strip]), float(start + speed * times[first])

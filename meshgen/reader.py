@@ -19,7 +19,7 @@ from catenary.solver.errors import InputError
 _LINE_GROUPS = (names.CONTACT_WIRE, names.MESSENGER_WIRE, names.DROPPERS)
 _POINT_GROUPS = (names.STEADY_ARMS, names.SUPPORTS, names.ANCHORS)
 _MAY_BE_EMPTY = (names.DROPPERS, names.STEADY_ARMS, names.SUPPORTS)
-# The mesh of 40 000 spans takes half of it.
+# A mesh of four million nodes takes half of it.
 MOST_BYTES = 500_000_000
 _HEAD = 65536  # [B], comments may stand first
 _SHOWN, _SOME = 60, 12  # of the names of groups that a file has

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from catenary.cases.scene import Scene
     from catenary.cases.schema_line import DropperTable
 
-# 40 000 spans of ten gaps with five elements each; their run takes 27 GB.
+# 20 000 spans of ten gaps with ten elements each; their run takes 27 GB.
 MOST_NODES = 4_000_000
 # From here on a mesh takes longer than one waits without a word.
 MANY_NODES = 50_000
