@@ -108,6 +108,6 @@ def test_a_mesh_that_lacks_a_group_is_refused(group: str, line: Path, tmp_path: 
     file.write_text(line.read_text().replace(f'"{group}"', '"something_else"'))
     done = catenary(*short_run(out, f"mesh.file={file}", GIVEN), cwd=tmp_path)
     assert done.code == 2
-    (sentence,) = done.stderr.splitlines()
+    (sentence,) = done.sentences
     assert group in sentence and str(file) in sentence
     assert list(tmp_path.iterdir()) == [file]
