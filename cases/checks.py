@@ -38,8 +38,6 @@ if TYPE_CHECKING:
 
 # Two heads cannot stand closer on a roof; their contacts would also share one finite element.
 MIN_SEPARATION = 1.0
-# A period of the 20 Hz filter: of a shorter stretch there are no statistics [s].
-SHORTEST_EVALUATION = 0.05
 # Slack for sums of decimal lengths [m].
 _TINY = 1e-6
 # As many span lengths are told in a sentence.
@@ -368,15 +366,6 @@ def _evaluation(scene: Scene) -> Iterator[Fault]:
             yield _refusal(scene, "evaluation.from_m", stretch.from_m, covers)
         if stretch.to_m > end - place.behind_m + _TINY:
             yield _refusal(scene, "evaluation.to_m", stretch.to_m, covers)
-    shortest = SHORTEST_EVALUATION * scene.train.speed_km_h / 3.6
-    if stretch.to_m - stretch.from_m < shortest:
-        yield _refusal(
-            scene,
-            "evaluation.to_m",
-            stretch.to_m,
-            f"the stretch from {stretch.from_m:g} m must be at least {shortest:.3g} m long, a "
-            "period of the 20 Hz filter; whole spans are usual",
-        )
 
 
 def _raising(scene: Scene) -> Iterator[Fault]:

@@ -64,12 +64,10 @@ def summary_text(summary: Mapping[str, Any], folder: Path) -> str:
             f"  {words[row['passed']]:10}  {row['criterion']}: {_number(value, digits)}, limit "
             f"{_number(limit, digits)} {row.get('unit', '')}".rstrip()
         )
-    # Older runs have neither.
-    warnings = [
-        text
-        for part in ("indicators", "arrivals")
-        for text in summary.get(part, {}).get("warnings", [])
-    ]
+    # Older runs have neither indicators nor arrivals.
+    warnings = list(summary.get("complaints", []))
+    for part in ("indicators", "arrivals"):
+        warnings += summary.get(part, {}).get("warnings", [])
     lines += ["", *(f"  WARNING     {text}" for text in warnings)]
     lines += [""] * bool(warnings) + [f"Results: {folder}"]
     return "\n".join(lines)

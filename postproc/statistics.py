@@ -232,6 +232,15 @@ def _pantograph(name: str, number: int, results: Results) -> PantographStatistic
         )
     within = (position >= start) & (position <= end)
     del position
+    taken = max(np.count_nonzero(within) - 1, 0) * results.dt
+    period = 1.0 / filters.CUT_OFF
+    if taken < period:
+        return PantographStatistics(
+            name,
+            complaint=f"No statistics of the {_noun(name)}: it passes the evaluation stretch "
+            f"within {1e3 * taken:.3g} ms, less than a period of the 20 Hz filter "
+            f"({1e3 * period:g} ms).",
+        )
     try:
         return PantographStatistics(
             name=name,

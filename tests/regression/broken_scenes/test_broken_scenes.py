@@ -241,10 +241,6 @@ ASSIGNMENTS = {
     "evaluation backwards": (["evaluation.to_m=400"], "must end after it starts"),
     "evaluation beyond the line": (["evaluation.to_m=1500"], "only runs from 90 to 1320 m"),
     "evaluation before the start": (["evaluation.from_m=50"], "only runs from 90"),
-    "evaluation of one sample": (
-        ["evaluation.from_m=600", "evaluation.to_m=600.01"],
-        "at least 3.47 m long, a period of the 20 Hz filter",
-    ),
     "raised too late": (["train.raise_time_s=10"], "must be raised by then"),
     "unknown edition": (["evaluation.edition=1999"], "must be one of 2006, 2012, 2020"),
     "unknown edition as text": (['evaluation.edition="1999"'], "must be one of"),

@@ -150,3 +150,19 @@ def test_too_long_a_step_gives_a_sentence_instead_of_figures(
     with Results(path) as results:
         found = stats.evaluate(results)
     assert "must be below 0.025 s" in found.complaints[0]
+
+
+@pytest.mark.parametrize("length", [0.01, 1.0, 4.1])
+def test_a_stretch_of_a_few_samples_gives_a_sentence_instead_of_figures(
+    length: float, run_folder: Path
+) -> None:
+    """At 83.3 m/s a period of 20 Hz is 4.17 m; a sample alone has no deviation."""
+    with Results(run_folder) as results:
+        results.evaluation = (300.0, 300.0 + length)
+        found = stats.evaluate(results)
+        results.evaluation = (300.0, 304.3)
+        longer = stats.evaluate(results)
+    assert all(np.isnan(p.std) for p in found.pantographs)
+    assert len(found.complaints) == 2
+    assert "less than a period of the 20 Hz filter (50 ms)" in found.complaints[0]
+    assert longer.complaints == []
