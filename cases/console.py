@@ -15,7 +15,7 @@ import typer
 
 from catenary.cases.input.plain_text import plain
 from catenary.solver.errors import CatenaryError, InputError
-from catenary.solver.parallel import launched_by_mpirun, on_root
+from catenary.solver.parallel import NO_MEMORY, launched_by_mpirun, on_root
 
 DONE, BROKEN, BAD_INPUT, NOT_ACCEPTED = 0, 1, 2, 3
 _RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK")
@@ -96,6 +96,9 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
         except CatenaryError as error:
             complain(str(error))
             code = error.exit_code
+        except MemoryError:
+            complain(NO_MEMORY)
+            code = BROKEN
         except KeyboardInterrupt:
             complain("interrupted")
             code = BROKEN

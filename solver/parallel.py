@@ -9,9 +9,14 @@ import traceback
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from catenary.solver.errors import CatenaryError
+from catenary.solver.errors import CatenaryError, RunBroken
 
 T = TypeVar("T")
+
+NO_MEMORY = (
+    "there is not enough memory left by the machine or a limit of the process; `catenary plan` "
+    "tells what a run takes, and what was written stays readable"
+)
 
 
 def on_root(comm: Any, work: Callable[[], T]) -> T:
@@ -28,13 +33,16 @@ def on_root(comm: Any, work: Callable[[], T]) -> T:
     Raises
     ------
     CatenaryError
-        The same one on all ranks; any other exception of rank 0 becomes a RuntimeError elsewhere.
+        The same one on all ranks, of a lack of memory too; any other exception of rank 0 becomes a
+        RuntimeError elsewhere.
     """
     result: Any = None
     error: BaseException | None = None
     if comm.rank == 0:
         try:
             result = work()
+        except MemoryError:
+            error = RunBroken(NO_MEMORY)
         except Exception as caught:  # every error must reach all ranks
             error = caught
     if comm.size > 1:

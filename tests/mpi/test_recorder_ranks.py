@@ -5,9 +5,11 @@ Run by ``mpirun -n N python -m mpi4py -m pytest tests/mpi/test_recorder_ranks.py
 
 from __future__ import annotations
 
+import runpy
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -17,7 +19,8 @@ from mpi4py import MPI
 
 from catenary.postproc import result_file
 from catenary.postproc.fields import FieldRecorder
-from catenary.postproc.header import REQUIRED_ATTRIBUTES, Header
+from catenary.postproc.header import Header
+from catenary.postproc.record.line_record import LineRecord
 from catenary.postproc.recorder import Recorder
 from catenary.postproc.results import Results
 from catenary.postproc.storage import NoRoom
@@ -25,7 +28,12 @@ from catenary.solver.errors import RunBroken
 from catenary.solver.observation import Stage, StepView
 
 COMM = MPI.COMM_WORLD
-N_ARMS, N_DROPPERS, N_NODES, N_STEPS, DT = 7, 23, 60, 130, 1e-3
+N_STEPS, DT = 130, 1e-3
+# A line whose head of a file is sound, as the unit tests of the recorders have it.
+MARCH = runpy.run_path(str(Path(__file__).parents[1] / "unit/postproc/conftest.py"))["March"](
+    n_steps=N_STEPS, dt=DT, comm=COMM
+)
+N_ARMS, N_DROPPERS, N_NODES = MARCH.arm_x.size, MARCH.dropper_x.size, MARCH.mesh.n_nodes
 Share = Callable[[int], np.ndarray]
 
 
@@ -58,22 +66,21 @@ def folder() -> Iterator[Path]:
 def make_header() -> Header | None:
     if COMM.rank:
         return None
-    attributes = dict.fromkeys(REQUIRED_ATTRIBUTES, ["made up"])
-    return Header(attributes, {"line/support_x": np.arange(3.0)})
+    header: Header = MARCH.header()
+    return header
 
 
 def make_stage(share: Share) -> Stage:
-    points = np.column_stack([np.arange(N_NODES), np.zeros(N_NODES), np.full(N_NODES, 5.0)])
     return Stage(
         n_pantographs=2,
         dt=DT,
         start_time=0.0,
         n_steps=N_STEPS,
-        arm_x=np.arange(N_ARMS, dtype=float),
-        dropper_x=np.arange(N_DROPPERS, dtype=float),
+        arm_x=MARCH.arm_x,
+        dropper_x=MARCH.dropper_x,
         owned_arms=share(N_ARMS),
         owned_droppers=share(N_DROPPERS),
-        node_points=points,
+        node_points=MARCH.mesh.points,
         owned_nodes=share(N_NODES),
     )
 
@@ -86,10 +93,10 @@ def make_view(step: int, share: Share) -> StepView:
         time=step * DT,
         contact_position=two,
         contact_force=10 * two if on_root else np.zeros(0),
-        head_height=20 * two if on_root else np.zeros(0),
-        wire_height=30 * two if on_root else np.zeros(0),
+        head_height=0.02 * two if on_root else np.zeros(0),
+        wire_height=0.03 * two if on_root else np.zeros(0),
         dropper_force=1000.0 * step + share(N_DROPPERS),
-        arm_uplift=-1000.0 * step - share(N_ARMS),
+        arm_uplift=-0.01 * step - share(N_ARMS),
         node_uplift=lambda: 1e-3 * step + share(N_NODES),
         energies=lambda: (COMM.allreduce(1.0), float(step)),
         checkpoint=lambda: checkpoint(step),
@@ -124,10 +131,10 @@ def test_all_channels_reach_the_file(folder: Path, share: Share, flush_every: in
         expected = {
             "contact_position": steps + [1.0, 2.0],
             "contact_force": 10 * (steps + [1.0, 2.0]),
-            "head_height": 20 * (steps + [1.0, 2.0]),
-            "wire_height": 30 * (steps + [1.0, 2.0]),
+            "head_height": 0.02 * (steps + [1.0, 2.0]),
+            "wire_height": 0.03 * (steps + [1.0, 2.0]),
             "dropper_force": 1000.0 * steps + np.arange(N_DROPPERS),
-            "arm_uplift": -1000.0 * steps - np.arange(N_ARMS),
+            "arm_uplift": -0.01 * steps - np.arange(N_ARMS),
         }
         for name, values in expected.items():
             np.testing.assert_array_equal(results.channel(name), values, name)
@@ -135,6 +142,38 @@ def test_all_channels_reach_the_file(folder: Path, share: Share, flush_every: in
         assert state["step"] == N_STEPS
         np.testing.assert_array_equal(state["ranks"], np.arange(COMM.size))
         np.testing.assert_array_equal(results.energies()["kinetic"], np.full(14, float(COMM.size)))
+
+
+@pytest.mark.parametrize("share", SHARES)
+def test_a_part_of_the_line_and_its_extremes_reach_the_file(folder: Path, share: Share) -> None:
+    """Every third step of some droppers in a window; broken at step 100, restarted at step 79."""
+    record = LineRecord(every=3, window=(30.0, 90.0), stretch=(25.0, 180.0))
+    for first, last in ((0, 100), (79, N_STEPS)):
+        recorder = Recorder(
+            COMM, folder / "run.h5", make_header(), flush_every=40, record=record, resume=first > 0
+        )
+        recorder.start(replace(make_stage(share), start_time=first * DT))
+        for step in range(first, last + 1):
+            recorder.observe(make_view(step, share))
+        recorder.finish("done" if last == N_STEPS else "broken")
+        recorder.close({})
+    if COMM.rank:
+        return
+    steps, x = np.arange(0, N_STEPS + 1, 3.0)[:, None], MARCH.dropper_x
+    inside = (x >= steps + 1.0 - 30.0) & (x <= steps + 2.0 + 90.0) & (x >= 25) & (x <= 180)
+    assert inside.any(axis=0).sum() > 20 and not inside.all(axis=1).any()
+    droppers, arms = np.arange(N_DROPPERS), np.arange(N_ARMS)
+    with Results(folder / "run.h5") as results:
+        np.testing.assert_allclose(results.line_time, DT * steps[:, 0])
+        expected = np.where(inside, 1000.0 * steps + droppers, np.nan)
+        np.testing.assert_array_equal(results.channel("dropper_force"), expected)
+        # Of every step and column: those of step 0 and of the last one.
+        np.testing.assert_array_equal(
+            results.extremes("dropper_force"), [droppers, 1000.0 * N_STEPS + droppers]
+        )
+        np.testing.assert_array_equal(
+            results.extremes("arm_uplift"), [-0.01 * N_STEPS - arms, -arms]
+        )
 
 
 @pytest.mark.parametrize("share", SHARES)

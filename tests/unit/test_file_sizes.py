@@ -1,0 +1,142 @@
+"""What a run records by its scene, and the sizes of its files: told before, true within 20 %."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from mpi4py import MPI
+
+from catenary.cases import console
+from catenary.cases.plan import estimate_memory, make_plan, plan_text
+from catenary.cases.runner import run_case
+from catenary.cases.scene import Scene, load_scene
+from catenary.postproc.record.line_record import GZIP
+from catenary.postproc.results import Results
+from catenary.solver.errors import InputError, RunBroken
+from catenary.solver.parallel import on_root
+
+# 0.45 s on a line of 22 spans.
+SHORT = (
+    "train.start_m=300",
+    "train.raise_time_s=0.05",
+    "evaluation.from_m=310",
+    "evaluation.to_m=325",
+    "train.end_m=331",
+    "mesh.elements_per_gap=4",
+)
+THINNED = (
+    "output.line_channels_every_s=0.005",
+    "output.line_channels_window_m=[100, 50]",
+    "output.line_channels_compression=gzip",
+)
+SCENES = {
+    "short": SHORT,
+    "shorter than a flush": (*SHORT, "output.field_every_s=0", "output.energy_every_s=0"),
+    "many short flushes": (*SHORT, "output.flush_every_steps=64"),
+    "fine steps": (*SHORT, "numerics.dt_s=1e-4", "output.field_every_s=0.01"),
+    "thinned": (*SHORT, *THINNED, "numerics.dt_s=2e-4"),
+    "spans": (*SHORT, "output.line_channels_spans=[5, 8]", "numerics.dt_s=2e-4"),
+    "no line channels": (*SHORT, "output.line_channels=[]", "numerics.dt_s=2e-4"),
+}
+
+
+def scene_of(*overrides: str, case: str = "en50318_2002") -> Scene:
+    return load_scene(case, list(overrides))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_plan_tells_the_sizes_of_the_files(name: str, tmp_path: Path) -> None:
+    scene = scene_of(*SCENES[name])
+    told = make_plan(scene).files
+    run_case(scene, tmp_path, MPI.COMM_SELF, only_summary=True)
+    result = (tmp_path / "run.h5").stat().st_size
+    film = sum(path.stat().st_size for path in tmp_path.glob("fields.*"))
+    print(f"run.h5 {result} B, told {told.result / result:.3f} of it")
+    assert told.result == pytest.approx(result, rel=0.2)
+    if film:
+        print(f"film {film} B, told {told.film / film:.3f} of it")
+    assert told.film == pytest.approx(film, rel=0.2)
+
+
+def test_a_scene_chooses_what_is_recorded_of_the_line(tmp_path: Path) -> None:
+    scene = scene_of(*SHORT, *THINNED, "output.line_channels_spans=[5, 8]")
+    run_case(scene, tmp_path, MPI.COMM_SELF, only_summary=True)
+    with Results(tmp_path) as results:
+        record = results.line_record
+        assert (record.every, record.window, record.compression) == (5, (100.0, 50.0), GZIP)
+        masts, x = results.line("support_x"), results.line("dropper_x")
+        columns = results.recorded_columns("dropper_force")
+        assert x[columns].min() > masts[4] and x[columns].max() < masts[8]
+        assert columns.size == 4 * 9
+
+
+def test_cadence_in_travel_is_that_in_time_over_the_speed() -> None:
+    # 0.5 m at 250 km/h are 7.2 ms.
+    told = make_plan(scene_of("output.line_channels_every_m=0.5"))
+    assert "every 7 ms" in told.recorded["line"]
+
+
+LONG = ("line.n_spans=200", "evaluation.to_m=10000")
+
+
+def test_long_lines_are_thinned_by_their_size() -> None:
+    """200 spans that the train runs, 2 GB of line channels if all were recorded."""
+    long = scene_of(*LONG, case="ambrosio2012")
+    thinned = make_plan(long)
+    text = plan_text(thinned)
+    assert "every 5 ms within 300 m behind and 200 m ahead of the train" in text
+    assert "a snapshot of the line every" in text and text.count("(chosen by size)") == 2
+    whole = make_plan(
+        scene_of(*LONG, "output.line_channels_every_s=0", "output.field_every_s=0.05",
+                 case="ambrosio2012")
+    )  # fmt: skip
+    assert "dropper forces recorded at every step" in whole.recorded["line"]
+    assert whole.files.result > 1.5e9 > 30 * thinned.files.result
+    assert thinned.files.film < 510e6 < whole.files.film
+
+
+def test_short_lines_are_recorded_whole() -> None:
+    told = make_plan(scene_of()).recorded
+    assert told["line"] == "arm uplift and dropper forces recorded at every step"
+
+
+@pytest.mark.parametrize(
+    ("override", "told"),
+    [
+        ("output.line_channels_spans=[5, 90]", "the line has the spans 1 to 22"),
+        ("output.line_channels_spans=[8, 5]", "from a span to a later one"),
+        ("output.line_channels_spans=[0, 5]", "at least 1"),
+        ("output.line_channels_window_m=[100]", "line_channels_window_m"),
+        ("output.line_channels_window_m=[-1, 5]", "at least 0"),
+        ('output.line_channels=["force"]', "arm_uplift"),
+        ("output.line_channels_compression=zip", "gzip"),
+    ],
+)
+def test_what_cannot_be_recorded_is_refused_with_its_key(override: str, told: str) -> None:
+    with pytest.raises(InputError) as caught:
+        scene_of(override)
+    assert told in str(caught.value) and "output" in str(caught.value)
+
+
+def test_two_cadences_are_refused() -> None:
+    with pytest.raises(InputError, match="both are given"):
+        scene_of("output.line_channels_every_s=0.01", "output.line_channels_every_m=1")
+
+
+def test_the_estimate_of_memory_grows_with_the_steps_too() -> None:
+    assert estimate_memory(10_000, 8_000_000) > estimate_memory(10_000) + 2e8
+
+
+def test_too_little_memory_ends_in_a_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+    def greedy() -> None:
+        np.empty(1 << 60, dtype=np.uint8)
+
+    with pytest.raises(typer.Exit) as ended:
+        console.guarded(greedy)()
+    assert ended.value.exit_code == console.BROKEN
+    assert "not enough memory" in capsys.readouterr().err
+    with pytest.raises(RunBroken, match="not enough memory"):
+        on_root(MPI.COMM_SELF, greedy)
