@@ -54,15 +54,16 @@ def test_there_are_sixty_and_each_says_what_it_does() -> None:
 @pytest.mark.parametrize("name", SCENES)
 def test_a_hostile_scene_is_refused(name: str, verb: str, tmp_path: Path) -> None:
     before = sorted(os.listdir(FOLDER))
-    begin = time.perf_counter()
+    begin = time.perf_counter(), time.process_time()
     words = [verb, str(FOLDER / f"{name}.toml"), *VERBS[verb]]
     result = CliRunner().invoke(app, words)
-    took = time.perf_counter() - begin
+    waited, worked = time.perf_counter() - begin[0], time.process_time() - begin[1]
     assert result.exit_code == 2, result.output
     assert result.stdout == ""
     assert_refused(result.stderr, several=verb == "check")
     assert list(tmp_path.iterdir()) == [] and sorted(os.listdir(FOLDER)) == before
-    assert took < LIMIT, f"{took:.1f} s"
+    # On a loaded machine one waits for a core as well.
+    assert worked < LIMIT and waited < 6 * LIMIT, f"{worked:.1f} s of work, {waited:.1f} s in all"
 
 
 @pytest.mark.parametrize("name", PROCESSES)
