@@ -1,7 +1,8 @@
 # One thread a rank: the linear algebra is small, and MPI is what runs in parallel.
 export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
-# What the environment holds is used, not what a user's shell adds.
+# What the environment holds is used, not what a user's shell adds; but on a cluster that may bring
+# the packages that setup links.
 unexport PYTHONPATH PYTHONHOME
 
 PYTHON := .venv/bin/python
@@ -34,10 +35,10 @@ help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 20
 
 setup: ## install what is needed, system packages included; quick when all is there
-	@bash .setup/setup.sh
+	@PYTHONPATH="$(PYTHONPATH)" bash .setup/setup.sh
 
 setup-newest: ## the same with the newest packages that pyproject.toml allows; says what differs
-	@bash .setup/setup.sh --newest
+	@PYTHONPATH="$(PYTHONPATH)" bash .setup/setup.sh --newest
 
 compile: setup ## compile the loops of the shipped cases ahead, for an installation that others share
 	@work=$$(mktemp -d) && trap 'rm -rf "$$work"' EXIT && \

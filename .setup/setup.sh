@@ -184,9 +184,9 @@ make_environment() {
     "${python[@]}" .setup/system_packages.py .venv ${extra_path:+"$extra_path"}
 }
 
-# Run by the environment's Python without the user's PYTHONPATH and folder.
+# Run by the environment's Python without the user's PYTHONPATH and folder, nor do its children see them.
 pip_install() {
-    .venv/bin/python -I -m pip install --quiet --no-input --disable-pip-version-check "$@" >&2
+    env -u PYTHONPATH .venv/bin/python -I -m pip install --quiet --no-input --disable-pip-version-check "$@" >&2
 }
 
 install_python_packages() {
