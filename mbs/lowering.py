@@ -59,8 +59,9 @@ class LoweredPantograph:
         s = len(model.strip_offsets)
         self.model = model
         self._lowering, self._base = lowering, base
-        # Of the strips' mean over the base: now, and where it is caught, not a number before.
-        self._height, self._catch = np.nan, np.nan
+        # Of the strips' mean over the base: now, and where it is caught, None before.
+        self._height = 0.0
+        self._catch: float | None = None
         self._caught = False
         self._latest: HeadState | None = None
         self._time = 0.0
@@ -90,7 +91,7 @@ class LoweredPantograph:
         """
         if self._caught:
             return self._where_caught(time)
-        if np.isnan(self._catch) and time > self._lowering.time:
+        if self._catch is None and time > self._lowering.time:
             self._catch = self._height - self._lowering.drop
         self._time, self._latest = time, self.model.predict(time)
         return self._latest
@@ -103,23 +104,28 @@ class LoweredPantograph:
         height = self._latest.height - self._latest.height_compliance @ contact_force
         self.model.advance(contact_force)
         self._height = float(height.mean()) - self._base_at(self._time)[0]
-        self._caught = self._height <= self._catch  # never while that is not a number
+        self._caught = self._catch is not None and self._height <= self._catch
 
     def state(self) -> np.ndarray:
-        """The model's state, its height, where it is caught and whether it is."""
-        return np.append(self.model.state(), [self._height, self._catch, float(self._caught)])
+        """The model's state, its height, where it is caught, and 0 before the lowering, 1 while it
+        is lowered, 2 when it is caught."""
+        lowered = self._catch is not None
+        phase = float(lowered) + float(self._caught)
+        return np.append(self.model.state(), [self._height, self._catch or 0.0, phase])
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
         self.model.restore(np.asarray(state)[:-3])
-        self._height, self._catch = float(state[-3]), float(state[-2])
-        self._caught = bool(state[-1])
+        self._height = float(state[-3])
+        self._catch = float(state[-2]) if state[-1] >= 1.0 else None
+        self._caught = bool(state[-1] == 2.0)
 
     def energy(self) -> float:
         """That of the model [J]; what is caught has none."""
         return 0.0 if self._caught else self.model.energy()
 
     def _where_caught(self, time: float) -> HeadState:
+        assert self._catch is not None
         place, velocity = self._base_at(time)
         self._still.height[:] = self._catch + place
         self._still.velocity[:] = velocity
