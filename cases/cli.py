@@ -172,7 +172,7 @@ def run(
     from catenary.cases.runner import run_case
 
     for text in arrival_warnings(scene):
-        console.say(f"WARNING {text}")
+        console.warn(text)
     tell = _teller(out)
     result = run_case(scene, out, comm, force=force, petsc_options=arguments, tell=tell)
     return _end(result, out, strict)
@@ -328,7 +328,7 @@ def check(
     for fact in waves["pantographs"]:
         console.say(fact["says"])
     for text in waves["warnings"]:
-        console.say(f"WARNING {text}")
+        console.warn(text)
     return console.DONE
 
 

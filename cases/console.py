@@ -46,6 +46,12 @@ def complain(sentence: str) -> None:
         typer.echo(f"catenary: {plain(' '.join(sentence.split()))}", err=True)
 
 
+def warn(sentence: str) -> None:
+    """Print a warning to standard error on rank 0, unless the verb is to be quiet. Not collective."""
+    if speaks() and not _quiet:
+        typer.echo(f"WARNING {plain(' '.join(sentence.split()))}", err=True)
+
+
 class LogHandler(logging.Handler):
     """Prints what the library logs as sentences on rank 0."""
 

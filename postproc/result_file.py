@@ -233,6 +233,8 @@ class ResultFile:
         slots = (_SLOTS[self._n_states % 2],) if self._n_states else _SLOTS
         for slot in slots:
             place = group.require_group(slot)
+            for name in set(place) - set(state):  # of the line as it was before an incident
+                del place[name]
             for name, value in state.items():
                 _replace(place, name, value)
             seal_arrays(place, state)

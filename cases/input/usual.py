@@ -47,7 +47,7 @@ USUAL: dict[str, tuple[float, float]] = {
 _SIGNED = ("line.stagger_m", "line.dropper.pre_sag")
 _MARGIN = 10.0  # beyond a usual range without a question
 # What a number a thousand times too small, or too large, was probably written in.
-_LARGER = {"N": "kN", "N/m": "kN/m", "mm": "m", "N m2": "kN m2", "m": "km"}
+_LARGER = {"N": "kN", "N/m": "kN/m", "mm": "m", "N m2": "kN m2"}
 _SMALLER = {"m": "mm", "kg": "g", "kg/m": "g/m", "s": "ms"}
 
 

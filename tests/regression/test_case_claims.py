@@ -98,7 +98,7 @@ def test_ac_simple_keeps_the_allowed_mean_force(speed: str, tmp_path: Path) -> N
     words = ["--set", f"train.speed_km_h={speed}", "output.field_every_s=0"]
     done = catenary("run", "ac_simple", "-o", str(tmp_path / "out"), *words, cwd=tmp_path)
     assert done.code == 0, done.stderr
-    assert "WARNING" not in done.stdout
+    assert "WARNING" not in done.stdout + done.stderr
     (line,) = [text for text in done.stdout.splitlines() if "mean contact force" in text]
     value, limit = (float(number) for number in re.findall(r"\d+\.\d+", line))
     print(line)
@@ -112,4 +112,4 @@ def test_a_shipped_case_ends_without_a_warning(case: str, tmp_path: Path) -> Non
     words = ["--set", "output.field_every_s=0"]
     done = catenary("run", case, "-o", str(tmp_path / "out"), *words, cwd=tmp_path)
     assert done.code == 0, done.stderr
-    assert "WARNING" not in done.stdout
+    assert "WARNING" not in done.stdout + done.stderr

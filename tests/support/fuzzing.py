@@ -168,7 +168,7 @@ def broken_scene(seed: int) -> RandomScene:
         lambda: "pantographs.reference.masses_kg=[1.0,-2.0]",
         lambda: "pantographs.reference.masses_kg=[1.0,2.0,3.0,4.0]",
         lambda: f"effects.{_word(rng)}=true",
-        lambda: "effects.gravity=false",
+        lambda: "effects={gravity=false,dropper_slackening=true}",
         lambda: f"numerics.scheme='{_word(rng)}'",
         lambda: f"contact.law='{_word(rng)}'",
         lambda: "numerics.newmark_gamma=0.4",
