@@ -47,7 +47,7 @@ def complain(sentence: str) -> None:
 
 
 def warn(sentence: str) -> None:
-    """Print a warning to standard error on rank 0, unless the verb is to be quiet. Not collective."""
+    """Print a warning to standard error on rank 0, unless quiet. Not collective."""
     if speaks() and not _quiet:
         typer.echo(f"WARNING {plain(' '.join(sentence.split()))}", err=True)
 
