@@ -7,6 +7,8 @@ unexport PYTHONPATH PYTHONHOME
 
 PYTHON := .venv/bin/python
 PYTEST := $(PYTHON) -m pytest
+# Tests that measure no time share the cores, a file at a time (benchmarks cannot).
+PYTEST_SHARED = $(PYTEST) -p no:benchmark --numprocesses auto --maxprocesses 4 --dist loadfile
 # An uncaught error on one rank ends all; ranks must not write one cache at a time.
 MPI_PYTEST := $(PYTHON) -m mpi4py -m pytest -p no:cacheprovider
 PARTS := meshgen solver mbs postproc cases
@@ -54,19 +56,17 @@ run: setup ## simulate the paper's case and write its report
 	@echo "report: $(CURDIR)/$(RESULT)/report.html"
 
 test: setup lint ## lint and all tests, as CI runs them
-	$(PYTEST) tests/unit
-	$(PYTEST) tests/verification
-	$(PYTEST) tests/regression
+	$(PYTEST_SHARED) tests/unit tests/verification tests/regression
 	@$(MAKE) --no-print-directory test-mpi
 
 test-unit: setup ## tests of single parts
-	$(PYTEST) tests/unit
+	$(PYTEST_SHARED) tests/unit
 
 test-verification: setup ## tests against closed-form and published solutions
-	$(PYTEST) tests/verification
+	$(PYTEST_SHARED) tests/verification
 
 test-regression: setup ## every case, shortened, against published ranges
-	$(PYTEST) tests/regression
+	$(PYTEST_SHARED) tests/regression
 
 test-mpi: setup ## the same answers on 2 and 3 ranks
 	timeout 1200 mpirun -n 2 $(MPI_SHARED) $(MPI_PYTEST) tests/mpi
