@@ -1,0 +1,377 @@
+"""What users ran into: the input, what it did, what happens now, and the test that shows it.
+
+The table says where each fault is tested; the tests that it names do the work. What hostile scenes
+did stands in the tables of ``test_hostile_input.py`` and in the files of ``hostile_scenes``.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+TESTS = Path(__file__).parents[1]
+
+
+class Fault(NamedTuple):
+    """A fault that was reported, and where its end is tested (file and function)."""
+
+    given: str
+    did: str
+    now: str
+    file: str
+    function: str
+
+
+FAULTS = (
+    # ---- a scene is data ----------------------------------------------------------------------
+    Fault(
+        "[petsc] start_in_debugger, dll_append, python types, viewers, logs, options files",
+        "ran commands and files, loaded libraries, overwrote files, showed /etc/passwd",
+        "refused: a closed list of bounded solver options; all else after -- only",
+        "regression/test_hostile_input.py",
+        "test_a_scene_gives_petsc_no_option_that_acts_on_files_or_programs",
+    ),
+    Fault(
+        "the same in the config of a run.h5 that restart reads",
+        "was handed to PETSc",
+        "judged as the scene of a file is",
+        "regression/test_hostile_input.py",
+        "test_the_scene_of_a_result_file_is_judged_like_any_other",
+    ),
+    Fault(
+        "a .petscrc beside a downloaded case",
+        "gave PETSc any option",
+        "not read",
+        "regression/test_hostile_input.py",
+        "test_options_files_beside_a_case_are_not_read",
+    ),
+    Fault(
+        "study.py beside a case",
+        "ran without being named",
+        "runs with --study only, after a line that names it",
+        "regression/test_hostile_input.py",
+        "test_a_program_beside_a_case_runs_only_with_study_and_is_named_before",
+    ),
+    Fault(
+        "NUL, escape sequences and other control characters in names, titles and keys",
+        "check found the scene sound; run ended in a traceback, the old run.h5 gone",
+        "one sentence that shows them escaped",
+        "regression/test_hostile_input.py",
+        "test_what_was_reported_ends_in_one_sentence",
+    ),
+    Fault(
+        "run --force on a scene that fails after set-up",
+        "the earlier result was gone",
+        "it stays until the first step of the new run is on the disk",
+        "unit/postproc/test_postproc_file_life.py",
+        "test_an_earlier_file_stays_until_the_first_step_is_written",
+    ),
+    Fault(
+        "a byte order mark",
+        "Invalid statement (at line 1, column 1)",
+        "taken",
+        "regression/test_hostile_input.py",
+        "test_a_byte_order_mark_is_taken",
+    ),
+    Fault(
+        "24 million nodes",
+        "minutes without a word",
+        "counted before the mesh is made; refused beyond 4 million",
+        "regression/test_hostile_input.py",
+        "test_a_mesh_is_counted_before_it_is_made",
+    ),
+    Fault(
+        "a variant called =HYPERLINK(...)",
+        "a formula in the spreadsheet",
+        "refused; other cells of CSV files get an apostrophe",
+        "regression/test_hostile_input.py",
+        "test_a_variant_is_not_named_like_a_formula",
+    ),
+    Fault(
+        "a hundred hostile scene files through check, plan and run",
+        "tracebacks, hangs, files",
+        "one sentence each, code 2, nothing written or run",
+        "regression/test_hostile_scenes.py",
+        "test_a_hostile_scene_is_refused",
+    ),
+    # ---- machines as users have them ----------------------------------------------------------
+    Fault(
+        "Debian's paraview or python3-matplotlib beside the program",
+        "two lines of warning at every verb, no test collected",
+        "the environment sees five packages of the system and no others",
+        "unit/test_environment.py",
+        "test_packages_come_from_the_environment_only",
+    ),
+    Fault(
+        "set-up in a year",
+        "whatever is newest then",
+        "the versions that were tested together",
+        "unit/test_environment.py",
+        "test_tested_versions_are_within_the_bounds",
+    ),
+    Fault(
+        "run --force and restart onto a live run",
+        "both destroyed",
+        "refused with process, machine and age of its last sign of life",
+        "regression/test_locked_folder.py",
+        "test_a_live_run_is_left_alone_and_can_be_looked_at",
+    ),
+    Fault(
+        "a lock that a dead process has left",
+        "(there were no locks)",
+        "taken over",
+        "unit/test_folder_lock.py",
+        "test_a_lock_of_a_dead_process_is_taken_over",
+    ),
+    Fault(
+        "neither HOME nor the installation can be written",
+        "Numba: cannot cache function",
+        "a private folder, or compiled loops in memory and a line that says so",
+        "unit/solver/test_loop_cache.py",
+        "test_a_user_without_home_and_without_write_access",
+    ),
+    Fault(
+        "one bit flipped in a result file",
+        "tracebacks, hangs, other numbers without a word",
+        "checksums; a sentence, or what is sound is used and the rest told",
+        "regression/test_fuzz_damage.py",
+        "test_a_flipped_bit_is_told_or_changes_nothing",
+    ),
+    Fault(
+        "a crash or an endless loop inside HDF5",
+        "an eternal hang that Ctrl-C does not end",
+        "a sentence: files are examined in a process of its own",
+        "regression/test_fuzz_damage.py",
+        "test_a_crash_and_an_endless_loop_of_hdf5_end_in_a_sentence",
+    ),
+    Fault(
+        "missing or odd attributes, datasets and checkpoints",
+        "KeyError, JSONDecodeError, ZeroDivisionError",
+        "one sentence",
+        "unit/postproc/test_postproc_damage.py",
+        "test_random_damage_is_told_in_a_sentence",
+    ),
+    Fault(
+        "edition 2099, a state with NaN, complete_rows of 0",
+        "computed, ended in a traceback or as done",
+        "refused before a restart computes",
+        "regression/test_fuzz_damage.py",
+        "test_what_cannot_be_is_not_continued",
+    ),
+    Fault(
+        "SIGTERM, SIGHUP, SIGUSR1 before the march",
+        "died without a word",
+        "a sentence that names signal and phase; nothing is written",
+        "regression/test_signals.py",
+        "test_before_the_march",
+    ),
+    Fault(
+        "the same after the march",
+        "died without a word",
+        "a sentence: the results are complete, report writes the rest",
+        "regression/test_signals.py",
+        "test_after_the_march",
+    ),
+    Fault(
+        "the same to one of several ranks",
+        "the others waited",
+        "all end",
+        "regression/test_signals.py",
+        "test_a_signal_to_one_of_several_ranks",
+    ),
+    Fault(
+        "summary, report and pictures of an earlier run under --force",
+        "stayed beside a new, half-done run.h5",
+        "removed once the new run has begun; a user's own files stay",
+        "unit/postproc/test_postproc_file_life.py",
+        "test_what_is_stale_goes_and_what_is_a_users_stays",
+    ),
+    Fault(
+        "a file of the user's moved onto run.h5 during the run",
+        "enlarged by 56 MB of zeros",
+        "untouched; the run ends and says so",
+        "unit/postproc/test_postproc_file_life.py",
+        "test_a_file_that_is_taken_away_ends_the_run",
+    ),
+    Fault(
+        "run.h5 as a link",
+        "followed and overwritten",
+        "the link is replaced",
+        "unit/postproc/test_postproc_file_life.py",
+        "test_a_link_is_replaced_and_not_followed",
+    ),
+    Fault(
+        "report on a full or read-only disk",
+        "traceback",
+        "a sentence in the system's true words",
+        "unit/postproc/test_postproc_file_life.py",
+        "test_a_report_that_cannot_be_written_is_a_sentence",
+    ),
+    Fault(
+        "the report of a long run",
+        "23.7 GB of memory",
+        "read by blocks",
+        "unit/postproc/test_block_reading.py",
+        "test_a_report_on_a_long_run_takes_bounded_memory",
+    ),
+    Fault(
+        "2000 spans for 240 s",
+        "17 GB of run.h5",
+        "a window around the train and a cadence beyond 500 MB; extremes of every step",
+        "unit/test_file_sizes.py",
+        "test_long_lines_are_thinned_by_their_size",
+    ),
+    Fault(
+        "plan of a short run",
+        "a tenth of the size of its files",
+        "within a few per cent",
+        "unit/test_file_sizes.py",
+        "test_the_plan_tells_the_sizes_of_the_files",
+    ),
+    # ---- silent nonsense ----------------------------------------------------------------------
+    Fault(
+        "en50318_2002 on 12 spans",
+        "46 N off in the force history, without a word",
+        "a warning with the number of spans that would do",
+        "unit/test_wave_arrivals.py",
+        "test_what_a_warning_advises_ends_it",
+    ),
+    Fault(
+        "where reflected waves meet a pantograph",
+        "not told",
+        "predicted to within some metres of where marches change",
+        "verification/test_wave_arrivals_in_a_march.py",
+        "test_the_force_changes_where_the_wave_is_met",
+    ),
+    Fault(
+        "a newcomer's first run of each shipped case",
+        "a warning about the shipped mesh",
+        "none",
+        "regression/test_case_claims.py",
+        "test_a_shipped_case_ends_without_a_warning",
+    ),
+    Fault(
+        "accuracy: errors of step and mesh that cancel",
+        "recommended",
+        "measured apart; both must keep the target",
+        "unit/test_accuracy_analysis.py",
+        "test_errors_of_step_and_mesh_that_cancel_are_no_reason",
+    ),
+    Fault(
+        "accuracy: a reference with the mesh that is judged, or an uncertain one",
+        "recommended",
+        "finer in both; no recommendation if it is uncertain by a third of the target",
+        "unit/test_accuracy_analysis.py",
+        "test_an_uncertain_reference_recommends_nothing",
+    ),
+    Fault(
+        "sweep of a line that fails",
+        "passed: false",
+        "the criteria that failed, by name",
+        "unit/test_sweep.py",
+        "test_what_failed_is_told_by_name",
+    ),
+    Fault(
+        "compare of equal runs; one rank",
+        "-0.0000; 1 ranks",
+        "0.0000; 1 rank",
+        "unit/postproc/test_wording.py",
+        "test_zero_has_no_sign",
+    ),
+    # ---- errors -------------------------------------------------------------------------------
+    Fault(
+        "-o with too long a name, below /proc, through a looped link",
+        "a traceback, or free some space after set-up",
+        "refused before anything is computed",
+        "unit/test_output_folder.py",
+        "test_a_folder_that_cannot_be_is_refused_in_true_words",
+    ),
+    Fault(
+        "230 GB of results, 8 million steps",
+        "begun without a word",
+        "size and hours are told, --force is asked for",
+        "unit/test_output_folder.py",
+        "test_a_very_large_run_asks_for_force",
+    ),
+    Fault(
+        "a verb, an option or an argument that is not there",
+        "three lines of usage",
+        "one sentence",
+        "regression/test_hostile_input.py",
+        "test_a_usage_error_is_one_sentence",
+    ),
+    Fault(
+        "ac_simple",
+        "FAILED mean contact force: 143.36, limit 143.36",
+        "keeps the limit; figures are printed to where they differ",
+        "unit/postproc/test_comparing.py",
+        "test_a_summary_shows_by_how_little_a_limit_is_missed",
+    ),
+    Fault(
+        "EN 50318 in other spans than 7 to 10",
+        "every row holds",
+        "a table of spans and meshes, kept true",
+        "regression/test_case_claims.py",
+        "test_the_windows_of_en50318_miss_what_its_readme_says",
+    ),
+    # ---- the paper's law ----------------------------------------------------------------------
+    Fault(
+        "equation (2.7) as it is printed",
+        "could not be chosen",
+        "line.dropper.slack_damping = kept; an independent program's deviations within 1 %",
+        "regression/test_printed_law.py",
+        "test_the_printed_law_gives_what_an_independent_program_gives",
+    ),
+    # ---- speaking with people -----------------------------------------------------------------
+    Fault(
+        "check of a scene with four faults",
+        "one of them, and 3 more problems",
+        "all, each with its key",
+        "regression/test_hostile_input.py",
+        "test_check_tells_every_fault_of_the_tables_with_its_key",
+    ),
+    Fault(
+        "list --keys damping; catenary --version",
+        "usage errors",
+        "bounds, words and typical values; versions of the libraries",
+        "unit/test_key_list.py",
+        "test_damping_and_bending_stiffness_have_typical_values",
+    ),
+    Fault(
+        "a misspelt key",
+        "3 to 4 s, because everything was imported",
+        "no numerical library is loaded for it",
+        "unit/test_cli_imports.py",
+        "test_no_backend_is_loaded_for_an_answer_or_a_refusal",
+    ),
+    Fault(
+        "a run whose log goes to a file",
+        "nothing until its end",
+        "a line every ten seconds",
+        "unit/postproc/test_postproc_progress.py",
+        "test_a_log_gets_a_line_every_ten_seconds",
+    ),
+    Fault(
+        "outputs in README and docs",
+        "stale",
+        "run and compared",
+        "regression/test_documents.py",
+        "test_what_is_shown_is_what_happens",
+    ),
+)
+
+
+@functools.cache
+def functions_of(file: str) -> set[str]:
+    """Names of the tests of a file."""
+    tree = ast.parse((TESTS / file).read_text(encoding="utf-8"))
+    return {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.given[:60])
+def test_a_fault_that_was_reported_has_its_test(fault: Fault) -> None:
+    assert fault.function in functions_of(fault.file)
