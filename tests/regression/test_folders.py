@@ -36,7 +36,7 @@ def test_results_are_replaced_only_by_force(tmp_path: Path) -> None:
 
     refused = catenary(*short_run(out, *TOO_FAST), cwd=tmp_path)
     assert refused.code == 2
-    (sentence,) = refused.stderr.splitlines()
+    (sentence,) = refused.sentences
     assert str(out / "run.h5") in sentence and "--force" in sentence
     assert content(out) == before
 
