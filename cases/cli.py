@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from catenary.cases import console, interrupts
-from catenary.cases.commands import completion, matplotlib_folder
+from catenary.cases.commands import completion, matplotlib_folder, memory_limit
 from catenary.cases.run.output_folder import refuse_impossible
 from catenary.postproc.pages.wording import counted
 from catenary.solver.errors import InputError
@@ -465,6 +465,9 @@ def main() -> None:
     logging.getLogger("catenary").addHandler(console.LogHandler())
     interrupts.install(several_ranks=launched_by_mpirun())
     matplotlib_folder.settle()
+    if too_little := memory_limit.complaint():
+        console.complain(too_little)
+        sys.exit(console.BAD_INPUT)
     if launched_by_mpirun():
         # From here on the end of each rank waits for the others', so that a sentence of rank 0
         # is out before the launcher sees the exit code of another.

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from typing import Any
 
 import pytest
@@ -70,3 +72,13 @@ def completed(typed: str) -> list[str]:
 )  # fmt: skip
 def test_the_shell_is_offered_what_fits(typed: str, offered: list[str]) -> None:
     assert completed(typed) == offered
+
+
+def test_too_low_a_limit_of_memory_is_one_sentence() -> None:
+    """OpenBLAS would try for ever to get memory, and llvmlite end in a traceback."""
+    bash = "ulimit -v 450000; exec \"$0\" -c 'from catenary.cases.cli import main; main()' report x"
+    words = ["bash", "-c", bash, sys.executable]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("catenary: this process may take 461 MB of memory (ulimit -v)")
+    assert done.stderr.count("\n") == 1 and not done.stdout
