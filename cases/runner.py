@@ -11,12 +11,12 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
-from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from catenary.cases.commands.versions import versions
 from catenary.cases.incident_facts import incident_facts
 from catenary.cases.interrupts import Phase, StopRequest
 from catenary.cases.meshing import mesh_of
@@ -369,7 +369,7 @@ def _header(order: _Order, problem: Problem, at_rest: AtRest) -> Header:
             "pantographs": header_facts(scene, problem),
             "incidents": incident_facts(scene, problem),
             "arrivals": arrival_facts(scene, problem),
-            "versions": _versions(),
+            "versions": versions(),
             "config": scene.resolved(),
             "petsc_options": list(order.petsc_options),
             "effects_on": [tuple(row) for row in on],
@@ -380,19 +380,6 @@ def _header(order: _Order, problem: Problem, at_rest: AtRest) -> Header:
             **static_datasets(at_rest.mesh, at_rest.form, at_rest.lift),
         },
     )
-
-
-def _versions() -> dict[str, str]:
-    import h5py
-    import mpi4py
-
-    return {
-        "catenary": metadata.version("catenary"),
-        "PETSc": ".".join(str(part) for part in PETSc.Sys.getVersion()),
-        "mpi4py": mpi4py.__version__,
-        "numpy": np.__version__,
-        "h5py": h5py.__version__,
-    }
 
 
 def _performance(outcome: Outcome, phases: Phases, n_ranks: int) -> dict[str, Any]:
