@@ -49,14 +49,7 @@ def examined(path: Path, limit: float | None = None) -> Records | None:
     if limit is None:
         limit = LIMIT + path.stat().st_size / PER_SECOND
     try:
-        done = subprocess.run(
-            [sys.executable, "-P", "-m", __name__, str(path)],
-            env=_environment(),
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            timeout=limit,
-            check=False,
-        )
+        done = _child(["-m", __name__, str(path)], limit)
     except subprocess.TimeoutExpired as error:
         raise InputError(
             f"{path} is damaged: HDF5 does not come to an end of reading it within {limit:.0f} s; "
@@ -83,17 +76,22 @@ def examined(path: Path, limit: float | None = None) -> Records | None:
     return Records(found["rows"], damaged, found["told"], float(found["last"]))
 
 
+def _child(words: list[str], limit: float) -> subprocess.CompletedProcess[bytes]:
+    """What a Python of its own makes of ``words`` within ``limit`` [s]."""
+    return subprocess.run(
+        [sys.executable, "-P", *words],
+        env=_environment(),
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        timeout=limit,
+        check=False,
+    )
+
+
 def survives(path: Path, limit: float = LIMIT) -> bool:
     """Whether HDF5 opens every dataset of a file, without a crash and within ``limit`` [s]."""
     try:
-        done = subprocess.run(
-            [sys.executable, "-P", "-c", _WALK, str(path)],
-            env=_environment(),
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            timeout=limit,
-            check=False,
-        )
+        done = _child(["-c", _WALK, str(path)], limit)
     except subprocess.TimeoutExpired:
         return False
     return done.returncode == 0
