@@ -30,6 +30,11 @@ _STRETCH = 2048
 class StationPasses:
     """Takes free steps. Not collective.
 
+    Attributes
+    ----------
+    kernel, arguments : the compiled function of a step, and the tuple that it is called with, for
+        compiled loops that take steps themselves. ``look_at`` replaces the tuple
+
     Parameters
     ----------
     product : with K
@@ -62,7 +67,8 @@ class StationPasses:
     def look_at(self, ends: np.ndarray, laws: np.ndarray, tension: np.ndarray) -> None:
         """Fill ``tension`` on the way back, as ``LineMotion.look_at``."""
         droppers = ends, laws, tension, pulled(*self._own, ends)
-        self._step = bound(forth_and_back, *self._parts, droppers)
+        self.kernel, self.arguments = forth_and_back, (*self._parts, droppers)
+        self._step = bound(self.kernel, *self.arguments)
 
     def step(self) -> None:
         """Find the accelerations and what the next step starts from."""

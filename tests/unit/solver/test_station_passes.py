@@ -58,3 +58,22 @@ def test_passes_take_the_steps_of_their_parts(n_own: int, before: int, after: in
     kernels.tension(plain, ends, LAWS, pulls)
     for one, other in zip(found, (*expected, pulls), strict=True):
         assert np.abs(one - other).max(initial=0.0) < ROUND_OFF * np.abs(other).max(initial=1.0)
+
+
+def test_a_compiled_loop_takes_the_same_steps_with_kernel_and_arguments() -> None:
+    product, factors = station_product(line(20), 0), station_factors(line(20))
+    assert product is not None and factors is not None
+    states = []
+    for by_kernel in (False, True):
+        start = np.cos(np.arange(80.0))
+        read, answer, shown = np.zeros(88), np.zeros(80), np.zeros(80)
+        motion = MotionAhead(read[4:-4], np.zeros(80), answer, shown, STEPS)
+        motion.put(start, 2.0 * start, 3.0 * start)
+        passes = StationPasses(product, factors, read, answer, motion, STEPS)
+        for _ in range(3):
+            if by_kernel:
+                passes.kernel(*passes.arguments)
+            else:
+                passes.step()
+        states.append(motion.displacement.copy())
+    assert np.array_equal(*states)
