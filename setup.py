@@ -17,9 +17,9 @@ setup(
             "*/README.md",
             "*/reference/*.csv",
             "*/study.toml",
-            "*/hard.toml",
+            "studies/hard/hard.toml",
             "*/*.py",
         ],
-        "catenary.postproc": ["templates/*"],
+        "catenary.postproc": ["report/templates/*"],
     },
 )

@@ -36,7 +36,7 @@ fingerprint() {
 
 is_current() {
     [ -f "$STAMP" ] && [ "$(cat "$STAMP")" = "$(fingerprint)" ] &&
-        .venv/bin/python -c 'import petsc4py, mpi4py, catenary.solver.errors' 2>/dev/null
+        .venv/bin/python -c 'import petsc4py, mpi4py, catenary.solver.base.errors' 2>/dev/null
 }
 
 # --- Debian and Ubuntu -------------------------------------------------------------------------

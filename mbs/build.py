@@ -5,18 +5,23 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import NamedTuple
 
-from catenary.mbs import head_kernels
-from catenary.mbs.base_motion import BaseMotion
-from catenary.mbs.full import FullPantograph
-from catenary.mbs.head_turning import PITCH, head_turning
+from catenary.mbs.head import head_kernels
+from catenary.mbs.head.roll import roll_of
+from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.interface import Pantograph
-from catenary.mbs.lateral import LateralPath
 from catenary.mbs.lowering import LoweredPantograph, Lowering
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.multibody import MultibodyData, head_weight_under_way, reduced, stand
-from catenary.mbs.raising import RaisingData, RaisingPantograph
-from catenary.mbs.roll import roll_of
+from catenary.mbs.mechanism.full_pantograph import FullPantograph
+from catenary.mbs.mechanism.head_rotation import PITCH, head_turning
+from catenary.mbs.mechanism.pantograph_data import (
+    MultibodyData,
+    head_weight_under_way,
+    reduced,
+    stand,
+)
+from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
+from catenary.mbs.vehicle.base_motion import BaseMotion
 
 # What a pantograph can be described by.
 PantographData = LumpedData | MultibodyData

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.mbs.base_motion import BaseMotion
-from catenary.mbs.head_steps import raised
+from catenary.mbs.head.newmark_head import raised
 from catenary.mbs.interface import HeadState, Pantograph
+from catenary.mbs.vehicle.base_motion import BaseMotion
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,13 @@ from functools import partial
 import numpy as np
 from scipy import linalg
 
-from catenary.mbs import head_kernels
-from catenary.mbs.base_motion import BaseMotion
-from catenary.mbs.bound import bound
-from catenary.mbs.head_steps import SteppedHead, raised
+from catenary.mbs.head import head_kernels
+from catenary.mbs.head.newmark_head import SteppedHead, raised
+from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.interface import HeadState
-from catenary.mbs.lateral import LateralPath
 from catenary.mbs.lumped_data import LumpedData, chain_matrix
+from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.solver.base.bound import bound
 
 
 class LumpedPantograph(SteppedHead):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.mbs.strips import ONE_STRIP, HeadParts, Strips, Turning, head_parts
+from catenary.mbs.head.strips import ONE_STRIP, HeadParts, Strips, Turning, head_parts
 
 
 @dataclass(frozen=True)

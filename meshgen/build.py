@@ -11,7 +11,7 @@ from catenary.meshgen.gmsh_lines import write_mesh
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.reader import read_mesh
-from catenary.solver.errors import InputError
+from catenary.solver.base.errors import InputError
 
 # A user's mesh may differ from the scene by this much along the track [m].
 _FIT = 0.01

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
-from catenary.solver.errors import InputError
+from catenary.solver.base.errors import InputError
 
 # Nodes closer than this are taken for one place [m].
 _SAME_PLACE = 1e-6

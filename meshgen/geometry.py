@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.meshgen.line import Line
-from catenary.solver.errors import InputError
+from catenary.solver.base.errors import InputError
 
 # Two cuts of a wire closer than this are taken for a slip of the pen [m].
 SHORTEST_GAP = 1e-3

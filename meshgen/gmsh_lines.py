@@ -12,8 +12,8 @@ import numpy as np
 from catenary.meshgen import mesh as names
 from catenary.meshgen.geometry import Stations, find_stations
 from catenary.meshgen.line import Line
-from catenary.solver.errors import InputError
-from catenary.solver.python_signals import python_signals_kept
+from catenary.solver.base.errors import InputError
+from catenary.solver.base.python_signals import python_signals_kept
 
 
 def write_mesh(

@@ -14,7 +14,7 @@ import numpy as np
 from catenary.meshgen import mesh as names
 from catenary.meshgen.chains import Groups, assemble
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.errors import InputError
+from catenary.solver.base.errors import InputError
 
 _LINE_GROUPS = (names.CONTACT_WIRE, names.MESSENGER_WIRE, names.DROPPERS)
 _POINT_GROUPS = (names.STEADY_ARMS, names.SUPPORTS, names.ANCHORS)

@@ -14,8 +14,8 @@ from catenary.cases.ambrosio2012.study import (
     searched,
     variations,
 )
-from catenary.cases.study import StudyRun
-from catenary.postproc.study_report import (
+from catenary.cases.studies.case_study import StudyRun
+from catenary.postproc.report.study_report import (
     NOT_REPRODUCED,
     REPRODUCED,
     Finding,

@@ -11,10 +11,11 @@ from matplotlib.axes import Axes
 
 from catenary.cases.ambrosio2012.measures import leading_position, mid_span
 from catenary.cases.ambrosio2012.statements import AVERAGE, LIGHT, SINGLE, Force, Run, Runs
-from catenary.postproc import filters, plots
-from catenary.postproc.results import Results
-from catenary.postproc.statistics import histogram
-from catenary.postproc.study_report import StudyFigure
+from catenary.postproc.evaluate import filters
+from catenary.postproc.evaluate.statistics import histogram
+from catenary.postproc.read.results import Results
+from catenary.postproc.report import plots
+from catenary.postproc.report.study_report import StudyFigure
 
 # damping -> train -> folder of its result file
 Folders = Mapping[str, Mapping[str, Path]]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from catenary.postproc.results import Results
+from catenary.postproc.read.results import Results
 
 # A pantograph moves the wire before it arrives: what a dropper does from here on, three dropper
 # spacings ahead of the head, counts as that pantograph's passage [m].

@@ -14,7 +14,7 @@ from catenary.cases.ambrosio2012.statements import (
     UPLIFT,
     Run,
 )
-from catenary.postproc.study_report import StudyTable
+from catenary.postproc.report.study_report import StudyTable
 
 _NAMED = 4  # variations that a reason names
 

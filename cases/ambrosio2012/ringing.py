@@ -14,11 +14,11 @@ from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from catenary.cases.ambrosio2012.statements import DAMPINGS, SINGLE, Run, Runs
-from catenary.cases.meshing import mesh_of
-from catenary.cases.scene import Scene
-from catenary.postproc.study_report import StudyTable
-from catenary.solver.equilibrium import find_form, stiffness_matrix
-from catenary.solver.model import Model, iterate_entries
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.scene import Scene
+from catenary.postproc.report.study_report import StudyTable
+from catenary.solver.model.model import Model, iterate_entries
+from catenary.solver.statics.equilibrium import find_form, stiffness_matrix
 
 
 class Band(NamedTuple):

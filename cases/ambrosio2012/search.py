@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from catenary.cases.ambrosio2012 import statements
 from catenary.cases.ambrosio2012.statements import AVERAGE, LIGHT, STD_RATIO, Run, Runs
-from catenary.postproc.study_report import REPRODUCED, StudyTable
+from catenary.postproc.report.study_report import REPRODUCED, StudyTable
 
 
 class Judged(NamedTuple):

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from catenary.postproc.study_report import NOT_REPRODUCED, REPRODUCED, UNDECIDED, Finding
+from catenary.postproc.report.study_report import NOT_REPRODUCED, REPRODUCED, UNDECIDED, Finding
 
 LIGHT, AVERAGE = "light", "average"
 DAMPINGS = (LIGHT, AVERAGE)

@@ -12,15 +12,15 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
 
-from catenary.cases.loading import read_toml
-from catenary.cases.scene import Scene
-from catenary.cases.study import StudyRun, StudyVariant
-from catenary.cases.variants import Variant, check_keys, slug
-from catenary.solver.errors import InputError
+from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.toml_input import read_toml
+from catenary.cases.studies.case_study import StudyRun, StudyVariant
+from catenary.cases.studies.sweep.variants import Variant, check_keys, slug
+from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:
-    from catenary.postproc.results import Results
-    from catenary.postproc.study_report import Study
+    from catenary.postproc.read.results import Results
+    from catenary.postproc.report.study_report import Study
 
 TABLE = Path(__file__).with_name("study.toml")
 VARIED = "vary"

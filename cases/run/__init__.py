@@ -1,1 +1,1 @@
-"""Running a case: its folder and who may write there, what it records, how it is stopped."""
+"""Running a case, and planning it."""

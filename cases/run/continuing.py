@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from catenary.postproc.header import Header
-from catenary.postproc.results import Results
-from catenary.solver.errors import InputError
+from catenary.postproc.read.results import Results
+from catenary.postproc.record.header import Header
+from catenary.solver.base.errors import InputError
 
 # What a restart finds again; the rest of the head may be another version's.
 _SAME = ("case", "n_dofs", "speed_m_per_s", "wave_speed_m_per_s", "system", "edition")

@@ -14,14 +14,14 @@ import numpy as np
 
 from catenary.cases.run.recording import PER_NODE, THINNED_WINDOW, Recording
 from catenary.mbs.build import has_joints
-from catenary.postproc import channels
-from catenary.postproc.channels import Channel
-from catenary.postproc.record.layout import Chunk, chunks_of
+from catenary.postproc.files.chunk_shapes import Chunk, chunks_of
+from catenary.postproc.record import channels
+from catenary.postproc.record.channels import Channel
 from catenary.postproc.record.line_record import GZIP
-from catenary.solver.problem import Problem
+from catenary.solver.problem.problem import Problem
 
 if TYPE_CHECKING:
-    from catenary.cases.scene import Scene
+    from catenary.cases.scene.scene import Scene
 
 _BYTES = 8
 # Checksum and entry in the index of a chunk [B].

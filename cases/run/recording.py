@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catenary.meshgen.mesh import LineMesh
-from catenary.postproc import channels
+from catenary.postproc.record import channels
 from catenary.postproc.record.line_record import GZIP, NONE, LineRecord, says
-from catenary.solver.problem import Problem
+from catenary.solver.problem.problem import Problem
 
 if TYPE_CHECKING:
-    from catenary.cases.schema_run import OutputTable
+    from catenary.cases.scene.tables.run import OutputTable
 
 # Size up to which the line's channels are recorded at every step, and snapshots at their usual
 # cadence, unless the scene says otherwise [B].

@@ -1,1 +1,1 @@
-"""Running variants of a case: what is done, what is left."""
+"""Studies of many runs: sweeps, accuracy, hard cases, stability, pantographs, the paper."""

@@ -1,1 +1,1 @@
-"""Reading and judging of result files."""
+"""Statistics of a run, the limits of the standards, comparison of runs."""

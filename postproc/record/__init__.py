@@ -1,1 +1,1 @@
-"""Writing results: what of a run is recorded, how its files are laid out and kept whole."""
+"""Recording a run: its channels, their buffers, and progress."""

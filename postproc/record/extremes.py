@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from catenary.postproc.gathering import ColumnGather
+from catenary.postproc.record.column_gather import ColumnGather
 
 
 class Extremes:

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catenary.postproc import channels
-from catenary.postproc.gathering import ColumnGather
+from catenary.postproc.record import channels
+from catenary.postproc.record.column_gather import ColumnGather
 from catenary.postproc.record.extremes import Extremes
 from catenary.postproc.record.line_record import LineRecord
-from catenary.solver.observation import Stage
+from catenary.solver.time_loop.observers import Stage
 
 
 class LineRows(NamedTuple):

@@ -1,1 +1,1 @@
-"""Foundations without imports from other parts: compiled loops and the folder that keeps them."""
+"""Leaves that every layer may import: errors, ranks, compiled loops, aligned arrays."""

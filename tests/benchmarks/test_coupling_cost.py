@@ -9,8 +9,8 @@ from small_lines import EN_PANTOGRAPH, WHOLE, en50318_line, mesh_of, numerics, p
 
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.contact_laws import LinearLaw
-from catenary.solver.problem import Problem
+from catenary.solver.problem.contact_laws import LinearLaw
+from catenary.solver.problem.problem import Problem
 
 N_SPANS, REPEATS = 8, 3
 STEPS = (4e-3, 2e-3, 1e-3, 0.5e-3)

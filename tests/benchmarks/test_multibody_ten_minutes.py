@@ -14,8 +14,8 @@ import paper_pantograph as paper
 import pytest
 from long_runs import DT, HEIGHT, STATIC, check_balance, check_no_drift, contact_forces, mean
 
-from catenary.mbs.forces import Actuator, SpringDamper
-from catenary.mbs.full import FullPantograph
+from catenary.mbs.mechanism.full_pantograph import FullPantograph
+from catenary.mbs.rigid.forces import Actuator, SpringDamper
 
 
 @pytest.mark.timeout(1500)

@@ -14,17 +14,17 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from catenary.cases.meshing import mesh_of
-from catenary.cases.scene import load_scene
-from catenary.mbs.base_motion import BaseMotion
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.scene import load_scene
 from catenary.mbs.build import Operation, PantographData, make_pantograph
-from catenary.mbs.irregularity import Irregularity
-from catenary.mbs.lateral import LateralPath
+from catenary.mbs.head.strips import Strips, Suspension, Turning
+from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.motion_sources import VehicleMotion
-from catenary.mbs.strips import Strips, Suspension, Turning
-from catenary.solver.equilibrium import elasticity, find_form, middle_span
-from catenary.solver.march import March
+from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.mbs.vehicle.irregularity import Irregularity
+from catenary.mbs.vehicle.motion_sources import VehicleMotion
+from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.time_loop.march import March
 
 CASE = "ambrosio2012"
 N_STEPS, ROUNDS = 3000, 7

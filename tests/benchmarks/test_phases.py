@@ -9,11 +9,11 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from catenary.cases.meshing import mesh_of
-from catenary.cases.scene import load_scene
-from catenary.solver.equilibrium import elasticity, find_form, middle_span
-from catenary.solver.events import NAMES
-from catenary.solver.march import March
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.scene import load_scene
+from catenary.solver.base.petsc_events import NAMES
+from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.time_loop.march import March
 
 N_STEPS = 5000
 

@@ -17,13 +17,13 @@ import pytest
 from floor import LIBRARIES
 from mpi4py import MPI
 
-from catenary.cases.meshing import mesh_of
-from catenary.cases.scene import load_scene
-from catenary.solver.distribution import distribute
-from catenary.solver.equilibrium import elasticity, find_form, middle_span
-from catenary.solver.march import March
-from catenary.solver.model import Model
-from catenary.solver.newmark import NewmarkLine
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.scene import load_scene
+from catenary.solver.integrators.newmark import NewmarkLine
+from catenary.solver.model.model import Model
+from catenary.solver.model.partition import distribute
+from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.time_loop.march import March
 
 CASE = "ambrosio2012"
 TRAINS = {

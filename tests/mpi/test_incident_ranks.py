@@ -13,17 +13,17 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from catenary.cases.meshing import mesh_of
-from catenary.cases.scene import load_scene
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.scene import load_scene
 from catenary.mbs.lowering import Lowering
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
-from catenary.solver.distribution import distribute
-from catenary.solver.equilibrium import elasticity, find_form, middle_span
-from catenary.solver.incidents import DropperBreak, LineIncident, TensionLoss
-from catenary.solver.march import March
-from catenary.solver.observation import Stage, StepView
-from catenary.solver.parallel import on_root
-from catenary.solver.problem import Problem
+from catenary.solver.base.parallel import on_root
+from catenary.solver.model.partition import distribute
+from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
+from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.time_loop.march import March
+from catenary.solver.time_loop.observers import Stage, StepView
 
 WORLD = MPI.COMM_WORLD
 # See test_same_answers.py.

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from catenary.cases.meshing import mesh_of
-from catenary.cases.scene import load_scene
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.scene import load_scene
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.equilibrium import elasticity, find_form, middle_span
-from catenary.solver.errors import NotConverged, RunBroken
-from catenary.solver.march import March
-from catenary.solver.observation import Stage, StepView
-from catenary.solver.parallel import on_root
-from catenary.solver.problem import Problem
+from catenary.solver.base.errors import NotConverged, RunBroken
+from catenary.solver.base.parallel import on_root
+from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.time_loop.march import March
+from catenary.solver.time_loop.observers import Stage, StepView
 
 # The parallel solve leaves a relative residual of 1e-16 a step, which grows at most in proportion
 # over some hundred steps; as in test_same_answers.py.
@@ -97,8 +97,8 @@ def test_a_pantograph_that_cannot_go_on_ends_the_run_on_all_ranks(
     case: tuple[Problem, LineMesh], scheme: str, motion: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Rank 0 alone moves it, and the others must not wait for what it cannot tell."""
-    from catenary.mbs.full import FullPantograph
-    from catenary.mbs.raising import RaisingPantograph
+    from catenary.mbs.mechanism.full_pantograph import FullPantograph
+    from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 
     problem, mesh = case
     kind: Any = FullPantograph
@@ -127,7 +127,7 @@ def test_a_pantograph_that_cannot_go_on_ends_the_run_on_all_ranks(
 def test_joints_that_do_not_close_end_the_run_on_all_ranks(
     case: tuple[Problem, LineMesh], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from catenary.mbs.full import FullPantograph
+    from catenary.mbs.mechanism.full_pantograph import FullPantograph
 
     problem, mesh = case
 

@@ -17,15 +17,15 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from catenary.postproc import result_file
-from catenary.postproc.fields import FieldRecorder
-from catenary.postproc.header import Header
+from catenary.postproc.files import result_file
+from catenary.postproc.files.disk import NoRoom
+from catenary.postproc.files.fields import FieldRecorder
+from catenary.postproc.read.results import Results
+from catenary.postproc.record.header import Header
 from catenary.postproc.record.line_record import LineRecord
-from catenary.postproc.recorder import Recorder
-from catenary.postproc.results import Results
-from catenary.postproc.storage import NoRoom
-from catenary.solver.errors import RunBroken
-from catenary.solver.observation import Stage, StepView
+from catenary.postproc.record.recorder import Recorder
+from catenary.solver.base.errors import RunBroken
+from catenary.solver.time_loop.observers import Stage, StepView
 
 COMM = MPI.COMM_WORLD
 N_STEPS, DT = 130, 1e-3

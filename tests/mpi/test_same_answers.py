@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from catenary.cases.meshing import mesh_of
-from catenary.cases.scene import load_scene
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.scene import load_scene
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
-from catenary.solver.distribution import distribute
-from catenary.solver.equilibrium import elasticity, find_form, middle_span
-from catenary.solver.errors import InputError
-from catenary.solver.march import March
-from catenary.solver.observation import Stage, StepView
-from catenary.solver.parallel import on_root
-from catenary.solver.problem import Problem
+from catenary.solver.base.errors import InputError
+from catenary.solver.base.parallel import on_root
+from catenary.solver.model.partition import distribute
+from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.time_loop.march import March
+from catenary.solver.time_loop.observers import Stage, StepView
 
 # The parallel solve leaves a relative residual of 1e-16 a step; over some thousand steps of a
 # lightly damped line that grows at most in proportion, and 1e-9 leaves room for a run ten times

@@ -19,7 +19,7 @@ import tempfile
 from datetime import date
 from pathlib import Path
 
-from catenary.cases.catalogue import shipped
+from catenary.cases.scene.case_files import shipped
 
 FILE = Path(__file__).with_name("golden.csv")
 COLUMNS = ["case", "pantograph", "mean_N", "std_N", "date", "reason"]
@@ -49,7 +49,7 @@ def write(rows: list[dict[str, str]]) -> None:
 def measure(case: str) -> list[dict[str, str]]:
     """Case, pantograph, mean and deviation of each pantograph of a shortened case."""
     with tempfile.TemporaryDirectory() as folder:
-        entry = "from catenary.cases.cli import main; main()"
+        entry = "from catenary.cases.cli.main import main; main()"
         command = [sys.executable, "-c", entry, "run", case, "--short", "-o", folder]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         summary = json.loads((Path(folder) / "summary.json").read_text())

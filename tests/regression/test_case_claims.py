@@ -9,12 +9,12 @@ import pytest
 from measuring import COMM
 from program import catenary
 
-from catenary.cases.catalogue import shipped
-from catenary.cases.jobs import make_jobs
-from catenary.cases.sweep import run_jobs
-from catenary.cases.variants import parse_vary, product
-from catenary.postproc.results import Results
-from catenary.postproc.statistics import contact_statistics
+from catenary.cases.scene.case_files import shipped
+from catenary.cases.studies.sweep.jobs import make_jobs
+from catenary.cases.studies.sweep.run_jobs import run_jobs
+from catenary.cases.studies.sweep.variants import parse_vary, product
+from catenary.postproc.evaluate.statistics import contact_statistics
+from catenary.postproc.read.results import Results
 
 CASES = shipped()
 # Rows of the table of windows in the README of EN 50318: mesh in the columns, misses in the cells.

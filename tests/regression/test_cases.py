@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from program import assert_sound, catenary
 
-from catenary.cases.catalogue import shipped
-from catenary.cases.scene import load_scene
+from catenary.cases.scene.case_files import shipped
+from catenary.cases.scene.scene import load_scene
 
 CASES = shipped()
 FILES = {"run.h5", "fields.xdmf", "fields.h5", "summary.json", "report.html"}

@@ -30,9 +30,9 @@ from documents import (
     numbers_agree,
 )
 
-from catenary.cases.catalogue import shipped
-from catenary.cases.cli import app
-from catenary.cases.scene import load_scene
+from catenary.cases.cli.main import app
+from catenary.cases.scene.case_files import shipped
+from catenary.cases.scene.scene import load_scene
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted(
@@ -43,7 +43,7 @@ DOCUMENTS = sorted(
 )
 LIMIT = 250.0  # for one command on a busy machine [s]
 RUNS = {"run", "after", "edit", "append"}
-_ENTRY = "from catenary.cases.cli import main; main()"
+_ENTRY = "from catenary.cases.cli.main import main; main()"
 
 
 def read(document: Path) -> str:

@@ -25,14 +25,14 @@ from fuzzing import (
 from mpi4py import MPI
 from typer.testing import CliRunner
 
-from catenary.cases import hard_runs
-from catenary.cases.cli import app
-from catenary.cases.hard_runs import Watched
-from catenary.cases.scene import Scene, load_scene
-from catenary.solver.changed_line import dropper_at
-from catenary.solver.errors import InputError
-from catenary.solver.incidents import DropperBreak
-from catenary.solver.parallel import on_root
+from catenary.cases.cli.main import app
+from catenary.cases.scene.scene import Scene, load_scene
+from catenary.cases.studies.hard import runs as hard_runs
+from catenary.cases.studies.hard.runs import Watched
+from catenary.solver.base.errors import InputError
+from catenary.solver.base.parallel import on_root
+from catenary.solver.problem.incidents import DropperBreak
+from catenary.solver.statics.after_incidents import dropper_at
 
 FIRST = int(os.environ.get("FUZZ_SEED", "1"))
 CASES = int(os.environ.get("FUZZ_CASES", "100"))

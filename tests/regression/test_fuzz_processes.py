@@ -19,11 +19,11 @@ from fuzzing import N_STEPS, RandomScene, wide_scene
 from mpi4py import MPI
 from program import MPIRUN, Done, Program, assert_sound, catenary, catenary_started, n_rows
 
-from catenary.cases import hard_runs
-from catenary.cases.hard_runs import Watched
-from catenary.cases.scene import load_scene
-from catenary.postproc.results import Results
-from catenary.solver.errors import InputError
+from catenary.cases.scene.scene import load_scene
+from catenary.cases.studies.hard import runs as hard_runs
+from catenary.cases.studies.hard.runs import Watched
+from catenary.postproc.read.results import Results
+from catenary.solver.base.errors import InputError
 
 FIRST = int(os.environ.get("FUZZ_SEED", "1"))
 CASES = int(os.environ.get("FUZZ_PROCESSES", "2"))

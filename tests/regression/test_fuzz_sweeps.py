@@ -19,9 +19,9 @@ from fuzzing_more import law_variants
 from program import assert_sound
 from typer.testing import CliRunner
 
-from catenary.cases.cli import app
-from catenary.cases.scene import load_scene
-from catenary.postproc.results import Results
+from catenary.cases.cli.main import app
+from catenary.cases.scene.scene import load_scene
+from catenary.postproc.read.results import Results
 
 FIRST = int(os.environ.get("FUZZ_SEED", "1"))
 PLAIN = ("output.field_every_s=0",)

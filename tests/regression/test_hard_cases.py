@@ -9,8 +9,8 @@ import pytest
 from mpi4py import MPI
 from program import MPIRUN, catenary
 
-from catenary.cases.hard_cases import HardCase, hard_cases
-from catenary.cases.hard_checks import check_case
+from catenary.cases.studies.hard.cases import HardCase, hard_cases
+from catenary.cases.studies.hard.checks import check_case
 
 # What the parallel solve and the coupling meet: stiff contact, several heads, switches at a cut,
 # lines that change on the way.

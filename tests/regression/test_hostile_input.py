@@ -15,14 +15,14 @@ import pytest
 from program import catenary, short_run
 from typer.testing import CliRunner
 
-from catenary.cases import meshing
-from catenary.cases.cli import app
-from catenary.cases.input.size import size_of
-from catenary.cases.meshing import mesh_of
-from catenary.cases.messages import Origin
-from catenary.cases.scene import load_scene, scene_from
-from catenary.cases.variants import read_named
-from catenary.solver.errors import InputError
+from catenary.cases.cli.main import app
+from catenary.cases.run import scene_mesh
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.error_sentences import Origin
+from catenary.cases.scene.mesh_size import size_of
+from catenary.cases.scene.scene import load_scene, scene_from
+from catenary.cases.studies.sweep.variants import read_named
+from catenary.solver.base.errors import InputError
 
 SOUND = Path(__file__).parent / "broken_scenes" / "sound.toml"
 NOT_FOR_A_SCENE = "is no PETSc option that a scene may give"
@@ -240,7 +240,7 @@ def test_ten_thousand_spans_are_allowed_and_their_size_is_told(
     told: list[str] = []
     logger = logging.getLogger("catenary.mesh")
     monkeypatch.setattr(logger, "warning", lambda form, *values: told.append(form % values))
-    monkeypatch.setattr(meshing, "make_mesh", lambda *given, **more: None)
+    monkeypatch.setattr(scene_mesh, "make_mesh", lambda *given, **more: None)
     mesh_of(load_scene(SOUND, ["line.n_spans=10000"]))
     (sentence,) = told
     assert "1000002 nodes and 2000004 unknowns" in sentence and "GB of memory" in sentence

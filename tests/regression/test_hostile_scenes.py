@@ -16,7 +16,7 @@ import pytest
 from program import catenary
 from typer.testing import CliRunner
 
-from catenary.cases.cli import app
+from catenary.cases.cli.main import app
 
 FOLDER = Path(__file__).with_name("hostile_scenes")
 SCENES = sorted(path.stem for path in FOLDER.glob("*.toml"))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from program import MPIRUN, assert_same_histories, catenary, short_run
 
-from catenary.postproc.results import Results
+from catenary.postproc.read.results import Results
 
 INCIDENTS = (
     "incidents=[{type='dropper_break',at_s=0.6,span=4,dropper=2},"

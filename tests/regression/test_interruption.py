@@ -24,7 +24,7 @@ from program import (
 )
 from program import started as program_started
 
-from catenary.postproc.results import Results
+from catenary.postproc.read.results import Results
 
 # Twice as many steps as the scene needs: a run that is signalled has then far to go.
 FINE = "numerics.dt_s=5e-4"
@@ -170,7 +170,7 @@ def test_a_file_that_may_not_grow_ends_the_run_with_a_sentence(tmp_path: Path) -
         "import resource\n"
         "from mpi4py import MPI  # which is not to meet the limit\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (2_000_000, resource.RLIM_INFINITY))\n"
-        "from catenary.cases.cli import main\n"
+        "from catenary.cases.cli.main import main\n"
         "main()\n"
     )
     words = short_run(out, FINE, SHORT_FLUSHES)
@@ -210,7 +210,7 @@ def test_a_full_disk_ends_the_run_with_a_sentence(room: str, ranks: int, tmp_pat
         '"$@"\n'
         f"code=$?; cp -r {out} {kept}; exit $code\n"
     )
-    program = python("-c", "from catenary.cases.cli import main; main()", *words)
+    program = python("-c", "from catenary.cases.cli.main import main; main()", *words)
     if ranks > 1:
         program = [str(MPIRUN), "-n", str(ranks), "--oversubscribe", *program]
     with program_started(["unshare", "-rm", "sh", str(script), *program], tmp_path) as run:

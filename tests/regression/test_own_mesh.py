@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from program import assert_sound, catenary, short_run
 
-from catenary.postproc.results import Results
+from catenary.postproc.read.results import Results
 
 # The key that makes a mesh, which a scene with a mesh of its own must not have.
 GIVEN = "mesh.elements_per_gap="

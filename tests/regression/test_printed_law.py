@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from catenary.cases.runner import run_case
-from catenary.cases.scene import load_scene
-from catenary.postproc.results import Results
-from catenary.postproc.statistics import evaluate
+from catenary.cases.run.runner import run_case
+from catenary.cases.scene.scene import load_scene
+from catenary.postproc.evaluate.statistics import evaluate
+from catenary.postproc.read.results import Results
 
 COMMON = (
     "line.dropper.pre_sag_mid_mm=20",

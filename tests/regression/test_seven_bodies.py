@@ -11,8 +11,8 @@ from measuring import check
 from paper_pantograph import data
 from program import catenary
 
-from catenary.mbs.multibody import reduced, stand
-from catenary.postproc.results import Results
+from catenary.mbs.mechanism.pantograph_data import reduced, stand
+from catenary.postproc.read.results import Results
 
 
 def run(folder: Path, *words: str) -> dict[str, Any]:

@@ -15,7 +15,7 @@ import time
 from pathlib import Path
 from mpi4py import MPI
 from catenary.cases import {module}
-from catenary.cases.cli import main
+from catenary.cases.cli.main import main
 
 before = {module}.{name}
 

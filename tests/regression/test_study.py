@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from program import catenary
 
-from catenary.postproc.results import Results
+from catenary.postproc.read.results import Results
 
 # Coarse: what is tested is the study, not its figures.
 COARSE = ("mesh.elements_per_gap=2", "numerics.dt_s=0.002")

@@ -10,16 +10,16 @@ import paper_pantograph as ambrosio
 import plane_pantograph
 from seven_bodies import HEAD, UPRIGHT, at_rest, calibrated, lively_load, pressed
 
-from catenary.mbs.constraint_handling import (
+from catenary.mbs.rigid.forces import Actuator
+from catenary.mbs.time_steps.constraint_handling import (
     AugmentedLagrangian,
     Baumgarte,
     ConstraintHandling,
     CoordinatePartitioning,
 )
-from catenary.mbs.forces import Actuator
-from catenary.mbs.integrators import integrate
-from catenary.mbs.step_solvers import METHODS
-from catenary.mbs.stepping import Stepper
+from catenary.mbs.time_steps.implicit_steps import Stepper
+from catenary.mbs.time_steps.step_solvers import METHODS
+from catenary.mbs.time_steps.variable_steps import integrate
 
 # Heights are kept at these intervals [s].
 EVERY = 0.25

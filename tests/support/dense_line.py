@@ -16,8 +16,8 @@ from numpy.polynomial import Polynomial
 
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
-from catenary.solver.equilibrium import Equilibrium
-from catenary.solver.problem import Problem
+from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.equilibrium import Equilibrium
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 

@@ -13,15 +13,15 @@ from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.distribution import distribute
-from catenary.solver.effects import Effect, register, registry, unregister
-from catenary.solver.equilibrium import Equilibrium, elasticity, find_form, middle_span
-from catenary.solver.line_integrators import make_line
-from catenary.solver.line_motion import LineMotion
-from catenary.solver.march import March, Outcome
-from catenary.solver.model import Model, iterate_entries
-from catenary.solver.observation import Stage, StepView
-from catenary.solver.problem import Numerics, Problem
+from catenary.solver.effects.effect import Effect, register, registry, unregister
+from catenary.solver.integrators.line_integrator import LineMotion
+from catenary.solver.integrators.make_line import make_line
+from catenary.solver.model.model import Model, iterate_entries
+from catenary.solver.model.partition import distribute
+from catenary.solver.problem.problem import Numerics, Problem
+from catenary.solver.statics.equilibrium import Equilibrium, elasticity, find_form, middle_span
+from catenary.solver.time_loop.march import March, Outcome
+from catenary.solver.time_loop.observers import Stage, StepView
 
 COMM = MPI.COMM_WORLD
 

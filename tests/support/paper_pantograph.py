@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from catenary.cases.input.convert_mechanism import multibody_of
-from catenary.cases.scene import load_scene
-from catenary.cases.schema_pantograph import CorrectionTable, MultibodyTable
-from catenary.mbs.multibody import MultibodyData, without_head
-from catenary.mbs.system import System
+from catenary.cases.scene.convert.mechanism import multibody_of
+from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.tables.pantograph import CorrectionTable, MultibodyTable
+from catenary.mbs.mechanism.pantograph_data import MultibodyData, without_head
+from catenary.mbs.rigid.system import System
 
 BASE, LOWER_ARM, UPPER_ARM = "base", "lower_arm", "upper_arm"
 LOWER_LINK, UPPER_LINK = "lower_link", "upper_link"

@@ -20,8 +20,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from catenary.postproc.channels import CHANNELS
-from catenary.postproc.results import Results
+from catenary.postproc.read.results import Results
+from catenary.postproc.record.channels import CHANNELS
 
 MPIRUN = shutil.which("mpirun")
 LIMIT = 120.0  # for anything that is to end by itself [s]; a loaded machine takes ten times as long
@@ -50,7 +50,7 @@ SHORT_SCENE = (
 )
 # Round-off of a solve, 1e-16, over 1e4 steps of a damped line; see tests/mpi/test_same_answers.py.
 SAME = 1e-9
-_ENTRY = "from catenary.cases.cli import main; main()"
+_ENTRY = "from catenary.cases.cli.main import main; main()"
 _MARK = "CATENARY_TEST_MARK"
 _PROC = Path("/proc")
 

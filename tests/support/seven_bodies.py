@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import paper_pantograph as ambrosio
 
-from catenary.mbs.bodies import SPACE, Motion
-from catenary.mbs.forces import PointForce
-from catenary.mbs.joints import PrescribedAngle, PrescribedPoint, constant
-from catenary.mbs.statics import calibrate_actuator, equilibrium
-from catenary.mbs.system import System
+from catenary.mbs.rigid.bodies import SPACE, Motion
+from catenary.mbs.rigid.forces import PointForce
+from catenary.mbs.rigid.joints import PrescribedAngle, PrescribedPoint, constant
+from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium
+from catenary.mbs.rigid.system import System
 
 ARM, HEAD = ambrosio.STABILISATION_ARM, ambrosio.HEAD
 STATIC_FORCE = 150.0

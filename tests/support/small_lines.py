@@ -9,8 +9,8 @@ import numpy as np
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.line import DropperKind, Line, SteadyArm, Wire
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
-from catenary.solver.contact_laws import LinearLaw
-from catenary.solver.problem import (
+from catenary.solver.problem.contact_laws import LinearLaw
+from catenary.solver.problem.problem import (
     Damping,
     Numerics,
     Placement,

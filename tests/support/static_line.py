@@ -9,9 +9,9 @@ from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
-from catenary.solver import elements
-from catenary.solver.equilibrium import Equilibrium
-from catenary.solver.model import Model
+from catenary.solver.model import elements
+from catenary.solver.model.model import Model
+from catenary.solver.statics.equilibrium import Equilibrium
 
 
 def absolute_rest(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from measuring import check
 
-from catenary.cases.accuracy_analysis import (
+from catenary.cases.studies.accuracy.analysis import (
     HISTORY,
     Found,
     Row,
@@ -22,7 +22,7 @@ from catenary.cases.accuracy_analysis import (
     separate,
     uncertainties,
 )
-from catenary.solver.errors import InputError
+from catenary.solver.base.errors import InputError
 
 FIGURES = {
     "mean_N": 120.0,

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from catenary.cases.accuracy_axes import AXES, DISCRETISATION, parse_axes
-from catenary.cases.accuracy_plan import Plan, make_plan
-from catenary.cases.cli import app
-from catenary.cases.scene import load_scene
-from catenary.solver.errors import InputError
+from catenary.cases.cli.main import app
+from catenary.cases.scene.scene import load_scene
+from catenary.cases.studies.accuracy.axes import AXES, DISCRETISATION, parse_axes
+from catenary.cases.studies.accuracy.plan import Plan, make_plan
+from catenary.solver.base.errors import InputError
 
 CASE = "en50318_2002"
 

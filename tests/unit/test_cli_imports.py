@@ -16,7 +16,7 @@ BACKENDS = {"gmsh", "h5py", "matplotlib", "meshio", "mpi4py", "numba", "petsc4py
 # the packages that are loaded by then.
 PROGRAM = """
 import contextlib, io, json, sys
-from catenary.cases.cli import main
+from catenary.cases.cli.main import main
 found = []
 for words in json.loads(sys.argv[1]):
     sys.argv = ["catenary", *words.split()]

@@ -11,12 +11,12 @@ import pytest
 from measuring import check
 from typer.testing import CliRunner
 
-from catenary.cases.catalogue import shipped
-from catenary.cases.cli import app
-from catenary.cases.loading import read_toml
-from catenary.cases.scene import load_scene
-from catenary.mbs.linearisation import of_chain
+from catenary.cases.cli.main import app
+from catenary.cases.scene.case_files import shipped
+from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.toml_input import read_toml
 from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.response.linearisation import of_chain
 
 
 def invoke(*words: str) -> Any:

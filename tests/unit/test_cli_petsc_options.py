@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from catenary.cases.petsc_options import as_arguments, split_extras
-from catenary.solver.errors import InputError
+from catenary.cases.process.petsc_options import as_arguments, split_extras
+from catenary.solver.base.errors import InputError
 
 
 def test_the_table_comes_first_and_the_command_line_wins() -> None:
@@ -40,7 +40,7 @@ def test_petsc_has_the_options_of_the_command_line(running: bool) -> None:
     script = f"""
 if {running}:
     from petsc4py import PETSc
-from catenary.cases.petsc_options import as_arguments, start_petsc
+from catenary.cases.process.petsc_options import as_arguments, start_petsc
 start_petsc(as_arguments({{"my_type": "cg", "my_flag": True, "my_rtol": 1e-12}}, ["-my_type", "x"]))
 from petsc4py import PETSc
 options = PETSc.Options()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.cases.meshing import mesh_of
-from catenary.cases.plan import estimate_march, estimate_memory, make_plan, plan_text
-from catenary.cases.scene import load_scene
+from catenary.cases.run.plan import estimate_march, estimate_memory, make_plan, plan_text
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.scene import load_scene
 
 
 def test_unknowns_are_the_nodes_of_the_mesh_times_the_unknowns_of_the_effects() -> None:

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from catenary.cases import console
-from catenary.cases.catalogue import shipped
-from catenary.cases.cli import app
-from catenary.cases.scene import load_scene
-from catenary.solver import effects
-from catenary.solver.errors import RunBroken
+from catenary.cases.cli.main import app
+from catenary.cases.scene.case_files import shipped
+from catenary.cases.scene.scene import load_scene
+from catenary.cases.terminal import console
+from catenary.solver.base.errors import RunBroken
+from catenary.solver.effects import effect as effects
 
 VERBS = ["run", "restart", "sweep", "list", "plan", "check", "mesh", "static", "pantograph"]
 VERBS += ["report", "compare", "hard", "stability-map"]
@@ -68,10 +68,10 @@ def runner(monkeypatch: pytest.MonkeyPatch) -> types.SimpleNamespace:
         options["tell"](told.result.outcome)
         return told.result
 
-    module = types.ModuleType("catenary.cases.runner")
+    module = types.ModuleType("catenary.cases.run.runner")
     module.run_case = run_case  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "catenary.cases.runner", module)
-    monkeypatch.setattr("catenary.cases.petsc_options.start_petsc", lambda arguments: None)
+    monkeypatch.setitem(sys.modules, "catenary.cases.run.runner", module)
+    monkeypatch.setattr("catenary.cases.process.petsc_options.start_petsc", lambda arguments: None)
     monkeypatch.setattr(sys, "excepthook", sys.excepthook)
     return told
 
@@ -97,7 +97,7 @@ def test_the_help_lists_every_verb() -> None:
 def test_importing_the_command_line_loads_no_backend() -> None:
     heavy = ("petsc4py", "mpi4py", "gmsh", "matplotlib", "h5py", "scipy", "numpy", "pydantic")
     script = (
-        "import sys, catenary.cases.cli\n"
+        "import sys, catenary.cases.cli.main\n"
         f"print([name for name in {heavy!r} if name in sys.modules])"
     )
     done = subprocess.run(
@@ -311,7 +311,7 @@ def test_restart_takes_no_assignments(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_the_reader_of_a_pipe_may_leave(tmp_path: Path) -> None:
-    script = "from catenary.cases.cli import main; main()"
+    script = "from catenary.cases.cli.main import main; main()"
     done = subprocess.run(
         f"'{sys.executable}' -c '{script}' list --keys | head -n 1",
         shell=True,

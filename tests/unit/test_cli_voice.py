@@ -11,7 +11,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from catenary.cases.cli import app
+from catenary.cases.cli.main import app
 
 
 def invoke(*words: str) -> Any:
@@ -76,7 +76,7 @@ def test_the_shell_is_offered_what_fits(typed: str, offered: list[str]) -> None:
 
 def test_too_low_a_limit_of_memory_is_one_sentence() -> None:
     """OpenBLAS would try for ever to get memory, and llvmlite end in a traceback."""
-    bash = "ulimit -v 450000; exec \"$0\" -c 'from catenary.cases.cli import main; main()' report x"
+    bash = "ulimit -v 450000; exec \"$0\" -c 'from catenary.cases.cli.main import main; main()' report x"
     words = ["bash", "-c", bash, sys.executable]
     done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 2

@@ -9,14 +9,14 @@ import pytest
 import typer
 from mpi4py import MPI
 
-from catenary.cases import console
-from catenary.cases.plan import estimate_memory, make_plan, plan_text
-from catenary.cases.runner import run_case
-from catenary.cases.scene import Scene, load_scene
+from catenary.cases.run.plan import estimate_memory, make_plan, plan_text
+from catenary.cases.run.runner import run_case
+from catenary.cases.scene.scene import Scene, load_scene
+from catenary.cases.terminal import console
+from catenary.postproc.read.results import Results
 from catenary.postproc.record.line_record import GZIP
-from catenary.postproc.results import Results
-from catenary.solver.errors import InputError, RunBroken
-from catenary.solver.parallel import on_root
+from catenary.solver.base.errors import InputError, RunBroken
+from catenary.solver.base.parallel import on_root
 
 # 0.45 s on a line of 22 spans.
 SHORT = (

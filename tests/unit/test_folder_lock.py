@@ -12,15 +12,15 @@ from pathlib import Path
 
 import pytest
 
-from catenary.cases.run import folder_lock, lock_owner
-from catenary.cases.run.folder_lock import LOCK_FILE, FolderLock
-from catenary.cases.run.lock_owner import Owner, myself, read_owner
-from catenary.solver.errors import InputError
+from catenary.cases.result_folder import folder_lock, lock_owner
+from catenary.cases.result_folder.folder_lock import LOCK_FILE, FolderLock
+from catenary.cases.result_folder.lock_owner import Owner, myself, read_owner
+from catenary.solver.base.errors import InputError
 
 HOLD = """
 import sys
 from pathlib import Path
-from catenary.cases.run.folder_lock import FolderLock
+from catenary.cases.result_folder.folder_lock import FolderLock
 lock = FolderLock(Path(sys.argv[1]), "catenary run other")
 print("held", flush=True)
 sys.stdin.read()

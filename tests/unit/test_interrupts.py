@@ -14,13 +14,14 @@ import pytest
 from mpi4py import MPI
 from program import SHORT_SCENE
 
-from catenary.cases import interrupts, runner
-from catenary.cases.interrupts import STOPPING, Interrupted, Phase, Stopped, StopRequest
-from catenary.cases.jobs import make_jobs
-from catenary.cases.scene import Scene, load_scene
-from catenary.cases.sweep import run_jobs
-from catenary.cases.variants import parse_vary, product
-from catenary.postproc.results import Results
+from catenary.cases.process import interrupts
+from catenary.cases.process.interrupts import STOPPING, Interrupted, Phase, Stopped, StopRequest
+from catenary.cases.run import runner
+from catenary.cases.scene.scene import Scene, load_scene
+from catenary.cases.studies.sweep.jobs import make_jobs
+from catenary.cases.studies.sweep.run_jobs import run_jobs
+from catenary.cases.studies.sweep.variants import parse_vary, product
+from catenary.postproc.read.results import Results
 
 # What is called in each phase of a run before its march.
 BEFORE = {
@@ -174,11 +175,11 @@ def check(what):
         except interrupts.Stopped as stopped:
             print(what, stopped.name)
         interrupts._wish.number = 0
-from catenary.cases.petsc_options import start_petsc
+from catenary.cases.process.petsc_options import start_petsc
 start_petsc([])
 check("petsc")
-from catenary.cases.meshing import mesh_of
-from catenary.cases.scene import load_scene
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.scene import load_scene
 mesh_of(load_scene("en50318_2002"))
 check("gmsh")
 os._exit(0)

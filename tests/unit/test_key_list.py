@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from catenary.cases.cli import app
-from catenary.cases.commands.key_list import key_details, key_table, keys_of_a_scene
-from catenary.cases.input.typical import TYPICAL
-from catenary.cases.scene import load_scene
-from catenary.solver.errors import InputError
+from catenary.cases.cli.main import app
+from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.typical_values import TYPICAL
+from catenary.cases.terminal.key_list import key_details, key_table, keys_of_a_scene
+from catenary.solver.base.errors import InputError
 
 
 def invoke(*words: str) -> Any:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from catenary.cases.commands import matplotlib_folder
+from catenary.cases.process import matplotlib_folder
 from catenary.solver.base import loop_cache
 
 

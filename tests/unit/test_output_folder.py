@@ -9,9 +9,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from catenary.cases.run import output_folder
-from catenary.cases.run.folder_lock import FolderLock
-from catenary.cases.run.output_folder import (
+from catenary.cases.result_folder import output_folder
+from catenary.cases.result_folder.folder_lock import FolderLock
+from catenary.cases.result_folder.output_folder import (
     MOST_BYTES,
     MOST_SECONDS,
     MOST_STEPS,
@@ -21,7 +21,7 @@ from catenary.cases.run.output_folder import (
     refuse_earlier,
     refuse_impossible,
 )
-from catenary.solver.errors import InputError
+from catenary.solver.base.errors import InputError
 
 SMALL = RunSize(1e6, 10.0, 2000)
 

@@ -103,8 +103,8 @@ def test_the_wheel_is_imported_from_where_it_is_installed(installed: Path, tmp_p
     modules = (
         "catenary.meshgen",
         "catenary.meshgen.line",
-        "catenary.solver.errors",
-        "catenary.solver.problem",
+        "catenary.solver.base.errors",
+        "catenary.solver.problem.problem",
         "catenary.mbs.lumped",
         "catenary.postproc",
         "catenary.cases",

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from catenary.cases.catalogue import shipped
-from catenary.cases.checks import estimated_dropper_lengths
-from catenary.cases.meshing import mesh_of
-from catenary.cases.scene import load_scene
-from catenary.solver.equilibrium import find_form
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.case_files import shipped
+from catenary.cases.scene.checks.scene import estimated_dropper_lengths
+from catenary.cases.scene.scene import load_scene
+from catenary.solver.statics.equilibrium import find_form
 
 
 def reference(case: str, name: str) -> list[dict[str, str]]:

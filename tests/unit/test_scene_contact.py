@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.cases.messages import Origin
-from catenary.cases.scene import load_scene, scene_from
-from catenary.solver.contact_laws import HYSTERESIS, HertzLaw, KinematicLaw, LinearLaw
-from catenary.solver.errors import InputError
+from catenary.cases.scene.error_sentences import Origin
+from catenary.cases.scene.scene import load_scene, scene_from
+from catenary.solver.base.errors import InputError
+from catenary.solver.problem.contact_laws import HYSTERESIS, HertzLaw, KinematicLaw, LinearLaw
 
 CASE = "en50318_2002"
 NO_STIFFNESS = "contact.stiffness_N_per_m="

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from catenary.cases.plan import effect_rows
-from catenary.cases.scene import load_scene
-from catenary.solver import effects
-from catenary.solver.errors import InputError
+from catenary.cases.run.plan import effect_rows
+from catenary.cases.scene.scene import load_scene
+from catenary.solver.base.errors import InputError
+from catenary.solver.effects import effect as effects
 
 OPTIONAL = [name for name, effect in effects.registry().items() if not effect.always]
 

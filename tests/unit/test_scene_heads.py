@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from catenary.cases.checks import MIN_SEPARATION
-from catenary.cases.messages import Origin
-from catenary.cases.scene import Scene, load_scene, scene_from
-from catenary.mbs.irregularity import Irregularity
-from catenary.mbs.motion_sources import Harmonic, Table, VehicleMotion
-from catenary.mbs.multibody import MultibodyData
-from catenary.mbs.strips import Strips, Suspension, Turning
-from catenary.solver.errors import InputError
+from catenary.cases.scene.checks.scene import MIN_SEPARATION
+from catenary.cases.scene.error_sentences import Origin
+from catenary.cases.scene.scene import Scene, load_scene, scene_from
+from catenary.mbs.head.strips import Strips, Suspension, Turning
+from catenary.mbs.mechanism.pantograph_data import MultibodyData
+from catenary.mbs.vehicle.irregularity import Irregularity
+from catenary.mbs.vehicle.motion_sources import Harmonic, Table, VehicleMotion
+from catenary.solver.base.errors import InputError
 
 CASE = "ac_simple"
 KIND = "pantographs.three_masses"
@@ -96,7 +96,7 @@ def test_files_are_taken_in_and_the_resolved_scene_needs_them_no_more(tmp_path: 
 
 
 def test_a_case_s_files_are_beside_it(tmp_path: Path) -> None:
-    from catenary.cases.catalogue import find_case
+    from catenary.cases.scene.case_files import find_case
 
     (tmp_path / "sway.csv").write_text("0,0\n10,0.01\n20,0\n30,0.01\n")
     case = find_case(CASE).read_text()

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.cases.incident_facts import incident_facts
-from catenary.cases.messages import Origin
-from catenary.cases.plan import make_plan, plan_text
-from catenary.cases.scene import Scene, load_scene, scene_from
+from catenary.cases.run.describe_incidents import incident_facts
+from catenary.cases.run.plan import make_plan, plan_text
+from catenary.cases.scene.error_sentences import Origin
+from catenary.cases.scene.scene import Scene, load_scene, scene_from
 from catenary.mbs.lowering import Lowering
-from catenary.solver.incidents import DropperBreak, TensionLoss
+from catenary.solver.problem.incidents import DropperBreak, TensionLoss
 
 INCIDENTS = (
     "incidents=[{type='lowering',at_s=3.0004,force_N=-75.0,drop_m=0.25},"

@@ -9,11 +9,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from catenary.cases.cli import app
-from catenary.cases.keys import known_keys
-from catenary.cases.messages import Origin
-from catenary.cases.scene import Scene, load_scene, scene_from
-from catenary.solver.errors import InputError
+from catenary.cases.cli.main import app
+from catenary.cases.scene.error_sentences import Origin
+from catenary.cases.scene.keys import known_keys
+from catenary.cases.scene.scene import Scene, load_scene, scene_from
+from catenary.solver.base.errors import InputError
 
 KEYS = [key.replace("*", "0") for key in known_keys(Scene)]
 NUMBERS = st.one_of(

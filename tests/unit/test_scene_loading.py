@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from catenary.cases.catalogue import find_case, shipped
-from catenary.cases.messages import Origin
-from catenary.cases.scene import Scene, load_scene, scene_from
-from catenary.cases.units import unit_of
-from catenary.solver.errors import InputError
+from catenary.cases.scene.case_files import find_case, shipped
+from catenary.cases.scene.error_sentences import Origin
+from catenary.cases.scene.scene import Scene, load_scene, scene_from
+from catenary.cases.scene.units import unit_of
+from catenary.solver.base.errors import InputError
 
 # Keys that other programs rely on.
 CONTRACT = [
@@ -229,7 +229,7 @@ def test_the_number_of_further_problems_is_told() -> None:
 
 
 def test_every_key_has_a_help_text() -> None:
-    from catenary.cases.keys import tables_in
+    from catenary.cases.scene.keys import tables_in
 
     tables = [Scene]
     for table in tables:

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from catenary.cases.messages import Origin
-from catenary.cases.plan import estimate_march, make_plan, plan_text
-from catenary.cases.scene import Scene, load_scene, scene_from
+from catenary.cases.run.plan import estimate_march, make_plan, plan_text
+from catenary.cases.scene.error_sentences import Origin
+from catenary.cases.scene.scene import Scene, load_scene, scene_from
 from catenary.mbs.build import has_joints
-from catenary.mbs.full import FullPantograph
-from catenary.mbs.joints import PrescribedPoint, constant
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.multibody import AllBodies, MultibodyData, reduced
-from catenary.mbs.raising import RaisingPantograph
-from catenary.solver.errors import InputError, RunBroken
+from catenary.mbs.mechanism.full_pantograph import FullPantograph
+from catenary.mbs.mechanism.pantograph_data import AllBodies, MultibodyData, reduced
+from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+from catenary.mbs.rigid.joints import PrescribedPoint, constant
+from catenary.solver.base.errors import InputError, RunBroken
 
 CASE, KIND = "ambrosio2012", "pantographs.seven_body"
 ALL = f"{KIND}.motion=all_bodies"

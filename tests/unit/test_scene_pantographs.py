@@ -10,19 +10,21 @@ import pytest
 from measuring import check
 from paper_pantograph import corrections, data, number_at, table
 
-from catenary.cases.checks_pantograph import check_pantographs
-from catenary.cases.commands.key_list import key_table
-from catenary.cases.convert_pantograph import static_force
-from catenary.cases.input.convert_mechanism import multibody_of
-from catenary.cases.keys import is_known, known_keys
-from catenary.cases.loading import read_toml
-from catenary.cases.pantograph_facts import header_facts, kind_lines
-from catenary.cases.scene import Scene, load_scene
-from catenary.cases.schema_pantograph import MultibodyTable
-from catenary.mbs.bodies import SPACE, Body
+from catenary.cases.run.describe_pantographs import header_facts, kind_lines
+from catenary.cases.scene.checks.pantograph import check_pantographs
+from catenary.cases.scene.convert.mechanism import multibody_of
+from catenary.cases.scene.convert.pantograph import static_force
+from catenary.cases.scene.keys import is_known, known_keys
+from catenary.cases.scene.scene import Scene, load_scene
+from catenary.cases.scene.tables.pantograph import MultibodyTable
+from catenary.cases.scene.toml_input import read_toml
+from catenary.cases.terminal.key_list import key_table
 from catenary.mbs.build import PantographData
-from catenary.mbs.forces import Actuator, BumpStop, Gravity, PointForce, SpringDamper, Table
-from catenary.mbs.joints import (
+from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand
+from catenary.mbs.rigid.bodies import SPACE, Body
+from catenary.mbs.rigid.forces import Actuator, BumpStop, Gravity, PointForce, SpringDamper, Table
+from catenary.mbs.rigid.joints import (
     Fixed,
     PointOnCurve,
     PointOnLine,
@@ -34,8 +36,6 @@ from catenary.mbs.joints import (
     Spherical,
     constant,
 )
-from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.multibody import MultibodyData, stand
 
 TELESCOPE = Path(__file__).parents[1] / "support" / "telescope.toml"
 A, B, ORIGIN = (0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.0, 0.0, 0.0)

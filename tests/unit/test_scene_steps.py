@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.cases.scene import load_scene
-from catenary.solver.errors import InputError
+from catenary.cases.scene.scene import load_scene
+from catenary.solver.base.errors import InputError
 
 GIVEN = ("numerics.adaptive_tolerance_N=0.5", "numerics.smallest_dt_s=1e-4")
 

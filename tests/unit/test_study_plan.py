@@ -14,11 +14,11 @@ from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from catenary.cases.ambrosio2012.study import read_table, searched, variants
-from catenary.cases.catalogue import shipped
-from catenary.cases.cli import app
-from catenary.cases.scene import Scene, load_scene
-from catenary.cases.study import StudyVariant, make_plan
-from catenary.postproc.study_report import (
+from catenary.cases.cli.main import app
+from catenary.cases.scene.case_files import shipped
+from catenary.cases.scene.scene import Scene, load_scene
+from catenary.cases.studies.case_study import StudyVariant, make_plan
+from catenary.postproc.report.study_report import (
     NOT_REPRODUCED,
     REPRODUCED,
     Finding,
@@ -29,7 +29,7 @@ from catenary.postproc.study_report import (
     verdict_text,
     write_study,
 )
-from catenary.solver.errors import InputError
+from catenary.solver.base.errors import InputError
 
 
 @pytest.fixture(autouse=True)

@@ -13,16 +13,16 @@ from matplotlib.figure import Figure
 from measuring import COMM
 from typer.testing import CliRunner
 
-from catenary.cases.cli import app
-from catenary.cases.commands.axis_words import STATISTICS_IN_WORDS, key_in_words
-from catenary.cases.jobs import STATISTICS, Ended, Job, make_jobs
-from catenary.cases.runner import run_case
-from catenary.cases.studies.done_before import read_record, read_summary
-from catenary.cases.sweep import run_jobs
-from catenary.cases.sweep_output import as_text, draw, rows, write
-from catenary.cases.variants import Variant, parse_vary, product
-from catenary.postproc.results import Results
-from catenary.solver.errors import InputError
+from catenary.cases.cli.main import app
+from catenary.cases.run.runner import run_case
+from catenary.cases.studies.sweep.axis_words import STATISTICS_IN_WORDS, key_in_words
+from catenary.cases.studies.sweep.done_before import read_record, read_summary
+from catenary.cases.studies.sweep.jobs import STATISTICS, Ended, Job, make_jobs
+from catenary.cases.studies.sweep.output import as_text, draw, rows, write
+from catenary.cases.studies.sweep.run_jobs import run_jobs
+from catenary.cases.studies.sweep.variants import Variant, parse_vary, product
+from catenary.postproc.read.results import Results
+from catenary.solver.base.errors import InputError
 
 CASE = "en50318_2002"
 # Six spans with one element a gap, run through in 460 steps.

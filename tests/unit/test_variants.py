@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catenary.cases.variants import (
+from catenary.cases.studies.sweep.variants import (
     Variant,
     check_keys,
     parse_vary,
@@ -16,7 +16,7 @@ from catenary.cases.variants import (
     read_named,
     slug,
 )
-from catenary.solver.errors import InputError
+from catenary.solver.base.errors import InputError
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import math
 import pytest
 from measuring import check
 
-from catenary.cases.run.arrival_facts import arrival_facts, wave_line
+from catenary.cases.run.describe_arrivals import arrival_facts, wave_line
 from catenary.cases.run.wave_arrivals import (
     Course,
     WaveLine,
@@ -20,7 +20,7 @@ from catenary.cases.run.wave_arrivals import (
     run_in_for,
     start_share,
 )
-from catenary.cases.scene import load_scene
+from catenary.cases.scene.scene import load_scene
 
 # One string, 1000 m, waves of 100 m/s.
 STRING = WaveLine(0.0, 1000.0, 50.0, 100.0, 100.0, 0.0, 0.0)

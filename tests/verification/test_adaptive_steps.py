@@ -10,9 +10,9 @@ from measuring import History, check, march, start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.contact_laws import HertzLaw, LinearLaw
-from catenary.solver.incidents import DropperBreak
-from catenary.solver.problem import Numerics, Problem
+from catenary.solver.problem.contact_laws import HertzLaw, LinearLaw
+from catenary.solver.problem.incidents import DropperBreak
+from catenary.solver.problem.problem import Numerics, Problem
 
 DT = 1e-3
 

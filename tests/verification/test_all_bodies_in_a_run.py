@@ -11,7 +11,7 @@ import pytest
 from measuring import History, check, start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.solver.problem import Problem
+from catenary.solver.problem.problem import Problem
 
 FORCE, HEIGHT, RAISED = 150.0, 5.55, 0.5
 

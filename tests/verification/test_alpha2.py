@@ -1,7 +1,7 @@
 """PETSc's TSALPHA2 as an independent second implementation of the same equations.
 
 What the scheme ``ts_alpha2`` shares with the default one are the matrices M, C and K alone. It
-takes line and pantographs as one nonlinear system (`solver/whole_system.py`), solves it by Newton's
+takes line and pantographs as one nonlinear system (`solver/schemes/monolithic_system.py`), solves it by Newton's
 method with the generalized-alpha scheme, and knows neither of predictors, compliances nor of an
 inner problem. Both methods are of order 2, so their difference must fall with order 2.
 """
@@ -25,11 +25,11 @@ from small_lines import (
 )
 
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
-from catenary.solver.contact_laws import LinearLaw
-from catenary.solver.equilibrium import find_form
-from catenary.solver.errors import InputError
-from catenary.solver.problem import Damping, Problem
-from catenary.solver.whole_system import WholeSystem
+from catenary.solver.base.errors import InputError
+from catenary.solver.problem.contact_laws import LinearLaw
+from catenary.solver.problem.problem import Damping, Problem
+from catenary.solver.schemes.monolithic_system import WholeSystem
+from catenary.solver.statics.equilibrium import find_form
 
 NOMINAL_HEIGHT = 5.52
 START, SPEED = 43.0, 80.0

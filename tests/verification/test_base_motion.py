@@ -12,21 +12,21 @@ from scipy import signal
 from scipy.integrate import quad
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.mbs.base_motion import BaseMotion
 from catenary.mbs.build import raising_data
-from catenary.mbs.constraint_handling import Baumgarte
-from catenary.mbs.forces import PointForce
-from catenary.mbs.integrators import integrate
-from catenary.mbs.irregularity import SPECTRA, Irregularity
-from catenary.mbs.joints import Fixed, PrescribedPoint, Prismatic, constant
-from catenary.mbs.kinematics import Law
-from catenary.mbs.lateral import LateralPath
+from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.motion_sources import Harmonic, Table, VehicleMotion
-from catenary.mbs.multibody import stand
-from catenary.mbs.raising import RaisingPantograph
-from catenary.mbs.statics import equilibrium
+from catenary.mbs.mechanism.pantograph_data import stand
+from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+from catenary.mbs.rigid.forces import PointForce
+from catenary.mbs.rigid.joints import Fixed, PrescribedPoint, Prismatic, constant
+from catenary.mbs.rigid.kinematics import Law
+from catenary.mbs.rigid.statics import equilibrium
+from catenary.mbs.time_steps.constraint_handling import Baumgarte
+from catenary.mbs.time_steps.variable_steps import integrate
+from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.mbs.vehicle.irregularity import SPECTRA, Irregularity
+from catenary.mbs.vehicle.motion_sources import Harmonic, Table, VehicleMotion
 
 SHORTEST, LONGEST = 3.0, 100.0
 

@@ -13,13 +13,13 @@ from small_lines import HANGING, WHOLE, en50318_line, mesh_of, numerics, problem
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.contact_laws import HertzLaw, KinematicLaw, LinearLaw
-from catenary.solver.coupling import Coupling, make_coupling
-from catenary.solver.errors import RunBroken
-from catenary.solver.heads import Heads
-from catenary.solver.law_in_steps import LinearInSteps
-from catenary.solver.problem import Problem
-from catenary.solver.response import LineResponse
+from catenary.solver.base.errors import RunBroken
+from catenary.solver.contact.head_states import Heads
+from catenary.solver.contact.line_response import LineResponse
+from catenary.solver.contact_problem.coupling import Coupling, make_coupling
+from catenary.solver.contact_problem.law_tangents import LinearInSteps
+from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
+from catenary.solver.problem.problem import Problem
 
 COUPLINGS = ("implicit", "iterated", "explicit")
 

@@ -8,8 +8,8 @@ from measuring import History, check, march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.contact_laws import LinearLaw
-from catenary.solver.problem import Problem
+from catenary.solver.problem.contact_laws import LinearLaw
+from catenary.solver.problem.problem import Problem
 
 LINE = en50318_line(5)
 EPS = np.finfo(float).eps

@@ -17,8 +17,8 @@ from small_lines import (
 )
 
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.solver.equilibrium import elasticity, find_form
-from catenary.solver.model import build
+from catenary.solver.model.model import build
+from catenary.solver.statics.equilibrium import elasticity, find_form
 
 
 def test_lift_of_a_single_wire_is_that_of_a_tensioned_beam() -> None:

@@ -20,7 +20,7 @@ from small_lines import (
 )
 
 from catenary.mbs.lumped_data import LumpedData
-from catenary.solver.equilibrium import find_form, stiffness_matrix
+from catenary.solver.statics.equilibrium import find_form, stiffness_matrix
 
 EPS = np.finfo(float).eps
 

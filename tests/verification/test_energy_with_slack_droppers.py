@@ -15,9 +15,9 @@ from small_lines import HANGING, en50318_line, mesh_of, numerics, problem_of, tr
 
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.solver.elements import shape_values
-from catenary.solver.equilibrium import find_form
-from catenary.solver.problem import Damping
+from catenary.solver.model.elements import shape_values
+from catenary.solver.problem.problem import Damping
+from catenary.solver.statics.equilibrium import find_form
 
 LIFT = 300.0
 

@@ -17,10 +17,10 @@ from small_lines import (
 )
 
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
-from catenary.solver.contact_laws import LinearLaw
-from catenary.solver.elements import shape_slopes, shape_values
-from catenary.solver.equilibrium import find_form
-from catenary.solver.problem import Problem, Train
+from catenary.solver.model.elements import shape_slopes, shape_values
+from catenary.solver.problem.contact_laws import LinearLaw
+from catenary.solver.problem.problem import Problem, Train
+from catenary.solver.statics.equilibrium import find_form
 
 EPS = np.finfo(float).eps
 

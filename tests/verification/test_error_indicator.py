@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from measuring import COMM
 
-from catenary.cases.accuracy import measure
-from catenary.cases.jobs import make_jobs
-from catenary.cases.sweep import run_jobs
-from catenary.cases.variants import parse_vary, product
+from catenary.cases.studies.accuracy.runs import measure
+from catenary.cases.studies.sweep.jobs import make_jobs
+from catenary.cases.studies.sweep.run_jobs import run_jobs
+from catenary.cases.studies.sweep.variants import parse_vary, product
 
 
 @pytest.mark.parametrize("case", ["en50318_2002", "ac_simple", "ambrosio2012"])

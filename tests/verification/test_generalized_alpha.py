@@ -1,6 +1,6 @@
 """HHT and the generalized-alpha method against their definition and their theory.
 
-The line steps them in a form of its own (`solver/generalized_alpha.py`), in which no force of an
+The line steps them in a form of its own (`solver/integrators/generalized_alpha.py`), in which no force of an
 earlier step appears. What is compared here is the form of the textbooks,
 
     M a(1 - a_m) + C v(1 - a_f) + K d(1 - a_f) = f(1 - a_f),      x(s) = s x_new + (1 - s) x_old,
@@ -30,10 +30,10 @@ from scipy.sparse import linalg as sparse_linalg
 from small_lines import BARE, HANGING, bare_wires, en50318_line, mesh_of, numerics, problem_of
 
 from catenary.meshgen.line import Wire
-from catenary.solver.equilibrium import find_form, stiffness_matrix
-from catenary.solver.integration import integration_of
-from catenary.solver.model import Model, build
-from catenary.solver.problem import Damping, Numerics
+from catenary.solver.model.model import Model, build
+from catenary.solver.problem.integrator_parameters import integration_of
+from catenary.solver.problem.problem import Damping, Numerics
+from catenary.solver.statics.equilibrium import find_form, stiffness_matrix
 
 METHODS = [
     ("generalized_alpha", 1.0),

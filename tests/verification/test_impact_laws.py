@@ -19,11 +19,11 @@ from scipy.optimize import brentq
 
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
-from catenary.solver.contact_laws import HYSTERESIS, HertzLaw, LinearLaw
-from catenary.solver.heads import Heads
-from catenary.solver.inner import InnerProblem
-from catenary.solver.law_in_steps import HertzInSteps, LawInSteps, LinearInSteps
-from catenary.solver.response import LineResponse
+from catenary.solver.contact.head_states import Heads
+from catenary.solver.contact.line_response import LineResponse
+from catenary.solver.contact_problem.complementarity import InnerProblem
+from catenary.solver.contact_problem.law_tangents import HertzInSteps, LawInSteps, LinearInSteps
+from catenary.solver.problem.contact_laws import HYSTERESIS, HertzLaw, LinearLaw
 
 MASS, STIFFNESS = 8.0, 1e6
 

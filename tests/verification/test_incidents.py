@@ -22,21 +22,21 @@ from small_lines import (
 )
 from static_line import absolute_rest, first_rest
 
-from catenary.cases import hard_runs
+from catenary.cases.studies.hard import runs as hard_runs
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
-from catenary.solver.changed_line import changed_line
-from catenary.solver.contact_laws import HertzLaw, KinematicLaw, LinearLaw
-from catenary.solver.elements import shape_slopes
-from catenary.solver.equilibrium import elasticity, find_form, middle_span
-from catenary.solver.incidents import (
+from catenary.solver.model.elements import shape_slopes
+from catenary.solver.model.model import Model
+from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
+from catenary.solver.problem.incidents import (
     DropperBreak,
     Happened,
     LineIncident,
     TensionLoss,
     in_steps,
 )
-from catenary.solver.model import Model
-from catenary.solver.problem import Damping, Problem, Train
+from catenary.solver.problem.problem import Damping, Problem, Train
+from catenary.solver.statics.after_incidents import changed_line
+from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
 
 EPS = np.finfo(float).eps
 INCIDENTS = {"dropper_break", "tension_loss"}

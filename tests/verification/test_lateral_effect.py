@@ -15,12 +15,12 @@ from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, trai
 
 from catenary.meshgen.line import Wire
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
-from catenary.solver import effects
-from catenary.solver.effects import Effect
-from catenary.solver.elements import uniform_load
-from catenary.solver.equilibrium import find_form
-from catenary.solver.model import ModelBuilder
-from catenary.solver.problem import Damping, Problem
+from catenary.solver.effects import effect as effects
+from catenary.solver.effects.effect import Effect
+from catenary.solver.model.elements import uniform_load
+from catenary.solver.model.model import ModelBuilder
+from catenary.solver.problem.problem import Damping, Problem
+from catenary.solver.statics.equilibrium import find_form
 
 NAME = "lateral_wind"
 WIND = 8.0  # [N/m] on both wires

@@ -21,13 +21,13 @@ from small_lines import (
     train,
 )
 
-from catenary.cases.convert_pantograph import pantograph_of
-from catenary.cases.loading import read_toml
-from catenary.cases.schema_pantograph import MultibodyTable
+from catenary.cases.scene.convert.pantograph import pantograph_of
+from catenary.cases.scene.tables.pantograph import MultibodyTable
+from catenary.cases.scene.toml_input import read_toml
 from catenary.mbs.build import PantographData
 from catenary.mbs.lowering import Lowering
 from catenary.mbs.lumped_data import LumpedData
-from catenary.solver.problem import Damping, Problem
+from catenary.solver.problem.problem import Damping, Problem
 
 TELESCOPE = Path(__file__).parents[1] / "support" / "telescope.toml"
 FORCE, PULL, AT, WITHIN, DROP = 120.0, -80.0, 0.5, 0.2, 0.3

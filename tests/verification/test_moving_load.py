@@ -27,10 +27,10 @@ from small_lines import (
 )
 
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.solver.contact_laws import LinearLaw
-from catenary.solver.effects import Effect
-from catenary.solver.elements import shape_values
-from catenary.solver.model import ModelBuilder
+from catenary.solver.effects.effect import Effect
+from catenary.solver.model.elements import shape_values
+from catenary.solver.model.model import ModelBuilder
+from catenary.solver.problem.contact_laws import LinearLaw
 
 TENSION, DENSITY = EN_CONTACT_WIRE.tension, EN_CONTACT_WIRE.mass_per_length
 WAVE_SPEED = EN_CONTACT_WIRE.wave_speed

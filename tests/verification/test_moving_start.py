@@ -8,7 +8,7 @@ from measuring import check, march
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 
 from catenary.mbs.lumped_data import LumpedData
-from catenary.solver.contact_laws import ContactLaw, KinematicLaw, LinearLaw
+from catenary.solver.problem.contact_laws import ContactLaw, KinematicLaw, LinearLaw
 
 STATIC, SPEED = 150.0, 320.0 / 3.6
 # The reference pantograph of the simple AC line.

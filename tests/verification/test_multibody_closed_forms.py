@@ -8,16 +8,9 @@ from measuring import check
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
-from catenary.mbs.bodies import SPACE, Body
-from catenary.mbs.constraint_handling import (
-    AugmentedLagrangian,
-    Baumgarte,
-    ConstraintHandling,
-    CoordinatePartitioning,
-)
-from catenary.mbs.forces import Gravity, SpringDamper
-from catenary.mbs.integrators import integrate
-from catenary.mbs.joints import (
+from catenary.mbs.rigid.bodies import SPACE, Body
+from catenary.mbs.rigid.forces import Gravity, SpringDamper
+from catenary.mbs.rigid.joints import (
     PrescribedAngle,
     Prismatic,
     Revolute,
@@ -25,8 +18,15 @@ from catenary.mbs.joints import (
     Spherical,
     steady,
 )
-from catenary.mbs.kinematics import point
-from catenary.mbs.system import System
+from catenary.mbs.rigid.kinematics import point
+from catenary.mbs.rigid.system import System
+from catenary.mbs.time_steps.constraint_handling import (
+    AugmentedLagrangian,
+    Baumgarte,
+    ConstraintHandling,
+    CoordinatePartitioning,
+)
+from catenary.mbs.time_steps.variable_steps import integrate
 
 G = 9.81
 METHODS: list[ConstraintHandling] = [

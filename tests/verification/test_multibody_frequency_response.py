@@ -12,23 +12,23 @@ from measuring import check
 from seven_bodies import ARM, HEAD, at_rest, calibrated, pressed
 from typer.testing import CliRunner
 
-from catenary.cases.cli import app
-from catenary.cases.loading import read_toml
-from catenary.mbs.bodies import SPACE, Body
+from catenary.cases.cli.main import app
+from catenary.cases.scene.toml_input import read_toml
 from catenary.mbs.build import raising_data
-from catenary.mbs.constraint_handling import Baumgarte
-from catenary.mbs.forces import Gravity, PointForce, SpringDamper
-from catenary.mbs.frequency_response import head_response
-from catenary.mbs.integrators import integrate
-from catenary.mbs.joints import Prismatic, Revolute, Spherical
-from catenary.mbs.kinematics import point
-from catenary.mbs.linearisation import apparent_mass, linearise, of_chain
+from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.raising import RaisingPantograph
-from catenary.mbs.stepping import Stepper
-from catenary.mbs.strips import Strips, Suspension
-from catenary.mbs.system import System
-from catenary.solver.errors import InputError
+from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+from catenary.mbs.response.frequency_response import head_response
+from catenary.mbs.response.linearisation import apparent_mass, linearise, of_chain
+from catenary.mbs.rigid.bodies import SPACE, Body
+from catenary.mbs.rigid.forces import Gravity, PointForce, SpringDamper
+from catenary.mbs.rigid.joints import Prismatic, Revolute, Spherical
+from catenary.mbs.rigid.kinematics import point
+from catenary.mbs.rigid.system import System
+from catenary.mbs.time_steps.constraint_handling import Baumgarte
+from catenary.mbs.time_steps.implicit_steps import Stepper
+from catenary.mbs.time_steps.variable_steps import integrate
+from catenary.solver.base.errors import InputError
 
 G = 9.81
 FREQUENCIES = np.array([0.3, 1.0, 4.0, 11.0, 25.0])

@@ -10,20 +10,20 @@ import pytest
 from measuring import check
 from seven_bodies import at_rest, calibrated, pressed
 
-from catenary.mbs.base_motion import BaseMotion
 from catenary.mbs.build import raising_data
-from catenary.mbs.full import FullPantograph
+from catenary.mbs.head.strips import Strips, Suspension
+from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.interface import Pantograph
-from catenary.mbs.joints import PrescribedAngle
-from catenary.mbs.lateral import LateralPath
-from catenary.mbs.linearisation import linearise
-from catenary.mbs.motion_sources import Table, VehicleMotion
-from catenary.mbs.multibody import stand
-from catenary.mbs.raising import RaisingPantograph
-from catenary.mbs.spins import without_spins
-from catenary.mbs.step_solvers import METHODS
-from catenary.mbs.strips import Strips, Suspension
-from catenary.solver.errors import CatenaryError, InputError, RunBroken
+from catenary.mbs.mechanism.full_pantograph import FullPantograph
+from catenary.mbs.mechanism.pantograph_data import stand
+from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+from catenary.mbs.response.linearisation import linearise
+from catenary.mbs.rigid.joints import PrescribedAngle
+from catenary.mbs.rigid.spin_locks import without_spins
+from catenary.mbs.time_steps.step_solvers import METHODS
+from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.mbs.vehicle.motion_sources import Table, VehicleMotion
+from catenary.solver.base.errors import CatenaryError, InputError, RunBroken
 
 STATIC, HEIGHT, DT = 150.0, 5.08, 1e-3
 WIRE = 5e4  # [N/m] contact, on a wire that does not give way

@@ -10,12 +10,12 @@ import paper_pantograph as paper
 from measuring import History, check, start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.cases.convert_pantograph import pantograph_of
-from catenary.cases.loading import read_toml
-from catenary.cases.schema_pantograph import MultibodyTable
+from catenary.cases.scene.convert.pantograph import pantograph_of
+from catenary.cases.scene.tables.pantograph import MultibodyTable
+from catenary.cases.scene.toml_input import read_toml
 from catenary.mbs.build import PantographData
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.multibody import MultibodyData, reduced, stand
+from catenary.mbs.mechanism.pantograph_data import MultibodyData, reduced, stand
 
 TELESCOPE = Path(__file__).parents[1] / "support" / "telescope.toml"
 

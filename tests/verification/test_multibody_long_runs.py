@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from seven_bodies import HEAD, at_rest, calibrated, pressed
 
 from catenary.mbs.build import raising_data
-from catenary.mbs.raising import RaisingPantograph
+from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 
 
 def test_plane_pantograph_rests_where_the_bodies_do() -> None:

@@ -10,19 +10,19 @@ import paper_pantograph as ambrosio
 import pytest
 from measuring import check
 
-from catenary.mbs.constraint_handling import (
+from catenary.mbs.rigid.forces import PointForce
+from catenary.mbs.rigid.joints import PrescribedPoint, constant
+from catenary.mbs.rigid.kinematics import point
+from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium, equivalent_mass, held_force
+from catenary.mbs.rigid.system import System
+from catenary.mbs.time_steps.constraint_handling import (
     AugmentedLagrangian,
     Baumgarte,
     ConstraintHandling,
     CoordinatePartitioning,
 )
-from catenary.mbs.forces import PointForce
-from catenary.mbs.integrators import integrate
-from catenary.mbs.joints import PrescribedPoint, constant
-from catenary.mbs.kinematics import point
-from catenary.mbs.statics import calibrate_actuator, equilibrium, equivalent_mass, held_force
-from catenary.mbs.system import System
-from catenary.solver.errors import InputError
+from catenary.mbs.time_steps.variable_steps import integrate
+from catenary.solver.base.errors import InputError
 
 ARM, HEAD = ambrosio.STABILISATION_ARM, ambrosio.HEAD
 HOLDER = PrescribedPoint("holder", ARM, constant(ambrosio.INITIAL_ARM_HEIGHT))

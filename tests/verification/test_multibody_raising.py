@@ -6,19 +6,19 @@ import numpy as np
 import paper_pantograph as ambrosio
 from measuring import check, orders, print_table
 
-from catenary.mbs.base_motion import BaseMotion
-from catenary.mbs.constraint_handling import Baumgarte
-from catenary.mbs.forces import PointForce
-from catenary.mbs.integrators import integrate
-from catenary.mbs.joints import PrescribedPoint, constant
-from catenary.mbs.lateral import LateralPath
+from catenary.mbs.head.strips import Strips, Suspension, Turning
+from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.motion_sources import Harmonic, VehicleMotion
-from catenary.mbs.raising import RaisingData, RaisingPantograph
-from catenary.mbs.reduction import ReducedMechanism, reduce_mechanism
-from catenary.mbs.statics import calibrate_actuator, equilibrium
-from catenary.mbs.strips import Strips, Suspension, Turning
+from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
+from catenary.mbs.mechanism.reduction import ReducedMechanism, reduce_mechanism
+from catenary.mbs.rigid.forces import PointForce
+from catenary.mbs.rigid.joints import PrescribedPoint, constant
+from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium
+from catenary.mbs.time_steps.constraint_handling import Baumgarte
+from catenary.mbs.time_steps.variable_steps import integrate
+from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
 
 EPS = np.finfo(float).eps
 ARM, HEAD = ambrosio.STABILISATION_ARM, ambrosio.HEAD

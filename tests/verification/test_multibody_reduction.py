@@ -8,16 +8,16 @@ import pytest
 from measuring import check
 from scipy.integrate import solve_ivp
 
-from catenary.mbs.bodies import SPACE, Body
-from catenary.mbs.constraint_handling import Baumgarte
-from catenary.mbs.forces import Gravity, SpringDamper
-from catenary.mbs.integrators import integrate
-from catenary.mbs.joints import PrescribedPoint, Revolute, constant
-from catenary.mbs.kinematics import point
-from catenary.mbs.reduction import reduce_mechanism
-from catenary.mbs.statics import equivalent_mass
-from catenary.mbs.system import System
-from catenary.solver.errors import InputError, RunBroken
+from catenary.mbs.mechanism.reduction import reduce_mechanism
+from catenary.mbs.rigid.bodies import SPACE, Body
+from catenary.mbs.rigid.forces import Gravity, SpringDamper
+from catenary.mbs.rigid.joints import PrescribedPoint, Revolute, constant
+from catenary.mbs.rigid.kinematics import point
+from catenary.mbs.rigid.statics import equivalent_mass
+from catenary.mbs.rigid.system import System
+from catenary.mbs.time_steps.constraint_handling import Baumgarte
+from catenary.mbs.time_steps.variable_steps import integrate
+from catenary.solver.base.errors import InputError, RunBroken
 
 ARM = ambrosio.STABILISATION_ARM
 G = 9.81

@@ -7,14 +7,20 @@ import pytest
 from measuring import check, print_table
 from scipy.special import ellipk
 
-from catenary.mbs.bodies import SPACE, Body, Motion
-from catenary.mbs.forces import BumpStop, Gravity, PointForce, SpringDamper
-from catenary.mbs.joints import PrescribedAngle, Prismatic, Revolute, Spherical, steady
-from catenary.mbs.kinematics import point
-from catenary.mbs.step_solvers import METHODS, Augmented, Partitioned, WithFeedback, step_solver
-from catenary.mbs.stepping import Stepper
-from catenary.mbs.system import System
-from catenary.solver.errors import InputError, RunBroken
+from catenary.mbs.rigid.bodies import SPACE, Body, Motion
+from catenary.mbs.rigid.forces import BumpStop, Gravity, PointForce, SpringDamper
+from catenary.mbs.rigid.joints import PrescribedAngle, Prismatic, Revolute, Spherical, steady
+from catenary.mbs.rigid.kinematics import point
+from catenary.mbs.rigid.system import System
+from catenary.mbs.time_steps.implicit_steps import Stepper
+from catenary.mbs.time_steps.step_solvers import (
+    METHODS,
+    Augmented,
+    Partitioned,
+    WithFeedback,
+    step_solver,
+)
+from catenary.solver.base.errors import InputError, RunBroken
 
 G = 9.81
 each_method = pytest.mark.parametrize("method", METHODS)

@@ -36,14 +36,14 @@ from small_lines import (
     train,
 )
 
-from catenary.cases.meshing import mesh_of as mesh_of_scene
-from catenary.cases.scene import load_scene
+from catenary.cases.run.scene_mesh import mesh_of as mesh_of_scene
+from catenary.cases.scene.scene import load_scene
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.postproc import filters
-from catenary.solver.equilibrium import find_form
-from catenary.solver.integration import NEWMARK, integration_of
-from catenary.solver.model import Model
-from catenary.solver.problem import Damping
+from catenary.postproc.evaluate import filters
+from catenary.solver.model.model import Model
+from catenary.solver.problem.integrator_parameters import NEWMARK, integration_of
+from catenary.solver.problem.problem import Damping
+from catenary.solver.statics.equilibrium import find_form
 
 # Average acceleration, a softer relative, two of Newmark's that damp, and those that damp with
 # order 2.

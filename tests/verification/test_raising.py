@@ -6,7 +6,7 @@ import numpy as np
 from measuring import check, march, print_table
 from small_lines import FREE_MASS, WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 
-from catenary.solver.problem import Problem, Train
+from catenary.solver.problem.problem import Problem, Train
 
 BELOW, FORCE = 0.3, 40.0
 

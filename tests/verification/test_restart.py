@@ -9,7 +9,7 @@ import pytest
 from measuring import History, check, start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.solver.contact_laws import LinearLaw
+from catenary.solver.problem.contact_laws import LinearLaw
 
 
 @pytest.mark.parametrize("integrator", ["newmark", "generalized_alpha"])

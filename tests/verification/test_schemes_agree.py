@@ -9,8 +9,8 @@ import pytest
 from measuring import History, check, march, start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.solver.contact_laws import HertzLaw, LinearLaw
-from catenary.solver.problem import Problem
+from catenary.solver.problem.contact_laws import HertzLaw, LinearLaw
+from catenary.solver.problem.problem import Problem
 
 
 def two_pantographs(

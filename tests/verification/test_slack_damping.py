@@ -17,13 +17,13 @@ from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, trai
 
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
-from catenary.solver.changed_line import acceleration_jump, changed_line, unchanged
-from catenary.solver.distribution import distribute
-from catenary.solver.elements import shape_values
-from catenary.solver.equilibrium import find_form
-from catenary.solver.incidents import DropperBreak
-from catenary.solver.model import Model
-from catenary.solver.problem import Damping, Problem
+from catenary.solver.model.elements import shape_values
+from catenary.solver.model.model import Model
+from catenary.solver.model.partition import distribute
+from catenary.solver.problem.incidents import DropperBreak
+from catenary.solver.problem.problem import Damping, Problem
+from catenary.solver.statics.after_incidents import acceleration_jump, changed_line, unchanged
+from catenary.solver.statics.equilibrium import find_form
 
 EPS = np.finfo(float).eps
 # The damping of the paper's average line; the droppers' is 2.75 kN s/m with it.

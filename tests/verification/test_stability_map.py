@@ -11,15 +11,15 @@ from mpi4py import MPI
 from scipy import linalg
 from small_lines import EN_PANTOGRAPH, HANGING, en50318_line, mesh_of, problem_of
 
-from catenary.cases import stability_theory as theory
-from catenary.cases.hard_runs import AtRest
-from catenary.cases.stability_map import RESOLUTION, Grid, as_rows, find, make_map
-from catenary.cases.stability_march import COUPLINGS, Bench
-from catenary.cases.stability_plot import draw
+from catenary.cases.studies.hard.runs import AtRest
+from catenary.cases.studies.stability import from_matrices as theory
+from catenary.cases.studies.stability.by_marching import COUPLINGS, Bench
+from catenary.cases.studies.stability.map import RESOLUTION, Grid, as_rows, find, make_map
+from catenary.cases.studies.stability.picture import draw
 from catenary.mbs.lumped_data import LumpedData
-from catenary.solver.contact import ContactWire
-from catenary.solver.distribution import distribute
-from catenary.solver.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.contact.contact_wire import ContactWire
+from catenary.solver.model.partition import distribute
+from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
 
 GRID = ((1e5, 0.5), (1e5, 8.0), (1e7, 2.0))
 NEWMARK = (0.25, 0.5)

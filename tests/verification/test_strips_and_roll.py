@@ -12,18 +12,18 @@ from scipy.integrate import solve_ivp
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
 from catenary.mbs.build import raising_data
-from catenary.mbs.forces import PointForce
-from catenary.mbs.full import FullPantograph
-from catenary.mbs.joints import PrescribedPoint, constant
-from catenary.mbs.lateral import LateralPath
+from catenary.mbs.head.roll import roll_of
+from catenary.mbs.head.strips import Strips, Suspension, Turning
+from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.multibody import stand
-from catenary.mbs.raising import RaisingPantograph
-from catenary.mbs.roll import roll_of
-from catenary.mbs.statics import equilibrium
-from catenary.mbs.strips import Strips, Suspension, Turning
-from catenary.solver.contact_laws import ContactLaw, KinematicLaw, LinearLaw
+from catenary.mbs.mechanism.full_pantograph import FullPantograph
+from catenary.mbs.mechanism.pantograph_data import stand
+from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+from catenary.mbs.rigid.forces import PointForce
+from catenary.mbs.rigid.joints import PrescribedPoint, constant
+from catenary.mbs.rigid.statics import equilibrium
+from catenary.solver.problem.contact_laws import ContactLaw, KinematicLaw, LinearLaw
 
 EPS = np.finfo(float).eps
 TWO = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0))

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from measuring import check
 
-from catenary.cases.scene import load_scene
-from catenary.mbs.forces import PointForce
-from catenary.mbs.multibody import MultibodyData, reduced, stand
-from catenary.mbs.turning_round import turned_round
-from catenary.solver.errors import InputError
+from catenary.cases.scene.scene import load_scene
+from catenary.mbs.mechanism.pantograph_data import MultibodyData, reduced, stand
+from catenary.mbs.rigid.forces import PointForce
+from catenary.mbs.rigid.reversed_system import turned_round
+from catenary.solver.base.errors import InputError
 
 EPS = np.finfo(float).eps
 KNEE = (-0.820, 0.0, 0.0)

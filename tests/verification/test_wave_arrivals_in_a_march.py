@@ -14,14 +14,14 @@ import numpy as np
 import pytest
 from measuring import COMM
 
-from catenary.cases.jobs import make_jobs
-from catenary.cases.run.arrival_facts import arrival_facts, wave_line
+from catenary.cases.run.describe_arrivals import arrival_facts, wave_line
 from catenary.cases.run.wave_arrivals import Course, from_far_end
-from catenary.cases.scene import load_scene
-from catenary.cases.sweep import run_jobs
-from catenary.cases.variants import parse_vary, product
-from catenary.postproc.filters import low_pass
-from catenary.postproc.results import Results
+from catenary.cases.scene.scene import load_scene
+from catenary.cases.studies.sweep.jobs import make_jobs
+from catenary.cases.studies.sweep.run_jobs import run_jobs
+from catenary.cases.studies.sweep.variants import parse_vary, product
+from catenary.postproc.evaluate.filters import low_pass
+from catenary.postproc.read.results import Results
 
 # A contact force that differs by more is another one [N]: 4e-5 of the standard deviation, far above
 # round-off, which is 1e-9.

@@ -9,9 +9,9 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import linalg
 
-from catenary.solver.line_motion import LineMotion
-from catenary.solver.model import Model
-from catenary.solver.operators import as_petsc, part_of
+from catenary.solver.integrators.line_integrator import LineMotion
+from catenary.solver.model.matrices import as_petsc, part_of
+from catenary.solver.model.model import Model
 
 
 def by_petsc(line: LineMotion, model: Model, block: int, kind: str, order: str) -> Callable:

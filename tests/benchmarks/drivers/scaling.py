@@ -23,10 +23,10 @@ import numpy as np
 from mpi4py import MPI
 from step_cost import room
 
-from catenary.cases.hard_runs import at_rest
-from catenary.cases.scene import load_scene
-from catenary.solver.march import March
-from catenary.solver.observation import Stage, StepView
+from catenary.cases.scene.scene import load_scene
+from catenary.cases.studies.hard.runs import at_rest
+from catenary.solver.time_loop.march import March
+from catenary.solver.time_loop.observers import Stage, StepView
 
 WORLD = MPI.COMM_WORLD
 # Of the steps of a turn, which find the caches full of another march.

@@ -17,15 +17,15 @@ import numpy as np
 from floor import LIBRARIES
 from mpi4py import MPI
 
-from catenary.cases.meshing import mesh_of
-from catenary.cases.scene import load_scene
-from catenary.solver.distribution import distribute
-from catenary.solver.equilibrium import elasticity, find_form, middle_span
-from catenary.solver.march import March
-from catenary.solver.model import Model, build
-from catenary.solver.newmark import NewmarkLine
-from catenary.solver.parallel import on_root
-from catenary.solver.problem import Problem
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.scene import load_scene
+from catenary.solver.base.parallel import on_root
+from catenary.solver.integrators.newmark import NewmarkLine
+from catenary.solver.model.model import Model, build
+from catenary.solver.model.partition import distribute
+from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.time_loop.march import March
 
 CHUNKS, ROUNDS = 5, 20
 # The fastest of the libraries on short lines and on long ones.

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from catenary.cases.cli import app
+from catenary.cases.cli.main import app
 
 SOUND = Path(__file__).with_name("sound.toml")
 # A sound list, of which an entry is changed at a time.

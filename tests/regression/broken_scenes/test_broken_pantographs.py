@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from catenary.cases.cli import app
+from catenary.cases.cli.main import app
 
 SOUND = Path(__file__).with_name("sound.toml")
 TELESCOPE = Path(__file__).parents[2] / "support" / "telescope.toml"

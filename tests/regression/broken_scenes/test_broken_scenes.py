@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from catenary.cases.cli import app
+from catenary.cases.cli.main import app
 
 # A scene of its own, so that a shipped case may change its numbers without a change here.
 SOUND = Path(__file__).with_name("sound.toml")
@@ -373,7 +373,7 @@ def test_a_mesh_without_a_group_is_refused(tmp_path: Path) -> None:
     ],
 )
 def test_the_program_itself_exits_with_2(words: list[str], tmp_path: Path) -> None:
-    entry = "from catenary.cases.cli import main; main()"
+    entry = "from catenary.cases.cli.main import main; main()"
     done = subprocess.run(
         [sys.executable, "-c", entry, *words],
         cwd=tmp_path,

@@ -7,14 +7,14 @@ import pytest
 from scipy import linalg
 from scipy.interpolate import CubicSpline
 
-from catenary.mbs import head_kernels
-from catenary.mbs.lateral import LateralPath
+from catenary.mbs.head import head_kernels
+from catenary.mbs.head.strips import Strips, Suspension, Turning, head_parts
+from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.raising import RaisingData, RaisingPantograph
-from catenary.mbs.reduction import ReducedMechanism
-from catenary.mbs.strips import Strips, Suspension, Turning, head_parts
-from catenary.solver.errors import RunBroken
+from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
+from catenary.mbs.mechanism.reduction import ReducedMechanism
+from catenary.solver.base.errors import RunBroken
 
 EPS = np.finfo(float).eps
 DT, BETA, GAMMA = 2e-3, 0.3, 0.55

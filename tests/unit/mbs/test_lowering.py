@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from catenary.mbs.base_motion import BaseMotion
 from catenary.mbs.build import Operation, make_pantograph
-from catenary.mbs.head_steps import raised
+from catenary.mbs.head.newmark_head import raised
 from catenary.mbs.lowering import LoweredPantograph, Lowering
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.motion_sources import Harmonic, VehicleMotion
+from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
 
 DATA = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0))
 STATIC, DT = 120.0, 1e-3

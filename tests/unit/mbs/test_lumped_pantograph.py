@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catenary.mbs import head_kernels
+from catenary.mbs.head import head_kernels
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData

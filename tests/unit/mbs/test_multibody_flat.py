@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from measuring import check
 
-from catenary.mbs.bodies import SPACE, Body, Motion
-from catenary.mbs.forces import (
+from catenary.mbs.rigid.bodies import SPACE, Body, Motion
+from catenary.mbs.rigid.forces import (
     Actuator,
     BumpStop,
     Force,
@@ -18,7 +18,7 @@ from catenary.mbs.forces import (
     SpringDamper,
     Table,
 )
-from catenary.mbs.joints import (
+from catenary.mbs.rigid.joints import (
     Fixed,
     Joint,
     PointOnCurve,
@@ -32,9 +32,9 @@ from catenary.mbs.joints import (
     constant,
     tabulated,
 )
-from catenary.mbs.kinematics import stacked
-from catenary.mbs.system import System, independent_rows
-from catenary.solver.errors import InputError
+from catenary.mbs.rigid.kinematics import stacked
+from catenary.mbs.rigid.system import System, independent_rows
+from catenary.solver.base.errors import InputError
 
 EPS = np.finfo(float).eps
 TIME = 0.7

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from measuring import check
 
-from catenary.mbs.bodies import SPACE, Body, Motion, initial_motion
-from catenary.mbs.forces import (
+from catenary.mbs.rigid.bodies import SPACE, Body, Motion, initial_motion
+from catenary.mbs.rigid.forces import (
     Actuator,
     BumpStop,
     Force,
@@ -16,8 +16,8 @@ from catenary.mbs.forces import (
     SpringDamper,
     Table,
 )
-from catenary.mbs.kinematics import point
-from catenary.solver.errors import InputError
+from catenary.mbs.rigid.kinematics import point
+from catenary.solver.base.errors import InputError
 
 EPS = np.finfo(float).eps
 AT_I, AT_J = (0.3, -0.2, 0.5), (-0.4, 0.1, 0.2)

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from measuring import check
 
-from catenary.mbs.bodies import SPACE, Body
-from catenary.mbs.constraint_handling import (
+from catenary.mbs.rigid.bodies import SPACE, Body
+from catenary.mbs.rigid.forces import Gravity
+from catenary.mbs.rigid.joints import Prismatic, Revolute
+from catenary.mbs.rigid.system import System
+from catenary.mbs.time_steps.constraint_handling import (
     AugmentedLagrangian,
     Baumgarte,
     CoordinatePartitioning,
 )
-from catenary.mbs.forces import Gravity
-from catenary.mbs.integrators import integrate
-from catenary.mbs.joints import Prismatic, Revolute
-from catenary.mbs.system import System
-from catenary.solver.errors import InputError, RunBroken
+from catenary.mbs.time_steps.variable_steps import integrate
+from catenary.solver.base.errors import InputError, RunBroken
 
 BODY = Body("slider", 1.0, (1.0, 1.0, 1.0))
 RAIL = System((BODY,), (Prismatic("rail", SPACE, "slider"),))

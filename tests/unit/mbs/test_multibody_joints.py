@@ -7,7 +7,7 @@ import pytest
 from measuring import check
 from scipy.spatial.transform import Rotation
 
-from catenary.mbs.bodies import (
+from catenary.mbs.rigid.bodies import (
     SPACE,
     Body,
     Motion,
@@ -16,7 +16,7 @@ from catenary.mbs.bodies import (
     parameter_rates,
     rotation_matrix,
 )
-from catenary.mbs.joints import (
+from catenary.mbs.rigid.joints import (
     Fixed,
     Joint,
     PointOnCurve,
@@ -31,7 +31,7 @@ from catenary.mbs.joints import (
     steady,
     tabulated,
 )
-from catenary.solver.errors import InputError
+from catenary.solver.base.errors import InputError
 
 EPS = np.finfo(float).eps
 TIME = 0.7

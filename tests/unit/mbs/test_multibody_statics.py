@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from measuring import check
 
-from catenary.mbs.bodies import SPACE, Body
-from catenary.mbs.forces import Actuator, Gravity, PointForce, SpringDamper
-from catenary.mbs.joints import (
+from catenary.mbs.rigid.bodies import SPACE, Body
+from catenary.mbs.rigid.forces import Actuator, Gravity, PointForce, SpringDamper
+from catenary.mbs.rigid.joints import (
     PrescribedPoint,
     Prismatic,
     Revolute,
     Spherical,
     constant,
 )
-from catenary.mbs.statics import calibrate_actuator, equilibrium, equivalent_mass, held_force
-from catenary.mbs.system import System
-from catenary.solver.errors import InputError, RunBroken
+from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium, equivalent_mass, held_force
+from catenary.mbs.rigid.system import System
+from catenary.solver.base.errors import InputError, RunBroken
 
 G = 9.81
 UP, ACROSS = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from measuring import check
 
-from catenary.mbs.bodies import SPACE, Body, Motion
-from catenary.mbs.forces import Gravity, PointForce
-from catenary.mbs.joints import (
+from catenary.mbs.rigid.bodies import SPACE, Body, Motion
+from catenary.mbs.rigid.forces import Gravity, PointForce
+from catenary.mbs.rigid.joints import (
     Fixed,
     PointOnLine,
     PrescribedPoint,
@@ -18,8 +18,8 @@ from catenary.mbs.joints import (
     constant,
     steady,
 )
-from catenary.mbs.system import System, independent_rows
-from catenary.solver.errors import InputError
+from catenary.mbs.rigid.system import System, independent_rows
+from catenary.solver.base.errors import InputError
 
 EPS = np.finfo(float).eps
 G = 9.81

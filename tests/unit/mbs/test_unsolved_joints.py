@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from catenary.mbs.bodies import SPACE, Body
-from catenary.mbs.forces import Gravity
-from catenary.mbs.joints import Revolute
-from catenary.mbs.reduction import ReducedMechanism
-from catenary.mbs.step_solvers import Augmented, Partitioned
-from catenary.mbs.stepping import Stepper
-from catenary.mbs.system import System
-from catenary.solver.errors import NotConverged, RunBroken
+from catenary.mbs.mechanism.reduction import ReducedMechanism
+from catenary.mbs.rigid.bodies import SPACE, Body
+from catenary.mbs.rigid.forces import Gravity
+from catenary.mbs.rigid.joints import Revolute
+from catenary.mbs.rigid.system import System
+from catenary.mbs.time_steps.implicit_steps import Stepper
+from catenary.mbs.time_steps.step_solvers import Augmented, Partitioned
+from catenary.solver.base.errors import NotConverged, RunBroken
 
 # A pendulum of 1 m that is let go from level.
 PENDULUM = System(

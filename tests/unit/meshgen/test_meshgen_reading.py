@@ -14,7 +14,7 @@ from catenary.meshgen.build import make_mesh, use_mesh
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.reader import read_mesh
-from catenary.solver.errors import InputError
+from catenary.solver.base.errors import InputError
 
 
 def test_a_file_in_any_order_and_numbering_is_read(by_hand: Any, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from catenary.meshgen.gmsh_lines import write_mesh
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.reader import read_mesh
-from catenary.solver.errors import InputError
+from catenary.solver.base.errors import InputError
 
 # Gmsh finds the parameter of each node to 1e-12 of the line's length, and writes 16 digits.
 PLACE = 1e-8

@@ -12,10 +12,10 @@ from mpi4py import MPI
 
 from catenary.meshgen.line import DropperKind, Line, SteadyArm, Wire
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
-from catenary.postproc.header import Header, line_datasets, static_datasets
-from catenary.postproc.recorder import Recorder
-from catenary.solver.equilibrium import Elasticity, Equilibrium
-from catenary.solver.observation import Observer, Stage, StepView
+from catenary.postproc.record.header import Header, line_datasets, static_datasets
+from catenary.postproc.record.recorder import Recorder
+from catenary.solver.statics.equilibrium import Elasticity, Equilibrium
+from catenary.solver.time_loop.observers import Observer, Stage, StepView
 
 N_SPANS, SPAN = 16, 50.0
 DROPPERS = tuple(5.0 + 5.0 * k for k in range(9))

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from catenary.postproc import export, filters
-from catenary.postproc.pages import envelope
-from catenary.postproc.record import reading
-from catenary.postproc.record.kept_extremes import store_extremes
-from catenary.postproc.result_file import COMPLETE
-from catenary.postproc.results import Results
+from catenary.postproc.evaluate import filters
+from catenary.postproc.files import block_reading
+from catenary.postproc.files.kept_extremes import store_extremes
+from catenary.postproc.files.result_file import COMPLETE
+from catenary.postproc.read.results import Results
+from catenary.postproc.report import csv_tables, envelope
 
 
 @pytest.mark.parametrize("shape", [(1,), (2,), (300,), (150_000,), (70_000, 2)])
@@ -37,8 +37,8 @@ def test_filters_in_blocks_are_those_of_scipy_to_the_last_bit(
 def test_columns_and_extremes_are_those_of_the_whole_table(
     run_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(reading, "BLOCK_BYTES", 1e5)
-    monkeypatch.setattr(reading, "_SLICE", 1000)
+    monkeypatch.setattr(block_reading, "BLOCK_BYTES", 1e5)
+    monkeypatch.setattr(block_reading, "_SLICE", 1000)
     with Results(run_folder) as results:
         for name in ("contact_force", "contact_position", "arm_uplift", "dropper_force"):
             whole = results.channel(name)
@@ -56,9 +56,9 @@ def test_a_table_is_the_same_whatever_its_blocks(
     run_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with Results(run_folder) as results:
-        whole = export.pantographs_csv(results)
-        monkeypatch.setattr(export, "_ROWS", 777)
-        assert export.pantographs_csv(results) == whole
+        whole = csv_tables.pantographs_csv(results)
+        monkeypatch.setattr(csv_tables, "_ROWS", 777)
+        assert csv_tables.pantographs_csv(results) == whole
 
 
 def test_a_thinned_curve_keeps_every_peak() -> None:
@@ -107,7 +107,7 @@ def test_files_of_the_earlier_layout_are_read(
 REPORT = """
 import sys
 from pathlib import Path
-from catenary.postproc.report import write_report
+from catenary.postproc.report.report import write_report
 write_report(sys.argv[1], sys.argv[2])
 print(Path("/proc/self/status").read_text().split("VmHWM:", 1)[1].split()[0])
 """
@@ -121,7 +121,7 @@ def make_long(path: Path, make_march: Any, record_run: Any) -> None:
     """
     march = make_march(n_steps=N_LONG, dt=8.0 / N_LONG, separations=(0.0,))
     recorder_options = {"flush_every": 4096}
-    from catenary.postproc.recorder import Recorder
+    from catenary.postproc.record.recorder import Recorder
 
     recorder = Recorder(march.comm, path, march.header(), **recorder_options)
     march.drive(recorder, last=20)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from catenary.cases.printing import summary_text
+from catenary.cases.terminal.terminal_text import summary_text
 from catenary.postproc.evaluate.comparing import decimals_that_tell
 
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catenary.postproc.record.csv_text import csv_text, plain_cell
+from catenary.postproc.files.csv_text import csv_text, plain_cell
 
 ROOT = Path(__file__).parents[3]
 
@@ -44,4 +44,4 @@ def test_no_other_file_writes_csv() -> None:
         for path in (ROOT / part).rglob("*.py")
         if "csv.writer(" in path.read_text() or "DictWriter(" in path.read_text()
     ]
-    assert writers == [Path("postproc/record/csv_text.py")]
+    assert writers == [Path("postproc/files/csv_text.py")]

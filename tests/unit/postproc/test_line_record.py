@@ -9,11 +9,11 @@ import h5py
 import numpy as np
 import pytest
 
-from catenary.postproc import statistics
-from catenary.postproc.channels import LINE_CHANNELS
+from catenary.postproc.evaluate import statistics
+from catenary.postproc.read.results import Results
+from catenary.postproc.record.channels import LINE_CHANNELS
 from catenary.postproc.record.line_record import GZIP, LineRecord, from_table, says
-from catenary.postproc.recorder import Recorder
-from catenary.postproc.results import Results
+from catenary.postproc.record.recorder import Recorder
 
 N_STEPS, FLUSH = 3000, 400
 WINDOW = (120.0, 80.0)

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import pyvista
 
-from catenary.postproc import fields
-from catenary.postproc.fields import FieldRecorder
-from catenary.solver.errors import RunBroken
+from catenary.postproc.files import fields
+from catenary.postproc.files.fields import FieldRecorder
+from catenary.solver.base.errors import RunBroken
 
 
 def watch(march: Any, path: Path, **options: Any) -> FieldRecorder:

@@ -10,19 +10,19 @@ from typing import Any
 import h5py
 import pytest
 
-from catenary.postproc.fields import FieldRecorder
-from catenary.postproc.record.disk_errors import reason, remedy
-from catenary.postproc.record.own_files import (
+from catenary.postproc.files.disk import broken_write
+from catenary.postproc.files.disk_errors import reason, remedy
+from catenary.postproc.files.fields import FieldRecorder
+from catenary.postproc.files.own_files import (
     OWN_FILES,
     REPORT_FILES,
     part_of,
     remove_parts,
     remove_stale,
 )
-from catenary.postproc.recorder import Recorder
-from catenary.postproc.results import Results
-from catenary.postproc.storage import broken_write
-from catenary.solver.errors import RunBroken
+from catenary.postproc.read.results import Results
+from catenary.postproc.record.recorder import Recorder
+from catenary.solver.base.errors import RunBroken
 
 
 def recorder(march: Any, path: Path, **options: Any) -> Recorder:
@@ -171,7 +171,7 @@ def test_what_is_stale_goes_and_what_is_a_users_stays(tmp_path: Path) -> None:
 
 
 def test_a_reports_files_are_all_declared(tmp_path: Path, make_march: Any, record_run: Any) -> None:
-    from catenary.postproc.report import write_report
+    from catenary.postproc.report.report import write_report
 
     path = record_run(tmp_path / "run.h5", make_march(), energy_every=20)
     written = {one.name for one in write_report(path, tmp_path).files}
@@ -183,7 +183,7 @@ def test_a_reports_files_are_all_declared(tmp_path: Path, make_march: Any, recor
 def test_a_report_that_cannot_be_written_is_a_sentence(
     tmp_path: Path, make_march: Any, record_run: Any
 ) -> None:
-    from catenary.postproc.report import write_report, write_summary
+    from catenary.postproc.report.report import write_report, write_summary
 
     path = record_run(tmp_path / "run.h5", make_march(n_steps=300))
     (tmp_path / "summary.json").mkdir()

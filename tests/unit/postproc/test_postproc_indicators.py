@@ -9,7 +9,7 @@ import pytest
 from measuring import check
 from scipy import linalg
 
-from catenary.postproc.indicators import (
+from catenary.postproc.evaluate.error_indicators import (
     LINE_MEMORY,
     NEAR_MEMORY,
     Method,
@@ -20,9 +20,9 @@ from catenary.postproc.indicators import (
     resolved_frequency,
     step_error,
 )
-from catenary.postproc.results import Results
-from catenary.solver import elements
-from catenary.solver.integration import Integration, integration_of
+from catenary.postproc.read.results import Results
+from catenary.solver.model import elements
+from catenary.solver.problem.integrator_parameters import Integration, integration_of
 
 UNDAMPED = Method(0.0, 0.0)
 

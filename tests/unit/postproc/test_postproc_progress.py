@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from catenary.postproc.progress import Progress, duration
-from catenary.solver.observation import Stage
-from catenary.solver.parallel import set_up_logging
+from catenary.postproc.record.progress import Progress, duration
+from catenary.solver.base.parallel import set_up_logging
+from catenary.solver.time_loop.observers import Stage
 
 RANK_0 = types.SimpleNamespace(rank=0)
 DT = 1e-3

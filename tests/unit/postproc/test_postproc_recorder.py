@@ -13,13 +13,14 @@ import h5py
 import numpy as np
 import pytest
 
-from catenary.postproc import channels, result_file
-from catenary.postproc.header import Header
-from catenary.postproc.recorder import Recorder
-from catenary.postproc.results import Results
-from catenary.postproc.storage import NoRoom
-from catenary.postproc.summary import real_time_factor
-from catenary.solver.errors import InputError, RunBroken
+from catenary.postproc.files import result_file
+from catenary.postproc.files.disk import NoRoom
+from catenary.postproc.read.results import Results
+from catenary.postproc.record import channels
+from catenary.postproc.record.header import Header
+from catenary.postproc.record.recorder import Recorder
+from catenary.postproc.report.summary import real_time_factor
+from catenary.solver.base.errors import InputError, RunBroken
 
 CONFTEST = Path(__file__).with_name("conftest.py")
 
@@ -234,7 +235,7 @@ def test_a_full_disk_ends_the_run_with_a_sentence_and_keeps_the_record(
     )
     last = program.stderr.strip().splitlines()[-1]
     assert program.returncode == 1
-    assert last.startswith(f"catenary.solver.errors.RunBroken: writing {path} failed at t = ")
+    assert last.startswith(f"catenary.solver.base.errors.RunBroken: writing {path} failed at t = ")
     assert "(File too large): raise the limit on the size of a file" in last
     with Results(path) as results:
         # Everything up to the step at which the run broke is there, and the file says why.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from catenary.postproc.remarks import remarks
+from catenary.postproc.evaluate.remarks import remarks
 
 
 class Told:

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from catenary.postproc import export, plots
-from catenary.postproc.compare import compare
-from catenary.postproc.report import write_report
-from catenary.postproc.results import Results
-from catenary.solver.errors import InputError
+from catenary.postproc.evaluate.compare import compare
+from catenary.postproc.read.results import Results
+from catenary.postproc.report import csv_tables, plots
+from catenary.postproc.report.report import write_report
+from catenary.solver.base.errors import InputError
 
 PNG = b"\x89PNG\r\n\x1a\n"
 PICTURES = (
@@ -167,7 +167,7 @@ def test_dropper_table_has_what_an_installer_cuts_by(report_folder: Path, march:
 
 def test_channels_as_csv(run_folder: Path, march: Any) -> None:
     with Results(run_folder) as results:
-        rows = list(csv.reader(io.StringIO(export.pantographs_csv(results))))
+        rows = list(csv.reader(io.StringIO(csv_tables.pantographs_csv(results))))
     assert rows[0][:3] == [
         "time [s]",
         "leading contact_position [m]",
@@ -201,7 +201,7 @@ def test_a_failed_criterion_is_named(tmp_path: Path, make_march: Any, record_run
 def test_an_interrupted_run_is_reported_as_far_as_it_went(
     tmp_path: Path, make_march: Any, steps: int
 ) -> None:
-    from catenary.postproc.recorder import Recorder
+    from catenary.postproc.record.recorder import Recorder
 
     march = make_march()
     watcher = Recorder(march.comm, tmp_path / "run.h5", march.header())

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catenary.postproc import standards
-from catenary.postproc.statistics import (
+from catenary.postproc.evaluate import standards
+from catenary.postproc.evaluate.statistics import (
     DropperStatistics,
     PantographStatistics,
     RunStatistics,
     SupportStatistics,
 )
-from catenary.solver.errors import InputError
+from catenary.solver.base.errors import InputError
 
 SPEED = 300.0 / 3.6
 WAVE = 441.0 / 3.6

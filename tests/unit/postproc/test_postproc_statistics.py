@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from catenary.postproc import statistics as stats
-from catenary.postproc.results import Results
+from catenary.postproc.evaluate import statistics as stats
+from catenary.postproc.read.results import Results
 
 DT, SPEED = 1e-3, 100.0
 TIME = DT * np.arange(12001)

@@ -12,9 +12,9 @@ import h5py
 import numpy as np
 import pytest
 
-from catenary.postproc import export, plots
-from catenary.postproc.report import write_report
-from catenary.postproc.results import Results
+from catenary.postproc.read.results import Results
+from catenary.postproc.report import csv_tables, plots
+from catenary.postproc.report.report import write_report
 
 
 @pytest.fixture
@@ -41,7 +41,7 @@ def test_each_strip_has_a_column(tmp_path: Path, with_strips: Any, record_run: A
         force = results.channel("contact_force")
         np.testing.assert_array_equal(one, force[:, :1])
         np.testing.assert_allclose(two, force[:, 1:] * [0.6, 0.4], rtol=1e-15)
-        rows = list(csv.reader(io.StringIO(export.pantographs_csv(results))))
+        rows = list(csv.reader(io.StringIO(csv_tables.pantographs_csv(results))))
         figure = plots.strip_forces(results)
         assert len(figure.axes) == 1
     heads = [head for head in rows[0] if "strip" in head]

@@ -10,10 +10,10 @@ import pytest
 from measuring import march
 from small_lines import HANGING, WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 
-from catenary.solver import contact_kernels
-from catenary.solver.contact import ContactWire
-from catenary.solver.distribution import distribute
-from catenary.solver.equilibrium import find_form
+from catenary.solver.contact import contact_kernels
+from catenary.solver.contact.contact_wire import ContactWire
+from catenary.solver.model.partition import distribute
+from catenary.solver.statics.equilibrium import find_form
 
 LINE = ac_simple_line(4)
 EPS = np.finfo(float).eps

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from small_lines import BARE, ac_simple_line, mesh_of, problem_of
 
-from catenary.solver.distribution import PANTOGRAPH_NODES, distribute
-from catenary.solver.model import Model, build
+from catenary.solver.model.model import Model, build
+from catenary.solver.model.partition import PANTOGRAPH_NODES, distribute
 
 
 @pytest.fixture(scope="module")

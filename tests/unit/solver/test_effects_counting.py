@@ -10,18 +10,18 @@ import pytest
 from small_lines import BARE, EN_PANTOGRAPH, ac_simple_line, mesh_of, problem_of, train
 
 from catenary.mbs.build import Operation, make_pantograph
-from catenary.mbs.lateral import LateralPath
+from catenary.mbs.head.strips import Turning
+from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lowering import Lowering
-from catenary.mbs.motion_sources import Harmonic, VehicleMotion
-from catenary.mbs.strips import Turning
+from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import MESSENGER_WIRE, LineMesh
-from catenary.solver import effects
-from catenary.solver.contact_laws import LinearLaw
-from catenary.solver.equilibrium import find_form
-from catenary.solver.incidents import DropperBreak, TensionLoss
-from catenary.solver.model import Model, build
-from catenary.solver.problem import Damping, Problem
+from catenary.solver.effects import effect as effects
+from catenary.solver.model.model import Model, build
+from catenary.solver.problem.contact_laws import LinearLaw
+from catenary.solver.problem.incidents import DropperBreak, TensionLoss
+from catenary.solver.problem.problem import Damping, Problem
+from catenary.solver.statics.equilibrium import find_form
 
 N_SPANS = 4
 

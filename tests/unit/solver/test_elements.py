@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catenary.solver import elements
+from catenary.solver.model import elements
 
 EPS = np.finfo(float).eps
 lengths = st.floats(0.05, 20.0)

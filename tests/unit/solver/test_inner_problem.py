@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from catenary.solver import inner
-from catenary.solver.contact_laws import HertzLaw, LinearLaw
-from catenary.solver.heads import Heads
-from catenary.solver.inner import InnerProblem, InnerSolution
-from catenary.solver.law_in_steps import HertzInSteps, LinearInSteps
-from catenary.solver.response import LineResponse
+from catenary.solver.contact.head_states import Heads
+from catenary.solver.contact.line_response import LineResponse
+from catenary.solver.contact_problem import complementarity
+from catenary.solver.contact_problem.complementarity import InnerProblem, InnerSolution
+from catenary.solver.contact_problem.law_tangents import HertzInSteps, LinearInSteps
+from catenary.solver.problem.contact_laws import HertzLaw, LinearLaw
 
 EPS = np.finfo(float).eps
 
@@ -135,7 +135,7 @@ def test_pivoting_finds_the_same_solution(case: Case) -> None:
     """Without any round of the active set, the fallback has to do all the work."""
     usual = case.solve()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(inner, "_MAX_ROUNDS", 0)
+        patch.setattr(complementarity, "_MAX_ROUNDS", 0)
         pivoted = case.solve()
     assert pivoted.pivoted and not usual.pivoted
     assert case.violation(pivoted) < TOLERANCE

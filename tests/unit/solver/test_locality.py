@@ -21,14 +21,14 @@ from small_lines import (
     problem_of,
 )
 
-from catenary.solver import compliance
-from catenary.solver.compliance import Windows
-from catenary.solver.equilibrium import find_form
-from catenary.solver.errors import RunBroken
-from catenary.solver.line_motion import LineMotion
-from catenary.solver.locality import DECAY, reach
-from catenary.solver.model import Model, build
-from catenary.solver.problem import Damping
+from catenary.solver.base.errors import RunBroken
+from catenary.solver.integrators.line_integrator import LineMotion
+from catenary.solver.linear import unit_responses
+from catenary.solver.linear.decay_length import DECAY, reach
+from catenary.solver.linear.unit_responses import Windows
+from catenary.solver.model.model import Model, build
+from catenary.solver.problem.problem import Damping
+from catenary.solver.statics.equilibrium import find_form
 
 DAMPED = HANGING | {"structural_damping"}
 
@@ -110,7 +110,7 @@ def test_short_columns_are_the_columns_of_full_solves(stepper: LineMotion) -> No
     ends = model.dofs(model.mesh.droppers)
     x = model.mesh.x(model.mesh.droppers[:, 1])
     pair = np.broadcast_to(np.array([1.0, -1.0]), ends.shape)
-    found = compliance.compute(
+    found = unit_responses.compute(
         COMM, stepper.operators.solve_for, stepper.ownership, stepper.windows, ends, pair, x
     )
     coefficients = (1.0, stepper.position_factor, stepper.velocity_factor)
@@ -139,7 +139,7 @@ def test_columns_that_leak_are_refused(stepper: LineMotion) -> None:
     too_short = Windows(positions(model)[:: model.block_size], model.block_size, 4.0)
     solve_for, ones = stepper.operators.solve_for, np.ones(dofs.shape)
     with pytest.raises(RunBroken, match=r"does not decay within 4 m.*numerics\.dt_s"):
-        compliance.compute(COMM, solve_for, stepper.ownership, too_short, dofs, ones, x)
+        unit_responses.compute(COMM, solve_for, stepper.ownership, too_short, dofs, ones, x)
 
 
 def test_windows_hold_all_unknowns_within_reach() -> None:

@@ -19,7 +19,7 @@ from catenary.solver.base import loop_cache
 LOOP = "from catenary.solver.sizes import SIZE\n@compiled\ndef loop(x):\n    return x + SIZE\n"
 COMPILE = """
 import numpy as np
-from catenary.solver.kernels import shift
+from catenary.solver.integrators.state_kernels import shift
 places = np.zeros(2)
 shift(np.ones(2), places, 3.0)
 assert places[0] == 4.0

@@ -11,11 +11,11 @@ from petsc4py import PETSc
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.effects import Effect
-from catenary.solver.errors import InputError, RunBroken
-from catenary.solver.model import ModelBuilder
-from catenary.solver.observation import StepView
-from catenary.solver.problem import Problem
+from catenary.solver.base.errors import InputError, RunBroken
+from catenary.solver.effects.effect import Effect
+from catenary.solver.model.model import ModelBuilder
+from catenary.solver.problem.problem import Problem
+from catenary.solver.time_loop.observers import StepView
 
 LINE = en50318_line(3)
 BREAKS_AT = 0.0105

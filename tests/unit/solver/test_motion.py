@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from catenary.solver import kernels
-from catenary.solver.motion import Motion, MotionAhead, Steps
+from catenary.solver.integrators import state_kernels
+from catenary.solver.integrators.line_state import Motion, MotionAhead, Steps
 
 RNG = np.random.default_rng(5)
 N = 12
@@ -29,7 +29,7 @@ def test_it_keeps_what_newmark_s_formulas_predict(state: np.ndarray) -> None:
     motion, work = ahead(), np.zeros(N)
     motion.put(*state)
     predicted = state.copy()
-    kernels.predict(*predicted, work, *STEPS[:4])
+    state_kernels.predict(*predicted, work, *STEPS[:4])
     x, y, z, _ = motion.read
     for found, expected in ((x, work), (y, predicted[1]), (z, state[2])):
         np.testing.assert_allclose(found, expected, rtol=0, atol=4 * ROUND_OFF)
@@ -42,7 +42,7 @@ def test_it_gives_back_what_it_took(state: np.ndarray) -> None:
     np.testing.assert_allclose(found, state, rtol=0, atol=4 * ROUND_OFF)
     at_unknowns = [
         [read(i, motion.read) for i in range(N)]
-        for read in (kernels.displacement_at, kernels.velocity_at)
+        for read in (state_kernels.displacement_at, state_kernels.velocity_at)
     ]
     np.testing.assert_allclose(at_unknowns, state[:2], rtol=0, atol=4 * ROUND_OFF)
 

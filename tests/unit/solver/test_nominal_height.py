@@ -15,9 +15,9 @@ from small_lines import (
 )
 
 from catenary.meshgen.line import Line
-from catenary.solver.equilibrium import elasticity, find_form, middle_span
-from catenary.solver.pantographs import nominal_height_rule
-from catenary.solver.problem import Placement
+from catenary.solver.contact.pantographs import nominal_height_rule
+from catenary.solver.problem.problem import Placement
+from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
 
 
 def height_on(line: Line, elements: int, placement: Placement) -> float:

@@ -10,7 +10,7 @@ import pytest
 from petsc4py import PETSc
 from scipy import sparse
 
-from catenary.solver.linear import PartSolver, Wrapped
+from catenary.solver.linear.petsc_solvers import PartSolver, Wrapped
 
 N_STATIONS = 12
 
@@ -54,7 +54,7 @@ def test_a_solver_that_nobody_destroyed_does_not_crash_the_end_of_python() -> No
     """PETSc is finalised after Python, and cannot free what is written in Python then."""
     code = (
         "import numpy as np; from scipy import sparse; "
-        "from catenary.solver.linear import PartSolver; "
+        "from catenary.solver.linear.petsc_solvers import PartSolver; "
         "kept = PartSolver(sparse.identity(8).tobsr((4, 4)), slice(0, 2), True, True); "
         "kept.itself = kept"
     )

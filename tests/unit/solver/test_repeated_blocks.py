@@ -8,9 +8,9 @@ from repeating_line import line
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from catenary.solver.repeated_rows import repeated_rows
-from catenary.solver.station_blocks import MOST_KINDS, station_product
-from catenary.solver.station_factors import station_factors
+from catenary.solver.linear.station_factors import station_factors
+from catenary.solver.linear.station_products import MOST_KINDS, station_product
+from catenary.solver.linear.unique_rows import repeated_rows
 
 RNG = np.random.default_rng(7)
 # Sums of a dozen products of numbers of order one; solves lose a few digits to the condition, 1e2.

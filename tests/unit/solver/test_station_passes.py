@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from repeating_line import line
 
-from catenary.solver import kernels
-from catenary.solver.motion import Motion, MotionAhead, Steps
-from catenary.solver.station_blocks import station_product
-from catenary.solver.station_factors import station_factors
-from catenary.solver.station_passes import StationPasses
+from catenary.solver.integrators import state_kernels
+from catenary.solver.integrators.line_state import Motion, MotionAhead, Steps
+from catenary.solver.integrators.two_pass_step import StationPasses
+from catenary.solver.linear.station_factors import station_factors
+from catenary.solver.linear.station_products import station_product
 
 RNG = np.random.default_rng(11)
 STEPS = Steps(0.1, 0.002, 0.05, 0.3, 0.0025, 0.05, 0.4)
@@ -36,10 +36,10 @@ def test_passes_take_the_steps_of_their_parts(n_own: int, before: int, after: in
 
     read, force, solution = others.copy(), np.zeros(4 * n), answer.copy()
     expected = displacement.copy(), velocity.copy(), solution[own]
-    kernels.predict(*expected, read[4:-4][own], *STEPS[:4])
+    state_kernels.predict(*expected, read[4:-4][own], *STEPS[:4])
     product.multiply(read, force)
     factors.solve(force, solution)
-    kernels.correct(*expected, *STEPS[4:])
+    state_kernels.correct(*expected, *STEPS[4:])
 
     # Droppers at every third station, whose ends may be at different ones.
     upper = np.arange(0, n_own, 3)
@@ -55,7 +55,7 @@ def test_passes_take_the_steps_of_their_parts(n_own: int, before: int, after: in
     passes.step()
     found = motion.displacement, motion.velocity, answer[own], tension
     plain = Motion(*expected, (0.0, 0.0)).read
-    kernels.tension(plain, ends, LAWS, pulls)
+    state_kernels.tension(plain, ends, LAWS, pulls)
     for one, other in zip(found, (*expected, pulls), strict=True):
         assert np.abs(one - other).max(initial=0.0) < ROUND_OFF * np.abs(other).max(initial=1.0)
 

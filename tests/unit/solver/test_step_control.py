@@ -7,10 +7,10 @@ import pytest
 from measuring import check
 from petsc4py import PETSc
 
-from catenary.solver.errors import InputError
-from catenary.solver.problem import n_halvings
-from catenary.solver.step_control import StepControl
-from catenary.solver.step_error import StepError
+from catenary.solver.base.errors import InputError
+from catenary.solver.problem.problem import n_halvings
+from catenary.solver.schemes.step_error import StepError
+from catenary.solver.schemes.ts_adapt import StepControl
 
 
 @pytest.fixture

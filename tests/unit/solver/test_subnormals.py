@@ -10,8 +10,8 @@ import pytest
 from measuring import History, start_march
 from small_lines import en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.solver import march
-from catenary.solver.subnormals import taken_for_zero
+from catenary.solver.base.flush_to_zero import taken_for_zero
+from catenary.solver.time_loop import march
 
 TINY = np.finfo(float).tiny
 

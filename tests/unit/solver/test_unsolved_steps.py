@@ -14,16 +14,21 @@ from measuring import History, start_march
 from petsc4py import PETSc
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.solver.contact_laws import HertzLaw, LinearLaw
-from catenary.solver.coupling import Explicit
-from catenary.solver.equilibrium import find_form
-from catenary.solver.errors import InputError, NotConverged, RunBroken
-from catenary.solver.heads import Heads
-from catenary.solver.inner import InnerProblem
-from catenary.solver.law_in_steps import HertzInSteps, KinematicInSteps, LawInSteps, LinearInSteps
-from catenary.solver.march import Outcome
-from catenary.solver.problem import Problem
-from catenary.solver.response import LineResponse
+from catenary.solver.base.errors import InputError, NotConverged, RunBroken
+from catenary.solver.contact.head_states import Heads
+from catenary.solver.contact.line_response import LineResponse
+from catenary.solver.contact_problem.complementarity import InnerProblem
+from catenary.solver.contact_problem.coupling import Explicit
+from catenary.solver.contact_problem.law_tangents import (
+    HertzInSteps,
+    KinematicInSteps,
+    LawInSteps,
+    LinearInSteps,
+)
+from catenary.solver.problem.contact_laws import HertzLaw, LinearLaw
+from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.time_loop.march import Outcome
 
 NO_DROPPERS = np.zeros((0, 1))
 LINE = en50318_line(2)

@@ -1,0 +1,96 @@
+"""The verb ``accuracy``. Imported by ``cli``, whose app it extends."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from catenary.cases.cli import main as cli
+from catenary.cases.result_folder.output_folder import refuse_impossible
+from catenary.cases.terminal import completion, console
+from catenary.solver.base.errors import InputError
+
+if TYPE_CHECKING:
+    from catenary.cases.studies.accuracy.plan import Plan
+
+_MOST_REPEATS = 99
+
+
+@cli.app.command(
+    "accuracy",
+    help="Vary step, mesh, scheme, coupling and models of a case; print the error of each setting, "
+    "its time, and what to take for a wanted accuracy. The same command continues a study that was "
+    "stopped.",
+    epilog="Example: catenary accuracy en50318_2002 -o results/accuracy --axes dt,grid --target 2%",
+)
+@console.guarded
+def accuracy(
+    case: cli.Case,
+    out: cli.Out,
+    extras: cli.PetscOptions = None,
+    axes: Annotated[
+        str | None,
+        typer.Option(
+            "--axes",
+            metavar="NAME,...",
+            autocompletion=completion.axes,
+            help="Out of dt, elements, grid, scheme, coupling, contact, dropper, pantograph; all "
+            "if absent.",
+        ),
+    ] = None,
+    target: Annotated[
+        str, typer.Option("--target", metavar="PERCENT", help="Wanted accuracy.")
+    ] = "1%",
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick", help="Few levels and a coarser reference, good for targets from 2%."
+        ),
+    ] = False,
+    repeats: Annotated[
+        int, typer.Option("--repeats", metavar="N", help="How often short runs are timed.")
+    ] = 3,
+    assignments: cli.Assignments = None,
+    shortened: cli.Shortened = False,
+    force: cli.Force = False,
+    verbose: cli.Verbose = False,
+) -> int:
+    """Collective."""
+    from catenary.cases.process.petsc_options import split_extras
+    from catenary.cases.studies.accuracy.analysis import parse_target
+    from catenary.cases.studies.accuracy.axes import parse_axes
+    from catenary.cases.studies.accuracy.plan import make_plan
+
+    wanted = parse_target(target)
+
+    def read() -> tuple[Plan, list[str]]:
+        more, options = split_extras(extras or [])
+        refuse_impossible(out)
+        if not 1 <= repeats <= _MOST_REPEATS:
+            raise InputError(f"--repeats {repeats} must be between 1 and {_MOST_REPEATS}")
+        overrides = [*(assignments or []), *more]
+        chosen = parse_axes(axes)
+        plan = make_plan(case, chosen, overrides, shortened, quick=quick, repeats=repeats)
+        return plan, options
+
+    comm, plan, arguments = cli.begin(read, verbose, lambda made: made.jobs[0].scene)
+    from catenary.cases.result_folder.folder_lock import held
+    from catenary.cases.studies.accuracy import output as accuracy_output
+    from catenary.cases.studies.accuracy import runs as study
+    from catenary.postproc.report.wording import counted
+    from catenary.solver.base.parallel import on_root
+
+    with held(out, comm, f"catenary accuracy {case}"):
+        found, ended = study.run(
+            plan, out, comm, force=force, petsc_options=arguments, tell=console.say
+        )
+        if found is None:
+            console.complain("the study was interrupted; the same command continues it")
+            return console.BROKEN
+        files = on_root(comm, lambda: accuracy_output.write(found, out, wanted))
+    console.say("\n" + accuracy_output.as_text(found, wanted))
+    console.say(
+        f"\n{counted(len(ended), 'run')}, {found.wall:.0f} s\n" + "\n".join(map(str, files))
+    )
+    return console.DONE

@@ -1,0 +1,46 @@
+"""The verb ``list``. Imported by ``cli``, whose app it extends."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from catenary.cases.cli import main as cli
+from catenary.cases.terminal import completion, console
+from catenary.solver.base.errors import InputError
+
+
+@cli.app.command(
+    "list",
+    help="List the shipped cases, or all keys of a scene.",
+    epilog="Example: catenary list --keys damping",
+)
+@console.guarded
+@console.serial
+def list_cases(
+    keys: Annotated[
+        bool, typer.Option("--keys", help="Every key of a scene, its unit, default and meaning.")
+    ] = False,
+    wanted: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="FILTER",
+            autocompletion=completion.keys,
+            help="With --keys: a part of a key, or a pattern with * and ?; tells also bounds, the "
+            "words that a key accepts, and typical values.",
+        ),
+    ] = None,
+) -> None:
+    """Serial."""
+    if keys:
+        from catenary.cases.terminal.key_list import key_details, key_table
+
+        console.say(key_table() if wanted is None else key_details(wanted))
+        return
+    if wanted is not None:
+        raise InputError(f"{wanted} filters keys: write `catenary list --keys {wanted}`")
+    from catenary.cases.scene.case_files import entries
+    from catenary.cases.terminal import terminal_text
+
+    console.say(terminal_text.case_table(entries()))

@@ -1,0 +1,77 @@
+"""The verb ``pantograph``. Imported by ``cli``, whose app it extends."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from catenary.cases.cli import main as cli
+from catenary.cases.terminal import console
+
+
+@cli.app.command(
+    "pantograph",
+    help="Print static force, equivalent masses, natural frequencies and frequency response of a "
+    "case's pantograph, and a lumped model fitted to it; with -o also write them as files.",
+    epilog="Example: catenary pantograph ambrosio2012 --fit 2 -o results/pantograph",
+)
+@console.guarded
+@console.serial
+def pantograph(
+    case: cli.Case,
+    extras: cli.MoreAssignments = None,
+    kind: Annotated[
+        str | None,
+        typer.Option(
+            "--kind",
+            metavar="NAME",
+            help="Which table of [pantographs]; the leading one's if absent.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--out",
+            parser=console.folder,
+            metavar="<path>",
+            help="Folder for receptance.csv, receptance.png and lumped.toml.",
+        ),
+    ] = None,
+    masses: Annotated[
+        int | None,
+        typer.Option(
+            "--fit",
+            metavar="N",
+            help="Masses of the lumped model, 1 to 3; two if absent, a lumped pantograph's own.",
+        ),
+    ] = None,
+    low: Annotated[float, typer.Option("--from", metavar="HZ", help="Lowest frequency.")] = 0.1,
+    high: Annotated[float, typer.Option("--to", metavar="HZ", help="Highest frequency.")] = 25.0,
+    points: Annotated[
+        int, typer.Option("--points", metavar="N", help="Frequencies between them, geometric.")
+    ] = 250,
+    fit_low: Annotated[
+        float,
+        typer.Option(
+            "--fit-from",
+            metavar="HZ",
+            help="Fit above this frequency: below it the raising decides, which no spring need be.",
+        ),
+    ] = 0.5,
+    assignments: cli.Assignments = None,
+    force: cli.Force = False,
+) -> None:
+    """Serial."""
+    from catenary.cases.studies.pantograph.output import new_files, write_study
+    from catenary.cases.studies.pantograph.study import Range, study, study_text
+
+    over = Range(low, high, points, fit_low).checked()
+    if out is not None:
+        new_files(out, force)
+    found = study(cli.load(case, assignments, extras), kind, masses, over)
+    console.say(study_text(found))
+    if out is not None:
+        console.say("\n" + "\n".join(str(path) for path in write_study(found, out)))

@@ -1,0 +1,58 @@
+"""The verb ``stability-map``. Imported by ``cli``, whose app it extends."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from catenary.cases.cli import main as cli
+from catenary.cases.result_folder.output_folder import refuse_impossible
+from catenary.cases.terminal import console
+from catenary.solver.base.errors import InputError
+
+TABLE, PICTURE = "stability_map.csv", "stability_map.png"
+
+
+@cli.app.command(
+    "stability-map",
+    help="Find the largest stable step of every coupling against contact stiffness and head mass, "
+    "from the matrices of a step and by marching, and draw it. Some three minutes; exits with 3 "
+    "if the two do not agree.",
+    epilog="Example: catenary stability-map en50318_2002 -o results/stability",
+)
+@console.guarded
+@console.serial
+def stability_map(
+    case: cli.Case,
+    out: cli.Out,
+    extras: cli.MoreAssignments = None,
+    assignments: cli.Assignments = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Few stiffnesses and masses.")] = False,
+    shortened: cli.Shortened = False,
+    force: cli.Force = False,
+) -> int:
+    """Serial."""
+    from mpi4py import MPI
+
+    from catenary.cases.studies.stability import map as study
+    from catenary.cases.studies.stability.picture import draw
+    from catenary.cases.studies.sweep.output import as_csv
+    from catenary.postproc.files.disk import write_all
+    from catenary.postproc.report import plots
+
+    refuse_impossible(out)
+    if (out / TABLE).exists() and not force:
+        raise InputError(
+            f"{out / TABLE} is there already; name another folder with -o, or give --force"
+        )
+    given = [*(assignments or []), *(extras or [])]
+    grid = study.QUICK if quick else study.Grid()
+    found = study.make_map(case, given, shortened, MPI.COMM_SELF, grid, console.say)
+    content: dict[str, bytes | str] = {
+        TABLE: as_csv(study.as_rows(found)),
+        PICTURE: plots.png(draw(found)),
+    }
+    files = write_all(out, content)
+    console.say("\n" + study.as_text(found) + "\n" + "\n".join(map(str, files)))
+    return console.DONE if all(one.agrees for one in found.limits) else console.NOT_ACCEPTED

@@ -1,0 +1,173 @@
+"""The verb ``sweep`` and what ``run --study`` does. Imported by ``cli``, whose app it extends."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from catenary.cases.cli import main as cli
+from catenary.cases.result_folder.output_folder import refuse_impossible
+from catenary.cases.terminal import completion, console
+from catenary.solver.base.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from catenary.cases.studies.sweep.jobs import Ended, Job
+
+_SHOWN_BROKEN = 3
+
+
+@cli.app.command(
+    "sweep",
+    help="Run variants of a case one after the other and put their statistics side by side. The "
+    "same command continues a sweep that was stopped.",
+    epilog="Example: catenary sweep en50318_2002 -o results/speeds --vary "
+    "train.speed_km_h=200,250,300 --vary contact.stiffness_N_per_m=2e4,5e4",
+)
+@console.guarded
+def sweep(
+    case: cli.Case,
+    out: cli.Out,
+    extras: cli.MoreAndPetscOptions = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--vary",
+            metavar="KEY=V1,V2,...",
+            autocompletion=completion.assignments,
+            help="Values that a key takes; repeatable, all combinations are run.",
+        ),
+    ] = None,
+    named: Annotated[
+        Path | None,
+        typer.Option(
+            "--variants",
+            help='TOML file of named variants, each a line name = ["key=value", ...].',
+        ),
+    ] = None,
+    assignments: cli.Assignments = None,
+    plotted: Annotated[
+        str | None,
+        typer.Option(
+            "--plot",
+            metavar="STATISTIC,...",
+            help="Columns of sweep.csv to draw; mean_N,std_N,max_N,min_N,max_uplift_mm if absent.",
+        ),
+    ] = None,
+    shortened: cli.Shortened = False,
+    reports: Annotated[
+        bool, typer.Option("--reports", help="Also write the report of each run.")
+    ] = False,
+    force: cli.Force = False,
+    verbose: cli.Verbose = False,
+) -> int:
+    """Collective."""
+    from catenary.cases.process.petsc_options import split_extras
+    from catenary.cases.studies.sweep.jobs import check_statistics, make_jobs
+    from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product, read_named
+
+    def read() -> tuple[list[Job], list[str]]:
+        more, options = split_extras(extras or [])
+        if not vary and named is None:
+            raise InputError("there is nothing to vary: give --vary key=v1,v2,... or --variants")
+        check_statistics(_names(plotted))
+        varied = [parse_vary(text) for text in vary or []]
+        check_keys(product(varied, {}), "on the command line (--vary)")
+        table = {} if named is None else read_named(named)
+        check_keys(product([], table), f"in {named}")
+        variants = product(varied, table)
+        overrides = [*(assignments or []), *more]
+        jobs = make_jobs(case, variants, overrides, shortened, full_report=reports)
+        _refuse_other_sweep(out, jobs, force)
+        return jobs, options
+
+    comm, jobs, arguments = cli.begin(read, verbose, lambda made: made[0].scene)
+    from catenary.cases.result_folder.folder_lock import held
+    from catenary.cases.studies.sweep import output as sweep_output
+    from catenary.cases.studies.sweep.run_jobs import run_jobs
+    from catenary.solver.base.parallel import on_root
+
+    name = jobs[0].scene.case.name
+    show = _names(plotted) or sweep_output.PLOTTED
+    with held(out, comm, f"catenary sweep {case}"):
+        ended = run_jobs(jobs, out, comm, force=force, petsc_options=arguments, tell=console.say)
+        files = on_root(comm, lambda: sweep_output.write(out, name, ended, show))
+    console.say("\n" + sweep_output.as_text(ended))
+    console.say("\n" + "\n".join(str(path) for path in files))
+    return verdict(ended, "sweep")
+
+
+def run_study(
+    case: str,
+    out: Path,
+    extras: Sequence[str],
+    assignments: Sequence[str],
+    shortened: bool,
+    force: bool,
+    verbose: bool,
+) -> int:
+    """What ``catenary run CASE --study`` does; returns the exit code. Collective."""
+    from catenary.cases.process.petsc_options import split_extras
+    from catenary.cases.studies.case_study import Plan, find_study, make_plan
+
+    def read() -> tuple[Plan, list[str]]:
+        refuse_impossible(out)
+        more, options = split_extras(extras)
+        console.say(f"--study runs the program {find_study(case)}, which may do all that you may")
+        return make_plan(case, [*assignments, *more], shortened), options
+
+    comm, plan, arguments = cli.begin(read, verbose, lambda made: made.jobs[0].scene)
+    from catenary.cases.result_folder.folder_lock import held
+    from catenary.cases.studies import case_study
+
+    with held(out, comm, f"catenary run {case} --study"):
+        report, ended = case_study.run(
+            plan, out, comm, force=force, petsc_options=arguments, tell=console.say
+        )
+    if report is not None:
+        console.say("\n" + report)
+    return verdict(ended, "study")
+
+
+def verdict(ended: Sequence[Ended], what: str) -> int:
+    """The exit code; says which variants broke. Not collective."""
+    if ended and ended[-1].outcome == "interrupted":
+        console.complain(f"the {what} was interrupted; the same command continues it")
+        return console.BROKEN
+    broken = [one for one in ended if not one.done]
+    if not broken:
+        return console.DONE
+    names = ", ".join(f"{one.variant.name} ({one.outcome})" for one in broken[:_SHOWN_BROKEN])
+    more = len(broken) - _SHOWN_BROKEN
+    console.complain(
+        f"{len(broken)} of {len(ended)} variants broke: {names}"
+        + (f" and {more} more" if more > 0 else "")
+    )
+    return console.BROKEN
+
+
+def _names(text: str | None) -> list[str]:
+    """The names of a list with commas."""
+    return [] if text is None else [name.strip() for name in text.split(",")]
+
+
+def _refuse_other_sweep(out: Path, jobs: Sequence[Any], force: bool) -> None:
+    """Refuse to replace the table of a sweep that had variants which this one has not."""
+    refuse_impossible(out)
+    path = out / "sweep.json"
+    if force or not path.is_file():
+        return
+    try:
+        there = {one["name"] for one in json.loads(path.read_text(encoding="utf-8"))["variants"]}
+    except (OSError, ValueError, KeyError, TypeError):
+        there = set()
+    other = sorted(there - {job.variant.name for job in jobs})
+    if other:
+        raise InputError(
+            f"{path} is the table of a sweep with other variants ({other[0]}); name another folder "
+            "with -o, or give --force to replace it"
+        )

@@ -1,0 +1,1 @@
+"""The process of a run: signals, PETSc's options, memory limit, versions."""

@@ -1,0 +1,259 @@
+"""The lock of a result folder: one process writes there, all others are refused in a sentence.
+
+A lock is a file that is linked into place, which is one operation on local disks and over NFS. It
+names its process; where the kernel has ``flock`` the process also holds that. A lock that a dead
+process of this machine left is taken over. Of a process on another machine nobody can say that it
+is dead: its last sign of life is told, and the user removes the file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import os
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from catenary.cases.result_folder.lock_owner import Owner, myself, read_owner
+from catenary.postproc.files.disk_errors import code_of, reason, remedy
+from catenary.solver.base.errors import InputError
+from catenary.solver.base.parallel import on_root
+
+LOCK_FILE = ".catenary.lock"
+# Time between two signs of life [s], and after how many of them a lock looks left behind.
+HEARTBEAT = 30.0
+SILENT = 20
+_TRIES = 20
+
+
+class FolderLock:
+    """A result folder held by this process, from the call on. Not collective.
+
+    Parameters
+    ----------
+    folder : made if it is not there, with its parents
+    command : what this process does, told to those who are refused
+
+    Raises
+    ------
+    InputError
+        If another process holds it, or if the folder cannot be made or written to.
+    """
+
+    def __init__(self, folder: Path, command: str) -> None:
+        self._made = _make(folder)
+        self._stop = threading.Event()
+        try:
+            self._directory = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        except OSError as error:
+            _remove(self._made)
+            raise refusal(folder, error) from error
+        try:
+            self._handle = self._take(folder, myself(command))
+        except BaseException as error:
+            os.close(self._directory)
+            _remove(self._made)
+            if isinstance(error, OSError):
+                raise refusal(folder, error) from error
+            raise
+        self._beat = threading.Thread(target=self._live, name="catenary-lock", daemon=True)
+        self._beat.start()
+
+    def release(self) -> None:
+        """Remove the lock, and the folders made for it if nothing was written into them."""
+        self._stop.set()
+        self._beat.join()
+        # By the folder's descriptor: it may have been moved, with the lock in it.
+        with contextlib.suppress(OSError):
+            if os.path.samestat(self._stat(LOCK_FILE), os.fstat(self._handle)):
+                os.unlink(LOCK_FILE, dir_fd=self._directory)
+        os.close(self._handle)
+        os.close(self._directory)
+        _remove(self._made)
+
+    def _take(self, folder: Path, me: Owner) -> int:
+        """Put the lock in place; returns its descriptor."""
+        name = f"{LOCK_FILE}.{me.host}.{me.pid}"
+        handle = os.open(name, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o644, dir_fd=self._directory)
+        try:
+            os.write(handle, me.text().encode())
+            os.fsync(handle)
+            with contextlib.suppress(OSError):
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            for _ in range(_TRIES):
+                if self._put(name, handle):
+                    return handle
+                self._clear(folder, me, handle)
+            raise InputError(f"{folder / LOCK_FILE} changes hands all the time; try again")
+        except BaseException:
+            os.close(handle)
+            raise
+        finally:
+            with contextlib.suppress(OSError):
+                os.unlink(name, dir_fd=self._directory)
+
+    def _put(self, name: str, handle: int) -> bool:
+        """Give the file its name as the lock; False if there is a lock."""
+        here = self._directory
+        try:
+            os.link(name, LOCK_FILE, src_dir_fd=here, dst_dir_fd=here, follow_symlinks=False)
+        except FileExistsError:
+            # Over NFS the answer to a link that was made may get lost, and it is tried again.
+            return os.fstat(handle).st_nlink == 2
+        except OSError as error:
+            if error.errno not in (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK):
+                raise
+            return self._rename(name)  # a file system without links
+        return True
+
+    def _rename(self, name: str) -> bool:
+        try:
+            claim = os.open(LOCK_FILE, os.O_CREAT | os.O_EXCL, dir_fd=self._directory)
+        except FileExistsError:
+            return False
+        os.close(claim)
+        os.rename(name, LOCK_FILE, src_dir_fd=self._directory, dst_dir_fd=self._directory)
+        return True
+
+    def _clear(self, folder: Path, me: Owner, mine: int) -> None:
+        """Remove the lock that is there if its process is dead, else refuse."""
+        try:
+            old = os.open(LOCK_FILE, os.O_RDWR | os.O_NOFOLLOW, dir_fd=self._directory)
+        except FileNotFoundError:
+            return
+        try:
+            owner = read_owner(os.read(old, 65536).decode(errors="replace"))
+            if not _dead(old, owner, me):
+                raise InputError(_in_use(folder, owner, self._silence(old, mine)))
+            # Of two that find the same dead lock one renames it; the other finds a new one here.
+            aside = f"{LOCK_FILE}.{me.host}.{me.pid}.dead"
+            os.rename(LOCK_FILE, aside, src_dir_fd=self._directory, dst_dir_fd=self._directory)
+            if not os.path.samestat(self._stat(aside), os.fstat(old)):
+                here = self._directory
+                try:
+                    os.link(aside, LOCK_FILE, src_dir_fd=here, dst_dir_fd=here)
+                except FileExistsError:
+                    pass
+                except OSError:  # a file system without links
+                    os.rename(aside, LOCK_FILE, src_dir_fd=here, dst_dir_fd=here)
+                    return
+            os.unlink(aside, dir_fd=self._directory)
+        except FileNotFoundError:
+            return
+        finally:
+            os.close(old)
+
+    @staticmethod
+    def _silence(old: int, mine: int) -> float:
+        """Time since a lock's last sign of life [s], by the clock of the disk."""
+        os.utime(mine)
+        return max(0.0, os.fstat(mine).st_mtime - os.fstat(old).st_mtime)
+
+    def _live(self) -> None:
+        while not self._stop.wait(HEARTBEAT):
+            with contextlib.suppress(OSError):
+                os.utime(self._handle)
+
+    def _stat(self, name: str) -> os.stat_result:
+        return os.stat(name, dir_fd=self._directory, follow_symlinks=False)
+
+
+@contextlib.contextmanager
+def held(folder: Path, comm: Any, command: str) -> Iterator[None]:
+    """A context in which this run alone writes into a folder. Collective.
+
+    Raises
+    ------
+    InputError
+        As ``FolderLock``, on all ranks.
+    """
+    locks: list[FolderLock] = []
+    on_root(comm, lambda: locks.append(FolderLock(folder, command)))
+    try:
+        yield
+    finally:
+        for lock in locks:
+            lock.release()
+
+
+def refusal(folder: Path, error: OSError) -> InputError:
+    """The sentence for a folder that cannot be made or written to."""
+    said, advice = reason(error), remedy(error)
+    if code_of(error) in (errno.ENOTDIR, errno.EEXIST):
+        blocked = next(
+            (one for one in (folder, *folder.parents) if os.path.lexists(one) and not one.is_dir()),
+            folder,
+        )
+        broken_link = blocked.is_symlink() and not blocked.exists()
+        said = f"{blocked} is {'a link that leads nowhere' if broken_link else 'no folder'}"
+        advice = "choose another output folder"
+    return InputError(
+        f"the folder {folder} for the results cannot be made or written to ({said}): {advice}"
+    )
+
+
+def _make(folder: Path) -> list[Path]:
+    """Make a folder; returns those that were made, the outermost first."""
+    made: list[Path] = []
+    try:
+        missing = [folder]
+        while not missing[-1].exists() and missing[-1] != missing[-1].parent:
+            missing.append(missing[-1].parent)
+        for path in reversed(missing[:-1]):
+            path.mkdir(exist_ok=True)
+            made.append(path)
+        if not folder.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
+    except OSError as error:
+        _remove(made)
+        raise refusal(folder, error) from error
+    return made
+
+
+def _remove(made: list[Path]) -> None:
+    """Remove folders unless something was written into them, which is the rule."""
+    for path in reversed(made):
+        with contextlib.suppress(OSError):
+            path.rmdir()
+
+
+def _dead(old: int, owner: Owner | None, me: Owner) -> bool:
+    """Whether the process of a lock is no more, as far as that can be known."""
+    let_go = False
+    try:
+        fcntl.flock(old, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        let_go = True
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without flock
+        pass
+    if owner is None:
+        return False
+    if owner.same_processes(me):
+        return not owner.alive
+    # Of containers on one kernel flock knows all; of another machine nobody does.
+    return me.before_restart(owner) or (owner.same_boot(me) and let_go)
+
+
+def _in_use(folder: Path, owner: Owner | None, silence: float) -> str:
+    """The sentence for who is refused; ``silence`` since the last sign of life [s]."""
+    lock = folder / LOCK_FILE
+    sign = f"its last sign of life is {_duration(silence)} old"
+    if owner is None:
+        return (
+            f"{folder} seems to be in use: {lock} names no process, {sign}; if no run is writing "
+            "there, remove that file"
+        )
+    advice = "wait for its end, or choose another folder"
+    if silence > SILENT * HEARTBEAT:
+        advice = f"if that process has ended, remove {lock}; else {advice}"
+    return f"{folder} is in use by {owner.told}, {sign}: {advice}"
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 120.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"

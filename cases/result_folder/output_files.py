@@ -1,0 +1,50 @@
+"""Files that a verb writes at the user's request: refused before anything is computed."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catenary.postproc.files.csv_text import csv_text
+from catenary.solver.base.errors import InputError, RunBroken
+
+DROPPER_COLUMNS = ("dropper_span", "dropper_x", "dropper_length", "dropper_force")
+_DROPPER_HEADS = ("span", "x_m", "length_m", "force_N")
+
+
+def new_file(path: Path, suffixes: tuple[str, ...], force: bool) -> None:
+    """Raise ``InputError`` unless ``path`` can be written with one of ``suffixes``."""
+    if path.suffix not in suffixes:
+        raise InputError(f"-o {path} must have a name that ends in {' or '.join(suffixes)}")
+    if path.is_dir():
+        raise InputError(f"-o {path} is a folder; name a file")
+    if path.exists() and not force:
+        raise InputError(f"-o {path} exists already; give --force to replace it")
+    if not path.parent.is_dir():
+        raise InputError(f"-o {path} cannot be written: there is no folder {path.parent}")
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise InputError(f"-o {path} cannot be written: permission denied")
+
+
+def write_static(path: Path, table: Mapping[str, Any]) -> None:
+    """Write the static table: the droppers as CSV, or everything as JSON, by the file's suffix."""
+    try:
+        with path.open("w", encoding="utf-8", newline="") as stream:
+            if path.suffix == ".json":
+                plain = {name: np.asarray(value).tolist() for name, value in table.items()}
+                json.dump(plain, stream, indent=1)
+                stream.write("\n")
+                return
+            columns = [np.asarray(table[name]) for name in DROPPER_COLUMNS]
+            rows = (
+                (int(span) + 1, f"{x:.4f}", f"{length:.5f}", f"{force:.3f}")
+                for span, x, length, force in zip(*columns, strict=True)
+            )
+            stream.write(csv_text(_DROPPER_HEADS, rows))
+    except OSError as error:
+        raise RunBroken(f"{path} could not be written: {error.strerror}") from error

@@ -1,0 +1,179 @@
+"""The folder of a run's results, judged before anything is computed: names, files there, room."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import logging
+import os
+import stat
+from pathlib import Path
+from typing import NamedTuple
+
+from catenary.cases.result_folder.folder_lock import refusal
+from catenary.postproc.files.own_files import (
+    FIELD_FILES,
+    OWN_FILES,
+    RUN_FILE,
+    part_of,
+    remove_parts,
+)
+from catenary.solver.base.errors import InputError
+
+logger = logging.getLogger("catenary.run")
+
+# A run beyond one of these asks for --force.
+MOST_BYTES = 20e9
+MOST_SECONDS = 12 * 3600.0
+MOST_STEPS = 5_000_000
+# A run beyond one of these is announced [bytes], [s].
+LARGE = 1e9
+LONG = 600.0
+
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+class RunSize(NamedTuple):
+    """What a run is estimated to take.
+
+    Attributes
+    ----------
+    n_bytes : of its result files [bytes]
+    seconds : wall time of its time loop [s]
+    n_steps : number of steps
+    """
+
+    n_bytes: float
+    seconds: float
+    n_steps: int
+
+
+def prepare(folder: Path, force: bool) -> None:
+    """Refuse a folder that holds results or cannot take all files of a run. Not collective.
+
+    The folder is there and locked by this process. Parts of files that dead runs left are removed.
+
+    Raises
+    ------
+    InputError
+        If there are results and ``force`` is not given, or if a file with the longest name of all
+        cannot be written.
+    """
+    refuse_earlier(folder, force)
+    remove_parts(folder)
+    trial = part_of(folder / max(OWN_FILES, key=len), os.getpid())
+    try:
+        with trial.open("wb", buffering=0) as file:
+            file.write(b"trial")
+    except OSError as error:
+        raise refusal(folder, error) from error
+    finally:
+        with contextlib.suppress(OSError):
+            trial.unlink()
+
+
+def refuse_impossible(folder: Path) -> None:
+    """Raise InputError if a folder of this name cannot be, without making it. Not collective."""
+    try:
+        found = os.stat(folder)
+    except FileNotFoundError:
+        # Whether it can be made is seen when the folder is locked; this takes no time.
+        above = next(path for path in folder.absolute().parents if path.exists())
+        if not os.access(above, os.W_OK | os.X_OK):
+            read_only = os.statvfs(above).f_flag & os.ST_RDONLY
+            code = errno.EROFS if read_only else errno.EACCES
+            raise refusal(folder, OSError(code, os.strerror(code))) from None
+        return
+    except OSError as error:
+        raise refusal(folder, error) from error
+    if not stat.S_ISDIR(found.st_mode):
+        raise InputError(f"-o {folder} is a file; name a folder for the results")
+
+
+def refuse_earlier(folder: Path, force: bool) -> None:
+    """Raise InputError if a folder holds a run's results and ``force`` is not given."""
+    result = folder / RUN_FILE
+    if result.is_dir() and not result.is_symlink():
+        raise InputError(f"{result} is a folder; remove it, or name another one with -o")
+    if force or not os.path.lexists(result):
+        return
+    what = "holds the results of an earlier run"
+    if not result.exists():
+        what = "is a link that leads nowhere"
+    elif not _is_hdf5(result):
+        what = "is there already, and is no result file"
+    raise InputError(
+        f"{result} {what}; name another folder with -o, or give --force to replace "
+        f"{'them' if 'results' in what else 'it'}"
+    )
+
+
+def check_size(folder: Path, size: RunSize, force: bool) -> None:
+    """Announce a large run; refuse one beyond the bounds or without room. Not collective.
+
+    The files that the run is to replace count as room.
+
+    Raises
+    ------
+    InputError
+        Unless ``force`` is given.
+    """
+    room = free_bytes(folder) + _replaced_bytes(folder)
+    takes = (
+        f"{size.n_steps} steps take about {duration(size.seconds)} and {volume(size.n_bytes)} in "
+        f"{folder}, where {volume(room)} are free"
+    )
+    beyond = size.n_bytes > MOST_BYTES or size.seconds > MOST_SECONDS or size.n_steps > MOST_STEPS
+    if not force:
+        if size.n_bytes > room:
+            raise InputError(
+                f"there is no room for the results: {takes}; free some space, name another folder "
+                "with -o, record less, or give --force to run until the disk is full"
+            )
+        if beyond:
+            raise InputError(
+                f"the run is very large: {takes}; beyond {volume(MOST_BYTES)}, "
+                f"{duration(MOST_SECONDS)} or {MOST_STEPS} steps give --force to run it all the "
+                "same"
+            )
+    if beyond or size.n_bytes > LARGE or size.seconds > LONG:
+        logger.info(takes)
+
+
+def free_bytes(folder: Path) -> float:
+    """What this user may still write to the disk of a folder [bytes]."""
+    try:
+        found = os.statvfs(folder)
+    except OSError as error:
+        raise refusal(folder, error) from error
+    return float(found.f_bavail) * found.f_frsize
+
+
+def _replaced_bytes(folder: Path) -> float:
+    """Blocks on the disk of the files that a new run removes [bytes]."""
+    total = 0.0
+    for name in (RUN_FILE, *FIELD_FILES):
+        with contextlib.suppress(OSError):
+            found = (folder / name).lstat()
+            total += 512.0 * found.st_blocks if found.st_nlink == 1 else 0.0
+    return total
+
+
+def _is_hdf5(path: Path) -> bool:
+    try:
+        with path.open("rb") as file:
+            return file.read(len(_HDF5)) == _HDF5
+    except OSError:
+        return False
+
+
+def volume(n_bytes: float) -> str:
+    """A size in words: MB below one GB."""
+    return f"{n_bytes / 1e9:.1f} GB" if n_bytes >= 1e9 else f"{n_bytes / 1e6:.1f} MB"
+
+
+def duration(seconds: float) -> str:
+    """A time in words: hours from one on."""
+    if seconds < 60.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 3600.0 else f"{seconds / 3600.0:.1f} h"

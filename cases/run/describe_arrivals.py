@@ -1,0 +1,211 @@
+"""What is told of waves from the ends of the line and of the run-in: plan, check, result file."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from catenary.cases.run.wave_arrivals import (
+    SHORT_RUN_IN,
+    Arrivals,
+    Course,
+    WaveLine,
+    arrivals,
+    end_for,
+    reflection_felt,
+    run_in_for,
+)
+from catenary.cases.scene.scene import Scene
+from catenary.meshgen.line import Line, Wire
+from catenary.solver.problem.problem import Problem
+
+_WIRES = ("contact_wire", "messenger_wire")
+
+
+class Told(NamedTuple):
+    """A line for waves, the course of each pantograph, what reaches it, and how it is called."""
+
+    line: WaveLine
+    courses: tuple[Course, ...]
+    found: tuple[Arrivals, ...]
+    names: tuple[str, ...]
+
+
+def arrival_facts(scene: Scene, problem: Problem) -> dict[str, Any]:
+    """Facts in SI units, sentences about each pantograph, and warnings; plain enough for JSON.
+
+    Not collective.
+    """
+    told = _told(problem)
+    rows = zip(told.names, told.found, told.courses, strict=True)
+    return {
+        "wave_speed_m_per_s": told.line.speed,
+        "fastest_wave_m_per_s": told.line.fastest,
+        "pantographs": [
+            {
+                "start_m": course.start,
+                "run_in_m": found.run_in,
+                "run_in_spans": found.run_in_spans,
+                "start_share_of_std": found.start_share,
+                "far_end_met_at_m": None if found.far_end is None else found.far_end.at,
+                "far_end_met_at_s": None if found.far_end is None else found.far_end.time,
+                "far_end_share": found.far_share,
+                "near_end_met_at_m": None if found.near_end is None else found.near_end.at,
+                "near_end_met_at_s": None if found.near_end is None else found.near_end.time,
+                "says": _sentence(name, found),
+            }
+            for name, found, course in rows
+        ],
+        "warnings": [
+            *_reflections(scene, told),
+            *_short_run_in(scene, problem, told),
+            *_short_stretch(problem, told),
+        ],
+    }
+
+
+def arrival_warnings(scene: Scene) -> list[str]:
+    """The warnings among ``arrival_facts``, before a run is made. Not collective."""
+    warnings: list[str] = arrival_facts(scene, scene.to_problem())["warnings"]
+    return warnings
+
+
+def wave_line(problem: Problem) -> WaveLine:
+    """The line as long waves see it; hardware counts with its mean mass per length."""
+    line = problem.line
+    masts = line.support_positions
+    wires: list[Wire] = [getattr(line, name) for name in _WIRES]
+    mass = sum(wire.mass_per_length for wire in wires) + _hardware(line)
+    dampings = [problem.damping.per_component.get(name) for name in _WIRES]
+    usual = (problem.damping.alpha, problem.damping.beta)
+    pairs = [usual if pair is None else pair for pair in dampings]
+    if "structural_damping" not in problem.effects:
+        pairs = [(0.0, 0.0)]
+    return WaveLine(
+        start=float(masts[0]),
+        end=float(masts[-1]),
+        span=_span(line),
+        speed=math.sqrt(sum(wire.tension for wire in wires) / mass),
+        fastest=max(wire.wave_speed for wire in wires),
+        alpha=min(pair[0] for pair in pairs),
+        beta=min(pair[1] for pair in pairs),
+    )
+
+
+def _told(problem: Problem) -> Told:
+    line, train = wave_line(problem), problem.train
+    starts = [train.start - place.behind for place in train.placements]
+    duration = (train.end - train.start) / train.speed
+    courses = tuple(
+        Course(
+            start,
+            start + train.speed * duration,
+            train.speed,
+            problem.evaluation,
+            max(starts),
+            min(starts),
+        )
+        for start in starts
+    )
+    found = tuple(arrivals(line, course) for course in courses)
+    n = len(starts)
+    names = tuple("pantograph" if n == 1 else f"pantograph {i + 1}" for i in range(n))
+    return Told(line, courses, found, names)
+
+
+def _hardware(line: Line) -> float:
+    """Mass of droppers and their clamps per length of line [kg/m]."""
+    kind = line.dropper
+    length = max(line.encumbrance, 0.0)
+    each = kind.mass_per_length * length + kind.messenger_clamp_mass + kind.contact_clamp_mass
+    n = sum(len(positions) for positions in line.dropper_positions)
+    return float(n * each / sum(line.span_lengths))
+
+
+def _span(line: Line) -> float:
+    """Mean length of the running spans [m]."""
+    first, last = line.running_range
+    n = line.n_spans - sum(line.n_transition)
+    return (last - first) / n if n else sum(line.span_lengths) / line.n_spans
+
+
+def _sentence(name: str, found: Arrivals) -> str:
+    ends = []
+    for what, met in (("far", found.far_end), ("near", found.near_end)):
+        ends.append(
+            f"of the {what} end at {met.at:.0f} m ({met.time:.1f} s)"
+            if met is not None
+            else f"of the {what} end not before the run ends"
+        )
+    return (
+        f"{name}: {found.run_in:.0f} m or {found.run_in_spans:.1f} spans from start to evaluated "
+        f"stretch, after which the start is estimated to leave {100 * found.start_share:.2g} % of "
+        f"the standard deviation; meets waves {' and '.join(ends)}"
+    )
+
+
+def _reflections(scene: Scene, told: Told) -> list[str]:
+    felt = [i for i, course in enumerate(told.courses) if reflection_felt(told.line, course)]
+    if not felt:
+        return []
+    ends = [end_for(told.line, told.courses[i]) for i in felt]
+    # 1 mm for the rounding of sums.
+    more = math.ceil((max(ends) - told.line.end - 1e-3) / told.line.span)
+    wanted = scene.line.n_spans + max(more, 1)
+    said = []
+    for i in felt:
+        met = told.found[i].far_end
+        assert met is not None  # a stretch lies within the run
+        share = told.found[i].far_share
+        left = "" if share > 0.9 else f", with up to {100 * share:.2g} % of its amplitude"
+        first, last = told.courses[i].stretch
+        fits = met.at - first >= told.line.span
+        shorter = f", or evaluation.to_m = {math.floor(met.at):g} at most" if fits else ""
+        said.append(
+            f"{_subject(told.names[i])} meets the waves that the far end of the line reflects at "
+            f"{met.at:.0f} m ({met.time:.1f} s){left}, before the evaluated stretch ends "
+            f"({first:g} to {last:g} m): its force is not that of a long line. Take "
+            f"line.n_spans = {wanted}{shorter}."
+        )
+    return said
+
+
+def _short_run_in(scene: Scene, problem: Problem, told: Told) -> list[str]:
+    speed, line = problem.train.speed, told.line
+    short = [i for i, found in enumerate(told.found) if found.start_share > SHORT_RUN_IN]
+    if not short:
+        return []
+    needed = run_in_for(line, speed)
+    leader = max(course.leader for course in told.courses)
+    first = problem.line.running_range[0]
+    said = []
+    for i in short:
+        course, found = told.courses[i], told.found[i]
+        # To a metre, on the safe side.
+        start = math.floor(course.stretch[0] - needed + leader - course.start)
+        begin = math.ceil(course.start + needed)
+        fits = start - (leader - course.rear) >= first
+        remedy = f"train.start_m = {start:g} at most, or " if fits else ""
+        said.append(
+            f"{_subject(told.names[i])} starts {found.run_in:.0f} m, {found.run_in_spans:.1f} "
+            f"spans, before the evaluated stretch: the start is estimated to leave "
+            f"{100 * found.start_share:.0f} % of the standard deviation in its force, where "
+            f"{100 * SHORT_RUN_IN:.0f} % is the limit. Take {remedy}evaluation.from_m = {begin:g} "
+            "at least."
+        )
+    return said
+
+
+def _subject(name: str) -> str:
+    return "The pantograph" if name == "pantograph" else name.capitalize()
+
+
+def _short_stretch(problem: Problem, told: Told) -> list[str]:
+    first, last = problem.evaluation
+    if last - first >= told.line.span * (1.0 - 1e-9):
+        return []
+    return [
+        f"The evaluated stretch of {last - first:g} m is shorter than a span ({told.line.span:g} "
+        "m): its statistics leave out what the rest of a span does, and no criterion that they "
+        f"pass says much. Take evaluation.to_m = {first + math.ceil(told.line.span):g} at least."
+    ]

@@ -1,0 +1,92 @@
+"""What is told of the train's pantographs: model, static force, actuator force, assembly."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from catenary.cases.scene.scene import Scene
+from catenary.mbs.head.strips import Strips
+from catenary.mbs.lumped_data import LumpedData
+from catenary.solver.problem.problem import Problem
+
+if TYPE_CHECKING:
+    from catenary.mbs.build import PantographData
+
+
+def model_of(data: PantographData) -> str:
+    """The model's name, as ``type`` has it in a scene."""
+    return "lumped" if isinstance(data, LumpedData) else "multibody"
+
+
+def description_of(data: PantographData, static_force: float) -> str:
+    """A line about a pantograph."""
+    if not isinstance(data, LumpedData):
+        from catenary.mbs.mechanism.pantograph_data import describe
+
+        return describe(data) + _strips_of(data.strips)
+    masses = ", ".join(f"{mass:g}" for mass in data.masses)
+    noun = "mass" if len(data.masses) == 1 else "masses"
+    text = f"lumped: {len(data.masses)} {noun} of {masses} kg; {static_force:.1f} N"
+    return text + _strips_of(data.strips)
+
+
+def _strips_of(strips: Strips) -> str:
+    """What is not the usual single strip, fixed to the head."""
+    if strips.number == 1 and strips.suspension is None:
+        return ""
+    text = "; 1 strip" if strips.number == 1 else f"; 2 strips {strips.spacing:g} m apart"
+    if strips.suspension is None:
+        return text
+    own = strips.suspension
+    return f"{text} of {own.mass:g} kg on {own.stiffness:g} N/m"
+
+
+def header_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
+    """What a result file says of each pantograph, in running order. Not collective."""
+    return [
+        {
+            "kind": place.name,
+            "model": model_of(placement.data),
+            "description": description_of(placement.data, placement.static_force),
+            "static_force_N": placement.static_force,
+            "actuator_force_N": _actuator_force(placement.data),
+            "touching_mass_kg": _touching_mass(placement.data),
+        }
+        for place, placement in zip(scene.train.pantographs, problem.train.placements, strict=True)
+    ]
+
+
+def kind_lines(scene: Scene, problem: Problem) -> dict[str, list[str]]:
+    """Lines about each kind of pantograph on the train, by its name. Not collective."""
+    lines: dict[str, list[str]] = {}
+    for place, placement in zip(scene.train.pantographs, problem.train.placements, strict=True):
+        lines[place.name] = [description_of(placement.data, placement.static_force)]
+        if not isinstance(placement.data, LumpedData):
+            from catenary.mbs.mechanism.pantograph_data import describe_assembly, stand
+
+            lines[place.name].append(describe_assembly(stand(placement.data).missed))
+    return lines
+
+
+def _actuator_force(data: PantographData) -> float | None:
+    if isinstance(data, LumpedData):
+        return None
+    from catenary.mbs.mechanism.pantograph_data import stand
+
+    return stand(data).actuator_force
+
+
+def _touching_mass(data: PantographData) -> float:
+    """Mass that one contact meets first [kg]: a strip on its suspension, or its share of the
+    head."""
+    if data.strips.suspension is not None:
+        return data.strips.suspension.mass
+    return _head_mass(data) / data.strips.number
+
+
+def _head_mass(data: PantographData) -> float:
+    if isinstance(data, LumpedData):
+        return data.masses[0]
+    from catenary.mbs.mechanism.pantograph_data import stand
+
+    return stand(data).head.mass

@@ -1,0 +1,318 @@
+"""What a scene will simulate and what not, its size, and an estimate of memory and time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+from catenary.cases.result_folder.output_folder import RunSize, volume
+from catenary.cases.run.describe_arrivals import arrival_facts
+from catenary.cases.run.describe_incidents import incident_facts
+from catenary.cases.run.describe_pantographs import kind_lines
+from catenary.cases.run.file_sizes import FileSizes, estimate_files
+from catenary.cases.run.recording import Recording, recording_of
+from catenary.cases.scene.scene import Scene
+from catenary.mbs.mechanism.pantograph_data import MultibodyData
+from catenary.postproc.report.wording import counted
+from catenary.solver.effects import effect as effects
+from catenary.solver.problem.problem import Numerics, Problem, n_halvings
+
+if TYPE_CHECKING:
+    from catenary.meshgen.mesh import LineMesh
+
+# Cost model of the march on one rank, records included: overhead of a step, and time per unknown.
+# Runs of the case ambrosio2012 on 25, 100 and 1000 spans, 4.5e3 to 1.8e5 unknowns, on a two-core
+# machine of 2026 (Debian 12, PETSc 3.18) lie within 40 % of it, and machines differ by a factor of
+# two; the plan calls it an estimate.
+STEP_OVERHEAD = 4.5e-5  # [s]
+STEP_PER_UNKNOWN = 4.8e-9  # [s]
+# The fixed-point scheme repeats the solve; 3 times the time of one_solve was measured.
+# PETSc's TSALPHA2 factors anew in every iteration; 26 times was measured.
+SCHEME_FACTOR = {"one_solve": 1.0, "fixed_point": 3.0, "ts_alpha2": 26.0}
+# A substep of a pantograph with all its bodies: 0.21 to 0.38 ms were measured with the paper's
+# seven, by the way of keeping joints.
+ALL_BODIES_SUBSTEP = 3.0e-4  # [s]
+
+# Time between two flushes of the result file, each of which takes some 5 ms [s], and what may wait
+# for one in memory [B].
+FLUSH_EVERY = 0.5
+FLUSH_MEMORY = 1e8
+# Steps of a flush whose chunks are not too small.
+LEAST_FLUSH = 256
+
+# Resident memory of runs of ambrosio2012 on 25, 300, 1000 and 2000 spans, report included, within
+# 10 %: program and libraries, then per unknown.
+MEMORY_BASE = 3.85e8  # [B]
+MEMORY_PER_UNKNOWN = 2200.0  # [B]
+# What a step adds, as the report takes the history of one pantograph after the other.
+MEMORY_PER_STEP = 40.0  # [B]
+_BYTES = 8
+_PER_PANTOGRAPH = 6  # channels of a pantograph at most
+
+
+class EffectRow(NamedTuple):
+    """An effect and why it is, or is not, part of a run."""
+
+    name: str
+    title: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A run before it is made.
+
+    Attributes
+    ----------
+    case, title : of the scene
+    on, off : effects that are simulated, and those that are not
+    unknowns : names of the unknowns at each node
+    n_nodes, n_dofs, n_steps : sizes
+    n_droppers, n_arms, n_pantographs : counts
+    element_lengths : shortest and longest element of the contact wire [m]
+    speed, wave_speed : of the train and of the contact wire [m/s]
+    static_forces : of the pantographs [N]
+    kinds : name and description of each kind of pantograph on the train
+    start, end, evaluation : stretch that the leading pantograph runs, and that is judged [m]
+    incidents : time [s] and sentence of each, in order of time
+    arrivals : sentences about run-in and waves from the ends of the line
+    warnings : sentences about them, empty if the line is long enough
+    dt, simulated : time step and simulated time [s]
+    halved : what is said of steps that adapt, empty if none do
+    memory : estimate of the resident memory on one rank [B]
+    march : estimate of the wall time of the time loop on one rank [s]
+    files : sizes of the files
+    recorded : what is recorded of line and snapshots, in sentences by what it is
+    """
+
+    case: str
+    title: str
+    on: list[EffectRow]
+    off: list[EffectRow]
+    unknowns: tuple[str, ...]
+    n_nodes: int
+    n_dofs: int
+    n_steps: int
+    n_droppers: int
+    n_arms: int
+    n_pantographs: int
+    element_lengths: tuple[float, float]
+    speed: float
+    wave_speed: float
+    static_forces: tuple[float, ...]
+    kinds: tuple[tuple[str, str], ...]
+    start: float
+    end: float
+    evaluation: tuple[float, float]
+    incidents: tuple[tuple[float, str], ...]
+    arrivals: tuple[str, ...]
+    warnings: tuple[str, ...]
+    dt: float
+    scheme: str
+    halved: str
+    simulated: float
+    memory: float
+    march: float
+    files: FileSizes
+    recorded: dict[str, str]
+
+
+def effect_rows(scene: Scene, problem: Problem) -> tuple[list[EffectRow], list[EffectRow]]:
+    """Effects that a run simulates and those that it does not, with the reason. Not collective."""
+    active = {effect.name for effect in effects.active(problem)}
+    on, off = [], []
+    for name, effect in effects.registry().items():
+        if name in active:
+            if effect.always:
+                reason = "part of every scene"
+            else:
+                reason = "asked for by the scene" if name in scene.effects else "default"
+            on.append(EffectRow(name, effect.title, reason))
+        elif name in problem.effects:
+            off.append(EffectRow(name, effect.title, "nothing in the scene calls for it"))
+        else:
+            said = name in scene.effects
+            reason = "left out by the scene" if said else "off unless the scene asks for it"
+            off.append(EffectRow(name, effect.title, reason))
+    return on, off
+
+
+def run_size(scene: Scene, mesh: LineMesh) -> RunSize:
+    """What a run of a scene takes, by its plan. Not collective."""
+    plan = make_plan(scene, mesh)
+    return RunSize(plan.files.total, plan.march, plan.n_steps)
+
+
+def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
+    """The plan of a scene; makes the mesh if it is not given. Not collective."""
+    import numpy as np
+
+    from catenary.cases.run.scene_mesh import mesh_of
+    from catenary.meshgen.mesh import CONTACT_WIRE
+
+    problem = scene.to_problem()
+    mesh = mesh_of(scene) if mesh is None else mesh
+    on, off = effect_rows(scene, problem)
+    unknowns = effects.unknowns_per_node(effects.active(problem))
+    n_dofs = mesh.n_nodes * len(unknowns)
+    train, dt = problem.train, problem.numerics.dt
+    simulated = (train.end - train.start) / train.speed
+    n_steps = max(1, math.floor(simulated / dt + 1e-9))
+    length = np.diff(mesh.x(mesh.wires[CONTACT_WIRE]))
+    n_droppers, n_arms = mesh.droppers.shape[0], mesh.steady_arms.size
+    recording = recording_of(scene.output, problem, mesh, n_steps)
+    flush_every = scene.output.flush_every_steps or flush_cadence(problem, n_dofs, recording)
+    waves = arrival_facts(scene, problem)
+    return Plan(
+        case=scene.case.name,
+        title=scene.case.title,
+        on=on,
+        off=off,
+        unknowns=unknowns,
+        n_nodes=mesh.n_nodes,
+        n_dofs=n_dofs,
+        n_steps=n_steps,
+        n_droppers=n_droppers,
+        n_arms=int(n_arms),
+        n_pantographs=len(train.placements),
+        element_lengths=(float(length.min()), float(length.max())),
+        speed=train.speed,
+        wave_speed=problem.line.contact_wire.wave_speed,
+        static_forces=tuple(place.static_force for place in train.placements),
+        kinds=tuple((name, told[0]) for name, told in kind_lines(scene, problem).items()),
+        start=train.start,
+        end=train.end,
+        evaluation=problem.evaluation,
+        incidents=tuple((fact["time_s"], fact["says"]) for fact in incident_facts(scene, problem)),
+        arrivals=tuple(fact["says"] for fact in waves["pantographs"]),
+        warnings=tuple(waves["warnings"]),
+        dt=dt,
+        scheme=problem.numerics.scheme,
+        halved=_halved(problem.numerics),
+        simulated=simulated,
+        memory=estimate_memory(n_dofs, n_steps),
+        march=estimate_march(n_dofs, n_steps, problem.numerics.scheme, _substeps(problem)),
+        files=estimate_files(scene, problem, recording, n_dofs, flush_every),
+        recorded=recording.sentences(dt),
+    )
+
+
+def estimate_memory(n_dofs: int, n_steps: int = 0) -> float:
+    """Resident memory of a run on one rank, its report included [B]."""
+    return MEMORY_BASE + MEMORY_PER_UNKNOWN * n_dofs + MEMORY_PER_STEP * n_steps
+
+
+def estimate_march(n_dofs: int, n_steps: int, scheme: str, n_substeps: int = 0) -> float:
+    """Wall time of the time loop on one rank [s].
+
+    ``n_substeps`` are those of a step that pantographs with all their bodies take, all together.
+    """
+    step = STEP_OVERHEAD + STEP_PER_UNKNOWN * n_dofs
+    step *= SCHEME_FACTOR[scheme]
+    return n_steps * (step + ALL_BODIES_SUBSTEP * n_substeps)
+
+
+def _halved(numerics: Numerics) -> str:
+    tolerance = numerics.adaptive_tolerance
+    if tolerance is None:
+        return ""
+    shortest = numerics.dt / 2 ** n_halvings(numerics.dt, numerics.smallest_dt)
+    return (
+        f"steps with a contact force wrong by more than {tolerance:g} N, or without a solution, "
+        f"are halved, down to {1e3 * shortest:g} ms (not in the estimates)"
+    )
+
+
+def _substeps(problem: Problem) -> int:
+    """Substeps in a step of all pantographs whose bodies are all moved."""
+    kinds = [place.data for place in problem.train.placements]
+    ways = [kind.all_bodies for kind in kinds if isinstance(kind, MultibodyData)]
+    return sum(way.substeps for way in ways if way is not None)
+
+
+def flush_cadence(problem: Problem, n_dofs: int, recording: Recording) -> int:
+    """Steps between two flushes: about half a second of wall time, and what fits into memory.
+
+    Not so few that the file is made of small chunks, and whole chunks of them. The same on any
+    number of ranks, so that their files are.
+    """
+    step = estimate_march(n_dofs, 1, problem.numerics.scheme, _substeps(problem))
+    columns = _PER_PANTOGRAPH * len(problem.train.placements)
+    columns += recording.arm_x.size + recording.dropper_x.size
+    wanted = max(round(FLUSH_EVERY / step), LEAST_FLUSH)
+    steps = max(1, min(wanted, int(FLUSH_MEMORY / (_BYTES * columns))))
+    for part in (LEAST_FLUSH * recording.line.every, LEAST_FLUSH, recording.line.every):
+        if steps >= part:
+            return steps - steps % part
+    return steps
+
+
+def plan_text(plan: Plan) -> str:
+    """The plan as text for a terminal."""
+    ratio = plan.speed / plan.wave_speed
+    forces = ", ".join(f"{force:.1f}" for force in plan.static_forces)
+    pantographs = counted(plan.n_pantographs, "pantograph")
+    rows = [
+        ("train", f"{3.6 * plan.speed:g} km/h, {pantographs}, static force {forces} N"),
+        *(("pantograph", f"{name}, {told}") for name, told in plan.kinds),
+        (
+            "speed",
+            f"{ratio:.2f} of the contact wire's wave speed ({3.6 * plan.wave_speed:.1f} km/h)",
+        ),
+        ("runs", f"from {plan.start:g} to {plan.end:g} m (leading pantograph)"),
+        ("evaluated", f"from {plan.evaluation[0]:g} to {plan.evaluation[1]:g} m"),
+        *(("incident", f"at {time:.4g} s: {says}") for time, says in plan.incidents),
+        *(("waves", says) for says in plan.arrivals),
+        (
+            "mesh",
+            f"{plan.n_nodes} nodes, {counted(plan.n_droppers, 'dropper')}, "
+            f"{counted(plan.n_arms, 'steady arm')}, "
+            f"elements of {plan.element_lengths[0]:.2f} to {plan.element_lengths[1]:.2f} m",
+        ),
+        (
+            "unknowns",
+            f"{plan.n_dofs} = {plan.n_nodes} nodes x {len(plan.unknowns)} "
+            f"({', '.join(plan.unknowns)})",
+        ),
+        (
+            "time",
+            f"{plan.simulated:.2f} s in {counted(plan.n_steps, 'step')} of {1e3 * plan.dt:g} ms, "
+            f"scheme {plan.scheme}",
+        ),
+        *([("adapted", plan.halved)] if plan.halved else []),
+        ("memory", f"about {plan.memory / 1e6:.0f} MB on one rank (estimate)"),
+        (
+            "march",
+            f"about {_duration(plan.march)} on one rank, real-time factor "
+            f"{plan.simulated / plan.march:.1f} (estimate)",
+        ),
+        (
+            "results",
+            f"about {volume(plan.files.result)} in run.h5, "
+            f"{volume(plan.files.film)} in fields.h5, {volume(plan.files.report)} of report "
+            "(estimate)",
+        ),
+        ("recorded", "; ".join(plan.recorded.values())),
+    ]
+    lines = [f"{plan.case}: {plan.title}", ""]
+    lines += [f"  {label:10} {text}" for label, text in rows]
+    lines += [""] * bool(plan.warnings) + [f"  WARNING    {text}" for text in plan.warnings]
+    lines += ["", "Simulated:", *_effect_lines(plan.on)]
+    lines += ["", "Not simulated:", *_effect_lines(plan.off)]
+    return "\n".join(lines)
+
+
+def _effect_lines(rows: list[EffectRow]) -> list[str]:
+    if not rows:
+        return ["  (nothing)"]
+    width = max(len(row.name) for row in rows)
+    return [f"  {row.name:{width}}  {row.title} ({row.reason})" for row in rows]
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 90:
+        return f"{seconds:.2g} s"
+    if seconds < 5400:
+        return f"{seconds / 60:.1f} min"
+    return f"{seconds / 3600:.1f} h"

@@ -1,0 +1,404 @@
+"""From a scene to a judged contact force: mesh, equilibrium, march, recorder, report.
+
+Data flows one way; every phase is timed and is a PETSc log stage of the same name.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from catenary.cases.process.interrupts import Phase, StopRequest
+from catenary.cases.process.versions import versions
+from catenary.cases.result_folder.folder_lock import held
+from catenary.cases.result_folder.output_folder import RunSize, check_size, prepare
+from catenary.cases.run.continuing import refuse_other_run, state_to_continue
+from catenary.cases.run.describe_arrivals import arrival_facts
+from catenary.cases.run.describe_incidents import incident_facts
+from catenary.cases.run.describe_pantographs import header_facts
+from catenary.cases.run.plan import effect_rows, flush_cadence, run_size
+from catenary.cases.run.recording import recording_of
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.scene import Scene
+from catenary.meshgen.mesh import LineMesh
+from catenary.postproc.files.fields import FieldRecorder
+from catenary.postproc.files.own_files import remove_stale
+from catenary.postproc.record.header import Header, line_datasets, static_datasets
+from catenary.postproc.record.progress import Progress
+from catenary.postproc.record.recorder import Recorder
+from catenary.postproc.report.report import write_report, write_summary
+from catenary.solver.base.errors import CatenaryError, RunBroken
+from catenary.solver.base.parallel import on_root
+from catenary.solver.base.petsc import PETSc
+from catenary.solver.model.model import Model, build
+from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.equilibrium import (
+    Elasticity,
+    Equilibrium,
+    elasticity,
+    find_form,
+    middle_span,
+)
+from catenary.solver.time_loop.march import March, Outcome
+from catenary.solver.time_loop.observers import Observer
+
+logger = logging.getLogger("catenary.runner")
+
+RESULT = "run.h5"
+
+
+@dataclass
+class RunOutcome:
+    """How a run ended.
+
+    ``outcome`` is "done", "interrupted" or the sentence of what broke; ``accepted`` the verdict
+    of the standard, None if not judged; ``summary`` the content of ``summary.json``.
+    """
+
+    outcome: str
+    accepted: bool | None
+    summary: dict[str, Any] = field(default_factory=dict)
+
+
+class AtRest(NamedTuple):
+    """A line in equilibrium, on all ranks."""
+
+    mesh: LineMesh
+    model: Model
+    form: Equilibrium
+    lift: Elasticity
+
+
+class Phases:
+    """Wall time of the phases of a run [s], each shown while it lasts, and also a PETSc log stage.
+
+    Collective by use.
+    """
+
+    def __init__(self, progress: Progress) -> None:
+        self.wall: dict[str, float] = {}
+        self.progress = progress
+
+    @contextmanager
+    def __call__(self, name: str) -> Iterator[None]:
+        """Time what happens inside."""
+        begin = time.perf_counter()
+        stage = PETSc.Log.Stage(name)
+        stage.push()
+        try:
+            with self.progress.phase(name):
+                yield
+        finally:
+            stage.pop()
+            self.wall[name] = time.perf_counter() - begin
+
+
+def run_case(
+    scene: Scene,
+    out_dir: Path,
+    comm: Any,
+    *,
+    force: bool = False,
+    petsc_options: Sequence[str] = (),
+    tell: Callable[[str], None] = lambda outcome: None,
+    only_summary: bool = False,
+    large: bool | None = None,
+) -> RunOutcome:
+    """Simulate a scene and write results, fields and report into ``out_dir``. Collective.
+
+    Parameters
+    ----------
+    scene : Scene, the same on all ranks
+    force : whether results that are there may be replaced
+    petsc_options : the options that PETSc was started with, for the record
+    tell : called with the outcome on all ranks when the result file is closed, before the report
+        is drawn: an MPI launcher that is interrupted leaves its processes a second
+    only_summary : of the report write ``summary.json`` alone, which costs no time
+    large : whether a run may pass the bounds on its size; as ``force`` if not given
+
+    Raises
+    ------
+    InputError
+        If the line or an option of PETSc is impossible, if results are there already, if the
+        folder cannot be written to or is another run's, or if the run is too large; nothing is
+        written then.
+    RunBroken
+        If files cannot be written.
+    """
+    allowed = force if large is None else large
+    order = _Order(scene, out_dir, comm, petsc_options, tell, None, only_summary)
+    with held(out_dir, comm, f"catenary run {scene.case.name}"):
+        on_root(comm, lambda: prepare(out_dir, force))
+        return _run(order, lambda size: check_size(out_dir, size, allowed))
+
+
+def restart_case(
+    scene: Scene,
+    out_dir: Path,
+    comm: Any,
+    *,
+    petsc_options: Sequence[str] = (),
+    tell: Callable[[str], None] = lambda outcome: None,
+) -> RunOutcome:
+    """Continue an interrupted or broken run from its last checkpoint. Collective.
+
+    ``scene`` must be the one that the run was started with; any number of ranks may continue.
+    ``petsc_options`` and ``tell`` are those of ``run_case``.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to continue, or if another process writes into the folder.
+    """
+    with held(out_dir, comm, f"catenary restart {out_dir}"):
+        state = on_root(comm, lambda: state_to_continue(out_dir / RESULT))
+        order = _Order(scene, out_dir, comm, petsc_options, tell, state, False)
+        return _run(order, lambda size: None)
+
+
+def static_table(scene: Scene) -> dict[str, np.ndarray]:
+    """The line at rest, arrays named as in the result file's groups. Not collective."""
+    problem = scene.to_problem()
+    mesh = mesh_of(scene)
+    model, form = find_form(problem, mesh)
+    lift = elasticity(model, *middle_span(problem.line))
+    data = {
+        **line_datasets(problem.line, mesh, problem.evaluation),
+        **static_datasets(mesh, form, lift),
+        "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
+    }
+    return {name.rsplit("/", 1)[-1]: values for name, values in data.items()}
+
+
+@dataclass(frozen=True)
+class _Order:
+    """A run that is wanted: the arguments of ``run_case``, and the state that it continues from."""
+
+    scene: Scene
+    out_dir: Path
+    comm: Any
+    petsc_options: Sequence[str]
+    tell: Callable[[str], None]
+    state: dict[str, Any] | None
+    only_summary: bool
+
+    @property
+    def resume(self) -> bool:
+        """Whether it continues another run."""
+        return self.state is not None
+
+    @property
+    def result(self) -> Path:
+        """The result file."""
+        return self.out_dir / RESULT
+
+
+def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
+    """All phases of a run whose folder is ready. Collective.
+
+    ``judge`` sees the size of the run as soon as the mesh is there, on rank 0.
+    """
+    scene, comm = order.scene, order.comm
+    phases = Phases(Progress(comm))
+    left = f"{order.result} is as it was" if order.resume else "nothing was written"
+    with ExitStack() as stack:
+        with Phase(comm, "the line was read", left) as phase:
+            problem = scene.to_problem()
+            at_rest = _at_rest(scene, problem, comm, phases, phase, judge)
+            header = _header(order, problem, at_rest) if comm.rank == 0 else None
+            if order.resume:
+                on_root(comm, lambda: _refuse_other_run(order.out_dir, header, problem))
+            phase.next("the line was distributed")
+            with phases("distribute"):
+                parts = problem, at_rest.model, at_rest.form, at_rest.lift
+                march = stack.enter_context(March(comm, *parts))
+                if order.state is not None:
+                    march.restore(order.state)
+            observers, recorder = _observers(
+                order, problem, at_rest, header, phases.progress, march.n_steps
+            )
+        with StopRequest() as stop:
+            with phases("march"):
+                outcome = march.run(observers, stop)
+            recorder.close(_performance(outcome, phases, comm.size))
+    if not recorder.begun:
+        raise RunBroken(outcome.outcome)
+    order.tell(outcome.outcome)
+    with phases("report"):
+        result = _reported(order, outcome)
+    logger.debug("phases [s]: %s", {name: round(wall, 3) for name, wall in phases.wall.items()})
+    return result
+
+
+def _at_rest(
+    scene: Scene,
+    problem: Problem,
+    comm: Any,
+    phases: Phases,
+    phase: Phase,
+    judge: Callable[[RunSize], None],
+) -> AtRest:
+    """Mesh and equilibrium, found on rank 0 and given to all. Collective."""
+
+    def make_mesh() -> LineMesh:
+        mesh = mesh_of(scene)
+        judge(run_size(scene, mesh))
+        return mesh
+
+    def rest() -> tuple[Equilibrium, np.ndarray, Elasticity]:
+        model, form = find_form(problem, mesh)
+        lift = elasticity(model, *middle_span(problem.line))
+        return form, model.dropper_lengths, lift
+
+    phase.next("the mesh was made")
+    with phases("mesh"):
+        mesh: LineMesh = on_root(comm, phase.alone(make_mesh))
+    phase.next("the equilibrium was found")
+    with phases("equilibrium"):
+        form, lengths, lift = on_root(comm, phase.alone(rest))
+        model = build(problem, mesh, lengths)
+    return AtRest(mesh, model, form, lift)
+
+
+def _observers(
+    order: _Order,
+    problem: Problem,
+    at_rest: AtRest,
+    header: Header | None,
+    progress: Progress,
+    n_steps: int,
+) -> tuple[list[Observer], Recorder]:
+    """All that watches the march, the recorder last. Not collective.
+
+    The state to continue from, which the recorder writes, stands for all before it. ``n_steps`` are
+    those of the whole run, ``header`` is needed on rank 0.
+    """
+    comm, dt, output = order.comm, problem.numerics.dt, order.scene.output
+    recording = recording_of(output, problem, at_rest.mesh, n_steps)
+    for sentence in recording.told(dt):
+        logger.info(sentence)
+    flush_every = output.flush_every_steps or flush_cadence(
+        problem, at_rest.model.n_dofs, recording
+    )
+    fields: FieldRecorder | None = None
+    if recording.field_every:
+        fields = FieldRecorder(
+            comm,
+            order.out_dir / "fields.xdmf",
+            at_rest.mesh.wires,
+            at_rest.mesh.droppers,
+            every=recording.field_every,
+            flush_every=flush_every,
+            resume=order.resume,
+            wait=True,
+        )
+
+    def begun() -> None:
+        remove_stale(order.out_dir)
+        if fields is not None:
+            fields.publish()
+
+    recorder = Recorder(
+        comm,
+        order.result,
+        header,
+        flush_every=flush_every,
+        energy_every=recording.energy_every,
+        record=recording.line,
+        resume=order.resume,
+        on_begun=begun,
+    )
+    first: list[Observer] = [] if fields is None else [fields]
+    return [*first, progress, recorder], recorder
+
+
+def _reported(order: _Order, outcome: Outcome) -> RunOutcome:
+    """Write the report on rank 0. Collective.
+
+    After an interruption the next signal ends the process, before one it leaves a whole result.
+    """
+
+    def work() -> RunOutcome:
+        return _report(order.out_dir, outcome, order.only_summary)
+
+    if outcome.outcome != "done":
+        return on_root(order.comm, work)
+    left = f"{order.result} is complete: `catenary report {order.out_dir}` writes the report again"
+    with Phase(order.comm, "the report was written", left) as phase:
+        return on_root(order.comm, phase.alone(work))
+
+
+def _report(out_dir: Path, outcome: Outcome, only_summary: bool) -> RunOutcome:
+    try:
+        if only_summary:
+            accepted = write_summary(out_dir / RESULT, out_dir)
+        else:
+            accepted = write_report(out_dir / RESULT, out_dir).verdict
+        summary = json.loads((out_dir / "summary.json").read_text(encoding="utf-8"))
+    except (OSError, CatenaryError) as error:
+        if outcome.outcome != "done":  # that has been told, and this adds nothing
+            return RunOutcome(outcome.outcome, None)
+        raise RunBroken(
+            f"{error}; the results are complete: `catenary report {out_dir}` writes the report "
+            "again"
+        ) from error
+    return RunOutcome(outcome.outcome, accepted, summary)
+
+
+def _header(order: _Order, problem: Problem, at_rest: AtRest) -> Header:
+    scene = order.scene
+    on, off = effect_rows(scene, problem)
+    line = problem.line
+    return Header(
+        attributes={
+            "case": scene.case.name,
+            "title": scene.case.title,
+            "n_dofs": at_rest.model.n_dofs,
+            "speed_m_per_s": problem.train.speed,
+            "wave_speed_m_per_s": line.contact_wire.wave_speed,
+            "system": scene.evaluation.system,
+            "edition": scene.evaluation.edition,
+            "pantographs": header_facts(scene, problem),
+            "incidents": incident_facts(scene, problem),
+            "arrivals": arrival_facts(scene, problem),
+            "versions": versions(),
+            "config": scene.resolved(),
+            "petsc_options": list(order.petsc_options),
+            "effects_on": [tuple(row) for row in on],
+            "effects_off": [tuple(row) for row in off],
+        },
+        datasets={
+            **line_datasets(line, at_rest.mesh, problem.evaluation),
+            **static_datasets(at_rest.mesh, at_rest.form, at_rest.lift),
+        },
+    )
+
+
+def _performance(outcome: Outcome, phases: Phases, n_ranks: int) -> dict[str, Any]:
+    """What is known at the end; after a restart, of the last part."""
+    counted: dict[str, float] = dict(outcome.counters)
+    if outcome.traffic is not None:
+        # Of the rank that sends most; a whole number unless droppers of other ranks slacken.
+        counted["messages_per_step"], counted["message_bytes_per_step"] = (
+            round(value, 3) for value in outcome.traffic
+        )
+    return {
+        "n_ranks": n_ranks,
+        "march_wall_s": outcome.wall,
+        "phase_wall_s": phases.wall,
+        "inner_iterations": counted,
+    }
+
+
+def _refuse_other_run(out_dir: Path, header: Header | None, problem: Problem) -> None:
+    assert header is not None
+    n_strips = tuple(len(place.data.strip_offsets) for place in problem.train.placements)
+    refuse_other_run(out_dir / RESULT, header, problem.numerics.dt, n_strips)

@@ -1,0 +1,74 @@
+"""The shipped cases, found from their folders, and the file that a case argument stands for."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+from pathlib import Path
+
+from catenary.cases.scene.plain_text import plain
+from catenary.cases.scene.toml_input import read_toml
+from catenary.solver.base.errors import InputError
+
+CASES = Path(__file__).resolve().parents[1]
+CASE_FILE = "case.toml"
+
+
+@dataclass(frozen=True)
+class CaseEntry:
+    """A shipped case: its name, its title and its file."""
+
+    name: str
+    title: str
+    path: Path
+
+
+def shipped() -> dict[str, Path]:
+    """Case files of the shipped cases by name, in alphabetical order."""
+    return {path.parent.name: path for path in sorted(CASES.glob(f"*/{CASE_FILE}"))}
+
+
+def entries() -> list[CaseEntry]:
+    """The shipped cases with their titles, which are read without checking the rest."""
+    return [CaseEntry(name, _title(path), path) for name, path in shipped().items()]
+
+
+def _title(path: Path) -> str:
+    """``case.title`` of a case file, empty if it has none."""
+    case = read_toml(path).get("case")
+    return str(case.get("title", "")) if isinstance(case, dict) else ""
+
+
+def find_case(case: str) -> Path:
+    """The case file that ``case`` stands for: a shipped case's name, a file, or a folder with one.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    known = shipped()
+    if not case.strip():
+        raise InputError(
+            "the case has no name: name a shipped case (`catenary list`), a case.toml or its folder"
+        )
+    if case in known:
+        return known[case]
+    try:
+        path = Path(case).expanduser()
+        if path.is_dir() and (path / CASE_FILE).is_file():
+            return path / CASE_FILE
+        if path.is_file():
+            return path
+        exists = path.exists()
+    except (OSError, ValueError, RuntimeError):  # names too long, null bytes, unknown users
+        exists = False
+    if exists:
+        raise InputError(f"{case} is no case file and no folder that holds a {CASE_FILE}")
+    near = difflib.get_close_matches(case, known, n=1)
+    hint = f"did you mean {near[0]}?" if near else f"shipped cases are {', '.join(known)}"
+    raise InputError(f"there is no case or file named {_printable(case)}; {hint}")
+
+
+def _printable(text: str) -> str:
+    return plain(text, 200)

@@ -1,0 +1,1 @@
+"""Whether the tables of a scene fit together."""

@@ -1,0 +1,417 @@
+"""What types and bounds cannot see: whether line, train, evaluation and effects fit together.
+
+Every check yields a ``Fault`` for each thing that is wrong: its sentence names the key, its value,
+what is allowed and where the key was written. A check that needs what another one found wrong is
+left out; all others go on.
+"""
+
+from __future__ import annotations
+
+import difflib
+import functools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from catenary.cases.scene.checks.contact import check_contact
+from catenary.cases.scene.checks.incidents import check_incidents
+from catenary.cases.scene.checks.output import check_output
+from catenary.cases.scene.checks.pantograph import check_mechanisms, check_pantographs
+from catenary.cases.scene.checks.scheme import check_scheme
+from catenary.cases.scene.checks.vehicle import check_vehicle
+from catenary.cases.scene.error_sentences import refusal, shown, unknown_key
+from catenary.cases.scene.faults import Fault, SceneError
+from catenary.cases.scene.keys import is_known, known_keys
+from catenary.cases.scene.mesh_size import size_faults
+from catenary.cases.scene.usual_ranges import usual_faults
+from catenary.meshgen.geometry import SHORTEST_GAP
+from catenary.meshgen.line import Line
+from catenary.solver.base.errors import InputError
+from catenary.solver.effects import effect as effects
+from catenary.solver.problem.problem import Problem
+
+if TYPE_CHECKING:
+    from catenary.cases.scene.scene import Scene
+
+# Two heads cannot stand closer on a roof; their contacts would also share one finite element.
+MIN_SEPARATION = 1.0
+# Slack for sums of decimal lengths [m].
+_TINY = 1e-6
+# As many span lengths are told in a sentence.
+_SOME = 6
+# Effects that are off by default and need a value in the scene: the key that holds it.
+_DATA_OF = {
+    "residual_dropper_stiffness": "line.dropper.residual_stiffness_ratio",
+}
+
+
+def check(scene: Scene) -> None:
+    """Raise ``SceneError`` with all in which a scene contradicts itself."""
+    faults = faults_of(scene)
+    if faults:
+        raise SceneError(faults)
+
+
+def faults_of(scene: Scene) -> list[Fault]:
+    """All in which a scene contradicts itself."""
+    found = _Findings()
+    for of_tables in _OF_TABLES:
+        found.nothing_by(of_tables, scene)
+    if found.nothing_by(_pantograph_names, scene):
+        found.nothing_by(check_pantographs, scene)
+        found.nothing_by(check_scheme, scene)
+    # What is too large is not even made, and what follows from a wrong unit is not told.
+    sound = found.nothing_by(size_faults, scene) and found.nothing_by(usual_faults, scene)
+    line = _line(scene, found) if sound else None
+    if line is None:
+        return found.faults
+    for of_line in (_dropper_lengths, _speed):
+        found.nothing_by(of_line, scene, line)
+    if found.nothing_by(_running, scene, line) and found.nothing_by(_evaluation, scene):
+        found.nothing_by(_raising, scene)
+    if found.faults:
+        return found.faults
+    # What may need the machinery of multibody systems stands last: other faults are told at once.
+    if found.nothing_by(check_mechanisms, scene, line):
+        found.nothing_by(_requirements_of_defaults, scene)
+        found.nothing_by(check_vehicle, scene, line)
+        found.nothing_by(check_incidents, scene, line)
+    return found.faults
+
+
+@dataclass
+class _Findings:
+    """What checks have found so far."""
+
+    faults: list[Fault] = field(default_factory=list)
+
+    def nothing_by(self, check: Callable[..., Iterator[Fault]], *of: Any) -> bool:
+        """Take in what a check finds; returns whether that is nothing."""
+        before = len(self.faults)
+        try:
+            self.faults.extend(check(*of))
+        except SceneError as error:
+            self.faults.extend(error.faults)
+        except InputError as error:
+            self.faults.append(Fault("", str(error)))
+        return len(self.faults) == before
+
+
+def _line(scene: Scene, found: _Findings) -> Line | None:
+    """The line of a scene, None if its droppers do not fit into its spans."""
+    lines: list[Line] = []
+
+    def make() -> Iterator[Fault]:
+        lines.append(scene.to_line())
+        yield from _droppers_inside_spans(scene, lines[0])
+
+    return lines[0] if found.nothing_by(make) else None
+
+
+def _refusal(scene: Scene, key: str, value: object, why: str) -> Fault:
+    return refusal(scene.origin, key, value, why)
+
+
+def _test_keys(scene: Scene) -> Iterator[Fault]:
+    known = known_keys(type(scene))
+    for key in scene.test:
+        if not is_known(key, known) or key.startswith("test."):
+            where = f"in the [test] table {scene.origin.of('test')}"
+            yield Fault("test", unknown_key(key, where, known))
+
+
+def _effect_names(scene: Scene) -> Iterator[Fault]:
+    known = effects.registry()
+    for name, on in scene.effects.items():
+        key = f"effects.{name}"
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            hint = f"did you mean effects.{near[0]}?" if near else f"known are {', '.join(known)}"
+            yield Fault(key, f"{shown(key)[1:-1]} {scene.origin.of(key)} is unknown; {hint}")
+        elif known[name].always and not on:
+            yield _refusal(scene, key, on, "it is part of every scene and cannot be left out")
+
+
+def _requirements_of_chosen(scene: Scene) -> Iterator[Fault]:
+    for name in scene.effects:
+        yield from _requirements(scene, name, "on", f"effects.{name}")
+
+
+def _requirements_of_defaults(scene: Scene) -> Iterator[Fault]:
+    """Of effects that are on by default, unless the scene holds nothing for them to act on."""
+    problem = functools.cache(scene.to_problem)
+    for name, effect in effects.registry().items():
+        if name in scene.effects:
+            continue
+        for fault in _requirements(scene, name, "on by default", ""):
+            if effect.applies(problem()):
+                yield fault
+
+
+def _requirements(scene: Scene, name: str, how: str, key: str) -> Iterator[Fault]:
+    switches = scene.switches()
+    for required in effects.registry()[name].requires if switches.get(name) else ():
+        if not switches[required]:
+            at = key or f"effects.{required}"
+            yield Fault(
+                at,
+                f"effects.{name} is {how} and requires effects.{required}, which is off "
+                f"{scene.origin.of(at)}; switch both on or both off",
+            )
+
+
+def _effect_data(scene: Scene) -> Iterator[Fault]:
+    values = {
+        "residual_dropper_stiffness": scene.line.dropper.residual_stiffness_ratio,
+    }
+    switches = scene.switches()
+    for name, value in values.items():
+        key = _DATA_OF[name]
+        if switches.get(name) and value == 0:
+            yield _refusal(
+                scene, key, value, f"effects.{name} is on and needs a value greater than 0"
+            )
+        if value > 0 and name not in scene.effects and switches.get(name) is False:
+            yield _refusal(
+                scene,
+                key,
+                value,
+                f"it acts only with effects.{name} = true; write that, or false to leave it out",
+            )
+    n = len(scene.train.pantographs)
+    if n > 1 and not switches.get("several_pantographs", True):
+        key = "effects.several_pantographs"
+        yield _refusal(
+            scene, key, False, f"train.pantographs has {n} entries; leave one or switch it on"
+        )
+
+
+def _pantograph_names(scene: Scene) -> Iterator[Fault]:
+    for i, place in enumerate(scene.train.pantographs):
+        if place.name not in scene.pantographs:
+            near = difflib.get_close_matches(place.name, scene.pantographs, n=1)
+            hint = (
+                f"did you mean {near[0]}?"
+                if near
+                else f"it must be one of {', '.join(scene.pantographs)}"
+            )
+            yield _refusal(scene, f"train.pantographs.{i}.name", place.name, hint)
+        elif place.reversed and scene.pantographs[place.name].type == "lumped":
+            key = f"train.pantographs.{i}.reversed"
+            yield _refusal(
+                scene, key, True, f"{place.name} is a chain of lumped masses, with no front"
+            )
+
+
+def _separations(scene: Scene) -> Iterator[Fault]:
+    behind = [place.behind_m for place in scene.train.pantographs]
+    if behind[0] != 0:
+        key = "train.pantographs.0.behind_m"
+        yield _refusal(scene, key, behind[0], "the first pantograph leads, so it must be 0")
+    ahead = scene.strips_ahead()
+    for i in range(1, len(behind)):
+        strips = ahead[i - 1] + ahead[i]
+        if behind[i] < behind[i - 1] + MIN_SEPARATION + strips - _TINY:
+            because = f", because its strips and that one's take {strips:g} m" if strips else ""
+            yield _refusal(
+                scene,
+                f"train.pantographs.{i}.behind_m",
+                behind[i],
+                f"it must be at least {MIN_SEPARATION + strips:g} m more than the "
+                f"{behind[i - 1]:g} m of the pantograph before it{because}",
+            )
+
+
+def _droppers_inside_spans(scene: Scene, line: Line) -> Iterator[Fault]:
+    kind = scene.line.dropper
+    if kind.positions_m is not None and len(set(line.span_lengths)) > 1:
+        key = "line.dropper.positions_m"
+        lengths = ", ".join(f"{span:g}" for span in sorted(set(line.span_lengths))[:_SOME])
+        yield Fault(
+            key,
+            f"{key} {scene.origin.of(key)} holds for one span length, but the spans are "
+            f"{lengths} m long; give line.dropper.patterns or count and spacing_m",
+        )
+        return
+    for span, positions in zip(line.span_lengths, line.dropper_positions, strict=True):
+        outside = [x for x in positions if not SHORTEST_GAP <= x <= span - SHORTEST_GAP]
+        close = [pair for pair in zip(positions, positions[1:], strict=False)
+                 if pair[1] - pair[0] < SHORTEST_GAP]  # fmt: skip
+        if not outside and not close:
+            continue
+        if kind.count is not None and not outside:
+            why = f"droppers must be at least {SHORTEST_GAP:g} m apart"
+            yield _refusal(scene, "line.dropper.spacing_m", kind.spacing_m, why)
+            return
+        if kind.count is not None:
+            yield _refusal(
+                scene,
+                "line.dropper.count",
+                kind.count,
+                f"at a spacing of {kind.spacing_m:g} m these do not fit into a span of {span:g} m",
+            )
+            return
+        which = "positions_m" if kind.positions_m is not None else "patterns"
+        key = f"line.dropper.{which}"
+        if outside:
+            what = f"a dropper at {outside[0]:g} m; it must lie inside the span, between 0 and "
+            what += f"{span:g} m"
+        else:
+            left, right = close[0]
+            what = f"droppers at {left:.10g} and {right:.10g} m; they must be at least "
+            what += f"{SHORTEST_GAP:g} m apart"
+        yield Fault(key, f"{key} {scene.origin.of(key)} puts {what}")
+        return
+
+
+def estimated_dropper_lengths(line: Line, gravity: float) -> list[np.ndarray]:
+    """Dropper lengths of each span [m], the messenger wire taken as a parabola.
+
+    Its load is its own weight and that of the contact wire less what the pre-sag's curvature lets
+    the contact wire's tension carry; bending and the supports' give are left out. Good to a few
+    centimetres: it serves to refuse the impossible, the form finding gives the lengths.
+    """
+    lengths = []
+    places = [np.asarray(positions, dtype=float) for positions in line.dropper_positions]
+    ends = np.cumsum([place.size for place in places])[:-1]
+    masts = np.repeat(line.support_positions[:-1], [place.size for place in places])
+    heights = np.split(line.target_height(masts + np.concatenate(places)), ends)
+    for i, (span, x) in enumerate(zip(line.span_lengths, places, strict=True)):
+        pre_sag = np.asarray(line.pre_sag[i])
+        height = heights[i] - pre_sag
+        mid_sag = float(pre_sag.max(initial=0.0))
+        carried = 8 * mid_sag * line.contact_wire.tension / span**2
+        weight = gravity * (line.contact_wire.mass_per_length + line.messenger_wire.mass_per_length)
+        load = max(weight - carried, gravity * line.messenger_wire.mass_per_length)
+        sag = load * x * (span - x) / (2 * line.messenger_wire.tension)
+        lengths.append(line.contact_height + line.encumbrance - sag - height)
+    return lengths
+
+
+def _dropper_lengths(scene: Scene, line: Line) -> Iterator[Fault]:
+    gravity = Problem.gravity if scene.switches().get("gravity", True) else 0.0
+    shortest = [float(v.min()) for v in estimated_dropper_lengths(line, gravity)]
+    span = int(np.argmin(shortest))
+    if shortest[span] <= 0:
+        yield _refusal(
+            scene,
+            "line.encumbrance_m",
+            line.encumbrance,
+            f"the messenger wire would hang {-shortest[span]:.2f} m below the contact wire in span "
+            f"{span + 1}: raise it, raise line.messenger_wire.tension_N or shorten the span",
+        )
+
+
+def _speed(scene: Scene, line: Line) -> Iterator[Fault]:
+    wave = 3.6 * line.contact_wire.wave_speed
+    speed = scene.train.speed_km_h
+    if speed >= wave and not scene.switches().get("supercritical_speed", False):
+        yield _refusal(
+            scene,
+            "train.speed_km_h",
+            speed,
+            f"it must be below the wave speed of the contact wire ({wave:.1f} km/h, which "
+            f"tension_N = {line.contact_wire.tension:g} and mass_kg_per_m = "
+            f"{line.contact_wire.mass_per_length:g} give it) unless effects.supercritical_speed = "
+            "true",
+        )
+
+
+def _running(scene: Scene, line: Line) -> Iterator[Fault]:
+    first, last = line.running_range
+    start, end = scene.train.start_m, scene.end_m
+    rear = scene.train.pantographs[-1].behind_m
+    ahead = scene.strips_ahead()
+    first, last = first + ahead[-1], last - max(ahead)
+    inside = f"the running range is {first:g} to {last:g} m"
+    if any(ahead):
+        inside += ", strips included"
+    if not first - _TINY <= start <= last + _TINY:
+        yield _refusal(scene, "train.start_m", start, f"it must lie inside the line: {inside}")
+    if start - rear < first - _TINY:
+        yield _refusal(
+            scene,
+            "train.start_m",
+            start,
+            f"the pantograph {rear:g} m behind would start at {start - rear:g} m, outside the "
+            f"line: {inside}",
+        )
+    given = scene.train.end_m
+    if given is not None and given > last + _TINY:
+        yield _refusal(scene, "train.end_m", given, f"it must lie inside the line: {inside}")
+    if end <= start:
+        if given is None:
+            yield _refusal(
+                scene, "train.start_m", start, f"it must lie before the end at {end:g} m"
+            )
+        yield _refusal(
+            scene, "train.end_m", given, f"it must be greater than train.start_m ({start:g} m)"
+        )
+    if end - start < scene.train.speed_km_h / 3.6 * scene.numerics.dt_s:
+        yield _refusal(
+            scene, "numerics.dt_s", scene.numerics.dt_s, "the run would have no step at all"
+        )
+
+
+def _evaluation(scene: Scene) -> Iterator[Fault]:
+    start, end = scene.train.start_m, scene.end_m
+    stretch = scene.evaluation
+    for i, place in enumerate(scene.train.pantographs):
+        who = "the pantograph" if len(scene.train.pantographs) == 1 else f"pantograph {i + 1}"
+        covers = f"{who} only runs from {start - place.behind_m:g} to {end - place.behind_m:g} m"
+        if stretch.from_m < start - place.behind_m - _TINY:
+            yield _refusal(scene, "evaluation.from_m", stretch.from_m, covers)
+        if stretch.to_m > end - place.behind_m + _TINY:
+            yield _refusal(scene, "evaluation.to_m", stretch.to_m, covers)
+
+
+def _raising(scene: Scene) -> Iterator[Fault]:
+    run = (scene.evaluation.from_m - scene.train.start_m) / (scene.train.speed_km_h / 3.6)
+    if scene.train.raise_time_s > run + _TINY:
+        yield _refusal(
+            scene,
+            "train.raise_time_s",
+            scene.train.raise_time_s,
+            f"the leading pantograph reaches evaluation.from_m after {run:.3g} s and must be "
+            "raised by then",
+        )
+
+
+def _standard(scene: Scene) -> Iterator[Fault]:
+    from catenary.postproc.evaluate.standards import EDITIONS, SYSTEMS
+
+    for key, value, known in (
+        ("evaluation.edition", scene.evaluation.edition, EDITIONS),
+        ("evaluation.system", scene.evaluation.system, SYSTEMS),
+    ):
+        if value not in known:
+            yield _refusal(scene, key, value, f"it must be one of {', '.join(known)}")
+
+
+def _mesh_file(scene: Scene) -> Iterator[Fault]:
+    path = scene.mesh_file()
+    if path is None:
+        return
+    try:
+        found = Path(path).is_file()
+    except (OSError, ValueError):
+        found = False
+    if not found:
+        yield _refusal(scene, "mesh.file", str(path), "there is no such file")
+
+
+# Checks that need no other one.
+_OF_TABLES: tuple[Callable[[Scene], Iterator[Fault]], ...] = (
+    _test_keys,
+    _effect_names,
+    _requirements_of_chosen,
+    _effect_data,
+    check_contact,
+    _separations,
+    _standard,
+    _mesh_file,
+    check_output,
+)

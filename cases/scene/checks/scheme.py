@@ -1,0 +1,55 @@
+"""What the scheme ts_alpha2, a second opinion on plain scenes, does not know."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from catenary.cases.scene.error_sentences import refusal
+from catenary.cases.scene.faults import Fault
+from catenary.cases.scene.tables.pantograph import LumpedTable
+
+if TYPE_CHECKING:
+    from catenary.cases.scene.scene import Scene
+
+
+def check_scheme(scene: Scene) -> Iterator[Fault]:
+    """What a scene's scheme cannot simulate.
+
+    The names of its pantographs must be known.
+    """
+    if scene.numerics.scheme != "ts_alpha2":
+        return
+    knows = "numerics.scheme ts_alpha2 knows only"
+    if scene.contact.law != "linear":
+        yield refusal(scene.origin, "contact.law", scene.contact.law, f"{knows} law linear")
+    switches = scene.switches()
+    for i, incident in enumerate(scene.incidents):
+        if switches[incident.type]:
+            why = f"{knows} lines and pantographs that stay what they are"
+            yield refusal(scene.origin, f"incidents.{i}.type", incident.type, why)
+    for name in ("head_roll", "vehicle_motion"):
+        if switches[name]:
+            yield refusal(
+                scene.origin,
+                f"effects.{name}",
+                True,
+                f"{knows} heads and bases that move along a vertical: switch it off",
+            )
+    for name in {place.name: None for place in scene.train.pantographs}:
+        table = scene.pantographs[name]
+        if not isinstance(table, LumpedTable):
+            key = f"pantographs.{name}.type"
+            yield refusal(scene.origin, key, table.type, f"{knows} type lumped")
+            continue
+        key = f"pantographs.{name}.strips"
+        if table.strips.number != 1:
+            yield refusal(scene.origin, f"{key}.number", table.strips.number, f"{knows} one strip")
+        if table.strips.stiffness_N_per_m is not None:
+            value = table.strips.stiffness_N_per_m
+            yield refusal(
+                scene.origin,
+                f"{key}.stiffness_N_per_m",
+                value,
+                f"{knows} strips that are fixed to the head",
+            )

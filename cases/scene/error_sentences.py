@@ -1,0 +1,234 @@
+"""One sentence for each thing that is wrong with a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+from catenary.cases.scene.faults import MOST_TOLD, Fault, SceneError
+from catenary.cases.scene.keys import is_known, known_keys, nearest, without_kinds
+from catenary.cases.scene.plain_text import plain
+from catenary.cases.scene.tables.petsc import ELSEWHERE
+from catenary.cases.scene.units import unit_of
+from catenary.cases.scene.usual_ranges import unit_guess, usual_range
+
+_SHOWN, _SOME, _DEEP = 60, 8, 3
+_LONGEST_KEY = 200  # of one in a sentence
+COMMAND_LINE = "on the command line (--set)"
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a scene's keys were written: its file, pairs of a key that was assigned and the place
+    of that, and pairs of a key and the file that its value was read from."""
+
+    file: str
+    overridden: tuple[tuple[str, str], ...] = ()
+    taken_in: tuple[tuple[str, str], ...] = ()
+
+    def of(self, key: str) -> str:
+        """Place of a key, with its preposition, for use in a sentence."""
+        for above, file in self.taken_in:
+            if key == above or key.startswith(above + "."):
+                return f"in {file}"
+        for given, where in reversed(self.overridden):
+            if key == given or key.startswith(given + ".") or given.startswith(key + "."):
+                return where
+        return f"in {self.file}"
+
+    def is_overridden(self, key: str) -> bool:
+        """Whether just this key was assigned."""
+        return any(key == given for given, _ in self.overridden)
+
+
+def shown(value: Any) -> str:
+    """A value as a person would write it, shortened."""
+    return plain(_as_toml(value), _SHOWN)
+
+
+def _as_toml(value: Any, depth: int = 0) -> str:
+    """A value as TOML has it; of what is long or deep, the beginning."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, list | tuple | dict) and depth == _DEEP:
+        return "..."
+    if isinstance(value, list | tuple):
+        some = ", ".join(_as_toml(one, depth + 1) for one in value[:_SOME])
+        return f"[{some}{', ...' if len(value) > _SOME else ''}]"
+    if isinstance(value, dict):
+        pairs = [f"{key} = {_as_toml(one, depth + 1)}" for key, one in list(value.items())[:_SOME]]
+        return f"{{{', '.join(pairs)}{', ...' if len(value) > _SOME else ''}}}"
+    if value is None:
+        return "nothing"
+    try:
+        return str(value)
+    except ValueError:
+        return "a number of thousands of digits"
+
+
+def refusal(origin: Origin, key: str, value: object, why: str) -> Fault:
+    """The fault that says what a key is, where it was written, and why it cannot be."""
+    unit = unit_of(key)
+    number = f"{value:g}" if isinstance(value, float) else shown(value)
+    in_unit = f" {unit}" if unit else ""
+    return Fault(key, f"{key} is {number}{in_unit} {origin.of(key)}; {why}")
+
+
+def refuse(origin: Origin, key: str, value: object, why: str) -> NoReturn:
+    """Raise the ``SceneError`` with the one fault that ``refusal`` gives."""
+    raise SceneError([refusal(origin, key, value, why)])
+
+
+def unknown_key(key: str, where: str, known: list[str]) -> str:
+    """The sentence for a key that the scene does not know."""
+    near = nearest(key, known)
+    if key.startswith("petsc."):
+        hint = f"; did you mean {near}?" if near and near.startswith("petsc.") else ""
+        return f"{shown(key)[1:-1]} {where} {ELSEWHERE}{hint}"
+    hint = f"; did you mean {near}?" if near else "; see `catenary list --keys` for all keys"
+    return f"{shown(key)[1:-1]} {where} is unknown{hint}"
+
+
+def _or(listed: str) -> str:
+    """A list "a, b, c" as "a, b or c"."""
+    return " or ".join(listed.rsplit(", ", 1))
+
+
+# What pydantic's error types ask for, completed with the error's own limits.
+_WANTED: dict[str, Callable[[dict[str, Any]], str]] = {
+    "greater_than": lambda c: f"must be greater than {c['gt']:g}",
+    "greater_than_equal": lambda c: f"must be at least {c['ge']:g}",
+    "less_than": lambda c: f"must be less than {c['lt']:g}",
+    "less_than_equal": lambda c: f"must be at most {c['le']:g}",
+    "finite_number": lambda c: "must be a finite number",
+    "float_type": lambda c: "must be a number",
+    "int_type": lambda c: "must be a whole number",
+    "int_from_float": lambda c: "must be a whole number",
+    "bool_type": lambda c: "must be true or false",
+    "string_type": lambda c: "must be text",
+    "list_type": lambda c: "must be a list",
+    "dict_type": lambda c: "must be a table",
+    "model_type": lambda c: "must be a table",
+    "literal_error": lambda c: f"must be {c['expected'].replace(chr(39), '')}",
+    "too_short": lambda c: (
+        f"must have at least {c['min_length']} {'entry' if c['min_length'] == 1 else 'entries'}"
+    ),
+    "too_long": lambda c: f"must have at most {c['max_length']} entries",
+    "string_too_short": lambda c: "must not be empty",
+    "string_too_long": lambda c: f"must have at most {c['max_length']} characters",
+    "value_error": lambda c: str(c["error"]),
+    "union_tag_invalid": lambda c: (
+        f"must be of type {_or(c['expected_tags'].replace(chr(39), ''))}, not {c['tag']}"
+    ),
+    "union_tag_not_found": lambda c: "must have a type",
+}
+
+
+def _something_else(limits: dict[str, Any]) -> str:
+    return "must be something else"
+
+
+_OF_A_NUMBER = (
+    "greater_than",
+    "greater_than_equal",
+    "less_than",
+    "less_than_equal",
+    "finite_number",
+    "float_type",
+)
+
+
+def schema_faults(
+    failed: ValidationError, raw: dict[str, Any], model: type[BaseModel], origin: Origin
+) -> tuple[list[Fault], int]:
+    """The faults of a validation, ``MOST_TOLD`` at most, and how many there are more."""
+    found = failed.errors(include_url=False)
+    # A misspelt key often shows up as a missing one too: the misspelling is the cause.
+    found.sort(key=lambda p: 0 if p["type"] == "extra_forbidden" else 1)
+    faults: list[Fault] = []
+    for one in found[:MOST_TOLD]:
+        parts, field = without_kinds(one["loc"], model)
+        key = plain(".".join(_location(parts, raw)), _LONGEST_KEY) or "the scene"
+        faults.append(Fault(key, _sentence(dict(one), key, parts, field, model, origin)))
+    return faults, max(0, len(found) - MOST_TOLD)
+
+
+def _sentence(
+    fault: dict[str, Any],
+    key: str,
+    parts: list[int | str],
+    field: FieldInfo | None,
+    model: type[BaseModel],
+    origin: Origin,
+) -> str:
+    where = origin.of(key)
+    kind = fault["type"]
+    if kind == "extra_forbidden":
+        of_this_kind = known_keys(model, fault["loc"])
+        if not is_known(key, of_this_kind) and is_known(key, known_keys(model)):
+            return f"{key} {where} does not belong to type {_kind(fault['loc'], parts)}"
+        return unknown_key(key, where, of_this_kind)
+    if kind == "missing":
+        meaning = field.description if field is not None else ""
+        return f"{key}{f' ({meaning})' if meaning else ''} is missing {where}"
+    wanted = _WANTED.get(kind, _something_else)(fault.get("ctx") or {})
+    value = fault["input"]
+    if isinstance(value, dict | BaseModel):
+        return f"{key} {where} {wanted}"
+    unit = unit_of(key)
+    shown_unit = f" [{unit}]" if unit and kind in _OF_A_NUMBER else ""
+    guess = ""
+    if (
+        kind in (*_OF_A_NUMBER, "value_error")
+        and isinstance(value, int | float)
+        and not isinstance(value, bool)
+    ):
+        guess = _guess(key, value)
+    return f"{key} is {shown(value)} {where}; it {wanted}{shown_unit}{guess}"
+
+
+def _guess(key: str, value: float) -> str:
+    """The usual range of a number that is out of bounds, and which unit it probably has."""
+    try:
+        guess, usual = unit_guess(key, value), usual_range(key)
+    except OverflowError:  # an integer that no float can hold
+        return ""
+    if guess or usual is None:
+        return f"; {guess}" if guess else ""
+    unit = unit_of(key)
+    return f"; usual are {usual[0]:.12g} to {usual[1]:.12g} {unit}".rstrip()
+
+
+def _kind(loc: Sequence[int | str], parts: Sequence[int | str]) -> str:
+    """The last kind of table in a pydantic location, from what is left without kinds."""
+    left, kind = list(parts), ""
+    for part in loc:
+        if left and part == left[0]:
+            left.pop(0)
+        else:
+            kind = str(part)
+    return kind
+
+
+def _location(loc: Sequence[int | str], raw: Any) -> list[str]:
+    """The part of a pydantic location that exists as written, with the missing or extra key."""
+    parts: list[str] = []
+    for part in loc:
+        if part == "[key]":
+            break
+        if isinstance(part, int) and not isinstance(raw, list):
+            break  # one number was written where a list may stand
+        parts.append(str(part))
+        if isinstance(raw, dict):
+            raw = raw.get(part)
+        elif isinstance(raw, list) and isinstance(part, int) and part < len(raw):
+            raw = raw[part]
+        else:
+            raw = None
+    return parts

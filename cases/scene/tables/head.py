@@ -1,0 +1,106 @@
+"""Scene tables of a pantograph's head: its collector strips, and its roll."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+
+from catenary.cases.scene.table import TAKE_AWAY, Table
+
+# What belongs together: a strip's own suspension, a head's pitch.
+_SUSPENSION = ("mass_kg", "stiffness_N_per_m")
+_PITCH = ("pitch_inertia_kg_m2", "pitch_spring_distance_m")
+
+# What weighs or turns less than this is none of a pantograph's parts [kg], [kg m2]; accelerations
+# of far less are beyond a computer's numbers.
+LEAST_MASS, LEAST_INERTIA = 1e-3, 1e-6
+
+
+def _no_less_mass(mass: float) -> float:
+    if mass < LEAST_MASS:
+        raise ValueError(f"must be at least {LEAST_MASS:g} kg")
+    return mass
+
+
+def _no_less_inertia(inertia: float) -> float:
+    if inertia < LEAST_INERTIA:
+        raise ValueError(f"must be at least {LEAST_INERTIA:g} kg m2")
+    return inertia
+
+
+def _no_switch(value: Any) -> Any:
+    if isinstance(value, bool):
+        raise ValueError("must be 1 or 2")
+    return value
+
+
+SomeMass = AfterValidator(_no_less_mass)
+SomeInertia = AfterValidator(_no_less_inertia)
+
+
+class StripsTable(Table):
+    """Collector strips, fixed to the head or on springs of their own."""
+
+    number: Annotated[Literal[1, 2], BeforeValidator(_no_switch)] = Field(
+        1, description="strips of the head, one or two"
+    )
+    spacing_m: float | None = Field(
+        None, gt=0, le=3, description="between two strips, along the track"
+    )
+    length_m: float | None = Field(
+        None, gt=0, le=5, description="of a strip, across the track; unchecked if absent"
+    )
+    mass_kg: Annotated[float, Field(gt=0, le=100), SomeMass] | None = Field(
+        None, description="of each strip on springs of its own, part of the head's"
+    )
+    stiffness_N_per_m: float | None = Field(
+        None, gt=0, le=1e8, description="between each strip and the head"
+    )
+    damping_N_s_per_m: float = Field(0.0, ge=0, le=1e6, description="between each strip and head")
+    pitch_inertia_kg_m2: Annotated[float, Field(gt=0, le=1000), SomeInertia] | None = Field(
+        None, description="of a lumped head that pitches between two strips"
+    )
+    pitch_spring_distance_m: float | None = Field(
+        None, gt=0, le=3, description="along the track, between the springs below such a head"
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> StripsTable:
+        if self.number == 2 and self.spacing_m is None:
+            raise ValueError("needs spacing_m for number = 2")
+        if self.number == 1:
+            for name in ("spacing_m", *_PITCH):
+                if getattr(self, name) is not None:
+                    raise ValueError(f"must not have {name} with number = 1{TAKE_AWAY}")
+        for pair in (_SUSPENSION, _PITCH):
+            given = [name for name in pair if getattr(self, name) is not None]
+            if len(given) == 1:
+                raise ValueError(f"needs {' and '.join(pair)} together, but only has {given[0]}")
+        if self.damping_N_s_per_m > 0 and self.mass_kg is None:
+            raise ValueError(
+                "must not have damping_N_s_per_m without mass_kg and stiffness_N_per_m, because "
+                f"it acts between a strip and the head{TAKE_AWAY}"
+            )
+        return self
+
+    @property
+    def mass(self) -> float:
+        """Of all strips that have springs of their own [kg]."""
+        return 0.0 if self.mass_kg is None else self.number * self.mass_kg
+
+    @property
+    def ahead(self) -> float:
+        """How far the outer strips are from the head's middle, along the track [m]."""
+        return 0.0 if self.spacing_m is None else 0.5 * self.spacing_m
+
+
+class RollTable(Table):
+    """A lumped head that rolls on two springs beside each other."""
+
+    inertia_kg_m2: Annotated[float, Field(gt=0, le=1000), SomeInertia] = Field(
+        description="of the head, about the track"
+    )
+    spring_distance_m: float = Field(
+        gt=0, le=3, description="across the track, between the springs below the head"
+    )

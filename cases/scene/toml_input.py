@@ -1,0 +1,142 @@
+"""Reading a case file and the ``--set`` assignments into one nested table, without judging it."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from catenary.cases.scene.error_sentences import COMMAND_LINE, shown
+from catenary.cases.scene.plain_text import DEEPEST, decode, plain, read_whole
+from catenary.solver.base.errors import InputError
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+# A key part and its dot; more of them in a row make a table that is nested too deeply, which would
+# take the parser a time that grows with their square.
+_PART = r"""(?:[A-Za-z0-9_-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')[ \t]*\.[ \t]*"""
+_DEEP_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*(?:{_PART}){{{DEEPEST}}}", re.MULTILINE)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Contents of a TOML file in UTF-8, with or without a byte order mark.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is not TOML.
+    """
+    text = decode(read_whole(path, str(path)), str(path))
+    deep = _DEEP_KEY.search(text)
+    if deep is not None:
+        line = text.count("\n", 0, deep.start() + 1) + 1
+        raise InputError(f"{path} has in line {line} a key of more than {DEEPEST} parts")
+    try:
+        return tomllib.loads(text)
+    except RecursionError as error:
+        raise InputError(f"{path} is nested too deeply") from error
+    except ValueError as error:  # TOMLDecodeError, and integers of thousands of digits
+        raise InputError(f"{path} is not valid TOML: {_toml_words(error)}") from error
+
+
+def _toml_words(error: ValueError) -> str:
+    """What the parser says, without Python's way to write keys; it also fails on long integers."""
+    if not isinstance(error, tomllib.TOMLDecodeError):
+        return "a number is too long"
+    keys = re.compile(r"\((?:'[^']*'(?:, )?)+,?\)")
+    return plain(keys.sub(lambda m: ".".join(re.findall(r"'([^']*)'", m[0])), str(error)), 300)
+
+
+# What ``key=`` stands for: the key is taken away, so that its default holds.
+REMOVED = object()
+
+
+class Assigned(NamedTuple):
+    """An assignment ``key=value``, the option that gave it, and its place for use in a sentence."""
+
+    text: str
+    option: str = "--set"
+    where: str = COMMAND_LINE
+
+
+def parse_assignment(text: str, option: str = "--set") -> tuple[str, Any]:
+    """Key and value of ``key=value``; the value is read as TOML, as plain text if it is none.
+
+    An empty value is ``REMOVED``. ``option`` names in an error what gave it.
+
+    Raises
+    ------
+    InputError
+        If it has another form, or a key that no scene can have.
+    """
+    key, equals, value = text.partition("=")
+    key = key.strip()
+    if not equals or not key or any(not part for part in key.split(".")):
+        raise InputError(
+            f"{option} {shown(text)} must have the form key=value, e.g. train.speed_km_h=300"
+        )
+    if key.count(".") >= DEEPEST:
+        raise InputError(f"{option} {shown(key)} has a key of more than {DEEPEST} parts")
+    if not value.strip():
+        return key, REMOVED
+    try:
+        parsed = tomllib.loads(f"value = {value}")
+    except (ValueError, RecursionError):
+        return key, value.strip()
+    if set(parsed) != {"value"}:
+        return key, value.strip()
+    return key, parsed["value"]
+
+
+def assign(raw: dict[str, Any], key: str, value: Any, where: str = COMMAND_LINE) -> None:
+    """Set a dotted key in a nested table, making the tables on the way; ``REMOVED`` takes it away.
+
+    A number in the key is an index into a list; the number after the last one appends. ``where``
+    says in an error where the assignment was written.
+
+    Raises
+    ------
+    InputError
+        If the key leads through something that is neither a table nor a list.
+    """
+    parts = key.split(".")
+    if parts[0] == "test" and len(parts) > 2:
+        parts = [parts[0], ".".join(parts[1:])]  # its keys hold dots
+    here: Any = raw
+    for depth, part in enumerate(parts):
+        last = depth == len(parts) - 1
+        if isinstance(here, list):
+            place: Any = _index(here, parts, depth, where)
+            if place == len(here):
+                here.append({})
+        elif isinstance(here, dict):
+            place = part
+            if not last:
+                here.setdefault(part, {})
+        else:
+            above = ".".join(parts[:depth])
+            raise InputError(
+                f"{shown(key)[1:-1]} cannot be set {where}: {above} is {shown(here)} and no table"
+            )
+        if not last:
+            here = here[place]
+        elif value is not REMOVED:
+            here[place] = value
+        elif isinstance(here, list) or place in here:
+            del here[place]
+
+
+def _index(here: list[Any], parts: list[str], depth: int, where: str) -> int:
+    """The index that a key names in a list, at most one past its last entry."""
+    above, part = ".".join(parts[:depth]), parts[depth]
+    index = int(part) if part.isascii() and part.isdigit() and len(part) < 6 else -1
+    if not 0 <= index <= len(here):
+        raise InputError(
+            f"{shown('.'.join(parts))[1:-1]} cannot be set {where}: {above} is a list of "
+            f"{len(here)}, so that a number from 0 to {len(here)} must follow it"
+        )
+    return index

@@ -1,0 +1,301 @@
+"""What runs of different settings say of accuracy: errors, orders, Pareto front, advice.
+
+Pure functions on figures that are there already; ``cases/studies/accuracy/runs.py`` makes the runs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from catenary.solver.base.errors import InputError
+
+
+class Quantity(NamedTuple):
+    """A figure whose error is looked at: its key in a summary, its unit, and the figure of the
+    reference that makes 100 %."""
+
+    key: str
+    unit: str
+    scale: str
+
+
+HISTORY = "history"
+QUANTITIES = {
+    "mean": Quantity("mean_N", "N", "mean_N"),
+    "std": Quantity("std_N", "N", "std_N"),
+    "std_0_5": Quantity("std_0_5_N", "N", "std_0_5_N"),
+    "std_5_20": Quantity("std_5_20_N", "N", "std_5_20_N"),
+    "max": Quantity("max_N", "N", "std_N"),
+    "min": Quantity("min_N", "N", "std_N"),
+    "uplift": Quantity("max_uplift_mm", "mm", "max_uplift_mm"),
+    HISTORY: Quantity("", "N", "std_N"),
+}
+WORDS = {"std": "the standard deviation (0-20 Hz)", HISTORY: "the force history (rms, 0-20 Hz)"}
+
+
+@dataclass(frozen=True)
+class Found:
+    """What one run found.
+
+    Attributes
+    ----------
+    pantographs : a table of figures of each, keys as in ``summary.json``
+    uplift : largest at a steady arm [mm], None if there is none
+    histories : force below 20 Hz at common positions of each pantograph, (n,) [N]
+    """
+
+    pantographs: Sequence[dict[str, Any]]
+    uplift: float | None
+    histories: Sequence[np.ndarray]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A level of an axis beside what it is compared with.
+
+    Attributes
+    ----------
+    axis, level : names
+    outcome : "done", or what broke or is not possible
+    sizes : what is refined, by name
+    errors : quantity -> difference from the reference in its unit, of the pantograph where it is
+        largest, signed (``HISTORY``: rms)
+    percent : quantity -> its magnitude in percent of the reference's scale
+    cost : wall time of the march per simulated second, median [s/s]
+    timings : how many runs that median is of
+    estimate : the run's own estimate of the error of the history [N]
+    iterations : rounds a step takes: of its small problem, or corrections (whole solves)
+    by_step, by_mesh : quantity -> error of the step alone and of the mesh alone in percent, where
+        both are refined: they may cancel in ``percent``
+    """
+
+    axis: str
+    level: str
+    outcome: str
+    sizes: dict[str, float] = field(default_factory=dict)
+    errors: dict[str, float] = field(default_factory=dict)
+    percent: dict[str, float] = field(default_factory=dict)
+    cost: float = math.nan
+    timings: int = 0
+    estimate: float = math.nan
+    iterations: float = math.nan
+    by_step: dict[str, float] = field(default_factory=dict)
+    by_mesh: dict[str, float] = field(default_factory=dict)
+
+    def worst(self, quantity: str) -> float:
+        """The largest of the whole error and those of step and mesh alone [%]."""
+        parts = (self.percent, self.by_step, self.by_mesh)
+        return max((part[quantity] for part in parts if quantity in part), default=math.inf)
+
+    @property
+    def done(self) -> bool:
+        """Whether the run came to its end and could be compared."""
+        return self.outcome == "done" and bool(self.errors)
+
+
+def compare(
+    found: Found, reference: Found, scale_of: Found | None = None
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Errors in units and in percent, see ``Row``; what either run does not have is left out.
+
+    ``scale_of`` is the run whose figures make 100 %, the reference if it is not given.
+    """
+    errors: dict[str, float] = {}
+    percent: dict[str, float] = {}
+    for name, quantity in QUANTITIES.items():
+        for own, other, scale in _pairs(name, quantity, found, reference, scale_of or reference):
+            if scale <= 0.0 or math.isnan(own - other):
+                continue
+            share = 100.0 * abs(own - other) / scale
+            if name not in percent or share > percent[name]:
+                errors[name], percent[name] = own - other, share
+    return errors, percent
+
+
+def _pairs(
+    name: str, quantity: Quantity, found: Found, reference: Found, scale_of: Found
+) -> list[tuple[float, float, float]]:
+    """Own value, the reference's and the scale, of each pantograph or of the line."""
+    if name == "uplift":
+        if found.uplift is None or reference.uplift is None or scale_of.uplift is None:
+            return []
+        return [(found.uplift, reference.uplift, scale_of.uplift)]
+    pairs = []
+    tables = found.pantographs, reference.pantographs, scale_of.pantographs
+    for p, (own, other, whole) in enumerate(zip(*tables, strict=True)):
+        if any(table.get("std_N") is None for table in (own, other, whole)):
+            continue
+        if name == HISTORY:
+            difference = found.histories[p] - reference.histories[p]
+            rms = float(np.sqrt(np.mean(difference**2)))
+            pairs.append((rms, 0.0, float(whole[quantity.scale])))
+        else:
+            figures = own[quantity.key], other[quantity.key], abs(whole[quantity.scale])
+            pairs.append((float(figures[0]), float(figures[1]), float(figures[2])))
+    return pairs
+
+
+def uncertainties(
+    reference: Found | None, chains: Sequence[Sequence[Found | None]]
+) -> dict[str, float]:
+    """By how much a reference may be wrong itself, by quantity [%]; infinite if it is not known.
+
+    Each of ``chains`` holds three runs, of which each has half the fineness of the one before it in
+    one size. With d and D, by what the first two and the last two differ, the observed order is
+    p = log2(D / d), and the error of the first 1.25 d / (2^p - 1), of which the sizes' sum is
+    taken. Orders above 2, that of all schemes, are not trusted; where differences do not shrink,
+    three times the larger one stands for the error.
+
+    Source: P. J. Roache, J. Fluids Eng. 116 (1994) 405-413, the grid convergence index.
+    """
+    told = dict.fromkeys(QUANTITIES, 0.0)
+    for fine, middle, coarse in chains:
+        if reference is None or fine is None or middle is None or coarse is None:
+            return dict.fromkeys(QUANTITIES, math.inf)
+        near = compare(middle, fine, reference)[1]
+        far = compare(coarse, middle, reference)[1]
+        for name in told:
+            told[name] += _extrapolated(near.get(name, math.inf), far.get(name, math.inf))
+    return told
+
+
+_SAFETY, _HIGHEST_ORDER, _LOWEST_ORDER, _WITHOUT_ORDER = 1.25, 2.0, 0.5, 3.0
+
+
+def _extrapolated(near: float, far: float) -> float:
+    """The error of the finest of three runs from what neighbours differ by."""
+    if near == 0.0 or math.isinf(near) or math.isinf(far):
+        return near
+    order = math.log2(far / near) if far > 0.0 else -math.inf
+    if order < _LOWEST_ORDER:
+        return _WITHOUT_ORDER * max(near, far)
+    return _SAFETY * near / (2.0 ** min(order, _HIGHEST_ORDER) - 1.0)
+
+
+def separate(
+    found: Found, step_alone: Found | None, reference: Found
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Errors of the step and of the mesh alone [%], both empty where they are not known.
+
+    ``step_alone`` has the mesh of ``found`` and the step of ``reference``.
+    """
+    if step_alone is None:
+        return {}, {}
+    by_step = compare(found, step_alone, reference)[1]
+    return by_step, compare(step_alone, reference)[1]
+
+
+def observed_orders(rows: Sequence[Row], size: str, quantity: str) -> list[tuple[float, float]]:
+    """Size and observed order towards the next finer level, coarsest first.
+
+    The order between sizes a > b with errors e and f is log(e / f) / log(a / b). Levels that
+    broke, and errors of zero, have none.
+    """
+    known = [r for r in rows if r.done and size in r.sizes and r.errors.get(quantity, 0.0) != 0.0]
+    known.sort(key=lambda row: -row.sizes[size])
+    result = []
+    for coarse, fine in zip(known[:-1], known[1:], strict=True):
+        refined = math.log(coarse.sizes[size] / fine.sizes[size])
+        smaller = math.log(abs(coarse.errors[quantity] / fine.errors[quantity]))
+        result.append((coarse.sizes[size], smaller / refined))
+    return result
+
+
+def pareto(rows: Sequence[Row], quantity: str = HISTORY) -> list[Row]:
+    """The rows that no other beats in both cost and error, cheapest first."""
+    known = [row for row in rows if row.done and quantity in row.percent and row.cost > 0.0]
+    known.sort(key=lambda row: (row.cost, row.percent[quantity]))
+    front: list[Row] = []
+    for row in known:
+        if not front or row.percent[quantity] < front[-1].percent[quantity]:
+            front.append(row)
+    return front
+
+
+def cheapest(rows: Sequence[Row], quantity: str, target: float) -> Row | None:
+    """The cheapest row within ``target`` [%] that is not there by chance, None if none is.
+
+    Errors of statistics change their sign as settings grow finer, and are small where they do;
+    those of step and mesh may cancel. A row counts only if its errors of step and mesh alone are
+    within the target as well, and those of all rows that are at least as fine in every size.
+    """
+    known = [row for row in rows if row.done and quantity in row.percent and row.cost > 0.0]
+
+    def finer(row: Row, than: Row) -> bool:
+        return all(row.sizes[size] <= than.sizes[size] * (1 + 1e-9) for size in than.sizes)
+
+    within = [
+        row
+        for row in known
+        if all(other.worst(quantity) <= target for other in known if finer(other, row))
+    ]
+    return min(within, key=lambda row: row.cost, default=None)
+
+
+# The reference's own uncertainty is at most this share of the target, or nothing is recommended.
+_SHARE = 1.0 / 3.0
+
+
+def advice(
+    rows: Sequence[Row], quantity: str, target: float, uncertainty: float = 0.0, without: str = ""
+) -> str:
+    """What to take for an error of at most ``target`` [%], as a sentence.
+
+    Parameters
+    ----------
+    rows : of one axis
+    uncertainty : of the reference itself [%]
+    without : whose error is not in the rows, "step" or "mesh"; empty if both are
+    """
+    what = WORDS.get(quantity, f"the {quantity}")
+    if not uncertainty <= _SHARE * target:
+        own = f"may be wrong by {uncertainty:.2g} % itself"
+        if math.isinf(uncertainty):
+            own = "has an uncertainty that is not known"
+        return (
+            f"What {target:g} % in {what} takes cannot be told: the reference {own}, and "
+            "a third of the target is the most that would do."
+        )
+    row = cheapest(rows, quantity, target)
+    if row is None:
+        known = [r.worst(quantity) for r in rows if r.done and quantity in r.percent]
+        best = f"; the smallest error among them is {min(known):.2g} %" if known else ""
+        return f"No setting tried is reliably within {target:g} % in {what}{best}."
+    parts = []
+    if "dt" in row.sizes:
+        parts.append(f"dt = {1e3 * row.sizes['dt']:g} ms")
+    if "h" in row.sizes:
+        parts.append(f"elements per gap = {round(1.0 / row.sizes['h'])}")
+    alone = ""
+    if quantity in row.by_step and quantity in row.by_mesh:
+        alone = f" (step {row.by_step[quantity]:.2g}, mesh {row.by_mesh[quantity]:.2g})"
+    speed = 1.0 / row.cost
+    times = f"{speed:.3g} times {'faster' if speed >= 1 else 'the speed'}"
+    times += " than real time" if speed >= 1 else " of real time"
+    aside = f"; the error of the {without} comes on top and is not judged" if without else ""
+    return (
+        f"For {target:g} % in {what}: {', '.join(parts)}; error {row.percent[quantity]:.2g} %"
+        f"{alone}, {times}{aside}."
+    )
+
+
+def parse_target(text: str) -> float:
+    """Percent of ``1%`` or ``1``.
+
+    Raises
+    ------
+    InputError
+        If it is no number above 0 and up to 100.
+    """
+    try:
+        value = float(text.strip().removesuffix("%"))
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value <= 100.0:
+        raise InputError(f"--target {text} must be a percentage above 0 and up to 100, e.g. 1%")
+    return value

@@ -1,0 +1,374 @@
+"""The axes of ``catenary accuracy``: one table, to which an axis is added with one entry.
+
+An axis of *discretisation* changes how exactly the scene's equations are solved: its levels are
+compared with a reference that is finer in all that the axis refines, and whose own uncertainty
+coarser ones tell. An axis of *models* changes the equations: its levels differ from the scene as it
+is, and no difference is an error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from catenary.cases.scene.error_sentences import shown
+from catenary.solver.base.errors import InputError
+
+if TYPE_CHECKING:
+    from catenary.cases.scene.scene import Scene
+
+DISCRETISATION, MODEL = "discretisation", "model"
+_SMALLEST_FIT = 0.5  # [Hz], as the verb ``pantograph`` does
+
+
+@dataclass(frozen=True)
+class Level:
+    """One setting of an axis.
+
+    Attributes
+    ----------
+    name : short, unique within its axis
+    assignments : ``key=value`` each, on top of the scene
+    sizes : what is refined, by name: ``dt`` [s], ``h`` as a share of a gap; empty if nothing is
+    quick : whether the level also belongs to the short form of the axis
+    """
+
+    name: str
+    assignments: tuple[str, ...]
+    sizes: tuple[tuple[str, float], ...] = ()
+    quick: bool = False
+
+    def size(self, name: str) -> float | None:
+        """The value of one of ``sizes``, None if it has none."""
+        return dict(self.sizes).get(name)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What the levels of a discretisation axis are compared with, and what it is measured by.
+
+    Attributes
+    ----------
+    level : finer than every level of the axis in all that it refines
+    chains : for each size three levels, of which each has half the fineness of the one before it;
+        the first is the reference, or has its fineness in that size
+    """
+
+    level: Level
+    chains: tuple[tuple[Level, Level, Level], ...]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One thing that is varied.
+
+    Attributes
+    ----------
+    name, title : for the option ``--axes`` and for headings
+    kind : ``DISCRETISATION`` or ``MODEL``
+    levels : the levels for a scene, quick ones only on request; none where it has nothing to vary
+    reference : for a scene, the reference of a discretisation axis; None for models, which are
+        compared with the scene as it is
+    refined : which of the levels' sizes an observed order belongs to, "" if none
+    step_alone : for a level of step and mesh, the one with its mesh and the reference's step: what
+        the two differ by is the error of the step, what is left that of the mesh; None if the axis
+        does not refine both
+    """
+
+    name: str
+    title: str
+    kind: str
+    levels: Callable[[Scene], Sequence[Level]]
+    reference: Callable[[bool], Reference] | None = None
+    refined: str = ""
+    step_alone: Callable[[Level], Level] | None = None
+
+    def chosen(self, scene: Scene, quick: bool) -> list[Level]:
+        """The levels of the axis for a scene, in the long or the short form."""
+        return [level for level in self.levels(scene) if level.quick or not quick]
+
+
+def parse_axes(text: str | None) -> list[Axis]:
+    """The axes of a list with commas, all if it is left out.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown or given twice.
+    """
+    if text is None:
+        return list(AXES.values())
+    names = [name.strip() for name in text.split(",")]
+    for name in names:
+        if name not in AXES:
+            raise InputError(f"--axes {shown(name)[1:-1]} is unknown; there are {', '.join(AXES)}")
+        if names.count(name) > 1:
+            raise InputError(f"--axes names {name} twice")
+    return [AXES[name] for name in names]
+
+
+# ---- step and mesh ------------------------------------------------------------------------------
+
+
+def step(dt: float, elements: int | None = None, quick: bool = False) -> Level:
+    """A time step [s], and elements per gap if given."""
+    assignments, sizes = [f"numerics.dt_s={dt:g}"], [("dt", dt)]
+    name = f"{1e3 * dt:g}_ms"
+    if elements is not None:
+        name += f"_{elements}_elements"
+        assignments.append(f"mesh.elements_per_gap={elements}")
+        sizes.append(("h", 1.0 / elements))
+    return Level(name, tuple(assignments), tuple(sizes), quick)
+
+
+def mesh(elements: int, quick: bool = False, dt: float | None = None) -> Level:
+    """Elements per gap, at the scene's own step unless one [s] is given."""
+    assignments = [f"mesh.elements_per_gap={elements}"]
+    assignments += [] if dt is None else [f"numerics.dt_s={dt:g}"]
+    return Level(f"{elements}_elements", tuple(assignments), (("h", 1.0 / elements),), quick)
+
+
+_STEPS = ((2e-4, False), (5e-4, False), (1e-3, True), (2e-3, True), (4e-3, False), (8e-3, False))
+_ELEMENTS = (1, 2, 3, 4, 5, 6, 8, 12, 16)
+_FEW_ELEMENTS = (3, 5)
+# Step [s] and elements per gap, in the long form and the short one, of the reference for step and
+# mesh together. Meshes are compared at
+# this step: a fine mesh and a long step do not go together, see ``solver/linear/unit_responses.py``.
+_FINEST_STEP, _FINEST_MESH, _QUICK_MESH = 2e-4, 40, 24
+
+
+def _steps(scene: Scene) -> list[Level]:
+    return [step(dt, None, quick) for dt, quick in _STEPS]
+
+
+def _fine_step(quick: bool) -> Reference:
+    """On the scene's own mesh: of the error of the step alone."""
+    dt = 1.25e-4 if quick else 5e-5
+    return Reference(step(dt), ((step(dt), step(2 * dt), step(4 * dt)),))
+
+
+def _own_mesh(scene: Scene) -> bool:
+    return scene.mesh.file is not None
+
+
+def _meshes(scene: Scene) -> list[Level]:
+    if _own_mesh(scene):
+        return []
+    return [mesh(n, n in _FEW_ELEMENTS, _FINEST_STEP) for n in _ELEMENTS]
+
+
+def _fine_both(quick: bool) -> Reference:
+    dt, n = _FINEST_STEP, _QUICK_MESH if quick else _FINEST_MESH
+    meshes = step(dt, n), step(dt, n // 2), step(dt, n // 4)
+    # Steps on the coarsest of these meshes: fine meshes and long steps do not go together.
+    steps = meshes[-1], step(2 * dt, n // 4), step(4 * dt, n // 4)
+    return Reference(meshes[0], (meshes, steps))
+
+
+def _at_the_finest_step(level: Level) -> Level:
+    h = level.size("h")
+    assert h is not None
+    return step(_FINEST_STEP, round(1.0 / h))
+
+
+# Fine meshes with long steps are left out of the grid, as above [s].
+_LONGEST_STEP = {8: 1e-3, 12: 5e-4, 16: 5e-4}
+
+
+def _grid(scene: Scene) -> list[Level]:
+    if _own_mesh(scene):
+        return []
+    return [
+        step(dt, n, dt in (1e-3, 2e-3) and n in _FEW_ELEMENTS)
+        for dt in (5e-4, 1e-3, 2e-3, 4e-3)
+        for n in _ELEMENTS
+        if dt <= _LONGEST_STEP.get(n, 1.0)
+    ]
+
+
+# ---- scheme and coupling ------------------------------------------------------------------------
+
+_NEWMARK = ("numerics.integrator=newmark", "numerics.spectral_radius=")
+_ONE_SOLVE = ("numerics.iterations=", "numerics.scheme=one_solve")
+# The paper's correction, so many times in every step, whatever they reach; or until changes are
+# below tolerances, of which the loosest end every step after the first.
+_PAPER = ("numerics.coupling=", "numerics.iterations=", "numerics.scheme=fixed_point")
+_LOOSENESS = ((1e-2, 1.0), (1e-4, 1e-1), (1e-5, 1e-2), (1e-7, 1e-4))
+
+
+def _newmark(name: str, gamma: float, beta: float, quick: bool = False) -> Level:
+    keys = (f"numerics.newmark_gamma={gamma}", f"numerics.newmark_beta={beta}")
+    return Level(name, (*_ONE_SOLVE, *_NEWMARK, *keys), quick=quick)
+
+
+def _alpha(integrator: str, radius: float) -> Level:
+    keys = (
+        f"numerics.integrator={integrator}",
+        f"numerics.spectral_radius={radius}",
+        "numerics.newmark_gamma=",
+        "numerics.newmark_beta=",
+    )
+    return Level(f"{integrator}_{radius:g}", (*_ONE_SOLVE, *keys))
+
+
+def _ts_alpha2(radius: float) -> Level:
+    """PETSc's own stepper, which runs on one rank and knows plain scenes only."""
+    own = _alpha("generalized_alpha", radius).assignments[len(_ONE_SOLVE) :]
+    keys = ("numerics.coupling=", "numerics.iterations=", "numerics.scheme=ts_alpha2")
+    return Level(f"ts_alpha2_{radius:g}", (*keys, *own))
+
+
+def _schemes(scene: Scene) -> list[Level]:
+    levels = [
+        _newmark("average_acceleration", 0.5, 0.25, True),
+        _newmark("newmark_0.55", 0.55, 0.28, True),
+        _newmark("newmark_0.6", 0.6, 0.3025),
+        *(_alpha("generalized_alpha", radius) for radius in (0.9, 0.8, 0.5, 0.0)),
+        *(_alpha("hht", radius) for radius in (0.9, 0.8)),
+        _ts_alpha2(0.8),
+    ]
+    levels += [
+        Level(
+            f"corrected_{n}_times",
+            (*_PAPER, "numerics.max_iterations=", f"numerics.iterations={n}"),
+        )
+        for n in (1, 2, 4, 6, 10, 20)
+    ]
+    levels += [
+        Level(
+            f"corrected_to_{eps_d:g}_m",
+            (*_PAPER, f"numerics.eps_d_m={eps_d:g}", f"numerics.eps_v_m_per_s={eps_v:g}"),
+        )
+        for eps_d, eps_v in _LOOSENESS
+    ]
+    return levels
+
+
+def _couplings(scene: Scene) -> list[Level]:
+    return [
+        Level(name, (*_ONE_SOLVE, f"numerics.coupling={name}"), quick=name != "iterated")
+        for name in ("implicit", "iterated", "explicit")
+    ]
+
+
+# Steps that adapt: longest step [s], and how wrong a contact force may be in one step [N].
+_ADAPTED = ((1e-3, 1.0), (1e-3, 0.1), (4e-3, 10.0), (4e-3, 1.0), (4e-3, 0.1))
+
+
+def _adaptive(scene: Scene) -> list[Level]:
+    return [
+        Level(
+            f"{1e3 * dt:g}_ms_{tolerance:g}_N",
+            (*_ONE_SOLVE, f"numerics.dt_s={dt:g}", f"numerics.adaptive_tolerance_N={tolerance:g}"),
+            quick=tolerance == 10.0,
+        )
+        for dt, tolerance in _ADAPTED
+    ]
+
+
+# ---- models -------------------------------------------------------------------------------------
+
+_NO_LAW = ("contact.restitution=", "contact.hertz_stiffness_N_per_m1_5=",
+           "contact.damping_N_s_per_m=", "contact.least_impact_speed_m_per_s=")  # fmt: skip
+_ELASTIC = (*_NO_LAW, "effects.contact_damping=false")
+
+
+def _contacts(scene: Scene) -> list[Level]:
+    levels = [
+        Level(
+            f"linear_{k:g}",
+            (*_ELASTIC, "contact.law=linear", f"contact.stiffness_N_per_m={k:g}"),
+            quick=k in (5e4, 2e5),
+        )
+        for k in (2e4, 5e4, 1e5, 2e5, 1e6)
+    ]
+    levels.append(Level("hertz", (*_ELASTIC, "contact.law=hertz")))
+    levels += [
+        Level(
+            f"{law}_0.6",
+            (
+                *_NO_LAW,
+                f"contact.law={law}",
+                "contact.restitution=0.6",
+                "effects.contact_damping=true",
+            ),  # fmt: skip
+        )
+        for law in ("lankarani_nikravesh", "hunt_crossley", "flores", "gonthier")
+    ]
+    # Without numerical damping the force of a contact that does not give way alternates.
+    damped = (*_NEWMARK, "numerics.newmark_gamma=0.55", "numerics.newmark_beta=0.28")
+    rigid = (*_ELASTIC, "contact.stiffness_N_per_m=", "contact.law=kinematic", *damped)
+    return [*levels, Level("kinematic_newmark_0.55", rigid)]
+
+
+def _droppers(scene: Scene) -> list[Level]:
+    slack, kept = "effects.dropper_slackening", "effects.residual_dropper_stiffness"
+    slackens, damper = (f"{kept}=false", f"{slack}=true"), "line.dropper.slack_damping"
+    return [
+        Level("linear", (f"{kept}=false", f"{slack}=false"), quick=True),
+        Level("slackening", (*slackens, f"{damper}=released"), quick=True),
+        Level("slackening_damped", (*slackens, f"{damper}=kept")),
+        Level(
+            "residual_0.01",
+            (
+                f"{slack}=true",
+                f"{kept}=true",
+                "line.dropper.residual_stiffness_ratio=0.01",
+                f"{damper}=released",
+            ),
+        ),
+    ]
+
+
+def _pantographs(scene: Scene) -> list[Level]:
+    """Lumped chains fitted to the scene's leading kind; a mechanism also with all its bodies.
+
+    A chain is not fitted with more masses than it has: the data say nothing of the others.
+    """
+    kind = scene.train.pantographs[0].name
+    table = scene.pantographs[kind]
+    most = len(table.masses_kg) if table.type == "lumped" else 3
+    levels = [_fitted(scene, kind, n) for n in range(1, min(most, 3) + 1)]
+    if table.type == "multibody":
+        motion = f"pantographs.{kind}.motion"
+        levels.append(Level("reduced", (f"{motion}=reduced",), quick=True))
+        levels.append(Level("all_bodies", (f"{motion}=all_bodies",)))
+    return levels
+
+
+def _fitted(scene: Scene, kind: str, n_masses: int) -> Level:
+    """All pantographs of the train as chains fitted to a kind, as the verb ``pantograph`` does."""
+    from catenary.cases.studies.pantograph.output import inline_table
+    from catenary.cases.studies.pantograph.study import Range, study
+
+    found = study(scene, kind, n_masses, Range(0.1, 25.0, 2, _SMALLEST_FIT))
+    name = f"fitted_{n_masses}"
+    assignments = [f"pantographs.{name}={inline_table(found)}"]
+    for place in range(len(scene.train.pantographs)):
+        assignments += [
+            f"train.pantographs.{place}.name={name}",
+            f"train.pantographs.{place}.reversed=",
+        ]
+    return Level(f"fitted_{n_masses}_mass", tuple(assignments), quick=n_masses == 2)
+
+
+_ALL = (
+    Axis("dt", "time step, on the case's mesh", DISCRETISATION, _steps, _fine_step, "dt"),
+    Axis("elements", "elements per gap, step 0.2 ms", DISCRETISATION, _meshes, _fine_both, "h"),
+    Axis(
+        "grid",
+        "time step and elements per gap",
+        DISCRETISATION,
+        _grid,
+        _fine_both,
+        step_alone=_at_the_finest_step,
+    ),
+    Axis("scheme", "scheme, at the case's step", DISCRETISATION, _schemes, _fine_step),
+    Axis("coupling", "coupling, at the case's step", DISCRETISATION, _couplings, _fine_step),
+    Axis("adaptive", "steps halved where a force is wrong", DISCRETISATION, _adaptive, _fine_step),
+    Axis("contact", "contact law and stiffness", MODEL, _contacts),
+    Axis("dropper", "dropper model", MODEL, _droppers),
+    Axis("pantograph", "pantograph model", MODEL, _pantographs),
+)  # fmt: skip
+AXES = {axis.name: axis for axis in _ALL}

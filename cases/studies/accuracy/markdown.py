@@ -1,0 +1,98 @@
+"""The tables of an accuracy study as a page of Markdown."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from catenary.cases.studies.accuracy.analysis import HISTORY, QUANTITIES, Row
+from catenary.cases.studies.accuracy.axes import AXES, DISCRETISATION, Axis
+from catenary.cases.studies.accuracy.plan import PlannedAxis
+from catenary.cases.studies.accuracy.runs import Measured
+from catenary.postproc.report.wording import counted
+
+_SEPARATE = ("history by step", "history by mesh")
+_LAST_COLUMNS = ("est/true", "rounds", "s/s")
+
+
+def page(
+    found: Measured, sentences: Sequence[str], orders: dict[str, list[str]], picture: str
+) -> str:
+    """One table an axis, with what the study recommends first.
+
+    Parameters
+    ----------
+    found : what was measured
+    sentences : the recommendations
+    orders : lines on observed orders by axis name
+    picture : file of the work-precision diagram, empty for none
+    """
+    parts = [
+        f"# Accuracy and cost: {found.plan.case}",
+        f"`{_command(found)}`; {counted(len(found.rows), 'setting')}, "
+        f"{counted(round(found.wall / 60.0), 'minute')}. Errors in percent: of the reference's own "
+        "value for mean, deviations and uplift, of its standard deviation for maximum, minimum and "
+        'the force "history" (rms). "est/true" is the error that a run estimates itself over the '
+        'true one, "rounds" the solves of the small problem a step, "s/s" wall time of the march '
+        "per simulated second: read times as ratios. Where step and mesh are refined together, "
+        "errors of the history by the step and by the mesh alone stand beside the whole error, in "
+        "which they may cancel.",
+    ]
+    if picture:
+        parts.append(f"![work and precision]({picture})")
+    parts.append("\n".join(f"- {sentence}" for sentence in sentences))
+    for planned in found.plan.axes:
+        axis = planned.axis
+        parts.append(f"## {axis.title[0].upper()}{axis.title[1:]}")
+        if axis.kind == DISCRETISATION:
+            told = uncertainty_text(planned, found.uncertainty[axis.name])
+            parts.append(f"Reference: {planned.reference}. {told[0].upper()}{told[1:]}.")
+        else:
+            parts.append("Differences from the case as it is: of models, not errors.")
+        parts.append(_table(axis, found.rows_of(axis.name)))
+        parts += [line.strip()[0].upper() + line.strip()[1:] + "." for line in orders[axis.name]]
+    return "\n\n".join(parts) + "\n"
+
+
+def _command(found: Measured) -> str:
+    """The words that make this study again, the folder left out."""
+    names = [planned.axis.name for planned in found.plan.axes]
+    some = "" if names == list(AXES) else f" --axes {','.join(names)}"
+    return f"catenary accuracy {found.plan.case}{some}"
+
+
+def uncertainty_text(planned: PlannedAxis, percent: Mapping[str, float]) -> str:
+    """How far the reference itself may be wrong, and from which runs that is known."""
+    from_runs = " and from ".join(", ".join(chain) for chain in planned.chains)
+    known = {what: value for what, value in percent.items() if math.isfinite(value)}
+    if not known:
+        return f"the uncertainty of the reference is not known from {from_runs}"
+    told = ", ".join(f"{what} {_short(value)}" for what, value in known.items())
+    return f"uncertainty of the reference, from {from_runs} [%]: {told}"
+
+
+def _table(axis: Axis, rows: Sequence[Row]) -> str:
+    both = any(row.by_step for row in rows)
+    names = [*QUANTITIES, *(_SEPARATE if both else ()), *_LAST_COLUMNS]
+    lines = [
+        "| " + " | ".join([axis.name, *names]) + " |",
+        "|" + "---|" * (len(names) + 1),
+    ]
+    for row in rows:
+        cells = _cells(axis, row, both) if row.done else [row.outcome] + [""] * (len(names) - 1)
+        level = row.level.replace("_", " ")
+        lines.append("| " + " | ".join([level, *cells]) + " |")
+    return "\n".join(lines)
+
+
+def _cells(axis: Axis, row: Row, both: bool) -> list[str]:
+    true = row.errors.get(HISTORY, math.nan)
+    ratio = row.estimate / true if axis.refined == "dt" and true else math.nan
+    figures = [row.percent.get(name, math.nan) for name in QUANTITIES]
+    if both:
+        figures += [row.by_step.get(HISTORY, math.nan), row.by_mesh.get(HISTORY, math.nan)]
+    return [_short(value) for value in (*figures, ratio, row.iterations, row.cost)]
+
+
+def _short(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.3g}"

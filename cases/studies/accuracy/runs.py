@@ -1,0 +1,189 @@
+"""Runs ``catenary accuracy``: all settings once, short runs again for their time, then rows."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from catenary.cases.studies.accuracy.analysis import Found, Row, compare, separate, uncertainties
+from catenary.cases.studies.accuracy.plan import Plan, PlannedAxis, again
+from catenary.cases.studies.sweep.jobs import Ended
+from catenary.cases.studies.sweep.run_jobs import run_jobs
+from catenary.postproc.evaluate import filters
+from catenary.postproc.evaluate.statistics import covers
+from catenary.postproc.files.result_file import INTERRUPTED
+from catenary.postproc.read.results import Results
+
+RUNS = "runs"
+# Distance at which histories are compared [m]: 20 Hz are waves of 0.25 m at 18 km/h.
+_SPACING = 0.25
+# Marches of more steps times unknowns than this, some five seconds, are timed once: disturbances
+# are short beside them.
+_LONG = 2e8
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What an accuracy study has found.
+
+    Attributes
+    ----------
+    plan : what was run
+    rows : all levels, axis by axis
+    uncertainty : by axis name, of the reference itself (percent by quantity, infinite where it is
+        not known), only of discretisation axes
+    wall : time of all runs [s]
+    """
+
+    plan: Plan
+    rows: Sequence[Row]
+    uncertainty: Mapping[str, dict[str, float]]
+    wall: float
+
+    def rows_of(self, axis: str) -> list[Row]:
+        """The rows of an axis."""
+        return [row for row in self.rows if row.axis == axis]
+
+
+def measure(results: Results) -> dict[str, Any]:
+    """Forces below 20 Hz at common positions of the evaluation stretch, by pantograph [N].
+
+    A pantograph without statistics has none. Not collective.
+    """
+    start, end = results.evaluation
+    places = np.linspace(start, end, 1 + math.ceil((end - start) / _SPACING))
+    histories: list[list[float]] = []
+    for p in range(results.n_pantographs):
+        position = results.column("contact_position", p)
+        if not covers(position, (start, end)):
+            histories.append([])
+            continue
+        force = results.column("contact_force", p)
+        curve = CubicSpline(position, filters.low_pass(force, results.dt))
+        histories.append(np.round(curve(places), 4).tolist())
+    return {"histories": histories}
+
+
+def run(
+    plan: Plan,
+    out_dir: Path,
+    comm: Any,
+    *,
+    force: bool = False,
+    petsc_options: Sequence[str] = (),
+    tell: Callable[[str], None] = lambda line: None,
+) -> tuple[Measured | None, list[Ended]]:
+    """Run what is not done yet; returns what was found and all runs. Collective.
+
+    Repeats go through all settings before any is timed again, so that a disturbance does not
+    fall on a single one. Nothing was found if the study was interrupted.
+
+    Raises
+    ------
+    InputError
+        If ``out_dir`` holds other results and ``force`` is not given.
+    """
+    options: dict[str, Any] = {"force": force, "petsc_options": petsc_options, "tell": tell}
+    folder = out_dir / RUNS
+    ended = run_jobs(plan.jobs, folder, comm, measure=measure, **options)
+    if _interrupted(ended):
+        return None, ended
+    every = list(ended)
+    times = {one.variant.name: [one.summary["march_wall_s"]] for one in ended if one.done}
+    work = {one.variant.name: _work(one) for one in ended if one.done}
+    short = [job for job in plan.jobs if work.get(job.variant.name, _LONG) < _LONG]
+    for number in range(2, plan.repeats + 1):
+        tell(f"again, for their time, no. {number} of {plan.repeats}: {len(short)} short runs")
+        short.reverse()  # whatever else the machine does now and then meets others
+        repeated = run_jobs([again(job, number) for job in short], folder, comm, **options)
+        every += repeated
+        if _interrupted(repeated):
+            return None, every
+        for job, one in zip(short, repeated, strict=True):
+            if one.done:
+                times[job.variant.name].append(one.summary["march_wall_s"])
+    return evaluate(plan, ended, times, sum(one.wall for one in every)), every
+
+
+def evaluate(
+    plan: Plan, ended: Sequence[Ended], times: Mapping[str, Sequence[float]], wall: float
+) -> Measured:
+    """Rows of all axes from their runs. Not collective."""
+    runs = {one.variant.name: one for one in ended}
+    rows: list[Row] = []
+    uncertainty: dict[str, dict[str, float]] = {}
+    for planned in plan.axes:
+        rows += [_row(planned, name, runs, times) for name in _names(planned)]
+        if planned.chains:
+            chains = [[_found(runs[name]) for name in chain] for chain in planned.chains]
+            uncertainty[planned.axis.name] = uncertainties(_found(runs[planned.reference]), chains)
+    return Measured(plan, rows, uncertainty, wall)
+
+
+def _names(planned: PlannedAxis) -> list[str]:
+    return [level.name for level in planned.levels]
+
+
+def _row(
+    planned: PlannedAxis,
+    name: str,
+    runs: Mapping[str, Ended],
+    times: Mapping[str, Sequence[float]],
+) -> Row:
+    level = next(level for level in planned.levels if level.name == name)
+    head = (planned.axis.name, name)
+    if name in planned.refused:
+        return Row(*head, f"not possible: {planned.refused[name]}", dict(level.sizes))
+    one = runs[planned.runs[name]]
+    found, reference = _found(one), _found(runs[planned.reference])
+    if found is None or reference is None:
+        outcome = one.outcome if found is None else "its reference broke"
+        return Row(*head, outcome, dict(level.sizes))
+    errors, percent = compare(found, reference)
+    fine = planned.step_alone.get(name)
+    by_step, by_mesh = separate(found, None if fine is None else _found(runs[fine]), reference)
+    summary, walls = one.summary, times[one.variant.name]
+    counted = summary["inner_iterations"]
+    return Row(
+        *head,
+        one.outcome,
+        dict(level.sizes),
+        errors,
+        percent,
+        statistics.median(walls) / summary["simulated_s"],
+        len(walls),
+        _estimate(summary),
+        counted["rounds"] / counted["steps"],
+        by_step,
+        by_mesh,
+    )
+
+
+def _found(one: Ended) -> Found | None:
+    """What a run found, None if it broke."""
+    if not one.done:
+        return None
+    histories = [np.array(values) for values in one.measured["histories"]]
+    uplift = one.summary["supports"]["max_uplift_mm"]
+    return Found(one.summary["pantographs"], uplift, histories)
+
+
+def _estimate(summary: dict[str, Any]) -> float:
+    """The largest of the pantographs' estimated errors [N], NaN if there is none."""
+    told = [v for v in summary["indicators"]["time_step"]["force_error_N"] if v is not None]
+    return max(told, default=math.nan)
+
+
+def _work(one: Ended) -> float:
+    return float(one.summary["n_steps"]) * float(one.summary["n_dofs"])
+
+
+def _interrupted(ended: Sequence[Ended]) -> bool:
+    return bool(ended) and ended[-1].outcome == INTERRUPTED

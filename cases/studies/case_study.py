@@ -1,0 +1,187 @@
+"""The study of a case: many variants, and what they say of the statements of the case's source.
+
+A case folder may hold a ``study.py`` with three functions:
+
+- ``variants(scene, shortened)`` gives the ``StudyVariant`` s; it loads no backend;
+- ``measure(results)`` takes plain figures from each run's result file;
+- ``conclude(runs)`` turns the runs by name into a ``postproc.study_report.Study``.
+
+It is a program, unlike the scene: it runs with ``--study`` only, after a line that names it.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+from catenary.cases.scene.case_files import find_case
+from catenary.cases.scene.scene import Scene, load_scene
+from catenary.cases.studies.sweep.jobs import Ended, Job, make_jobs
+from catenary.cases.studies.sweep.variants import Variant, slug
+from catenary.solver.base.errors import InputError
+from catenary.solver.base.parallel import on_root
+
+STUDY_FILE = "study.py"
+RUNS = "runs"
+_FUNCTIONS = ("variants", "measure", "conclude")
+
+
+@dataclass(frozen=True)
+class StudyVariant:
+    """A run of a study; ``keep_results`` keeps its result file for the figures."""
+
+    variant: Variant
+    keep_results: bool = False
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A study that is to be run: the case's name, its ``study.py``, all jobs."""
+
+    case: str
+    path: Path
+    jobs: Sequence[Job]
+
+
+class StudyRun(NamedTuple):
+    """A run of a study as ``conclude`` sees it: how it ended, its scene, its results' folder."""
+
+    ended: Ended
+    scene: Scene
+    folder: Path
+
+
+def find_study(case: str) -> Path:
+    """The ``study.py`` of a case.
+
+    Raises
+    ------
+    InputError
+        If there is no such case, or if it has no study.
+    """
+    path = find_case(case).absolute().with_name(STUDY_FILE)
+    if not path.is_file():
+        raise InputError(
+            f"{case} has no study: there is no {STUDY_FILE} beside its {find_case(case).name}; "
+            "leave --study away, or vary keys with `catenary sweep`"
+        )
+    return path
+
+
+def make_plan(case: str, overrides: Sequence[str] = (), shortened: bool = False) -> Plan:
+    """All checked runs of a case's study. Not collective.
+
+    Parameters
+    ----------
+    case : name, file or folder
+    overrides : ``key=value`` each, for all runs; the study's own changes come after them
+    shortened : apply the case's ``[test]`` table and run the short form of the study
+
+    Raises
+    ------
+    InputError
+        If the case has no study, or if a scene of it is wrong.
+    """
+    path = find_study(case)
+    module = _load(path)
+    scene = load_scene(case, overrides, shortened)
+    planned: list[StudyVariant] = module.variants(scene, shortened)
+    jobs = make_jobs(case, [each.variant for each in planned], overrides, shortened)
+    kept = [
+        replace(job, keep_results=each.keep_results)
+        for job, each in zip(jobs, planned, strict=True)
+    ]
+    return Plan(scene.case.name, path, kept)
+
+
+def run(
+    plan: Plan,
+    out_dir: Path,
+    comm: Any,
+    *,
+    force: bool = False,
+    petsc_options: Sequence[str] = (),
+    tell: Callable[[str], None] = lambda line: None,
+) -> tuple[str | None, list[Ended]]:
+    """Run what is not done yet, write the study's report; returns its text and the runs.
+
+    Collective. An interrupted study has no text. Runs that broke are left out of the report,
+    whose verdicts then say what cannot be decided.
+
+    Raises
+    ------
+    InputError
+        If ``out_dir`` holds other results and ``force`` is not given.
+    """
+    from catenary.cases.studies.sweep.run_jobs import run_jobs
+
+    begin = time.perf_counter()
+    module = _load(plan.path)
+    ended = run_jobs(
+        plan.jobs,
+        out_dir / RUNS,
+        comm,
+        force=force,
+        petsc_options=petsc_options,
+        measure=module.measure,
+        tell=tell,
+    )
+    if ended and ended[-1].outcome == "interrupted":
+        return None, ended
+    text = on_root(comm, lambda: _conclude(plan, module, out_dir, ended, begin))
+    return text, ended
+
+
+def _conclude(
+    plan: Plan, module: ModuleType, out_dir: Path, ended: Sequence[Ended], begin: float
+) -> str:
+    from catenary.cases.studies.sweep import output as sweep_output
+    from catenary.postproc.files.disk import write_all
+    from catenary.postproc.report.study_report import verdict_text, write_study
+
+    runs = {
+        one.variant.name: StudyRun(one, job.scene, out_dir / RUNS / one.variant.name)
+        for one, job in zip(ended, plan.jobs, strict=True)
+    }
+    study = module.conclude(runs)
+    table = sweep_output.rows(ended)
+    wall = sum(one.wall for one in ended)
+    facts = {
+        "runs": f"{len(ended)}, of which {sum(not one.done for one in ended)} broke",
+        "time of all runs": f"{wall:.0f} s",
+        "time of this call": f"{time.perf_counter() - begin:.0f} s, "
+        f"{sum(one.skipped for one in ended)} of the runs had been done before",
+    }
+    files = write_study(study, out_dir, table, facts)
+    files += write_all(out_dir, {"study.csv": sweep_output.as_csv(table)})
+    told = [f"{name}: {value}" for name, value in facts.items()]
+    listed = [str(path) for path in files if path.stem == "study"]
+    return "\n".join([verdict_text(study), "", *told, "", *listed])
+
+
+def _load(path: Path) -> ModuleType:
+    """The module of a ``study.py``.
+
+    Raises
+    ------
+    InputError
+        If it cannot be loaded or lacks one of the three functions.
+    """
+    name = f"catenary_study_{slug(path.parent.name).replace('-', '_').replace('.', '_')}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None  # a file that ends in .py has a loader
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # whatever a person's own file does wrong
+        raise InputError(f"{path} cannot be loaded: {type(error).__name__}: {error}") from error
+    missing = [function for function in _FUNCTIONS if not callable(getattr(module, function, None))]
+    if missing:
+        raise InputError(f"{path} has no function {missing[0]}; a study needs all of "
+                         f"{', '.join(_FUNCTIONS)}")  # fmt: skip
+    return module

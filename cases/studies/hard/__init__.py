@@ -1,0 +1,1 @@
+"""The collection of hard cases, and the limits that they must keep."""

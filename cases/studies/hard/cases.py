@@ -1,0 +1,163 @@
+"""The collection of hard cases: what each is, what a right answer is, and its scenes.
+
+The table ``hard/hard.toml`` holds them; a case that is not in it is not run. Each is a variant of a
+shipped case. Limits in the table are the answer's own (what may be pressed, lifted, lost); limits
+that follow from round-off and from the methods stand in `hard_checks`.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field, ValidationError, model_validator
+
+from catenary.cases.scene.scene import Scene, load_scene
+from catenary.cases.scene.table import Table
+from catenary.cases.scene.toml_input import read_toml
+from catenary.solver.base.errors import InputError
+
+TABLE = Path(__file__).resolve().with_name("hard.toml")
+# The correction's own tolerances, far below what is compared.
+_CORRECTION = (
+    "numerics.scheme=fixed_point",
+    "numerics.eps_d_m=1e-11",
+    "numerics.eps_v_m_per_s=1e-8",
+    "numerics.max_iterations=400",
+)
+
+
+class Needs(Table):
+    """What must happen in a run for it to be the hard case that it is named after."""
+
+    switches: int = Field(0, ge=0, description="droppers that slacken or tighten, summed")
+    lost_m: float = Field(0, ge=0, description="longest way without contact, regained after it")
+    lost_share_below: float | None = Field(
+        None, gt=0, description="share of the steps without contact in the later half of the run"
+    )
+    on_nodes: int = Field(0, ge=0, description="steps that end exactly on a node of the wire")
+    crossing: bool = Field(
+        False, description="a dropper switches in the step that crosses the boundary of two ranks"
+    )
+    touches_after_s: float = Field(0, ge=0, description="first contact not before this time")
+    breaks: int = Field(0, ge=0, description="droppers that carry up to an incident, never after")
+    breaks_at_cut: bool = Field(
+        False, description="one of them stands within an element of the boundary of two ranks"
+    )
+    energy_leaves: float | None = Field(
+        None,
+        gt=0,
+        description="most by which the energy that leaves differs from theory, relative",
+    )
+    no_force_after_s: float | None = Field(
+        None, ge=0, description="no pantograph touches the wire after this time"
+    )
+    ends_at_m: float | None = Field(None, description="place where the run ends")
+
+
+class HardCase(Table):
+    """A hard case.
+
+    ``kind`` "train" marches a train; "free" lets the line go from under a force, without train.
+    """
+
+    name: str = Field(min_length=1, description="its name")
+    what: str = Field(min_length=1, description="what is hard about it")
+    right: str = Field(min_length=1, description="what a right answer is")
+    kind: Literal["train", "free"] = Field("train", description="what moves")
+    set: list[str] = Field(default_factory=list, description="assignments, as after --set")
+    short: list[str] = Field(default_factory=list, description="further ones of the short form")
+    force_below_N: float = Field(1e3, gt=0, description="no contact force is greater")
+    uplift_below_m: float = Field(0.3, gt=0, description="no contact lifts the wire by more")
+    refined: bool = Field(True, description="whether halved steps converge within the run")
+    fixed_point: Literal["agrees", "breaks"] = Field(
+        "agrees", description="what the paper's correction does"
+    )
+    energy_gain: float = Field(
+        1e-9, gt=0, description="most that the line's energy may gain beyond the work done on it, "
+        "of its largest value"
+    )  # fmt: skip
+    schemes_m: float = Field(
+        1e-7, gt=0, description="most by which head heights of the two schemes differ"
+    )
+    ranks: float = Field(
+        1e-9, gt=0, description="most by which forces of one and of several ranks differ, relative"
+    )
+    ranks_m: float | None = Field(
+        None, gt=0, description="in place of that where impacts let round-off decide forces: most "
+        "by which head heights differ"
+    )  # fmt: skip
+    steps: int = Field(0, ge=0, description="kind free: steps")
+    short_steps: int = Field(0, ge=0, description="kind free: steps of the short form")
+    needs: Needs = Field(default_factory=Needs, description="what must happen in it")
+
+    @model_validator(mode="after")
+    def _has_steps(self) -> HardCase:
+        if (self.kind == "free") != (self.steps > 0 and self.short_steps > 0):
+            raise ValueError("needs steps and short_steps if its kind is free, and only then")
+        return self
+
+    def scene(self, short: bool = False, halvings: int = 0, fixed_point: bool = False) -> Scene:
+        """Its scene with the step halved so often, or by the paper's correction."""
+        words = [*_common(), *self.set, *(self.short if short else [])]
+        if fixed_point:
+            words += _CORRECTION
+        scene = load_scene(_base(), words)
+        if halvings:
+            scene = load_scene(
+                _base(), [*words, f"numerics.dt_s={scene.numerics.dt_s / 2**halvings!r}"]
+            )
+        return scene
+
+
+class Collection(Table):
+    """The whole table."""
+
+    base: str = Field(description="the shipped case that all are variants of")
+    common: list[str] = Field(description="assignments of all")
+    cases: list[HardCase] = Field(min_length=1, description="the cases")
+
+
+@cache
+def collection() -> Collection:
+    """The table of hard cases.
+
+    Raises
+    ------
+    InputError
+        If the table is wrong.
+    """
+    try:
+        found = Collection.model_validate(read_toml(TABLE))
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise InputError(f"{TABLE}: {place}: {first['msg']}") from error
+    names = [case.name for case in found.cases]
+    if len(set(names)) != len(names):
+        raise InputError(f"{TABLE} has two cases of one name")
+    return found
+
+
+def hard_cases(names: list[str] | None = None) -> list[HardCase]:
+    """All hard cases, or those named.
+
+    Raises
+    ------
+    InputError
+        If there is none of such a name.
+    """
+    cases = {case.name: case for case in collection().cases}
+    for name in names or []:
+        if name not in cases:
+            raise InputError(f"there is no hard case {name}; there are {', '.join(cases)}")
+    return [cases[name] for name in names] if names else list(cases.values())
+
+
+def _base() -> str:
+    return collection().base
+
+
+def _common() -> list[str]:
+    return collection().common

@@ -1,0 +1,218 @@
+"""What is measured of hard cases, and the limits that it must keep.
+
+Limits that are no answer of a single case's are derived here:
+
+`FALLS` : of the difference between runs of halved steps; first order is 0.5, second order 0.25,
+    and droppers that switch a step earlier or later spread these.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from catenary.cases.studies.hard import runs as hard_runs
+from catenary.cases.studies.hard.cases import HardCase
+from catenary.cases.studies.hard.energy import energy_that_left
+from catenary.cases.studies.hard.runs import AtRest, Watched
+from catenary.solver.base.parallel import on_root
+from catenary.solver.problem.incidents import in_steps
+
+FALLS = 0.6
+# Energy that rises by less [-] is round-off of some thousand steps: of its largest value.
+ROUND_OFF = 1e-9
+# Differences of head heights below this share of their deviation need not fall any further.
+_SAME = 1e-4
+
+
+class Criterion(NamedTuple):
+    """What was measured: ``value`` must lie on the side of ``limit`` that ``passed`` tells."""
+
+    case: str
+    name: str
+    value: float
+    limit: float
+    passed: bool
+    note: str = ""
+
+
+def check_case(case: HardCase, world: Any, alone: Any, short: bool = False) -> list[Criterion]:
+    """Run a hard case in all its forms and measure it. Collective on ``world``.
+
+    Parameters
+    ----------
+    world : all ranks; agreement of ranks is measured if there are several
+    alone : a communicator of this process alone
+    short : the case's short form; steps are halved once only then
+    """
+    found: list[Criterion] = on_root(world, lambda: _check_alone(case, alone, short))
+    if world.size > 1:
+        found = [*found, _ranks(case, world, alone, short)]
+    return found
+
+
+def _check_alone(case: HardCase, comm: Any, short: bool) -> list[Criterion]:
+    rest = hard_runs.at_rest(case.scene(short), comm)
+    if case.kind == "free":
+        freed = hard_runs.run_free(rest, comm, case.short_steps if short else case.steps)
+        drift = float(np.abs(freed.energy / freed.energy[0] - 1.0).max())
+        return [_below(case, "relative change of energy", drift, case.energy_gain)]
+    base = hard_runs.run(rest, comm, with_work=True)
+    found = [_holds(case, "runs to its end", base.outcome == "done", base.outcome)]
+    if base.outcome != "done":
+        return found
+    found.append(_holds(case, "everything is finite", base.all_finite))
+    found += _bounded(case, rest, base)
+    halved = hard_runs.run(_rest(case, comm, short, 1), comm, with_work=True)
+    found += _energy(case, base, halved)
+    if case.refined and not short:
+        quartered = hard_runs.run(_rest(case, comm, short, 2), comm)
+        found.append(_refined(case, base, halved, quartered))
+    found.append(_correction(case, base, comm, short))
+    return [*found, *_needs(case, rest, base)]
+
+
+def _rest(case: HardCase, comm: Any, short: bool, halvings: int) -> AtRest:
+    return hard_runs.at_rest(case.scene(short, halvings), comm)
+
+
+def _bounded(case: HardCase, rest: AtRest, base: Watched) -> list[Criterion]:
+    lifted = base.wire - rest.rest_height(base.position)
+    return [
+        _below(case, "largest contact force [N]", float(base.force.max()), case.force_below_N),
+        _below(case, "largest lift [m]", float(np.abs(lifted).max()), case.uplift_below_m),
+    ]
+
+
+def _energy(case: HardCase, base: Watched, halved: Watched) -> list[Criterion]:
+    """Energy is not made, or, where switches of droppers make some, less with smaller steps."""
+    gain, less = base.energy_gain(), halved.energy_gain()
+    limit = max(FALLS * gain, ROUND_OFF)
+    return [
+        _below(case, "energy from nothing", gain, case.energy_gain),
+        _below(case, "the same at half the step", less, limit),
+    ]
+
+
+def _refined(case: HardCase, base: Watched, halved: Watched, quartered: Watched) -> Criterion:
+    first, second = _apart(base, halved), _apart(halved, quartered)
+    ratio = second / first if second > _SAME else 0.0
+    note = f"differences {first:.1e}, {second:.1e} of the deviation"
+    return _below(case, "difference after halving the step twice to once", ratio, FALLS, note)
+
+
+def _apart(coarse: Watched, fine: Watched) -> float:
+    """Rms difference of head heights at the coarser run's times over their deviation."""
+    n = min(coarse.time.size, (fine.time.size + 1) // 2)
+    difference = coarse.height[:n] - fine.height[::2][:n]
+    return float(np.sqrt((difference**2).mean()) / fine.height.std())
+
+
+def _correction(case: HardCase, base: Watched, comm: Any, short: bool) -> Criterion:
+    """The paper's correction agrees, or breaks where the table says so."""
+    scene = case.scene(short, fixed_point=True)
+    other = hard_runs.run(hard_runs.at_rest(scene, comm), comm)
+    if case.fixed_point == "breaks":
+        name = "the fixed-point correction breaks"
+        return _holds(case, name, other.outcome != "done", other.outcome)
+    if other.outcome != "done":
+        return _holds(case, "the fixed-point correction ends", False, other.outcome)
+    apart = float(np.abs(other.height - base.height).max())
+    return _below(case, "fixed-point correction, head height [m]", apart, case.schemes_m)
+
+
+def _needs(case: HardCase, rest: AtRest, base: Watched) -> list[Criterion]:
+    """Whether the run was the hard one that the case is named after."""
+    needs, found = case.needs, []
+    if needs.switches:
+        found.append(_reaches(case, "switches of droppers", base.switches().sum(), needs.switches))
+    if needs.lost_m:
+        found.append(_reaches(case, "way without contact [m]", lost_way(base), needs.lost_m))
+    if needs.lost_share_below is not None:
+        share = float((base.force[base.time.size // 2 :] == 0.0).mean())
+        found.append(_below(case, "share without contact", share, needs.lost_share_below))
+    if needs.on_nodes:
+        far = np.abs(base.position.reshape(-1, 1) - rest.node_places()).min(axis=1)
+        found.append(_reaches(case, "steps on a node", (far < 1e-9).sum(), needs.on_nodes))
+    if needs.crossing:
+        step = int(np.argmax(base.position[:, 0] > rest.cut()))
+        found.append(_reaches(case, "switches at the crossing", base.switches()[step - 1], 1))
+    if needs.touches_after_s:
+        touched = base.time[np.argmax(base.force[:, 0] > 0.0)]
+        found.append(_reaches(case, "first contact [s]", touched, needs.touches_after_s))
+    if needs.breaks:
+        found.append(_reaches(case, "droppers that break", broken(rest, base).size, needs.breaks))
+    if needs.breaks_at_cut:
+        far = float(np.abs(broken(rest, base) - rest.cut()).min(initial=np.inf))
+        longest = float(np.diff(rest.node_places()).max())
+        found.append(_below(case, "broken dropper to the boundary [m]", far, longest))
+    if needs.energy_leaves is not None:
+        left = energy_that_left(rest, base)
+        off = max(abs(one.observed / one.expected - 1.0) for one in left)
+        note = ", ".join(f"{one.expected:.3g} J at step {one.step}" for one in left)
+        name = "energy that leaves, relative"
+        found.append(_below(case, name, off, needs.energy_leaves, note))
+    if needs.no_force_after_s is not None:
+        late = base.force[base.time > needs.no_force_after_s]
+        name = f"force after {needs.no_force_after_s:g} s [N]"
+        found.append(_below(case, name, float(late.max()), 0.0))
+    if needs.ends_at_m is not None:
+        last = float(base.position[-1, 0])
+        found.append(_reaches(case, "end of the run [m]", last, needs.ends_at_m - 0.2))
+    return found
+
+
+def broken(rest: AtRest, run: Watched) -> np.ndarray:
+    """Places of the droppers that carry up to an incident and never after [m]."""
+    found = []
+    for happened in in_steps(rest.problem.incidents, rest.problem.numerics.dt):
+        before, after = run.taut[happened.step], run.taut[happened.step + 1 :]
+        found.append(np.flatnonzero(before & ~after.any(axis=0)))
+    mesh = rest.model.mesh
+    return np.asarray(mesh.x(mesh.droppers[np.unique(np.concatenate([*found, []]).astype(int)), 1]))
+
+
+def lost_way(run: Watched) -> float:
+    """Longest way between two contacts of the leading pantograph [m]."""
+    touched = run.position[run.force[:, 0] > 0.0, 0]
+    return float(np.diff(touched).max(initial=0.0))
+
+
+def _ranks(case: HardCase, world: Any, alone: Any, short: bool) -> Criterion:
+    """One rank against all of ``world``. Collective."""
+    scene = case.scene(short)
+    rest = hard_runs.at_rest(scene, world)
+    name = f"1 and {world.size} ranks, relative"
+    if case.kind == "free":
+        n_steps = case.short_steps
+        together = hard_runs.run_free(rest, world, n_steps)
+        one: Watched = on_root(world, lambda: hard_runs.run_free(rest, alone, n_steps))
+        apart = float(np.abs(together.energy / one.energy - 1.0).max())
+        return _below(case, name, apart, case.ranks)
+    together = hard_runs.run(rest, world)
+
+    def compare() -> Criterion:
+        one = hard_runs.run(rest, alone)
+        if one.force.shape != together.force.shape:
+            return _holds(case, name, False, together.outcome)
+        if case.ranks_m is not None:
+            apart = float(np.abs(together.height - one.height).max())
+            return _below(case, f"1 and {world.size} ranks, head height [m]", apart, case.ranks_m)
+        apart = float(np.abs(together.force - one.force).max() / np.abs(one.force).max())
+        return _below(case, name, apart, case.ranks)
+
+    result: Criterion = on_root(world, compare)
+    return result
+
+
+def _below(case: HardCase, name: str, value: float, limit: float, note: str = "") -> Criterion:
+    return Criterion(case.name, name, value, limit, bool(value <= limit), note)
+
+
+def _reaches(case: HardCase, name: str, value: float, limit: float) -> Criterion:
+    return Criterion(case.name, name, float(value), limit, bool(value >= limit), "at least")
+
+
+def _holds(case: HardCase, name: str, holds: bool, note: str = "") -> Criterion:
+    return Criterion(case.name, name, float(holds), 1.0, holds, "" if note == "done" else note)

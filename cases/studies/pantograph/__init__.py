@@ -1,0 +1,1 @@
+"""Frequency response and lumped model of a pantograph."""

@@ -1,0 +1,205 @@
+"""What the verb ``pantograph`` finds of a kind of pantograph: response, fit, tables for people."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from catenary.cases.run.describe_pantographs import description_of
+from catenary.cases.scene.convert.pantograph import pantograph_of, static_force
+from catenary.cases.scene.scene import Scene
+from catenary.mbs.build import PantographData
+from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand
+from catenary.mbs.response.frequency_response import HeadResponse, head_response, peaks
+from catenary.mbs.response.lumped_fit import ChainFit, fit_chain
+from catenary.solver.base.errors import InputError
+
+# Frequencies for the search of peaks and for the fit.
+N_SEARCHED, N_FITTED = 400, 200
+# A mode that moves the head by less than this part of what moves it most is not driven by it.
+UNMOVED = 1e-6
+
+
+class Range(NamedTuple):
+    """Frequencies asked for: from ``low`` to ``high`` [Hz], ``n_points`` of them, geometric.
+
+    ``fit_low`` [Hz]: a lumped model is fitted from there on.
+    """
+
+    low: float
+    high: float
+    n_points: int
+    fit_low: float
+
+    def frequencies(self) -> np.ndarray:
+        """The frequencies, shape (n_points,) [Hz]."""
+        return np.geomspace(self.low, self.high, self.n_points)
+
+    def checked(self) -> Range:
+        """Itself, unless it is none: then an InputError."""
+        if not 0.0 < self.low < self.high <= 1e5:
+            raise InputError(
+                f"--from {self.low:g} --to {self.high:g}: frequencies must grow from above 0 to "
+                "at most 1e5 Hz"
+            )
+        if not 2 <= self.n_points <= 1_000_000:
+            raise InputError(f"--points {self.n_points} must be between 2 and 1000000")
+        if not 0.0 < self.fit_low < self.high:
+            raise InputError(
+                f"--fit-from {self.fit_low:g} must be above 0 Hz and below --to {self.high:g}"
+            )
+        return self
+
+
+class PantographStudy(NamedTuple):
+    """A kind of pantograph with its response (n_points,) [m/N] and the chain fitted to it.
+
+    ``speed`` [km/h]; ``static_force`` [N]; ``nominal_height`` [m] of the head, None if the scene
+    leaves it to the line.
+    """
+
+    kind: str
+    case: str
+    speed: float
+    static_force: float
+    nominal_height: float | None
+    data: PantographData
+    response: HeadResponse
+    range: Range
+    receptance: np.ndarray
+    fit: ChainFit
+
+
+def study(scene: Scene, kind: str | None, n_masses: int | None, over: Range) -> PantographStudy:
+    """The response of a kind of pantograph of a scene, the leading one's if none is named.
+
+    ``n_masses`` of the lumped model: as many as a lumped pantograph has, or two, if left out.
+
+    Raises
+    ------
+    InputError
+        There is no such kind, it has no static force at the train's speed, or cannot stand.
+    """
+    over.checked()
+    kind = scene.train.pantographs[0].name if kind is None else kind
+    if kind not in scene.pantographs:
+        raise InputError(
+            f"--kind {kind}: the case has no such pantograph; it has {', '.join(scene.pantographs)}"
+        )
+    table, speed = scene.pantographs[kind], scene.train.speed_km_h
+    try:
+        force = static_force(kind, table, speed)
+        if force is None:
+            raise InputError(f"it has no static force at {speed:g} km/h")
+        data = pantograph_of(kind, table, speed)
+        response = head_response(data, force)
+    except InputError as error:
+        raise InputError(f"pantographs.{kind}: {error}") from error
+    if n_masses is None:
+        n_masses = 2 if isinstance(data, MultibodyData) else min(data.n_masses, 3)
+    at = np.geomspace(over.fit_low, over.high, N_FITTED)
+    fit = fit_chain(at, response.model.receptance(at), n_masses)
+    receptance = response.model.receptance(over.frequencies())
+    return PantographStudy(
+        kind,
+        scene.case.name,
+        speed,
+        force,
+        table.nominal_height_m,
+        data,
+        response,
+        over,
+        receptance,
+        fit,
+    )
+
+
+def study_text(found: PantographStudy) -> str:
+    """Tables of what was found."""
+    response = found.response
+    lines = [
+        f"pantograph {found.kind} of {found.case} at {found.speed:g} km/h",
+        f"  {description_of(found.data, found.static_force)}",
+        "",
+        *_rest_rows(found),
+        "",
+        *_mode_rows(response),
+        "",
+        *_peak_rows(found),
+        "",
+        *_fit_rows(found.fit),
+    ]
+    return "\n".join(lines)
+
+
+def _row(name: str, value: float, unit: str) -> str:
+    return f"  {name:42}{value:>12.6g}  {unit}"
+
+
+def _rest_rows(found: PantographStudy) -> list[str]:
+    response, rows = found.response, ["at rest under the wire"]
+    rows.append(_row("force on the head", response.static_force, "N"))
+    if isinstance(found.data, MultibodyData):
+        standing = stand(found.data)
+        if standing.actuator_force is not None:
+            rows.append(_row(f"force of {found.data.actuator}", standing.actuator_force, "N"))
+            rows.append(
+                _row("static force with the force given for it", standing.force_before, "N")
+            )
+        rows.append(_row("height of the arm above the base", standing.working_height, "m"))
+    rows.append(_row("lift lost per metre of raising", response.lift_stiffness, "N/m"))
+    rows += [_row(name, mass, "kg") for name, mass in response.masses.items()]
+    if isinstance(found.data, MultibodyData):
+        rows += ["", "joints missed in the given positions, before assembly"]
+        rows += [_row(miss.joint, 1e3 * miss.gap, "mm") for miss in stand(found.data).missed]
+    return rows
+
+
+def _mode_rows(response: HeadResponse) -> list[str]:
+    rows = [f"{'free motions':26}{'Hz':>10}{'damping ratio':>16}{'1/s':>11}"]
+    for mode in response.model.modes():
+        moves = "" if mode.share > UNMOVED else "  the head stays where it is"
+        if mode.root.imag == 0.0:
+            what = "grows" if mode.root.real > 0.0 else "dies out"
+            rows.append(f"  {what:24}{'-':>10}{'-':>16}{mode.root.real:>+11.4g}{moves}")
+        else:
+            rows.append(
+                f"  {'swings':24}{mode.frequency:>10.4g}{mode.damping_ratio:>16.4g}"
+                f"{mode.root.real:>+11.4g}{moves}"
+            )
+    if response.model.n_left_out:
+        rows.append(
+            f"  left out: {response.model.n_left_out} that nothing resists and the head does not "
+            f"drive, of {', '.join(response.model.left_out)}"
+        )
+    return rows
+
+
+def _peak_rows(found: PantographStudy) -> list[str]:
+    over = found.range
+    at = np.geomspace(over.low, over.high, max(N_SEARCHED, over.n_points))
+    rows = [f"{'peaks of the receptance':26}{'Hz':>10}{'mm/N':>16}{'phase, deg':>13}"]
+    for peak in peaks(found.response.model, at):
+        phase = math.degrees(np.angle(peak.receptance))
+        rows.append(
+            f"{'':28}{peak.frequency:>8.4g}{1e3 * abs(peak.receptance):>16.4g}{phase:>13.1f}"
+        )
+    return rows if len(rows) > 1 else [f"no peak of the receptance from {over.low:g} to "
+                                       f"{over.high:g} Hz"]  # fmt: skip
+
+
+def _fit_rows(fit: ChainFit) -> list[str]:
+    rows = [
+        f"lumped model fitted from {fit.lowest:g} to {fit.highest:g} Hz: {fit_error(fit)}",
+        f"  {'mass':6}{'kg':>12}{'N/m below':>14}{'N s/m below':>14}",
+    ]
+    columns = zip(fit.data.masses, fit.data.stiffnesses, fit.data.dampings, strict=True)
+    rows += [f"  {k + 1:<6}{m:>12.5g}{s:>14.5g}{c:>14.5g}" for k, (m, s, c) in enumerate(columns)]
+    return rows
+
+
+def fit_error(fit: ChainFit) -> str:
+    """How far a fit is off, for people."""
+    return f"rms error {100 * fit.rms_error:.2g} %, largest {100 * fit.largest_error:.2g} %"

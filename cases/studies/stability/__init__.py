@@ -1,0 +1,1 @@
+"""Where each coupling of line and pantograph is stable."""

@@ -1,0 +1,259 @@
+"""The stability map: largest step of each coupling against contact stiffness and head mass.
+
+Each point of the map is found twice: from the matrices of a step (`stability_theory`) and by
+marching (`stability_march`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from catenary.cases.scene.scene import Scene, load_scene
+from catenary.cases.scene.tables.run import MAX_DT
+from catenary.cases.studies.hard.runs import at_rest
+from catenary.cases.studies.stability import from_matrices as theory
+from catenary.cases.studies.stability.by_marching import (
+    AGREED,
+    COUPLINGS,
+    EXCHANGES,
+    GROWN,
+    STEPS,
+    Bench,
+)
+from catenary.mbs.lumped_data import LumpedData
+from catenary.solver.base.errors import InputError
+from catenary.solver.contact.contact_wire import ContactWire
+from catenary.solver.model.partition import distribute
+from catenary.solver.statics.equilibrium import middle_span
+
+# Newmark's method and a linear problem: one contact that neither parts nor damps, taut droppers.
+_LINEAR = (
+    "numerics.iterations=",
+    "numerics.spectral_radius=",
+    "numerics.integrator=newmark",
+    "numerics.coupling=",
+    "numerics.scheme=one_solve",
+    "contact.restitution=",
+    "contact.hertz_stiffness_N_per_m1_5=",
+    "contact.damping_N_s_per_m=",
+    "contact.least_impact_speed_m_per_s=",
+    "contact.law=linear",
+    "effects.contact_damping=false",
+    "effects.contact_loss=false",
+    "effects.residual_dropper_stiffness=false",
+    "effects.dropper_slackening=false",
+)
+# Steps that are looked at [s], and how closely a limit is found by marching.
+STEPS_RANGE = (1e-5, MAX_DT)
+RESOLUTION = 0.02
+# Theory is asked for longer ones too, so that curves leave the map where they do.
+_THEORY_RANGE = (STEPS_RANGE[0], 4.0 * MAX_DT)
+# First change of an iterate in depths at the start: slopes of an element are some 3 / m of it.
+_START = 10.0
+# Where the implicit coupling, which has no limit to be found, is tried [s].
+_TRIED = (1e-5, 1e-4, 1e-3, 1e-2, MAX_DT)
+AVERAGE_ACCELERATION = (0.25, 0.5)
+# Differences below this are round-off of the bisections.
+_SLACK = 1e-4
+
+
+@dataclass(frozen=True)
+class Grid:
+    """What is varied: stiffnesses [N/m] and head masses [kg] of the two axes of the map, and the
+    few of each that curves are drawn for on the other axis."""
+
+    stiffnesses: tuple[float, ...] = tuple(float(f"{10**e:.4g}") for e in np.arange(4.0, 8.1, 0.5))
+    head_masses: tuple[float, ...] = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+    few_stiffnesses: tuple[float, ...] = (1e5, 1e6, 1e7)
+    few_masses: tuple[float, ...] = (0.5, 2.0, 8.0)
+
+    def pairs(self) -> list[tuple[float, float]]:
+        """All stiffnesses and masses, each pair once."""
+        pairs = {(k, m) for k in self.stiffnesses for m in self.few_masses}
+        pairs |= {(k, m) for k in self.few_stiffnesses for m in self.head_masses}
+        return sorted(pairs)
+
+
+QUICK = Grid((1e5, 1e6, 1e7), (0.5, 2.0, 8.0), (1e6,), (0.5, 8.0))
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The largest step of a coupling, found in two ways.
+
+    Attributes
+    ----------
+    coupling : implicit, explicit, iterated or fixed_point
+    stiffness, head_mass : [N/m], [kg]
+    theory : from the matrices of a step [s], inf if all steps up to 0.1 s are stable
+    visible : from which step on a march of so many steps or exchanges shows it [s]
+    closed_form : omega dt = 2 [s], inf for the implicit coupling and with numerical damping
+    stable, unstable : steps that were marched [s], the limit lies between them
+    """
+
+    coupling: str
+    stiffness: float
+    head_mass: float
+    theory: float
+    visible: float
+    closed_form: float
+    stable: float
+    unstable: float
+
+    @property
+    def agrees(self) -> bool:
+        """Whether marching found what theory says.
+
+        That is, bracket and the stretch from the limit to where a march can show it overlap:
+        exchanges that hardly converge do not end in time, and what hardly grows is not yet large.
+        """
+        low, high = sorted((self.theory, self.visible))
+        return self.stable <= high * (1.0 + _SLACK) and self.unstable >= low * (1.0 - _SLACK)
+
+    @property
+    def marched(self) -> float:
+        """The limit as it was marched [s]: the middle of the bracket, inf if there is none."""
+        return float(np.sqrt(self.stable * self.unstable))
+
+
+@dataclass(frozen=True)
+class StabilityMap:
+    """A map: ``limits``, its ``grid``, where on the line [m], what a force meets there [kg], and
+    the case with its own stiffness [N/m] or None, head mass [kg] and step [s]."""
+
+    case: str
+    limits: Sequence[Limit]
+    grid: Grid
+    place: float
+    wire_mass: float
+    own: tuple[float | None, float, float]
+
+    def of(self, coupling: str, **fixed: float) -> list[Limit]:
+        """Limits of a coupling with a given ``stiffness`` or ``head_mass``."""
+        return [
+            limit
+            for limit in self.limits
+            if limit.coupling == coupling
+            and all(getattr(limit, name) == value for name, value in fixed.items())
+        ]
+
+
+def linear_scene(case: str, assignments: Sequence[str], shortened: bool) -> Scene:
+    """The case as the map takes it: linear. Raises InputError if its pantograph is no chain."""
+    scene = load_scene(case, [*assignments, *_LINEAR], shortened)
+    kind = scene.train.pantographs[0].name
+    if scene.pantographs[kind].type != "lumped":
+        raise InputError(
+            f"pantographs.{kind} of {scene.case.name} is a mechanism, but a stability map varies "
+            f"the head of a chain of masses; `catenary pantograph {case} --help` tells how to fit "
+            "one, or name a lumped one with --set train.pantographs.0.name=..."
+        )
+    return scene
+
+
+def make_map(
+    case: str,
+    assignments: Sequence[str],
+    shortened: bool,
+    comm: Any,
+    grid: Grid,
+    tell: Callable[[str], None] = lambda line: None,
+) -> StabilityMap:
+    """Find all limits. Not collective; ``comm`` is that of this process alone."""
+    own = load_scene(case, list(assignments), shortened)
+    scene = linear_scene(case, assignments, shortened)
+    rest = at_rest(scene, comm)
+    data = rest.problem.train.placements[0].data
+    assert isinstance(data, LumpedData)  # the scene was refused otherwise
+    wire = ContactWire(rest.model, rest.form, distribute(rest.model, 1, 0))
+    place = theory.lightest_place(rest.model, wire, *middle_span(rest.problem.line))
+    line = theory.point_model(rest.model, theory.load_at(wire, place, rest.model.n_dofs))
+    bench = Bench(rest, data, place, comm)
+    pairs, limits = grid.pairs(), []
+    for number, (stiffness, mass) in enumerate(pairs, start=1):
+        found = [find(bench, line, coupling, stiffness, mass) for coupling in COUPLINGS]
+        limits += found
+        told = ", ".join(f"{one.coupling} {in_ms(one.marched)}" for one in found)
+        tell(f"[{number}/{len(pairs)}] {stiffness:g} N/m, {mass:g} kg: {told} ms")
+    linear = own.contact.law == "linear"
+    own_point = (own.contact.stiffness_N_per_m if linear else None, data.masses[0])
+    return StabilityMap(
+        own.case.name, limits, grid, place, line.mass, (*own_point, own.numerics.dt_s)
+    )
+
+
+def find(
+    bench: Bench, line: theory.PointModel, coupling: str, stiffness: float, head_mass: float
+) -> Limit:
+    """The limit of a coupling for a head [kg] on a contact [N/m]. Not collective."""
+    numerics = bench.rest.problem.numerics
+    newmark = numerics.beta, numerics.gamma
+    masses = (head_mass, *bench.data.masses[1:])
+    both = theory.couple(line, LumpedData(masses, bench.data.stiffnesses, bench.data.dampings))
+    seen = GROWN ** (1.0 / STEPS)
+    if coupling not in ("implicit", "explicit"):
+        seen = (AGREED / _START) ** (1.0 / EXCHANGES)
+    expected, visible = (
+        theory.largest_step(both, newmark, stiffness, coupling, _THEORY_RANGE, allowed)
+        for allowed in (1.0, seen)
+    )
+    if coupling == "implicit":
+        # A limit could be anywhere, and stability above it.
+        tried = [dt for dt in _TRIED if not bench.is_stable(coupling, stiffness, head_mass, dt)]
+        stable, unstable = (MAX_DT, np.inf) if not tried else (0.0, min(tried))
+        closed = np.inf
+    else:
+        stable, unstable = bench.bracket(coupling, stiffness, head_mass, STEPS_RANGE, RESOLUTION)
+        closed = np.inf
+        if newmark == AVERAGE_ACCELERATION:
+            closed = theory.closed_form(line, head_mass, stiffness)
+    return Limit(coupling, stiffness, head_mass, expected, visible, closed, stable, unstable)
+
+
+def as_rows(found: StabilityMap) -> list[dict[str, Any]]:
+    """The map as rows under names with units; None where there is no limit."""
+    return [
+        {
+            "coupling": one.coupling,
+            "stiffness_N_per_m": one.stiffness,
+            "head_mass_kg": one.head_mass,
+            "wire_mass_kg": found.wire_mass,
+            "theory_s": _finite(one.theory),
+            "omega_dt_2_s": _finite(one.closed_form),
+            "marched_stable_s": one.stable,
+            "marched_unstable_s": _finite(one.unstable),
+            "agrees": "yes" if one.agrees else "no",
+        }
+        for one in found.limits
+    ]
+
+
+def as_text(found: StabilityMap) -> str:
+    """A sentence for each coupling."""
+    lines = [
+        f"{found.case} at {found.place:.2f} m, where the contact wire meets a force with "
+        f"{found.wire_mass:.3g} kg:"
+    ]
+    for coupling in COUPLINGS:
+        limits = found.of(coupling)
+        agree = sum(one.agrees for one in limits)
+        both = [one for one in limits if np.isfinite(one.theory) and one.marched < np.inf]
+        text = f"stable at all steps of up to {1e3 * MAX_DT:g} ms"
+        if both:
+            apart = max(abs(one.marched / one.theory - 1.0) for one in both)
+            text = f"marched limits within {100 * apart:.2g} % of theory's"
+        lines.append(f"  {coupling:12} {text}; {agree} of {len(limits)} agree")
+    return "\n".join(lines)
+
+
+def in_ms(dt: float) -> str:
+    """A step as milliseconds with three digits, or that there is no limit."""
+    return f"{1e3 * dt:.3g}" if np.isfinite(dt) else "no limit below 25"
+
+
+def _finite(dt: float) -> float | None:
+    return dt if np.isfinite(dt) else None

@@ -1,0 +1,1 @@
+"""Variants of a case, run one after the other."""

@@ -1,0 +1,133 @@
+"""What a sweep is to run and how it ended. Nothing here loads a backend."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from catenary.cases.scene.error_sentences import shown
+from catenary.cases.scene.keys import nearest
+from catenary.cases.scene.scene import Scene, load_scene
+from catenary.cases.scene.toml_input import Assigned
+from catenary.cases.studies.sweep.variants import NAMES, Variant
+from catenary.solver.base.errors import InputError
+
+# Columns of a sweep's table: of a row's pantograph, and of the line.
+PANTOGRAPH_COLUMNS = (
+    "mean_N",
+    "std_N",
+    "std_0_5_N",
+    "std_5_20_N",
+    "max_N",
+    "min_N",
+    "stat_max_N",
+    "stat_min_N",
+    "loss_percent",
+    "arcing_percent",
+    "contact_height_range_mm",
+)
+LINE_COLUMNS = ("max_uplift_mm", "n_slackened", "max_dropper_force_N", "min_dropper_force_N")
+STATISTICS = (*PANTOGRAPH_COLUMNS, *LINE_COLUMNS)
+
+
+def check_statistics(names: Sequence[str]) -> None:
+    """Raise InputError if one of ``names`` is no statistic of a sweep's table."""
+    for name in names:
+        if name not in STATISTICS:
+            near = nearest(name, list(STATISTICS))
+            hint = f"did you mean {near}?" if near else f"there are {', '.join(STATISTICS)}"
+            raise InputError(f"{shown(name)[1:-1]} is no statistic; {hint}")
+
+
+@dataclass(frozen=True)
+class Job:
+    """A variant with its scene and what is kept of its run.
+
+    ``full_report`` draws the run's own report; without ``keep_results`` only the summary and what
+    ``measure`` takes stay on the disk.
+    """
+
+    variant: Variant
+    scene: Scene
+    full_report: bool = False
+    keep_results: bool = True
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a variant ended.
+
+    Attributes
+    ----------
+    variant : which one
+    outcome : "done", "interrupted" or the sentence of what broke
+    summary : content of ``summary.json``, empty unless done
+    measured : what ``Measure`` took, empty unless done
+    wall : time that the run took [s], the earlier run's if it was not run again
+    skipped : whether it was done already
+    """
+
+    variant: Variant
+    outcome: str
+    summary: dict[str, Any] = field(default_factory=dict)
+    measured: dict[str, Any] = field(default_factory=dict)
+    wall: float = 0.0
+    skipped: bool = False
+
+    @property
+    def done(self) -> bool:
+        """Whether the run came to its end."""
+        return self.outcome == "done"
+
+
+def _assigned(variant: Variant) -> list[Assigned]:
+    """The assignments of a variant, each with what gave it."""
+    own = len(variant.assignments) - sum(key != NAMES for key in variant.varied)
+    by_name = f"by the variant {variant.name}"
+    return [
+        Assigned(text, "--vary", "on the command line (--vary)")
+        if number >= own
+        else Assigned(text, f"variant {variant.name}:", by_name)
+        for number, text in enumerate(variant.assignments)
+    ]
+
+
+def _refuse_petsc(variant: Variant) -> None:
+    """PETSc starts once, with the options of the first scene."""
+    for assignment in variant.assignments:
+        if assignment.split("=")[0].strip().split(".")[0] == "petsc":
+            raise InputError(
+                f"variant {variant.name} assigns {shown(assignment)[1:-1]}, but PETSc takes its "
+                "options once, when the program starts: give them with --set or after --"
+            )
+
+
+def make_jobs(
+    case: str,
+    variants: Sequence[Variant],
+    overrides: Sequence[str] = (),
+    shortened: bool = False,
+    *,
+    full_report: bool = False,
+) -> list[Job]:
+    """The variants' checked scenes. Not collective.
+
+    A variant's own assignments come after ``overrides`` and win.
+
+    Raises
+    ------
+    InputError
+        If a scene is wrong, with the variant's name if there are several.
+    """
+    jobs = []
+    for variant in variants:
+        _refuse_petsc(variant)
+        try:
+            scene = load_scene(case, overrides, shortened, _assigned(variant))
+        except InputError as error:
+            if len(variants) == 1:
+                raise
+            raise InputError(f"variant {variant.name}: {error}") from error
+        jobs.append(Job(variant, scene, full_report))
+    return jobs

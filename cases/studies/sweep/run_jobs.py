@@ -1,0 +1,189 @@
+"""Runs variants of a case one after the other in this process, each in a folder of its own.
+
+Imports, compiled loops and MPI are started once. What is done already is not run again, so that a
+sweep that was killed goes on where it was; a variant that breaks does not stop the others.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from catenary.cases.process.interrupts import Interrupted
+from catenary.cases.result_folder.output_folder import refuse_earlier, refuse_impossible
+from catenary.cases.run.runner import RESULT, run_case
+from catenary.cases.studies.sweep.done_before import read_record, read_summary, record_text
+from catenary.cases.studies.sweep.jobs import Ended, Job
+from catenary.postproc.files.disk import plain, write_all
+from catenary.postproc.files.own_files import VARIANT_FILE as RECORD
+from catenary.postproc.files.result_file import DONE, INTERRUPTED
+from catenary.postproc.read.results import Results
+from catenary.solver.base.errors import CatenaryError, InputError
+from catenary.solver.base.parallel import on_root
+
+# What is taken from an open result file beside the summary: plain values by name.
+Measure = Callable[[Results], dict[str, Any]]
+
+
+def run_jobs(
+    jobs: Sequence[Job],
+    out_dir: Path,
+    comm: Any,
+    *,
+    force: bool = False,
+    petsc_options: Sequence[str] = (),
+    measure: Measure | None = None,
+    tell: Callable[[str], None] = lambda line: None,
+) -> list[Ended]:
+    """Run what is not done yet, each job in ``out_dir/<name>``. Collective.
+
+    An interruption ends the list early; its last entry says so.
+
+    Parameters
+    ----------
+    jobs : the same on all ranks
+    force : run all anew, whatever is there, and however large the runs are
+    petsc_options : the options that PETSc was started with, for the record
+    measure : takes figures from each result file, on rank 0
+    tell : called with a line before and after each run
+
+    Raises
+    ------
+    InputError
+        If ``out_dir`` cannot be written to, or if it or a job's folder holds other results and
+        ``force`` is not given; nothing is run then.
+    RunBroken
+        If a record of what is done cannot be written.
+    """
+    earlier = on_root(comm, lambda: _earlier(jobs, out_dir, force, measure is not None))
+    ended: list[Ended] = []
+    begin, n_left = time.perf_counter(), sum(found is None for found in earlier)
+    n_run = 0
+    for number, (job, found) in enumerate(zip(jobs, earlier, strict=True), start=1):
+        place = f"[{number}/{len(jobs)}] {job.variant.name}"
+        if found is not None:
+            tell(f"{place}: done already")
+            ended.append(found)
+            continue
+        tell(place)
+        one = _run(job, out_dir / job.variant.name, comm, petsc_options, measure, force)
+        ended.append(one)
+        if one.outcome == INTERRUPTED:
+            break
+        n_run += 1
+        spent = time.perf_counter() - begin
+        left = spent / n_run * (n_left - n_run)
+        tell(f"    {_figures(one)}; {spent:.0f} s gone, about {left:.0f} s left")
+    return ended
+
+
+def _run(
+    job: Job,
+    folder: Path,
+    comm: Any,
+    petsc_options: Sequence[str],
+    measure: Measure | None,
+    large: bool,
+) -> Ended:
+    """Run one job and leave its record. Collective; raises only if that cannot be written."""
+    clock = time.perf_counter()
+    try:
+        result = run_case(
+            job.scene,
+            folder,
+            comm,
+            force=True,
+            petsc_options=petsc_options,
+            only_summary=not job.full_report,
+            large=large,
+        )
+        outcome, summary = result.outcome, result.summary
+    except Interrupted:
+        outcome, summary = INTERRUPTED, {}
+    except CatenaryError as error:  # the same on all ranks
+        outcome, summary = str(error), {}
+    if outcome != DONE:
+        return Ended(job.variant, outcome, wall=time.perf_counter() - clock)
+    wall = time.perf_counter() - clock
+    measured = on_root(comm, lambda: _leave_record(job, folder, measure, wall))
+    return Ended(job.variant, DONE, summary, measured, wall)
+
+
+def _leave_record(job: Job, folder: Path, measure: Measure | None, wall: float) -> dict[str, Any]:
+    """Take the measures and write what tells a later sweep that this one is done."""
+    measured: dict[str, Any] = {}
+    if measure is not None:
+        with Results(folder) as results:
+            measured = plain(measure(results))
+    record = {
+        "variant": job.variant.name,
+        "assignments": job.variant.assignments,
+        "config": job.scene.resolved(),
+        "wall_s": wall,
+        "measured": measured,
+    }
+    if not job.keep_results:
+        (folder / RESULT).unlink()
+    write_all(folder, {RECORD: record_text(record)})
+    return measured
+
+
+def _earlier(jobs: Sequence[Job], out_dir: Path, force: bool, measured: bool) -> list[Ended | None]:
+    """What is there of each job: how it ended, None if it is to be run."""
+    refuse_impossible(out_dir)
+    refuse_earlier(out_dir, force)
+    if force:
+        return [None] * len(jobs)
+    return [_found(job, out_dir / job.variant.name, measured) for job in jobs]
+
+
+def _found(job: Job, folder: Path, measured: bool) -> Ended | None:
+    wanted = json.loads(json.dumps(plain(job.scene.resolved())))
+    record = read_record(folder / RECORD)
+    if record is None:
+        _refuse_other_run(folder, wanted)
+        return None
+    if record.get("config") != wanted:
+        raise InputError(
+            f"{folder} holds the results of {job.variant.name} with another configuration; name "
+            "another folder with -o, or give --force to replace them"
+        )
+    summary = read_summary(folder / "summary.json")
+    missing = job.keep_results and not (folder / RESULT).is_file()
+    missing = missing or (job.full_report and not (folder / "report.html").is_file())
+    if summary is None or missing or (measured and not record.get("measured")):
+        return None
+    wall = float(record.get("wall_s", 0.0))
+    return Ended(job.variant, DONE, summary, record.get("measured", {}), wall, skipped=True)
+
+
+def _refuse_other_run(folder: Path, wanted: dict[str, Any]) -> None:
+    """Refuse to replace a run that no sweep with this configuration has begun."""
+    if not (folder / RESULT).exists():
+        return
+    try:
+        with Results(folder) as results:
+            same = results.attributes.get("config") == wanted
+    except InputError:  # killed before the file was made
+        same = True
+    if not same:
+        raise InputError(
+            f"{folder / RESULT} holds the results of another run; name another folder with -o, or "
+            "give --force to replace them"
+        )
+
+
+def _figures(ended: Ended) -> str:
+    """The figures of a variant that one wants to see at once, or what broke."""
+    if not ended.done:
+        return f"BROKE: {ended.outcome}"
+    parts = []
+    for one in ended.summary["pantographs"]:
+        if one["std_N"] is None:
+            parts.append("no statistics")
+        else:
+            parts.append(f"{one['name']} {one['mean_N']:.1f} +- {one['std_N']:.1f} N")
+    return ", ".join(parts)

@@ -1,0 +1,200 @@
+"""Variants of a case: names with assignments, and products of varied keys."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from catenary.cases.scene.error_sentences import shown, unknown_key
+from catenary.cases.scene.keys import is_known, known_keys
+from catenary.cases.scene.plain_text import steers
+from catenary.cases.scene.toml_input import parse_assignment, read_toml
+from catenary.postproc.files.csv_text import begins_formula
+from catenary.solver.base.errors import InputError
+
+MAX_VARIANTS = 10_000
+MOST_LETTERS = 200  # in a variant's name
+_LONGEST_SLUG = 100  # folder names may have 255 bytes; room for what a user puts around them
+# The column of the names of variants in a file, beside those of the varied keys.
+NAMES = "variant"
+_OPENING, _CLOSING, _QUOTES = "[{", "]}", "\"'"
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One way to change a case.
+
+    Attributes
+    ----------
+    name : names the variant and its folder
+    assignments : ``key=value`` each, applied to the case in this order
+    varied : varied key -> the value's text, for tables and axes
+    """
+
+    name: str
+    assignments: tuple[str, ...]
+    varied: Mapping[str, str] = field(default_factory=dict)
+
+
+class VariedKey(NamedTuple):
+    """A key and the texts of the values that it takes."""
+
+    key: str
+    values: tuple[str, ...]
+
+
+def parse_vary(text: str) -> VariedKey:
+    """Key and values of ``key=v1,v2,...``; commas inside brackets and quotes do not separate.
+
+    Raises
+    ------
+    InputError
+        If it has another form, or names a value twice or one that PETSc takes at its start.
+    """
+    key, equals, rest = text.partition("=")
+    key = key.strip()
+    values = tuple(_split(rest))
+    if not equals or not key or not all(values):
+        raise InputError(
+            f"--vary {shown(text)} must have the form key=value,value,..., e.g. "
+            "train.speed_km_h=250,300"
+        )
+    if key.split(".")[0] == "petsc":
+        raise InputError(
+            f"--vary {shown(key)[1:-1]} is not possible: PETSc takes its options once, when the "
+            "program starts"
+        )
+    if any(steers(letter) for letter in text):
+        raise InputError(f"--vary {shown(text)} holds a control character")
+    value, times = Counter(values).most_common(1)[0]
+    if times > 1:
+        raise InputError(f"--vary {shown(key)[1:-1]} names {shown(value)[1:-1]} twice")
+    return VariedKey(key, values)
+
+
+def _split(text: str) -> list[str]:
+    """``text`` cut at the commas that stand outside of brackets and quotes."""
+    parts, depth, quote, start = [], 0, "", 0
+    for place, letter in enumerate(text):
+        if quote:
+            quote = "" if letter == quote else quote
+        elif letter in _QUOTES:
+            quote = letter
+        elif letter in _OPENING:
+            depth += 1
+        elif letter in _CLOSING:
+            depth -= 1
+        elif letter == "," and depth == 0:
+            parts.append(text[start:place].strip())
+            start = place + 1
+    return [*parts, text[start:].strip()]
+
+
+def product(varied: Sequence[VariedKey], named: Mapping[str, Sequence[str]]) -> list[Variant]:
+    """All combinations of the varied keys' values, each under every named variant.
+
+    The last key varies fastest. Without named variants the keys alone make the variants.
+
+    Raises
+    ------
+    InputError
+        If a key is varied twice or there are too many combinations.
+    """
+    keys = [each.key for each in varied]
+    for key in keys:
+        if keys.count(key) > 1:
+            raise InputError(f"--vary {key} is given twice; name all its values in one --vary")
+    count = max(len(named), 1)
+    for each in varied:
+        count *= len(each.values)
+    if count > MAX_VARIANTS:
+        raise InputError(f"these variations make {count} runs; at most {MAX_VARIANTS} are allowed")
+    labels = _labels(keys)
+    variants = []
+    for name, assignments in (named or {"": ()}).items():
+        for values in itertools.product(*(each.values for each in varied)):
+            chosen = dict(zip(keys, values, strict=True))
+            words = [name] if name else []
+            words += [f"{labels[key]}_{value}" for key, value in chosen.items()]
+            own = tuple(f"{key}={value}" for key, value in chosen.items())
+            columns = {NAMES: name, **chosen} if name and chosen else chosen
+            variants.append(Variant("__".join(words), (*assignments, *own), columns))
+    return _with_own_folders(variants)
+
+
+def _labels(keys: Sequence[str]) -> dict[str, str]:
+    """The last part of each key, the whole key where two share it."""
+    last = [key.rsplit(".", 1)[-1] for key in keys]
+    return {
+        key: name if last.count(name) == 1 else key for key, name in zip(keys, last, strict=True)
+    }
+
+
+def slug(text: str) -> str:
+    """``text`` as the name of a folder: letters, digits, ``.``, ``_`` and ``-``.
+
+    What is too long is cut and marked with a digest of the whole.
+    """
+    name = re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-.") or "variant"
+    if len(name) > _LONGEST_SLUG:
+        mark = hashlib.sha256(text.encode()).hexdigest()[:8]
+        name = f"{name[: _LONGEST_SLUG - 9]}-{mark}"
+    return name
+
+
+def _with_own_folders(variants: list[Variant]) -> list[Variant]:
+    """The variants under names that are folders, no two the same."""
+    taken: set[str] = set()
+    result = []
+    for variant in variants:
+        name = slug(variant.name)
+        number = 2
+        while name.lower() in taken:  # some file systems do not tell capitals
+            name = f"{slug(variant.name)}-{number}"
+            number += 1
+        taken.add(name.lower())
+        result.append(Variant(name, variant.assignments, variant.varied))
+    return result
+
+
+def read_named(path: Path) -> dict[str, list[str]]:
+    """Named variants of a TOML file: a table of name = ["key=value", ...].
+
+    Raises
+    ------
+    InputError
+        If the file is something else.
+    """
+    table: dict[str, Any] = read_toml(path)
+    if not table:
+        raise InputError(f'{path} names no variant; a line of it is: name = ["key=value", ...]')
+    for name, assignments in table.items():
+        odd = begins_formula(name) or any(steers(letter) for letter in name)
+        if odd or not 0 < len(name) <= MOST_LETTERS:
+            raise InputError(
+                f"{shown(name)} in {path} cannot name a variant: a name has 1 to {MOST_LETTERS} "
+                "characters, none of them a control character, and begins with none of = + - @"
+            )
+        if not isinstance(assignments, list) or not all(isinstance(a, str) for a in assignments):
+            raise InputError(
+                f'{shown(name)[1:-1]} in {path} must be a list of assignments: ["key=value", ...]'
+            )
+    return table
+
+
+def check_keys(variants: Sequence[Variant], where: str) -> None:
+    """Raise InputError if an assignment of a variant has a key that the scene does not know."""
+    from catenary.cases.scene.scene import Scene
+
+    known = known_keys(Scene)
+    for variant in variants:
+        for assignment in variant.assignments:
+            key, _ = parse_assignment(assignment, f"variant {variant.name}:")
+            if not is_known(key, known):
+                raise InputError(unknown_key(key, where, known))

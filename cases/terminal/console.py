@@ -1,0 +1,140 @@
+"""How the command line speaks: one sentence for an error, one voice under mpirun, exit codes."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import logging
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from catenary.cases.scene.plain_text import plain
+from catenary.solver.base.errors import CatenaryError, InputError
+from catenary.solver.base.parallel import NO_MEMORY, launched_by_mpirun, on_root
+
+DONE, BROKEN, BAD_INPUT, NOT_ACCEPTED = 0, 1, 2, 3
+_RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK")
+# The option that ``guarded`` adds to every verb, and whether the present one has it.
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
+_quiet = False
+
+
+def speaks() -> bool:
+    """Whether this process is the one that prints: rank 0, or the only one. Not collective."""
+    return all(os.environ.get(name, "0") == "0" for name in _RANK_VARIABLES)
+
+
+def is_quiet() -> bool:
+    """Whether the verb that runs prints nothing but errors. Not collective."""
+    return _quiet
+
+
+def say(text: str) -> None:
+    """Print to standard output on rank 0, unless the verb is to be quiet. Not collective."""
+    if speaks() and not _quiet:
+        typer.echo(text)
+
+
+def complain(sentence: str) -> None:
+    """Print one sentence to standard error on rank 0. Not collective."""
+    if speaks():
+        typer.echo(f"catenary: {plain(' '.join(sentence.split()))}", err=True)
+
+
+def warn(sentence: str) -> None:
+    """Print a warning to standard error on rank 0, unless quiet. Not collective."""
+    if speaks() and not _quiet:
+        typer.echo(f"WARNING {plain(' '.join(sentence.split()))}", err=True)
+
+
+class LogHandler(logging.Handler):
+    """Prints what the library logs as sentences on rank 0."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Not collective."""
+        complain(record.getMessage())
+
+
+def folder(text: str) -> Path:
+    """The folder that an option names. Not collective.
+
+    An empty name, such as that of a shell's variable without a value, is refused: it would stand
+    for the working directory.
+    """
+    if not text.strip():
+        raise typer.BadParameter("it is empty; name a folder, the working directory by a dot")
+    return Path(text)
+
+
+def run_folder(text: str) -> Path:
+    """The folder of a run, for which its result file may stand. Not collective."""
+    path = Path(text)
+    return path.parent if path.name == "run.h5" and path.is_file() else path
+
+
+def world() -> Any:
+    """The communicator of all processes; starts MPI. Not collective."""
+    from mpi4py import MPI
+
+    return MPI.COMM_WORLD
+
+
+def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
+    """A command whose foreseen errors end in a sentence and an exit code, not in a traceback.
+
+    The command returns its exit code, None for 0; it gets the option ``--quiet``. Collective if the
+    command is.
+    """
+
+    @functools.wraps(command)
+    def wrapped(*args: Any, quiet: bool = False, **kwargs: Any) -> None:
+        global _quiet
+        _quiet = quiet
+        try:
+            if quiet and kwargs.get("verbose"):
+                raise InputError("--quiet and --verbose exclude each other; give one of them")
+            code = command(*args, **kwargs)
+        except CatenaryError as error:
+            complain(str(error))
+            code = error.exit_code
+        except MemoryError:
+            complain(NO_MEMORY)
+            code = BROKEN
+        except KeyboardInterrupt:
+            complain("interrupted")
+            code = BROKEN
+        except BrokenPipeError:  # the reader of a pipe has gone, as with `| head`
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            code = BROKEN
+        if code:
+            raise typer.Exit(code)
+
+    # The command line is made from signature and annotations.
+    signature = inspect.signature(command, eval_str=True)
+    option = inspect.Parameter(
+        "quiet", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Quiet
+    )
+    parameters = [*signature.parameters.values(), option]
+    wrapped.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    wrapped.__annotations__ = {one.name: one.annotation for one in parameters}
+    return wrapped
+
+
+def serial(command: Callable[..., int | None]) -> Callable[..., int | None]:
+    """A command that runs on rank 0 only; under mpirun the others learn its result.
+
+    Collective under mpirun. Its error is raised on all ranks.
+    """
+
+    @functools.wraps(command)
+    def wrapped(*args: Any, **kwargs: Any) -> int | None:
+        if not launched_by_mpirun():
+            return command(*args, **kwargs)
+        return on_root(world(), lambda: command(*args, **kwargs))
+
+    return wrapped

@@ -1,0 +1,231 @@
+"""``catenary list --keys``: every key of a scene with its unit, default, bounds and meaning."""
+
+from __future__ import annotations
+
+import difflib
+import fnmatch
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from pydantic import BaseModel, TypeAdapter
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from catenary.cases.scene.keys import ANY, kind_of, tables_in
+from catenary.cases.scene.typical_values import TYPICAL
+from catenary.cases.scene.units import unit_of
+from catenary.cases.scene.usual_ranges import usual_range
+from catenary.postproc.evaluate.standards import EDITIONS, SYSTEMS
+from catenary.solver.base.errors import InputError
+from catenary.solver.effects import effect as effects
+
+# Words that a check takes, where the key's type is plain text.
+_WORDS = {"evaluation.edition": list(EDITIONS), "evaluation.system": list(SYSTEMS)}
+_GLOB = "*?["
+
+
+@dataclass(frozen=True)
+class Key:
+    """What is known of a key: its field, and which kinds of a table have it (none for all)."""
+
+    name: str
+    default: str
+    meaning: str
+    field: FieldInfo | None = None
+    kinds: tuple[str, ...] = ()
+
+    @property
+    def unit(self) -> str:
+        """Unit in brackets, "" where the key has none."""
+        unit = unit_of(self.name)
+        return f"[{unit}]" if unit else ""
+
+
+def keys_of_a_scene() -> list[Key]:
+    """All keys of a scene, in the order of its tables."""
+    from catenary.cases.scene.scene import Scene
+
+    return _keys_in(Scene, "")
+
+
+def _keys_in(model: type[BaseModel], prefix: str) -> list[Key]:
+    found = []
+    for name, field in model.model_fields.items():
+        key = f"{prefix}{name}"
+        inner, wildcard = tables_in(field.annotation)
+        if key == "effects":
+            found += [
+                Key(f"effects.{effect.name}", str(effect.default).lower(), effect.title)
+                for effect in effects.registry().values()
+            ]
+        elif inner:
+            below = f"{key}.{ANY}." if wildcard else f"{key}."
+            found += _keys_in(inner[0], below) if len(inner) == 1 else _of_kinds(inner, below)
+        else:
+            found.append(Key(key, _default(field), field.description or "", field))
+    return found
+
+
+def _of_kinds(tables: Sequence[type[BaseModel]], prefix: str) -> list[Key]:
+    """Keys of a table of which there are kinds: those that only some have name these."""
+    kinds = [kind_of(table) for table in tables]
+    owners: dict[tuple[str, ...], tuple[Key, list[str]]] = {}
+    for table, kind in zip(tables, kinds, strict=True):
+        for key in _keys_in(table, prefix):
+            if key.name != f"{prefix}type":
+                same = (key.name, key.default, key.meaning)
+                owners.setdefault(same, (key, []))[1].append(kind)
+    found = [Key(f"{prefix}type", "-", f"one of {', '.join(kinds)}")]
+    for key, having in owners.values():
+        nested = "." in key.name[len(prefix) :]
+        some = () if nested or having == kinds else tuple(having)
+        found.append(replace(key, kinds=some or key.kinds))
+    return found
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "required"
+    if field.default is PydanticUndefined:
+        return "empty"
+    if field.default is None or field.default == "":
+        return "-"
+    if isinstance(field.default, bool):
+        return str(field.default).lower()
+    return str(field.default)
+
+
+def key_table() -> str:
+    """Every key of a scene: name, unit, default, meaning; one line each."""
+    rows = []
+    for key in keys_of_a_scene():
+        some = f" ({', '.join(key.kinds)})" if key.kinds else ""
+        rows.append(f"{key.name:52} {key.unit:8} {key.default:12} {key.meaning}{some}")
+    return "\n".join(rows)
+
+
+def key_details(wanted: str) -> str:
+    """All that is known of the keys that a filter leaves, several lines each.
+
+    ``wanted`` is a part of a key, or a pattern for all of it with ``*``, ``?`` and ``[...]``; if no
+    key has that part, a part of a meaning.
+
+    Raises
+    ------
+    InputError
+        If nothing is left.
+    """
+    return "\n".join(_details(key) for key in _chosen(wanted))
+
+
+def _chosen(wanted: str) -> list[Key]:
+    every, low = keys_of_a_scene(), wanted.strip().lower()
+    whole = [key for key in every if key.name.lower() == low]
+    if whole:
+        return whole
+    if any(letter in low for letter in _GLOB):
+        found = [key for key in every if fnmatch.fnmatchcase(key.name.lower(), low)]
+    else:
+        found = [key for key in every if low in key.name.lower()]
+        found = found or [key for key in every if low in key.meaning.lower()]
+    if found and low:
+        return found
+    parts = {part for key in every for part in key.name.split(".") if part != ANY}
+    near = difflib.get_close_matches(low, sorted(parts), n=1)
+    hint = f"did you mean {near[0]}?" if near else "`catenary list --keys` names all"
+    shown = "".join(c if c.isprintable() else "?" for c in wanted[:80])
+    raise InputError(f'no key of a scene fits "{shown}"; {hint}')
+
+
+def _details(key: Key) -> str:
+    head = f"{key.name} {key.unit}".rstrip()
+    default = {"required": "required", "-": "may be left out", "empty": "may be left out"}
+    facts = [default.get(key.default, f"default {key.default}")]
+    facts += [text for text in (_allowed(key),) if text]
+    if key.kinds:
+        facts.append(f"only of {', '.join(key.kinds)}")
+    lines = [key.meaning, "; ".join(facts)]
+    if key.name in TYPICAL:
+        lines.append(f"typical: {TYPICAL[key.name]}")
+    elif usual_range(key.name) is not None:
+        low, high = usual_range(key.name) or (0.0, 0.0)
+        lines.append(f"usual: {low:.12g} to {high:.12g}")
+    wrapped = [
+        textwrap.fill(line, 96, initial_indent="    ", subsequent_indent="      ")
+        for line in lines
+        if line
+    ]
+    return "\n".join([head, *wrapped])
+
+
+def words_of(key: Key) -> list[str]:
+    """The words that a key accepts, none if it takes anything else."""
+    if key.name in _WORDS:
+        return _WORDS[key.name]
+    if key.field is None:
+        return ["true", "false"] if key.name.startswith("effects.") else []
+    return _words_in(TypeAdapter(key.field.rebuild_annotation()).json_schema())
+
+
+def _words_in(schema: dict[str, Any]) -> list[str]:
+    if "anyOf" in schema:
+        return [word for one in schema["anyOf"] for word in _words_in(one)]
+    if schema.get("type") == "boolean":
+        return ["true", "false"]
+    only = [schema["const"]] if "const" in schema else []
+    return [str(word) for word in schema.get("enum", only)]
+
+
+def _allowed(key: Key) -> str:
+    """Bounds and words that a key accepts."""
+    words = words_of(key)
+    if words:
+        return " or ".join(words) if words == ["true", "false"] else f"one of {', '.join(words)}"
+    if key.field is None:
+        return ""
+    return _of_schema(TypeAdapter(key.field.rebuild_annotation()).json_schema())
+
+
+def _of_schema(schema: dict[str, Any]) -> str:
+    """What a JSON schema allows, in words."""
+    if "anyOf" in schema:
+        options = [_of_schema(one) for one in schema["anyOf"] if one.get("type") != "null"]
+        return " or ".join(dict.fromkeys(text for text in options if text))
+    words = _words_in(schema)
+    if words:
+        return f"one of {', '.join(words)}"
+    kind = schema.get("type")
+    if kind in ("number", "integer"):
+        noun = "whole number" if kind == "integer" else "number"
+        return f"{noun}{_range(schema)}"
+    if kind == "array":
+        return _list(schema)
+    return {"string": "text", "object": "table"}.get(str(kind), "")
+
+
+def _range(schema: dict[str, Any]) -> str:
+    parts = [
+        f"{word} {schema[name]:.12g}"
+        for name, word in (
+            ("minimum", "from"),
+            ("exclusiveMinimum", "above"),
+            ("maximum", "to"),
+            ("exclusiveMaximum", "to below"),
+        )
+        if name in schema
+    ]
+    return f" {' '.join(parts)}" if parts else ""
+
+
+def _list(schema: dict[str, Any]) -> str:
+    least, most = schema.get("minItems"), schema.get("maxItems")
+    if least is not None and least == most:
+        count = f"list of {least}"
+    elif most is not None:
+        count = f"list of {least or 0} to {most}"
+    else:
+        count = "list"
+    entries = _of_schema(schema.get("items", {}))
+    return f"{count}, each {entries}" if entries else count

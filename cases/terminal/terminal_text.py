@@ -1,0 +1,138 @@
+"""What the verbs print: tables for a terminal, no measurement and no decision."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catenary.cases.scene.case_files import CaseEntry
+from catenary.meshgen.line import Line
+from catenary.postproc.evaluate.comparing import decimals_that_tell
+from catenary.postproc.report.wording import counted, fixed
+
+
+def case_table(cases: Sequence[CaseEntry]) -> str:
+    """Names and titles of cases, one line each."""
+    width = max((len(entry.name) for entry in cases), default=0)
+    return "\n".join(f"{entry.name:{width}}  {entry.title}" for entry in cases)
+
+
+def summary_text(summary: Mapping[str, Any], folder: Path) -> str:
+    """The figures of a finished run that one wants to see at once.
+
+    Parameters
+    ----------
+    summary : content of ``summary.json``
+    folder : where the results are
+    """
+    start, end = summary["evaluation_m"]
+    lines = [
+        f"{summary['case']} at {summary['speed_km_h']:g} km/h, evaluated from {start:g} to "
+        f"{end:g} m",
+        "",
+        f"  {'pantograph':12}{'mean':>8}{'std':>8}{'max':>8}{'min':>8}{'stat max':>10}"
+        f"{'stat min':>10}  [N]{'loss':>8} [%]",
+    ]
+    for i, one in enumerate(summary["pantographs"]):
+        figures = [one[f"{name}_N"] for name in ("mean", "std", "max", "min")]
+        limits = [one["stat_max_N"], one["stat_min_N"]]
+        lines.append(
+            f"  {one.get('name') or i + 1!s:12}"
+            + "".join(f"{_number(value):>8}" for value in figures)
+            + "".join(f"{_number(value):>10}" for value in limits)
+            + f"{_number(one['loss_percent'], 3):>13}"
+        )
+    droppers = summary["droppers"]
+    lines += [
+        "",
+        f"  largest uplift at a steady arm {_number(summary['supports']['max_uplift_mm'])} mm; "
+        f"{counted(droppers['n_slackened'], 'dropper')} slackened",
+        f"  {counted(summary['n_steps'], 'step')}, {counted(summary['n_dofs'], 'unknown')}, "
+        f"{counted(summary['n_ranks'], 'rank')}, "
+        f"real-time factor {_number(summary['real_time_factor'], 2)}",
+        *_sizes_of_steps(summary.get("inner_iterations", {})),
+        "",
+    ]
+    words = {True: "passed", False: "FAILED", None: "not judged"}
+    for row in summary["acceptance"]:
+        value, limit = row["value"], row["limit"]
+        digits = decimals_that_tell(value, limit, 2)
+        lines.append(
+            f"  {words[row['passed']]:10}  {row['criterion']}: {_number(value, digits)}, limit "
+            f"{_number(limit, digits)} {row.get('unit', '')}".rstrip()
+        )
+    # Older runs have neither indicators nor arrivals.
+    warnings = list(summary.get("complaints", []))
+    for part in ("indicators", "arrivals"):
+        warnings += summary.get(part, {}).get("warnings", [])
+    lines += ["", *(f"  WARNING     {text}" for text in warnings)]
+    lines += [""] * bool(warnings) + [f"Results: {folder}"]
+    return "\n".join(lines)
+
+
+def _sizes_of_steps(counted: Mapping[str, Any]) -> list[str]:
+    """How many steps of which size were taken, where steps adapt."""
+    if "rejected_steps" not in counted:
+        return []
+    sizes = [
+        f"{count} of {name.removeprefix('steps_of_').replace('_', ' ')}"
+        for name, count in counted.items()
+        if name.startswith("steps_of_") and count
+    ]
+    again = counted["rejected_steps"] + counted["failed_steps"]
+    return [
+        f"  adaptive steps: {', '.join(sizes)}; {again} repeated, "
+        f"{counted['failed_steps']} of them without a solution"
+    ]
+
+
+def _number(value: float | None, digits: int = 1) -> str:
+    return "-" if value is None else fixed(value, digits)
+
+
+def static_text(table: Mapping[str, Any], line: Line) -> str:
+    """Dropper table, sag and elasticity of a line at rest.
+
+    Parameters
+    ----------
+    table : arrays in SI units named as in ``/static`` and ``/line`` of a result file:
+        ``dropper_span``, ``dropper_x``, ``dropper_length``, ``dropper_force``, ``contact_x``,
+        ``contact_height``, ``elasticity_x``, ``elasticity``
+    line : for the supports
+    """
+    data = {name: np.asarray(value) for name, value in table.items()}
+    masts = line.support_positions
+    lines = [f"{'span':>5} {'in span [m]':>12} {'length [m]':>11} {'force [N]':>10}"]
+    spans = data["dropper_span"].astype(int)
+    shown: dict[tuple[float, ...], int] = {}
+    for span in np.unique(spans):
+        chosen = spans == span
+        x = data["dropper_x"][chosen] - masts[span]
+        length, force = data["dropper_length"][chosen], data["dropper_force"][chosen]
+        # Millimetres and newtons decide: a span that is cut like an earlier one is only named.
+        pattern = tuple(np.round(np.concatenate([x, 1e3 * length, force])).tolist())
+        if pattern in shown:
+            lines.append(f"{span + 1:5d} as span {shown[pattern]}")
+            continue
+        shown[pattern] = int(span) + 1
+        lines += [
+            f"{span + 1:5d} {x[i]:12.3f} {length[i]:11.4f} {fixed(force[i], 1):>10}"
+            for i in range(x.size)
+        ]
+    height, lift = data["contact_height"], 1e3 * data["elasticity"]
+    first, last = line.running_range
+    at = data["contact_x"]
+    running = height[(at >= first) & (at <= last)]
+    place = data["elasticity_x"]
+    lines += [
+        "",
+        f"Contact wire at rest: {running.max():.4f} m at its highest and {running.min():.4f} m at "
+        f"its lowest in the running spans; sag {1e3 * (running.max() - running.min()):.1f} mm",
+        f"Elasticity from {place.min():g} to {place.max():g} m: {lift.min():.3f} to "
+        f"{lift.max():.3f} mm/N, mean {lift.mean():.3f} mm/N, unevenness "
+        f"{100 * (lift.max() - lift.min()) / (lift.max() + lift.min()):.1f} %",
+    ]
+    return "\n".join(lines)

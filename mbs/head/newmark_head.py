@@ -1,0 +1,109 @@
+"""What all pantographs share that step by Newmark's method: their state, their strips, contact."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from catenary.mbs.head import head_kernels
+from catenary.mbs.head.strips import HeadParts
+from catenary.mbs.head.wire_crossing import LateralPath
+from catenary.mbs.interface import HeadState
+
+
+class SteppedHead(ABC):
+    """A head's strips on n coordinates, the head's own first, which a step advances together.
+
+    Parameters
+    ----------
+    head : HeadParts
+    n : number of all coordinates; those that are not the head's are heights
+    dt, beta, gamma : Newmark step [s] and parameters, those of the line
+    lateral : where the wire crosses the strips, None if the head is not to roll
+    """
+
+    def __init__(
+        self,
+        head: HeadParts,
+        n: int,
+        dt: float,
+        beta: float,
+        gamma: float,
+        lateral: LateralPath | None,
+    ) -> None:
+        s = len(head.offsets)
+        self.strip_offsets = head.offsets
+        # Where the wire crosses the strips of a head that cannot roll makes no difference.
+        self._n, self._roll, self._lateral = n, head.roll, lateral if head.roll >= 0 else None
+        self._level = np.ones(n)
+        self._level[: head.n] = head.level
+        self._touch = np.zeros((2, s, n))
+        self._touch[0, :, : head.n] = head.touch
+        # dt, then what accelerations add to predictions, and to what is found.
+        self._newmark = np.array(
+            [dt, dt**2 * (0.5 - beta), dt * (1.0 - gamma), beta * dt**2, gamma * dt]
+        )
+        self._state, self._free = np.zeros((2, 3 * n))
+        self._by_force = np.zeros((3 * n, s))
+        self._early = np.zeros((2, s))
+        self._head = HeadState(s)
+        self._out = self._head.numbers
+
+    @property
+    def position(self) -> np.ndarray:
+        """Heights [m] and angles [rad], the head's first, shape (n,)."""
+        return self._state[: self._n]
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Velocities, upward, shape (n,) [m/s] or [rad/s]."""
+        return self._state[self._n : 2 * self._n]
+
+    def place(self, head_height: float, velocity: float = 0.0) -> None:
+        """Put the pantograph without contact to where its head is at this height [m].
+
+        Springs between its masses are relaxed, and all move upward with ``velocity`` [m/s].
+        """
+        n = self._n
+        self._state[:n] = head_height * self._level
+        self._state[n : 2 * n] = velocity * self._level
+        # A start from any other acceleration than what these forces cause loses an order in dt.
+        self._state[2 * n :] = self._acceleration(0.0)
+
+    @abstractmethod
+    def _acceleration(self, time: float) -> np.ndarray:
+        """Accelerations (n,) of the present state without contact."""
+
+    def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Heights and velocities (s,) of the strips by Newmark's predictor (paper eq. 2.5)."""
+        self._aim(time)
+        head_kernels.extrapolate(self._newmark, self._touch, self._state, self._early)
+        return self._early[0], self._early[1]
+
+    def advance(self, contact_force: np.ndarray) -> None:
+        """Take the step predicted last with these contact forces (s,) [N]."""
+        head_kernels.take(self._free, self._by_force, contact_force, self._state)
+
+    def state(self) -> np.ndarray:
+        """Positions, velocities and accelerations, shape (3 n,)."""
+        return self._state.copy()
+
+    def restore(self, state: np.ndarray) -> None:
+        """Continue from what ``state`` returned."""
+        self._state[:] = state
+
+    def _aim(self, time: float) -> None:
+        """Let the strips touch where the wire is at ``time`` [s]."""
+        if self._lateral is None:
+            return
+        self._lateral.move_to(time)
+        self._touch[0, :, self._roll] = self._lateral.place
+        self._touch[1, :, self._roll] = self._lateral.rate
+
+
+def raised(time: float, raise_time: float) -> float:
+    """Part of the lift that acts at ``time`` [s]: a half cosine from 0 to 1 over ``raise_time``."""
+    if time >= raise_time:
+        return 1.0
+    return 0.5 * (1.0 - float(np.cos(np.pi * time / raise_time)))

@@ -1,0 +1,331 @@
+"""A pantograph with all its bodies in the time loop: the reference for the reduced ones.
+
+Steps are those of `stepping`, so that joints stay closed, and the head's height at a step's end is
+affine in the contact forces of the step. A vehicle that moves carries the base along: in the base's
+axes all bodies weigh more by its acceleration, which is exact for a base that does not turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from catenary.mbs.head.newmark_head import raised
+from catenary.mbs.head.wire_crossing import LateralPath
+from catenary.mbs.interface import HeadState
+from catenary.mbs.mechanism.pantograph_data import MultibodyData, head_weight_under_way, stand
+from catenary.mbs.rigid import kernels
+from catenary.mbs.rigid.bodies import SPACE, Motion
+from catenary.mbs.rigid.forces import Gravity
+from catenary.mbs.rigid.joints import ORIGIN, PrescribedPoint, constant, steady
+from catenary.mbs.rigid.kinematics import point
+from catenary.mbs.rigid.spin_locks import without_spins
+from catenary.mbs.rigid.statics import equilibrium, held_force
+from catenary.mbs.rigid.system import System
+from catenary.mbs.time_steps.implicit_steps import Stepper
+from catenary.mbs.time_steps.step_solvers import StepSolver
+from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.solver.base.errors import InputError, RunBroken
+
+ARM, HEAD = "arm held at its place", "head moved from its place"
+# To how well a place without contact is found [m].
+PLACED = 1e-10
+
+
+@dataclass
+class _HoldDown:
+    """What holds the arm down until the pantograph is raised: ``force`` [N] less and less.
+
+    ``part(time)`` of the lift is let act; where it is negative, the arm is pulled down.
+    """
+
+    name: str
+    arm: str
+    part: Callable[[float], float]
+    force: float = 0.0
+
+    def generalised(self, motion: Motion, time: float) -> np.ndarray:
+        """Generalised forces (6 n,)."""
+        left = self.force * (1.0 - self.part(time))
+        return -left * point(motion, self.arm, ORIGIN).jacobian[2]
+
+    def energy(self, motion: Motion) -> float:
+        """Stores none."""
+        return 0.0
+
+
+@dataclass(frozen=True)
+class _Carried:
+    """What bodies feel of a base that is accelerated up and sideways."""
+
+    name: str
+    masses: tuple[float, ...]
+    base: BaseMotion
+
+    def generalised(self, motion: Motion, time: float) -> np.ndarray:
+        """Generalised forces (6 n,)."""
+        forces = np.zeros((len(self.masses), 6))
+        forces[:, 1] = self.base.lateral(time).acceleration
+        forces[:, 2] = self.base.vertical(time).acceleration
+        return -(np.array(self.masses)[:, None] * forces).ravel()
+
+    def energy(self, motion: Motion) -> float:
+        """Stores none."""
+        return 0.0
+
+
+class FullPantograph:
+    """All bodies of a multibody pantograph, implicit in the contact forces.
+
+    Links between two balls do not spin, strips have no suspension of their own.
+
+    Parameters
+    ----------
+    data : MultibodyData
+    static_force : force on a wire at rest [N] that holds the head at ``nominal_height`` [m]
+    raise_time : time over which the static force grows from zero [s]
+    dt, beta, gamma : Newmark step [s] and parameters, those of the line
+    lateral : where the wire crosses the strips; without it, in their middle
+    base : how the vehicle moves; without it the base stays
+    handling : way of keeping constraints, or its name in `step_solvers.METHODS`
+    substeps : into how many a step is cut
+
+    Raises
+    ------
+    InputError
+        The data's strips have a suspension of their own, or it cannot stand.
+    """
+
+    def __init__(
+        self,
+        data: MultibodyData,
+        static_force: float,
+        nominal_height: float,
+        raise_time: float,
+        dt: float,
+        beta: float = 0.25,
+        gamma: float = 0.5,
+        lateral: LateralPath | None = None,
+        base: BaseMotion | None = None,
+        handling: StepSolver | str = "coordinate_partitioning",
+        substeps: int = 1,
+    ) -> None:
+        if data.strips.suspension is not None:
+            raise InputError(
+                f"Pantograph {data.name!r}: strips with a suspension of their own are no bodies; "
+                "leave it out to have all bodies in the loop."
+            )
+        standing = stand(data)
+        self._data, self._dt = data, dt
+        self._lateral, self._base = lateral, base
+        part = partial(raised, raise_time=raise_time)
+        self._hold_down = _HoldDown("held down until raised", data.arm, part)
+        system = without_spins(standing.system, standing.motion)
+        system = system.with_forces(*data.wind, self._hold_down)
+        if base is not None:
+            masses = tuple(body.mass for body in system.bodies)
+            system = system.with_forces(_Carried("carried by the base", masses, base))
+        self._rest = standing.motion
+        self._zero = nominal_height - self._head_under(static_force)
+        self._still = without_spins(standing.system, standing.motion).with_forces(*data.wind)
+        s, space = len(data.strip_offsets), self._rest.numbers[SPACE]
+        self._touched = np.tile([space, space, self._rest.numbers[data.head]], (s, 1))
+        self._between = np.ones(s, dtype=bool)
+        self._upward, self._origins = np.tile([0.0, 0.0, 1.0], (s, 1)), np.zeros((s, 3))
+        self._points = np.zeros((s, 3))
+        self._points[:, 0] = data.strip_offsets
+        self._stepper = Stepper(system, dt, handling, self._pushed_down, substeps, beta, gamma)
+        self._stepper.begin(standing.motion, 0.0)
+        self._early = np.zeros((2, s))
+        self._head = HeadState(s)
+
+    @property
+    def strip_offsets(self) -> tuple[float, ...]:
+        """Places of the strips ahead of the pantograph's own place [m]."""
+        return self._data.strip_offsets
+
+    @property
+    def system(self) -> System:
+        """The bodies with all that acts on them but the contact forces."""
+        return self._stepper.system
+
+    @property
+    def motion(self) -> Motion:
+        """Where all bodies are, from the base."""
+        return self._stepper.motion
+
+    def follow(self, part: Callable[[float], float]) -> None:
+        """Let the part ``part(time)`` of the lift act."""
+        self._hold_down.part = part
+
+    def constraint_violation(self) -> float:
+        """Largest error of a row of the joints now [m, cosine]."""
+        return self._stepper.violation()
+
+    def place(self, head_height: float, velocity: float = 0.0) -> None:
+        """Put the pantograph where its head is at this height [m], without contact.
+
+        ``velocity`` [m/s]: upward, of head and arm, all other bodies as the joints want it. Both
+        count from the line, also where the base moves.
+
+        Raises
+        ------
+        RunBroken
+            The head does not reach this height.
+        """
+        try:
+            self._place(head_height, velocity)
+        except InputError as error:
+            raise self._beyond_reach(head_height) from error
+
+    def _place(self, head_height: float, velocity: float) -> None:
+        data, number = self._data, self._rest.numbers[self._data.head]
+        wanted, motion = head_height - self._zero, self._rest
+        if self._base is not None:
+            vertical = self._base.vertical(0.0)
+            wanted, velocity = wanted - vertical.place, velocity - vertical.velocity
+        arm = wanted - stand(data).head.offset
+        for _ in range(20):
+            holder = PrescribedPoint(ARM, data.arm, constant(arm))
+            motion = equilibrium(self._still.with_joints(holder), motion).motion
+            off = wanted - float(motion.position[number, 2])
+            arm += off
+            if abs(off) <= PLACED:
+                break
+        else:
+            raise self._beyond_reach(head_height)
+        self._hold_down.force = held_force(self._still, holder, motion)
+        if velocity:
+            raising = self._still.with_joints(
+                PrescribedPoint(ARM, data.arm, steady(arm, velocity)),
+                PrescribedPoint(HEAD, data.head, steady(wanted, velocity)),
+            )
+            motion = raising.project_velocities(motion, 0.0)
+        self._aim(0.0)
+        self._stepper.begin(motion, 0.0)
+
+    def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Heights and velocities (s,) of the strips at ``time`` [s] by Newmark's predictor."""
+        self._aim(time)
+        dt, stepper = self._dt, self._stepper
+        heights, gradients = self._touching(stepper.motion)
+        velocities, pushed = stepper.motion.velocities, stepper.acceleration
+        self._early[0] = self._zero + heights
+        self._early[0] += gradients @ (dt * velocities + 0.5 * dt**2 * pushed)
+        self._early[1] = gradients @ (velocities + dt * pushed)
+        self._add_base(time, self._early[0], self._early[1], stepper.motion)
+        return self._early[0], self._early[1]
+
+    def predict(self, time: float) -> HeadState:
+        """Strips at ``time`` [s] as affine functions of the contact forces in the coming step."""
+        self._aim(time)
+        # The loop's clock counts: a restart begins at any time.
+        self._stepper.time = time - self._dt
+        with self._named():
+            found = self._stepper.predict(time)
+        displacement, velocity, _ = found.changes(np.zeros(len(self._points)))
+        heights, gradients = self._touching(found.motion)
+        head = self._head
+        head.height[:] = self._zero + heights + gradients @ displacement
+        head.velocity[:] = gradients @ (found.motion.velocities + velocity)
+        head.height_compliance[:] = -gradients @ found.by_force[0]
+        head.velocity_compliance[:] = -gradients @ found.by_force[1]
+        self._add_base(time, head.height, head.velocity, found.motion)
+        return head
+
+    def advance(self, contact_force: np.ndarray) -> None:
+        """Take the step predicted last with these contact forces (s,) [N].
+
+        Raises
+        ------
+        RunBroken
+            Its joints cannot be kept closed, or numbers are not finite.
+        """
+        with self._named():
+            self._stepper.advance(np.asarray(contact_force, dtype=float))
+
+    def state(self) -> np.ndarray:
+        """Places, velocities, accelerations, contact forces, and what holds it down."""
+        stepper = self._stepper
+        more = [stepper.acceleration, stepper.forces, [self._hold_down.force]]
+        return np.concatenate([stepper.motion.to_vector(), *more])
+
+    def restore(self, state: np.ndarray) -> None:
+        """Continue from what ``state`` returned."""
+        stepper, n = self._stepper, self.motion.n_bodies
+        values = np.array(state, dtype=float)
+        stepper.motion = stepper.motion.restored(values[: 13 * n])
+        stepper.acceleration = values[13 * n : 19 * n]
+        stepper.forces = values[19 * n : -1]
+        self._hold_down.force = float(values[-1])
+
+    def energy(self) -> float:
+        """Kinetic energy in the base's axes and elastic energy of springs and stops [J].
+
+        Weights and actuators store none here, as with the other models.
+        """
+        system, motion = self.system, self.motion
+        elastic = sum(f.energy(motion) for f in system.forces if not isinstance(f, Gravity))
+        return 0.5 * float(system.mass @ motion.velocities**2) + elastic
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        """Say of which pantograph it is that breaks."""
+        try:
+            yield
+        except RunBroken as error:
+            raise type(error)(f"Pantograph {self._data.name!r}: {error}") from error
+
+    def _beyond_reach(self, head_height: float) -> RunBroken:
+        return RunBroken(
+            f"The head of pantograph {self._data.name!r} does not reach a wire at a height of "
+            f"{head_height:.4g} m: {head_height - self._zero:.4g} m above its base."
+        )
+
+    def _head_under(self, static_force: float) -> float:
+        """Height of the head above the base, arm at its working height, wire on the head [m]."""
+        standing = stand(self._data)
+        lifted = standing.head.weight - head_weight_under_way(self._data)
+        height = float(self._rest.position[self._rest.numbers[self._data.head], 2])
+        return height + (lifted - static_force) / standing.head.stiffness
+
+    def _aim(self, time: float) -> None:
+        """Let the strips touch where the wire is at ``time`` [s]."""
+        if self._lateral is not None:
+            self._lateral.move_to(time)
+            self._points[:, 1] = self._lateral.place
+
+    def _touching(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+        """Heights (s,) above the base where the wire is on the strips, and gradients (s, 6 n)."""
+        height, gradient, _, _ = kernels.products(
+            motion.position,
+            motion.rotation,
+            motion.velocity,
+            motion.spin,
+            self._touched,
+            self._between,
+            self._upward,
+            self._origins,
+            self._points,
+        )
+        return height, gradient
+
+    def _pushed_down(self, motion: Motion) -> np.ndarray:
+        """Generalised forces (6 n, s) of unit contact forces, downward."""
+        return -self._touching(motion)[1].T
+
+    def _add_base(
+        self, time: float, height: np.ndarray, velocity: np.ndarray, motion: Motion
+    ) -> None:
+        """What the base's motion and the wire's way along the strips add, in place."""
+        if self._lateral is not None:
+            tilt = motion.rotation[motion.numbers[self._data.head]][2, 1]
+            velocity += tilt * self._lateral.rate
+        if self._base is not None:
+            vertical = self._base.vertical(time)
+            height += vertical.place
+            velocity += vertical.velocity

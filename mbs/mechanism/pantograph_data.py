@@ -1,0 +1,362 @@
+"""A pantograph as a multibody system: what it is told by, and what a running one needs of it.
+
+The head stands on springs on one body, the arm, and everything else is a mechanism that raises
+the arm. Head and mechanism are taken apart: the head becomes a mass on a spring and a damper, the
+mechanism tables over the arm's height. Both follow from the bodies, joints and forces themselves.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from catenary.mbs.head.strips import ONE_STRIP, Strips
+from catenary.mbs.mechanism.reduction import ReducedMechanism, reduce_mechanism
+from catenary.mbs.rigid.bodies import Motion
+from catenary.mbs.rigid.forces import Force, Gravity, PointForce, SpringDamper
+from catenary.mbs.rigid.joints import Joint, PrescribedPoint, constant
+from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium, held_force, unheld_force
+from catenary.mbs.rigid.system import Miss, System
+from catenary.solver.base.errors import InputError, RunBroken
+
+logger = logging.getLogger("catenary.multibody")
+
+# Heights over which a mechanism is reduced, to either side of its working height, and how far
+# they are apart [m]: transition spans rise by half a metre.
+REACH, SPACING = 0.6, 0.02
+# Between those heights, to how much the lift is right [N].
+LIFT_TOLERANCE = 0.2
+# Part of the head's travel over which its spring is measured [m].
+TRAVEL = 0.01
+# Forces on further motions of the mechanism that show that it has no hold, over its weight. A link
+# that may spin between two balls, a little off its balance, stays well below.
+ADRIFT = 0.01
+# More than any actuator's force [N].
+MOST_FORCE = 1e7
+# The joint that holds the arm in what is computed here.
+HOLDER = "height of the arm"
+
+
+@dataclass(frozen=True)
+class AllBodies:
+    """How all bodies are moved in the time loop: joints kept by ``handling``, one of
+    `step_solvers.METHODS`, in so many ``substeps`` of the line's step."""
+
+    handling: str = "coordinate_partitioning"
+    substeps: int = 1
+
+
+@dataclass(frozen=True)
+class MultibodyData:
+    """A pantograph as a multibody system; heights from the base, x along the track, z up.
+
+    ``name`` for messages; ``system`` with joints that ``assembly_tolerance`` [m] lets miss in the
+    given positions; ``head``, ``arm`` names of bodies; ``working_height`` [m] of the arm's centre
+    of mass, None for where the joints close; ``actuator`` is the force to be calibrated to
+    ``static_force`` [N], both None if forces hold as they are; ``wind`` are forces that act under
+    way, not at standstill, where the static force is measured; ``strips`` are parts of the head.
+    ``all_bodies`` has all bodies in the time loop; with None the mechanism is reduced to tables.
+    """
+
+    name: str
+    system: System
+    head: str
+    arm: str
+    working_height: float | None = None
+    actuator: str | None = None
+    static_force: float | None = None
+    assembly_tolerance: float = 0.05
+    wind: tuple[PointForce, ...] = ()
+    strips: Strips = ONE_STRIP
+    all_bodies: AllBodies | None = None
+
+    @property
+    def strip_offsets(self) -> tuple[float, ...]:
+        """Places of the strips ahead of the pantograph's own place [m]."""
+        return self.strips.offsets
+
+
+class Head(NamedTuple):
+    """The head on its arm: ``mass`` [kg], ``stiffness`` [N/m] and ``damping`` [N s/m] of what
+    carries it, ``weight`` [N], ``offset`` [m] above the arm at rest without contact."""
+
+    mass: float
+    stiffness: float
+    damping: float
+    weight: float
+    offset: float
+
+
+class Standing(NamedTuple):
+    """A pantograph at its working height, pressing with its static force.
+
+    ``system`` with the calibrated actuator; ``motion`` without contact; ``missed`` is by how much
+    joints missed in the given positions; ``actuator_force`` [N], None if nothing was calibrated,
+    and ``force_before`` [N], the static force that the data's own actuator force gives.
+    ``n_freedoms`` counts the degrees of freedom, one of which is the raising.
+    """
+
+    system: System
+    motion: Motion
+    missed: tuple[Miss, ...]
+    working_height: float
+    static_force: float
+    actuator_force: float | None
+    force_before: float
+    n_freedoms: int
+    head: Head
+
+    @property
+    def worst(self) -> Miss:
+        """The joint that missed most."""
+        return max(self.missed, key=lambda miss: miss.gap)
+
+
+@lru_cache(maxsize=64)
+def stand(data: MultibodyData) -> Standing:
+    """The pantograph at its working height: assembled, judged and calibrated. Not collective.
+
+    Raises
+    ------
+    InputError
+        In one sentence: it cannot be assembled, or is no mechanism that raises a head on springs.
+    """
+    _judge_head(data)
+    missed = _judge_positions(data)
+    system = data.system
+    motion = system.assemble(system.start()).motion
+    repeated = system.redundant(motion)
+    if repeated:
+        raise InputError(
+            f"its joints {', '.join(repeated)} repeat, as often as said, what joints before them "
+            "hold already; let them hold less, such as spherical in place of revolute"
+        )
+    height = data.working_height
+    if height is None:
+        height = float(motion.position[motion.numbers[data.arm], 2])
+    holder = PrescribedPoint(HOLDER, data.arm, constant(height))
+    _judge_raising(data, motion)
+    try:
+        motion = system.with_joints(holder).assemble(motion).motion
+    except InputError as error:
+        raise InputError(
+            f"its arm {data.arm!r} does not reach its working height of {height:g} m: {error}"
+        ) from error
+    push = None
+    if data.actuator is not None and data.static_force is not None:
+        found = calibrate_actuator(system, data.actuator, holder, motion, data.static_force)
+        push, force, before = found.actuator_force, found.static_force, found.force_before
+        if abs(push) > MOST_FORCE:
+            raise InputError(
+                f"its actuator {data.actuator!r} would need {push:.3g} N for its static force of "
+                f"{force:g} N: it hardly acts on the arm {data.arm!r}; check its points"
+            )
+        system = system.with_force_changed(data.actuator, force=push)
+    else:
+        force = before = held_force(system, holder, motion)
+        if force <= 0.0:
+            raise InputError(
+                f"its static force is {force:.4g} N at its working height of {height:g} m: its "
+                "actuators cannot raise it"
+            )
+    motion = equilibrium(system.with_joints(holder), motion).motion
+    head = _head(data, system.with_joints(holder), motion)
+    n_freedoms = system.n_degrees_of_freedom(motion)
+    result = Standing(system, motion, missed, height, force, push, before, n_freedoms, head)
+    _log(data, result)
+    return result
+
+
+@lru_cache(maxsize=64)
+def reduced(data: MultibodyData) -> ReducedMechanism:
+    """The mechanism below the head, as far around its working height as it reaches."""
+    standing = stand(data)
+    frame = without_head(data, standing.system)
+    heights = standing.working_height + np.arange(-REACH, REACH + 0.5 * SPACING, SPACING)
+    start = _part(standing.motion, frame)
+    frame = frame.with_forces(*(f for f in data.wind if f.body != data.head))
+    return reduce_mechanism(
+        frame,
+        data.arm,
+        heights,
+        start=start,
+        as_far_as_it_goes=True,
+        tolerance=LIFT_TOLERANCE,
+        name=data.name,
+    )
+
+
+def head_weight_under_way(data: MultibodyData) -> float:
+    """The head's weight less what the wind lifts it by [N]."""
+    start = data.system.start()
+    up = 6 * start.numbers[data.head] + 2
+    lifts = [f.generalised(start, 0.0)[up] for f in data.wind if f.body == data.head]
+    return stand(data).head.weight - float(np.sum(lifts))
+
+
+def describe(data: MultibodyData) -> str:
+    """What a pantograph is, for people: bodies, freedoms, actuator, joints' misses."""
+    standing, system = stand(data), data.system
+    text = (
+        f"multibody: {len(system.bodies)} bodies, {len(system.joints)} joints, 1 of "
+        f"{standing.n_freedoms} degrees of freedom is the raising; arm at "
+        f"{standing.working_height:.3f} m, head {standing.head.mass:.3g} kg on "
+        f"{standing.head.stiffness:.4g} N/m"
+    )
+    if standing.actuator_force is not None:
+        text += f"; {data.actuator} at {standing.actuator_force:.0f} N"
+    text += f" for {standing.static_force:.1f} N"
+    if data.all_bodies is None:
+        return f"{text}; reduced to tables over its height"
+    way = data.all_bodies
+    cut = "" if way.substeps == 1 else f" in {way.substeps} substeps"
+    return f"{text}; all bodies in the time loop{cut}, joints kept by {way.handling}"
+
+
+def describe_assembly(missed: tuple[Miss, ...]) -> str:
+    """By how much joints missed in the given positions, for people."""
+    listed = ", ".join(f"{miss.joint} {1e3 * miss.gap:.1f} mm" for miss in missed)
+    return f"joints missed before assembly by: {listed}"
+
+
+def without_head(data: MultibodyData, system: System) -> System:
+    """The mechanism that raises the arm: nothing that the head is, or hangs on."""
+    bodies = tuple(body for body in system.bodies if body.name != data.head)
+    joints = tuple(joint for joint in system.joints if data.head not in _joined(joint))
+    forces: list[Force] = []
+    for force in system.forces:
+        if isinstance(force, Gravity):
+            forces.append(replace(force, masses=tuple(body.mass for body in bodies)))
+        elif data.head not in _joined(force):
+            forces.append(force)
+    return System(bodies, joints, tuple(forces))
+
+
+def _joined(what: Joint | Force) -> tuple[str, ...]:
+    """Names of the bodies that a joint or force is on."""
+    names = (getattr(what, key, None) for key in ("i", "j", "body"))
+    return tuple(name for name in names if name is not None)
+
+
+def _part(motion: Motion, system: System) -> Motion:
+    """Where the bodies of a smaller system are in the motion of a larger one."""
+    kept = [motion.numbers[name] for name in system.start().numbers]
+    return replace(
+        system.start(), position=motion.position[kept], parameters=motion.parameters[kept]
+    )
+
+
+def _head(data: MultibodyData, held: System, motion: Motion) -> Head:
+    """The head on its springs, measured around where it rests above the held arm."""
+    number, arm = motion.numbers[data.head], motion.numbers[data.arm]
+    rest = float(motion.position[number, 2])
+    around = rest + TRAVEL * np.linspace(-1.0, 1.0, 5)
+    try:
+        tables = reduce_mechanism(held, data.head, around, start=motion)
+    except (InputError, RunBroken) as error:
+        raise InputError(
+            f"its head {data.head!r} cannot move up and down on its arm {data.arm!r}: {error}"
+        ) from error
+    stiffness = -float(np.polyfit(around - rest, tables.lifts, 1)[0])
+    # What acts on the head alone: its weight, and forces at its points.
+    own = [force for force in held.forces if data.arm not in _joined(force)]
+    pull = float(np.sum([f.generalised(motion, 0.0)[6 * number + 2] for f in own]))
+    return Head(
+        mass=float(tables.masses[2]),
+        stiffness=stiffness,
+        damping=float(tables.dampings[2]),
+        weight=-pull,
+        offset=rest - float(motion.position[arm, 2]),
+    )
+
+
+def _judge_head(data: MultibodyData) -> None:
+    """Raise ``InputError`` unless the head hangs on the arm alone, on linear springs."""
+    allowed = {data.head, data.arm}
+    for joint in data.system.joints:
+        on = set(_joined(joint))
+        if data.head in on and on != allowed:
+            other = ", ".join(sorted(on - allowed)) or "space"
+            raise InputError(
+                f"its joint {joint.name!r} ties the head {data.head!r} to {other}; only the arm "
+                f"{data.arm!r} may carry it"
+            )
+    if not any(set(_joined(joint)) == allowed for joint in data.system.joints):
+        raise InputError(
+            f"its head {data.head!r} is guided by no joint on its arm {data.arm!r}; there must be "
+            "one that lets it slide, such as revolute_prismatic"
+        )
+    springs = 0
+    for force in data.system.forces:
+        on = set(_joined(force))
+        if data.head not in on or len(on) == 1:
+            continue
+        if on != allowed:
+            other = ", ".join(sorted(on - allowed))
+            raise InputError(
+                f"its force {force.name!r} acts between the head {data.head!r} and {other}; only "
+                f"the arm {data.arm!r} may carry it"
+            )
+        if not isinstance(force, SpringDamper) or callable(force.stiffness):
+            raise InputError(
+                f"its force {force.name!r} acts between head and arm and must be a spring with a "
+                "constant stiffness, because the head moves as a mass on a linear spring"
+            )
+        springs += force.stiffness > 0.0
+    if not springs:
+        raise InputError(
+            f"its head {data.head!r} stands on no spring: there must be one between it and its "
+            f"arm {data.arm!r}"
+        )
+
+
+def _judge_positions(data: MultibodyData) -> tuple[Miss, ...]:
+    """What joints miss in the given positions; raises ``InputError`` if one misses too much."""
+    missed = data.system.misses(data.system.start())
+    worst = max(missed, key=lambda miss: max(miss.gap, miss.tilt))
+    limit = data.assembly_tolerance
+    if max(worst.gap, worst.tilt) > limit:
+        much = f"{1e3 * worst.gap:.0f} mm" if worst.gap > limit else f"{worst.tilt:.2g} rad"
+        raise InputError(
+            f"its loops do not close: joint {worst.joint!r} misses by {much} in the given "
+            f"positions, where {1e3 * limit:g} mm (or {limit:g} rad) are allowed; check its points"
+        )
+    return missed
+
+
+def _judge_raising(data: MultibodyData, motion: Motion) -> None:
+    """Raise ``InputError`` unless the mechanism has one way to move that forces act on: raising."""
+    frame = without_head(data, data.system)
+    there = _part(motion, frame)
+    height = float(there.position[there.numbers[data.arm], 2])
+    holder = PrescribedPoint(HOLDER, data.arm, constant(height))
+    held = frame.with_joints(holder)
+    if held.n_degrees_of_freedom(there) == frame.n_degrees_of_freedom(there):
+        raise InputError(
+            f"its joints leave no way to raise the arm {data.arm!r}: take one away, or let it hold "
+            "less"
+        )
+    left = unheld_force(held, there)
+    if left > ADRIFT * 9.81 * sum(body.mass for body in frame.bodies):
+        raise InputError(
+            f"its mechanism has more than one way to move: with the arm {data.arm!r} held at its "
+            f"height, forces of {left:.3g} N (or N m) still move it; join its bodies further"
+        )
+
+
+def _log(data: MultibodyData, standing: Standing) -> None:
+    logger.debug("pantograph %s: %s", data.name, describe_assembly(standing.missed))
+    if standing.actuator_force is not None:
+        logger.debug(
+            "pantograph %s: actuator %s calibrated to %.1f N, static force %.2f N (with the force "
+            "of its data %.2f N)",
+            data.name,
+            data.actuator,
+            standing.actuator_force,
+            standing.static_force,
+            standing.force_before,
+        )

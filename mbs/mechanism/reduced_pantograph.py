@@ -1,0 +1,191 @@
+"""A pantograph of a head on springs over a reduced raising mechanism, with the line's fixed step.
+
+    m_head y'' = -k (y - z) - c (y' - z') - f
+    m(h) (z'' - b'') + 1/2 dm/dh (z' - b')^2
+        = r(t) S(h) - c_frame(h) (z' - b') - s(h) b'' + k (y - z) + c (y' - z')
+
+y is the head's height, z the height at which the arm below would carry it without contact,
+h the arm's height above the base, S the static force at that height: the mechanism's lift less the
+head's weight; r grows from 0 to 1 while the pantograph is raised. b is the height of a base that
+moves (Lagrange's equation with the kinetic energy 1/2 m h'^2 + s h' b'), s the mass that the base
+carries along with the arm. The head may stand on several strips, roll and pitch (`strips`); it is
+not carried along the track, and links between two balls do not spin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from catenary.mbs.head import head_kernels
+from catenary.mbs.head.newmark_head import SteppedHead, raised
+from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning, head_parts
+from catenary.mbs.head.wire_crossing import LateralPath
+from catenary.mbs.interface import HeadState
+from catenary.mbs.mechanism.reduction import ReducedMechanism
+from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.solver.base.bound import bound
+from catenary.solver.base.errors import RunBroken
+
+
+@dataclass(frozen=True)
+class RaisingData:
+    """A head on a mechanism.
+
+    ``frame``: mass, lift and damping over the arm's height above the base; ``head_mass`` [kg],
+    ``head_stiffness`` [N/m] and ``head_damping`` [N s/m] between head and arm; ``head_weight`` [N];
+    ``head_offset`` [m], height of the head above the arm at rest without contact; ``base_height``
+    [m] of the base, in the line's heights. ``strips`` are part of the head, which may turn about
+    the track as ``roll`` says.
+    """
+
+    frame: ReducedMechanism
+    head_mass: float
+    head_stiffness: float
+    head_damping: float
+    head_weight: float
+    head_offset: float
+    base_height: float = 0.0
+    strips: Strips = ONE_STRIP
+    roll: Turning | None = None
+
+
+class RaisingPantograph(SteppedHead):
+    """The equations above by Newmark's method, implicit in the contact forces.
+
+    The mechanism's tables are taken at the predicted height and its lift is linear from there: an
+    error of order dt^2 in coefficients, so that a step stays affine in the contact forces.
+
+    Parameters
+    ----------
+    data : RaisingData
+    raise_time : time over which the static force grows from zero [s]
+    dt, beta, gamma : Newmark step [s] and parameters, those of the line
+    lateral : where the wire crosses the strips; without it the head does not roll
+    base : how the vehicle moves; without it the base stays
+    """
+
+    def __init__(
+        self,
+        data: RaisingData,
+        raise_time: float,
+        dt: float,
+        beta: float = 0.25,
+        gamma: float = 0.5,
+        lateral: LateralPath | None = None,
+        base: BaseMotion | None = None,
+    ) -> None:
+        values = data.head_mass, data.head_stiffness, data.head_damping
+        head = head_parts(*values, data.strips, data.roll if lateral is not None else None)
+        super().__init__(head, head.n + 1, dt, beta, gamma, lateral)
+        self._data = data
+        self._part: Callable[[float], float] = partial(raised, raise_time=raise_time)
+        self._base = base
+        self._zero = data.head_offset + data.base_height
+        self._masses = np.append(head.masses, 0.0)
+        self._stiffness, self._damping = head.stiffness, head.damping
+        self._breaks, self._coefficients = data.frame.coefficients(carried=base is not None)
+        self._lowest, self._highest = float(self._breaks[0]), float(self._breaks[-1])
+        # Part of the lift, weight, zero, then height, velocity and acceleration of the base.
+        self._drive = np.array([0.0, data.head_weight, self._zero, 0.0, 0.0, 0.0])
+        self._step = bound(
+            head_kernels.raising_step,
+            self._newmark,
+            self._drive,
+            self._masses,
+            self._stiffness,
+            self._damping,
+            self._breaks,
+            self._coefficients,
+            self._touch,
+            self._state,
+            self._free,
+            self._by_force,
+            self._out,
+        )
+
+    def predict(self, time: float) -> HeadState:
+        """Strips at ``time`` [s] as affine functions of the contact forces in the coming step.
+
+        Raises
+        ------
+        RunBroken
+            The mechanism has left the heights that it can reach.
+        """
+        self._aim(time)
+        self._move_base(time)
+        height = self._step()
+        # What is not a number is left to those who couple.
+        if height < self._lowest or height > self._highest:
+            raise self._data.frame.left(height, time)
+        return self._head
+
+    def energy(self) -> float:
+        """Kinetic energy in the line's frame, and elastic energy of the head's springs beyond its
+        weight's, for a base at rest [J]."""
+        masses = self._masses.copy()
+        masses[-1] = self._frame_at(self.position[-1])[0][0]
+        stretch = self.position - self.position[-1] * self._level
+        return float(0.5 * masses @ self.velocity**2 + 0.5 * stretch @ self._stiffness @ stretch)
+
+    def static_force(self, head_height: float) -> float:
+        """Force on a wire that holds the strips at this height at rest, fully raised [N].
+
+        The head's springs give way under it.
+
+        Raises
+        ------
+        RunBroken
+            There is none: they give way faster than the lift falls.
+        """
+        data, force = self._data, 0.0
+        for _ in range(50):
+            previous = force
+            pressed = force / data.head_stiffness + data.strips.compression(force)
+            (_, lift, _), _ = self._frame_at(head_height + pressed)
+            force = float(lift) - data.head_weight
+            if abs(force - previous) <= 1e-10 * abs(force):
+                return force
+        raise RunBroken(
+            f"The force of the pantograph on a wire at {head_height:g} m is not found: its head's "
+            "springs give way faster than its lift falls; make them stiffer."
+        )
+
+    def follow(self, part: Callable[[float], float]) -> None:
+        """Let the part ``part(time)`` of the lift act."""
+        self._part = part
+
+    def _frame_at(self, z: float) -> tuple[np.ndarray, np.ndarray]:
+        """Mass, lift, damping and their slopes for a height z [m] over a base at rest."""
+        return self._data.frame.at(z - self._zero)
+
+    def _move_base(self, time: float) -> None:
+        """Put lift and base to ``time`` [s]."""
+        self._drive[0] = self._part(time)
+        if self._base is not None:
+            self._drive[3:] = self._base.vertical(time)
+
+    def _acceleration(self, time: float) -> np.ndarray:
+        self._move_base(time)
+        part, weight, zero, place, velocity, acceleration = self._drive
+        (mass, lift, slowing, carried), (mass_slope, *_) = self._columns_at(
+            self.position[-1] - zero - place
+        )
+        speed = self.velocity[-1] - velocity
+        force = -self._stiffness @ self.position - self._damping @ self.velocity
+        force[-1] += part * (lift - weight) - slowing * speed - 0.5 * mass_slope * speed**2
+        force[-1] += (mass - carried) * acceleration
+        masses = self._masses.copy()
+        masses[-1] = mass
+        return np.asarray(force / masses)
+
+    def _columns_at(self, height: float) -> tuple[np.ndarray, np.ndarray]:
+        """All columns of the mechanism's tables and their slopes at a height above the base [m]."""
+        if not self._lowest <= height <= self._highest:
+            raise self._data.frame.left(height)
+        values, slopes = np.empty(4), np.empty(4)
+        head_kernels.table_at(self._breaks, self._coefficients, height, values, slopes)
+        return values, slopes

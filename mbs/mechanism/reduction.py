@@ -1,0 +1,212 @@
+"""A mechanism that can only raise and lower, reduced to the height of one of its points.
+
+With h the height, m(h) dh^2/dt^2 + 1/2 dm/dh (dh/dt)^2 = F(h) - c(h) dh/dt + p, where p is a force
+that lifts the point: Lagrange's equation of the mechanism with everything but h eliminated. Tables
+of m, F and c over h hold all of it, so that a step costs a few interpolations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from catenary.mbs.rigid.bodies import Motion, Vector
+from catenary.mbs.rigid.joints import ORIGIN, PrescribedPoint, constant
+from catenary.mbs.rigid.kinematics import point
+from catenary.mbs.rigid.least_squares import least_squares
+from catenary.mbs.rigid.statics import equilibrium
+from catenary.mbs.rigid.system import System
+from catenary.solver.base.errors import InputError, RunBroken
+
+# Closer than this no heights are put in [m]: a stop of 1e5 N/m is then off by some 5 N over 1 mm.
+FINEST = 5e-4
+# A mechanism whose equivalent mass is so many times that at the start nearly locks: tables would
+# not follow it.
+LOCKING = 4.0
+
+
+@dataclass(frozen=True)
+class ReducedMechanism:
+    """Tables over the height of a point, joined by cubic splines.
+
+    ``heights`` [m], growing; ``masses`` [kg], equivalent mass at the point; ``lifts`` [N], upward
+    force on the point at rest; ``dampings`` [N s/m]; all of shape (n,), n >= 4. ``name`` is the
+    pantograph's, for messages. ``carried`` [kg], shape (n,): the sum of m dz/dh, force on the point
+    per upward acceleration of the base; None if the base is at rest.
+    """
+
+    heights: np.ndarray
+    masses: np.ndarray
+    lifts: np.ndarray
+    dampings: np.ndarray
+    name: str = ""
+    carried: np.ndarray | None = None
+    _table: CubicSpline = field(init=False, repr=False, compare=False)
+    _slopes: CubicSpline = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        columns = np.stack([self.masses, self.lifts, self.dampings], axis=1)
+        object.__setattr__(self, "_table", CubicSpline(self.heights, columns))
+        object.__setattr__(self, "_slopes", self._table.derivative())
+
+    def at(self, height: float) -> tuple[np.ndarray, np.ndarray]:
+        """Mass, lift and damping at a height [m], shape (3,), and their slopes, per metre.
+
+        Raises
+        ------
+        RunBroken
+            The height is not within the tables.
+        """
+        if not self.heights[0] <= height <= self.heights[-1]:
+            raise self.left(height)
+        return self._table(height), self._slopes(height)
+
+    def coefficients(self, carried: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Heights (n,) and, from each to the next, coefficients of the splines (n - 1, 4, 4).
+
+        The second index stands for mass, lift, damping and carried mass (zero unless asked for),
+        the third for powers, the highest first.
+        """
+        last = np.zeros_like(self.masses)
+        if carried:
+            if self.carried is None:
+                raise ValueError("nothing is known of what a moving base carries along")
+            last = self.carried
+        columns = np.stack([self.masses, self.lifts, self.dampings, last], axis=1)
+        spline = CubicSpline(self.heights, columns)
+        return spline.x, np.ascontiguousarray(spline.c.transpose(1, 2, 0))
+
+    def left(self, height: float, time: float | None = None) -> RunBroken:
+        """The error of a mechanism that has left its tables at a height [m] and a time [s]."""
+        who = f"of pantograph {self.name!r} " if self.name else ""
+        begin = "The" if time is None else f"At {time:.4g} s the"
+        return RunBroken(
+            f"{begin} arm {who}is at {height:.4g} m above its base, but its mechanism moves "
+            f"between {self.heights[0]:.4g} m and {self.heights[-1]:.4g} m only: it was thrown "
+            "off the wire, or the line's heights are beyond its reach; take a smaller "
+            "numerics.dt_s or a mechanism that reaches"
+        )
+
+    def acceleration(self, height: float, speed: float, push: float = 0.0) -> float:
+        """Acceleration upward [m/s^2] at a height [m] and speed upward [m/s].
+
+        ``push`` [N] is a further force on the point, upward. Raises RunBroken as ``at`` does.
+        """
+        (mass, lift, damping), (mass_slope, _, _) = self.at(height)
+        force = lift - damping * speed - 0.5 * mass_slope * speed**2 + push
+        return float(force / mass)
+
+
+def reduce_mechanism(
+    system: System,
+    body: str,
+    heights: Vector,
+    at: Vector = ORIGIN,
+    start: Motion | None = None,
+    as_far_as_it_goes: bool = False,
+    tolerance: float | None = None,
+    name: str = "",
+) -> ReducedMechanism:
+    """Tables of a mechanism for heights of the point ``at`` of a body.
+
+    Forces must not depend on time, and dampers be linear. What moves besides the raising (links
+    that spin between two balls) is taken to stay at rest, as it does in a plane mechanism.
+
+    Parameters
+    ----------
+    heights : shape (n,) [m], growing, n >= 4
+    start : a motion near by to assemble from, that of the system's data if None
+    as_far_as_it_goes : leave out the heights beyond the first one, above and below the start,
+        that the mechanism does not reach or where it nearly locks
+    tolerance : of the lift between heights [N]; where it is missed further ones are put in, down
+        to half a millimetre; None for the given heights alone
+    name : of the pantograph, for messages
+
+    Raises
+    ------
+    InputError
+        Heights do not grow, or the mechanism does not reach one of them.
+    """
+    table = np.asarray(heights, dtype=float)
+    if len(table) < 4 or np.any(np.diff(table) <= 0.0):
+        raise InputError(f"A mechanism is reduced for at least four growing heights, not {table}.")
+    # Heights are visited from the one that is nearest to the start, each from its neighbour.
+    motion = system.assemble(system.start() if start is None else start).motion
+    first = int(np.argmin(np.abs(table - point(motion, body, at).value[2])))
+    places = [_at_height(system, body, at, motion, table[first])]
+    for way in (table[first + 1 :], table[:first][::-1]):
+        there = places[0]
+        for height in way:
+            try:
+                there = _at_height(system, body, at, there.motion, height)
+            except (InputError, RunBroken):
+                if not as_far_as_it_goes:
+                    raise
+                break
+            if as_far_as_it_goes and there.columns[0] > LOCKING * places[0].columns[0]:
+                break
+            places.append(there)
+    if len(places) < 4:
+        raise InputError(
+            f"The mechanism moves by less than {4 * np.diff(table).min():g} m from the height of "
+            f"{table[first]:g} m before it locks or comes apart."
+        )
+    places.sort(key=lambda place: place.height)
+    if tolerance is not None:
+        places = _refined(system, body, at, places, tolerance)
+    reached = np.array([place.height for place in places])
+    masses, lifts, dampings, carried = np.array([place.columns for place in places]).T
+    return ReducedMechanism(reached, masses, lifts, dampings, name, carried)
+
+
+class _Place(NamedTuple):
+    """A mechanism at rest at a ``height``: ``columns`` (4,) of its tables there."""
+
+    height: float
+    motion: Motion
+    columns: np.ndarray
+
+
+def _refined(
+    system: System, body: str, at: Vector, places: list[_Place], tolerance: float
+) -> list[_Place]:
+    """The same with further heights in between where splines miss the lift, such as at stops."""
+    doubtful = list(pairwise(places))
+    while doubtful:
+        lift = CubicSpline([p.height for p in places], [p.columns[1] for p in places])
+        missed = set()
+        for low, high in doubtful:
+            if high.height - low.height > 2.0 * FINEST:
+                middle = 0.5 * (low.height + high.height)
+                there = _at_height(system, body, at, low.motion, middle)
+                if abs(lift(middle) - there.columns[1]) > tolerance:
+                    missed.add(middle)
+                    places.append(there)
+        places.sort(key=lambda place: place.height)
+        # A new height changes the spline next to it and, by a quarter, one interval on.
+        new = [k for k, place in enumerate(places) if place.height in missed]
+        near = {i for k in new for i in range(max(k - 2, 0), min(k + 2, len(places) - 1))}
+        doubtful = [(places[i], places[i + 1]) for i in sorted(near)]
+    return places
+
+
+def _at_height(system: System, body: str, at: Vector, near: Motion, height: float) -> _Place:
+    """The system at rest with a point at a height: mass, lift, damping and carried mass there."""
+    holder = PrescribedPoint("height", body, constant(float(height)), at)
+    motion = equilibrium(system.with_joints(holder), near).motion
+    rows = holder.rows(motion, 0.0)
+    jacobian = np.vstack([system.constraints(motion, 0.0).jacobian, rows.jacobian])
+    # Of all velocities with unit speed of the point those of least kinetic energy.
+    root = np.sqrt(system.inverse_mass)
+    unit_speed = np.append(np.zeros(len(jacobian) - 1), 1.0)
+    way = root * least_squares(jacobian * root, unit_speed, 1e-8)
+    lift = way @ system.generalised_forces(motion, 0.0)
+    damping = lift - way @ system.generalised_forces(motion.with_velocities(way), 0.0)
+    # Where the third of the six numbers of a body is its velocity upward.
+    carried = system.mass[2::6] @ way[2::6]
+    columns = np.array([system.mass @ way**2, lift, damping, carried])
+    return _Place(float(height), motion, columns)

@@ -1,0 +1,1 @@
+"""Linearisation, frequency response, and the lumped model fitted to it."""

@@ -1,0 +1,286 @@
+"""Small motions around rest: M x'' + C x' + K x = b f, of bodies with joints or of lumped masses.
+
+The motions x of a multibody system are velocities that its joints allow, chosen so that M = 1.
+Forces are differentiated along them with all joints kept closed, so that K holds springs, weights
+and what constant forces do when their levers change.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy import linalg
+
+from catenary.mbs.head.strips import Strips
+from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.rigid.bodies import Motion, Vector
+from catenary.mbs.rigid.joints import ORIGIN, unit
+from catenary.mbs.rigid.kinematics import point
+from catenary.mbs.rigid.least_squares import least_squares, null_space
+from catenary.mbs.rigid.system import System
+from catenary.solver.base.errors import InputError, RunBroken
+
+# Largest displacement [m or rad] and velocity [m/s or rad/s] for differences of forces.
+STEP, SPEED = 1e-5, 1e-4
+# Motions that less than this part of the largest stiffness, damping and load acts on are left out.
+NEUTRAL = 1e-8
+# A force left on a free motion above this part of the largest one (or of 1 N): not at rest.
+UNBALANCED = 1e-6
+
+
+class Mode(NamedTuple):
+    """A free motion exp(s t): ``root`` s [1/s] with Im s >= 0; a real root is a mode of its own.
+
+    ``share``: how much of the mode the point that is loaded moves, in parts of the largest mode's.
+    """
+
+    root: complex
+    share: float
+
+    @property
+    def frequency(self) -> float:
+        """|s| / 2 pi [Hz]: the undamped natural frequency."""
+        return abs(self.root) / (2.0 * np.pi)
+
+    @property
+    def damping_ratio(self) -> float:
+        """-Re s / |s|: 1 for a motion that dies out without swinging, < 0 for one that grows."""
+        return -self.root.real / abs(self.root) if self.root else 0.0
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """M x'' + C x' + K x = b f, and the displacement b^T x of the loaded point.
+
+    ``mass``, ``damping``, ``stiffness`` (k, k); ``push`` b (k,), positive upward like the
+    displacement. ``ways`` (n, k): what the motions x do to bodies, as `Motion` counts their
+    displacements, or to lumped masses. ``left_out``: bodies that also move in motions which
+    nothing resists and the load does not drive; there are ``n_left_out`` of those.
+    """
+
+    mass: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    push: np.ndarray
+    ways: np.ndarray
+    left_out: tuple[str, ...] = ()
+    n_left_out: int = 0
+
+    def amplitudes(self, frequencies: Vector) -> np.ndarray:
+        """Complex amplitudes (n_f, k) of x for a unit force exp(i w t) at frequencies (n_f,) [Hz].
+
+        Raises
+        ------
+        InputError
+            A frequency at which an undamped motion has no bounded response.
+        """
+        omega = 2.0 * np.pi * np.asarray(frequencies, dtype=float)[:, None, None]
+        dynamic = self.stiffness - omega**2 * self.mass + 1j * omega * self.damping
+        right = np.broadcast_to(self.push[:, None], (*dynamic.shape[:2], 1))
+        try:
+            return np.linalg.solve(dynamic, right)[..., 0]
+        except np.linalg.LinAlgError as error:
+            raise InputError(
+                "There is no response at one of the frequencies: nothing resists the load there."
+            ) from error
+
+    def receptance(self, frequencies: Vector) -> np.ndarray:
+        """Complex displacement of the loaded point per unit force on it (n_f,) [m/N].
+
+        Both upward: at frequencies (n_f,) [Hz] far below all natural ones of a held system it is
+        real and positive, its compliance.
+        """
+        return self.amplitudes(frequencies) @ self.push
+
+    def static_stiffness(self) -> float:
+        """Force upward that it takes to hold the point a metre higher, per metre [N/m]."""
+        return float(1.0 / (self.push @ linalg.solve(self.stiffness, self.push)))
+
+    def modes(self) -> tuple[Mode, ...]:
+        """Free motions by growing frequency."""
+        k = len(self.push)
+        inverse = linalg.inv(self.mass)
+        companion = np.block(
+            [
+                [np.zeros((k, k)), np.eye(k)],
+                [-inverse @ self.stiffness, -inverse @ self.damping],
+            ]
+        )
+        roots, shapes = linalg.eig(companion)
+        sizes = np.sqrt(np.einsum("im,ij,jm->m", shapes[:k].conj(), self.mass, shapes[:k]).real)
+        shares = np.abs(self.push @ shapes[:k]) / np.maximum(sizes, np.finfo(float).tiny)
+        largest = shares.max(initial=0.0) or 1.0
+        found = [
+            Mode(complex(root), float(share / largest))
+            for root, share in zip(roots, shares, strict=True)
+            if root.imag >= 0.0
+        ]
+        # Opposite roots differ by round-off only.
+        return tuple(sorted(found, key=lambda one: (float(f"{abs(one.root):.6g}"), one.root.real)))
+
+
+def of_chain(data: LumpedData) -> LinearModel:
+    """Lumped masses, loaded at the head."""
+    push = np.zeros(data.n_masses)
+    push[0] = 1.0
+    return LinearModel(
+        np.diag(np.asarray(data.masses, dtype=float)),
+        data.chain(data.dampings),
+        data.chain(data.stiffnesses),
+        push,
+        np.eye(data.n_masses),
+    )
+
+
+def with_strips(model: LinearModel, strips: Strips) -> LinearModel:
+    """The same head with its strips on their own springs, loaded on all of them alike.
+
+    The strips' masses are part of what the model's loaded point carries; they move as one.
+    """
+    sprung = strips.suspension
+    if sprung is None:
+        return model
+    way = np.append(-model.push, 1.0)  # stretch of the strips' springs
+    stretch = strips.number * np.outer(way, way)
+
+    def grown(matrix: np.ndarray) -> np.ndarray:
+        return np.pad(matrix, (0, 1))
+
+    mass = grown(model.mass)
+    together = strips.number * sprung.mass
+    mass[:-1, :-1] -= together * np.outer(model.push, model.push)
+    mass[-1, -1] = together
+    return replace(
+        model,
+        mass=mass,
+        damping=grown(model.damping) + sprung.damping * stretch,
+        stiffness=grown(model.stiffness) + sprung.stiffness * stretch,
+        push=np.append(np.zeros_like(model.push), 1.0),
+        ways=np.pad(model.ways, ((0, 0), (0, 1))),
+    )
+
+
+def linearise(
+    system: System,
+    motion: Motion,
+    body: str,
+    at: Vector = ORIGIN,
+    along: Vector = (0.0, 0.0, 1.0),
+    time: float = 0.0,
+) -> LinearModel:
+    """Small motions of a system at rest, loaded at a point of a body along a direction in space.
+
+    Not collective. Of a damper whose force has a kink at rest the mean of both slopes counts.
+
+    Parameters
+    ----------
+    motion : the system at rest, forces that are always there (the wire's) included in it
+
+    Raises
+    ------
+    InputError
+        The system is not at rest there, or its joints do not let the point move that way.
+    """
+    rest = motion.with_velocities(np.zeros(6 * motion.n_bodies))
+    free = null_space(system.constraints(rest, time).jacobian)
+    push = unit(along) @ point(rest, body, at).jacobian @ free
+    if np.abs(push).max(initial=0.0) < 1e-9:
+        raise InputError(f"The joints do not let body {body!r} move along {tuple(along)}.")
+    forces = system.generalised_forces(rest, time)
+    unbalanced = np.abs(free.T @ forces).max()
+    if unbalanced > UNBALANCED * (1.0 + np.abs(forces).max()):
+        raise InputError(
+            f"The multibody system is not at rest where it is to be linearised: {unbalanced:.3g} N "
+            "are left over."
+        )
+    # Motions of unit mass: y^T y is twice the kinetic energy.
+    lower = linalg.cholesky(free.T @ (system.mass[:, None] * free), lower=True)
+    ways = linalg.solve_triangular(lower, free.T, lower=True).T
+    push = linalg.solve_triangular(lower, push, lower=True)
+    stiffness = _stiffness(system, rest, ways, time)
+    damping = _damping(system, rest, ways, time)
+    kept, dropped = _separated(stiffness, damping, push)
+    return LinearModel(
+        np.eye(kept.shape[1]),
+        kept.T @ damping @ kept,
+        kept.T @ stiffness @ kept,
+        kept.T @ push,
+        ways @ kept,
+        _moved_bodies(system, ways @ dropped),
+        dropped.shape[1],
+    )
+
+
+def _stiffness(system: System, rest: Motion, ways: np.ndarray, time: float) -> np.ndarray:
+    """-d (N^T g) / dx by central differences with the joints kept closed (k, k)."""
+    result = np.empty((ways.shape[1],) * 2)
+    for k, way in enumerate(ways.T):
+        step = STEP / float(np.abs(way).max())
+        ahead, behind = (
+            _force_on(system, rest.moved(sign * step * way), ways, time) for sign in (1.0, -1.0)
+        )
+        result[:, k] = (behind - ahead) / (2.0 * step)
+    return result
+
+
+def _force_on(system: System, motion: Motion, ways: np.ndarray, time: float) -> np.ndarray:
+    """Force on motions ``ways`` (6 n, k), as the joints allow them at a place near by, (k,)."""
+    there = system.assemble(motion, time).motion
+    jacobian = system.constraints(there, time).jacobian
+    # The least change that makes them allowed: smooth, unlike another null space.
+    basis = ways
+    if len(jacobian):
+        basis = ways - least_squares(jacobian, jacobian @ ways, 1e-8)
+    return basis.T @ system.generalised_forces(there, time)
+
+
+def _damping(system: System, rest: Motion, ways: np.ndarray, time: float) -> np.ndarray:
+    """-d (N^T g) / dx' by central differences (k, k); gyroscopic moments cancel out at rest."""
+    result = np.empty((ways.shape[1],) * 2)
+    for k, way in enumerate(ways.T):
+        speed = SPEED / float(np.abs(way).max())
+        ahead, behind = (
+            ways.T @ system.generalised_forces(rest.with_velocities(sign * speed * way), time)
+            for sign in (1.0, -1.0)
+        )
+        result[:, k] = (behind - ahead) / (2.0 * speed)
+    return result
+
+
+def _separated(
+    stiffness: np.ndarray, damping: np.ndarray, push: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Bases (k, .) of the motions that something acts on, and of those that nothing does.
+
+    With M = 1 the two do not know of each other.
+    """
+    acting = []
+    for matrix in (stiffness, stiffness.T, damping, damping.T, push[None, :]):
+        size = np.abs(matrix).max()
+        if size > 0.0:
+            acting.append(matrix / size)
+    left, sizes, right = linalg.svd(np.vstack(acting), lapack_driver="gesvd")
+    n_kept = int(np.sum(sizes > NEUTRAL * sizes[0]))
+    return right[:n_kept].T, right[n_kept:].T
+
+
+def _moved_bodies(system: System, ways: np.ndarray) -> tuple[str, ...]:
+    """Names of bodies that take part in motions ``ways`` (6 n, k)."""
+    if not ways.shape[1]:
+        return ()
+    sizes = np.abs(ways.reshape(len(system.bodies), -1)).max(axis=1)
+    return tuple(
+        body.name
+        for body, size in zip(system.bodies, sizes, strict=True)
+        if size > 1e-3 * sizes.max()
+    )
+
+
+def apparent_mass(frequencies: Vector, receptance: np.ndarray) -> np.ndarray:
+    """-1 / (w^2 H) (n_f,) [kg]: the mass that would move as far at frequencies (n_f,) [Hz]."""
+    omega = 2.0 * np.pi * np.asarray(frequencies, dtype=float)
+    if np.any(omega <= 0.0):
+        raise RunBroken("An apparent mass is asked for at a frequency that is not positive.")
+    return -1.0 / (omega**2 * receptance)

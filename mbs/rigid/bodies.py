@@ -1,0 +1,175 @@
+"""Rigid bodies in Cartesian coordinates, their orientations as Euler parameters.
+
+Source: P. E. Nikravesh, Computer-aided analysis of mechanical systems, 1988, chapters 6 and 11.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from catenary.mbs.frame import SPACE
+from catenary.mbs.rigid import kernels
+from catenary.solver.base.errors import InputError
+
+Vector = Sequence[float] | np.ndarray
+
+
+def rotation_matrix(parameters: np.ndarray) -> np.ndarray:
+    """Matrices from body to space axes of unit Euler parameters (..., 4), shape (..., 3, 3)."""
+    rows = np.asarray(parameters, dtype=float)
+    matrices = kernels.rotation_matrices(np.ascontiguousarray(rows.reshape(-1, 4)))
+    return matrices.reshape(*rows.shape[:-1], 3, 3)
+
+
+def quaternion_product(p: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """Euler parameters (..., 4) of the rotation r, in axes already rotated by p."""
+    p0, p1, p2, p3 = np.moveaxis(p, -1, 0)
+    r0, r1, r2, r3 = np.moveaxis(r, -1, 0)
+    return np.stack(
+        [
+            p0 * r0 - p1 * r1 - p2 * r2 - p3 * r3,
+            p0 * r1 + p1 * r0 + p2 * r3 - p3 * r2,
+            p0 * r2 + p2 * r0 + p3 * r1 - p1 * r3,
+            p0 * r3 + p3 * r0 + p1 * r2 - p2 * r1,
+        ],
+        axis=-1,
+    )
+
+
+def parameter_rates(parameters: np.ndarray, spin: np.ndarray) -> np.ndarray:
+    """dp/dt = 1/2 L^T omega' (..., 4) [1/s] of angular velocities in body axes (..., 3) [rad/s].
+
+    Keeps p^T p for any p: the norm changes by the errors of integration only.
+    """
+    as_quaternion = np.concatenate([np.zeros((*spin.shape[:-1], 1)), spin], axis=-1)
+    return 0.5 * quaternion_product(parameters, as_quaternion)
+
+
+def normalised(parameters: np.ndarray) -> np.ndarray:
+    """Euler parameters (..., 4) scaled to p^T p = 1."""
+    return parameters / np.linalg.norm(parameters, axis=-1, keepdims=True)
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body; its axes are principal axes of inertia through its centre of mass.
+
+    ``mass`` [kg]; ``inertia`` about the body's axes, shape (3,) [kg m^2]; ``position`` of the
+    centre of mass [m] and ``turn``, the Euler parameters e1, e2, e3, at the start (e0 >= 0
+    follows from p^T p = 1).
+    """
+
+    name: str
+    mass: float
+    inertia: Vector
+    position: Vector = (0.0, 0.0, 0.0)
+    turn: Vector = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if self.name == SPACE:
+            raise InputError(f"A body must not be named {SPACE!r}, the name of the frame at rest.")
+        if self.mass <= 0.0 or len(self.inertia) != 3 or min(self.inertia) <= 0.0:
+            raise InputError(
+                f"Body {self.name!r}: mass {self.mass} and inertia {tuple(self.inertia)} "
+                "must be positive, with three moments of inertia."
+            )
+        # Half a turn has e0 = 0, which round-off must not refuse.
+        if np.dot(self.turn, self.turn) > 1.0 + 1e-12:
+            raise InputError(
+                f"Body {self.name!r}: turn {tuple(self.turn)} is longer than 1, "
+                "so that there is no e0 to it."
+            )
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """Euler parameters at the start, shape (4,)."""
+        e0 = np.sqrt(max(0.0, 1.0 - np.dot(self.turn, self.turn)))
+        return normalised(np.array([e0, *self.turn]))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Where n bodies are and how they move; the last row of each array is the frame at rest.
+
+    ``position`` (n + 1, 3) [m], ``parameters`` (n + 1, 4), ``velocity`` (n + 1, 3) [m/s] in space
+    axes, ``spin`` (n + 1, 3) [rad/s], the angular velocities in body axes. Displacements and
+    velocities of all bodies as one vector (6 n,) hold three translations, in space axes, and
+    three rotations, in body axes, a body.
+    """
+
+    numbers: dict[str, int]
+    position: np.ndarray
+    parameters: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    rotation: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rotation", kernels.rotation_matrices(self.parameters))
+
+    @property
+    def n_bodies(self) -> int:
+        return len(self.position) - 1
+
+    @property
+    def velocities(self) -> np.ndarray:
+        """Velocities and angular velocities, shape (6 n,)."""
+        return np.hstack([self.velocity, self.spin])[:-1].ravel()
+
+    def moved(self, displacement: np.ndarray) -> Motion:
+        """The same velocities after a displacement (6 n,) [m, rad]."""
+        position, parameters = self.position.copy(), self.parameters.copy()
+        kernels.move(position, parameters, displacement)
+        return Motion(self.numbers, position, parameters, self.velocity, self.spin)
+
+    def with_velocities(self, velocities: np.ndarray) -> Motion:
+        """The same place with velocities (6 n,) [m/s, rad/s]."""
+        return Motion(self.numbers, self.position, self.parameters, *_split(velocities))
+
+    def to_vector(self) -> np.ndarray:
+        """Positions and Euler parameters (7 n), then velocities (6 n): shape (13 n,)."""
+        places = np.hstack([self.position, self.parameters])[:-1].ravel()
+        return np.concatenate([places, self.velocities])
+
+    def from_vector(self, state: np.ndarray) -> Motion:
+        """The motion of an integrated ``state`` (13 n,), Euler parameters normalised."""
+        n = self.n_bodies
+        places = state[: 7 * n].reshape(n, 7).copy()
+        places[:, 3:] = normalised(places[:, 3:])
+        return self._at(places, state[7 * n :])
+
+    def restored(self, state: np.ndarray) -> Motion:
+        """The motion that ``to_vector`` gave as ``state``, to the last digit."""
+        n = self.n_bodies
+        return self._at(state[: 7 * n].reshape(n, 7), state[7 * n :])
+
+    def _at(self, places: np.ndarray, velocities: np.ndarray) -> Motion:
+        position = np.vstack([places[:, :3], np.zeros(3)])
+        parameters = np.vstack([places[:, 3:], [1.0, 0.0, 0.0, 0.0]])
+        return Motion(self.numbers, position, parameters, *_split(velocities))
+
+    def place_rates(self) -> np.ndarray:
+        """Rates of positions and Euler parameters, shape (7 n,)."""
+        rates = parameter_rates(self.parameters, self.spin)
+        return np.hstack([self.velocity, rates])[:-1].ravel()
+
+
+def _split(velocities: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Velocities and spins (n + 1, 3), the frame's included, of velocities (6 n,)."""
+    parts = np.zeros((2, len(velocities) // 6 + 1, 3))
+    parts[:, :-1] = velocities.reshape(-1, 2, 3).transpose(1, 0, 2)
+    return parts[0], parts[1]
+
+
+def initial_motion(bodies: Sequence[Body]) -> Motion:
+    """All bodies at rest where their data put them."""
+    n = len(bodies)
+    numbers = {body.name: i for i, body in enumerate(bodies)} | {SPACE: n}
+    if len(numbers) != n + 1:
+        raise InputError(f"Bodies must have different names: {[body.name for body in bodies]}.")
+    position = np.array([*(body.position for body in bodies), (0.0, 0.0, 0.0)], dtype=float)
+    parameters = np.array([*(body.parameters for body in bodies), (1.0, 0.0, 0.0, 0.0)])
+    return Motion(numbers, position, parameters, np.zeros((n + 1, 3)), np.zeros((n + 1, 3)))

@@ -1,0 +1,245 @@
+"""Forces on bodies: springs and dampers with tables, actuators, gravity, bump stops, point forces.
+
+Each force gives its generalised forces (6 n,): three forces [N] in space axes and three moments
+[N m] in body axes a body, and the energy that it stores.
+
+Source: P. E. Nikravesh, Computer-aided analysis of mechanical systems, 1988, chapters 10 and 11.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from scipy.integrate import quad
+from scipy.interpolate import BSpline, make_interp_spline
+
+from catenary.mbs.rigid.bodies import Motion, Vector
+from catenary.mbs.rigid.joints import ORIGIN
+from catenary.mbs.rigid.kinematics import difference, point
+from catenary.solver.base.errors import InputError
+
+
+class Force(Protocol):
+    """What a system of bodies asks of a force."""
+
+    @property
+    def name(self) -> str: ...
+
+    def generalised(self, motion: Motion, time: float) -> np.ndarray:
+        """Generalised forces at ``time`` [s], shape (6 n,) [N, N m]."""
+
+    def energy(self, motion: Motion) -> float:
+        """Energy stored [J], zero for a force that stores none."""
+
+
+class Table:
+    """A characteristic from a table, straight between its points and beyond its ends.
+
+    Parameters
+    ----------
+    x, y : arrays, shape (n,), n >= 2, x growing
+    what : what the table is of, for messages
+    """
+
+    def __init__(self, x: Vector, y: Vector, what: str = "table") -> None:
+        if len(x) != len(y) or len(x) < 2 or np.any(np.diff(x) <= 0.0):
+            raise InputError(
+                f"The {what} must have at least two points and as many values as growing "
+                f"arguments; it has arguments {list(x)} and values {list(y)}."
+            )
+        self._points = tuple(zip(map(float, x), map(float, y), strict=True))
+        self._line: BSpline = make_interp_spline(x, y, k=1)
+        self._work: BSpline = self._line.antiderivative()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Table) and self._points == other._points
+
+    def __hash__(self) -> int:
+        return hash(self._points)
+
+    def __call__(self, x: float) -> float:
+        return float(self._line(x))
+
+    def integral(self, start: float, end: float) -> float:
+        """The integral from ``start`` to ``end``."""
+        # Beyond the ends it goes on as the last parabola: right, because the line is straight.
+        return float(self._work(end) - self._work(start))
+
+
+# A characteristic: a constant slope, or a force as a function (a `Table`, for instance).
+Characteristic = float | Callable[[float], float]
+
+
+def _force_of(characteristic: Characteristic, x: float) -> float:
+    return characteristic(x) if callable(characteristic) else characteristic * x
+
+
+class _Line(NamedTuple):
+    """The line between points of two bodies: its length [m], its rate [m/s], d length / d q."""
+
+    length: float
+    rate: float
+    gradient: np.ndarray
+
+
+@dataclass(frozen=True)
+class _BetweenPoints:
+    """Something that acts along the line between a point of body i and a point of body j."""
+
+    name: str
+    i: str
+    j: str
+    at_i: Vector = ORIGIN
+    at_j: Vector = ORIGIN
+
+    def line(self, motion: Motion) -> _Line:
+        """Length, rate of length and gradient of length (6 n,)."""
+        between = difference(point(motion, self.j, self.at_j), point(motion, self.i, self.at_i))
+        length = float(np.linalg.norm(between.value))
+        if length == 0.0:
+            raise InputError(f"Force {self.name!r}: its two points coincide, it has no direction.")
+        way = between.value / length
+        return _Line(length, float(way @ between.rate), way @ between.jacobian)
+
+
+@dataclass(frozen=True)
+class SpringDamper(_BetweenPoints):
+    """A spring and a damper side by side between two points.
+
+    ``stiffness`` [N/m], or a function (a `Table`) of the extension [m] that gives the pull [N];
+    ``free_length`` [m]; ``damping`` [N s/m], or a function of the rate of extension [m/s].
+    """
+
+    stiffness: Characteristic = 0.0
+    free_length: float = 0.0
+    damping: Characteristic = 0.0
+
+    def pull(self, motion: Motion) -> float:
+        """Force with which it pulls its points together [N]."""
+        line = self.line(motion)
+        return self.pull_at(line.length, line.rate)
+
+    def pull_at(self, length: float, rate: float) -> float:
+        """The pull [N] at a length [m] and its rate [m/s]."""
+        elastic = _force_of(self.stiffness, length - self.free_length)
+        return elastic + _force_of(self.damping, rate)
+
+    def generalised(self, motion: Motion, time: float) -> np.ndarray:
+        """Generalised forces (6 n,)."""
+        line = self.line(motion)
+        return -self.pull_at(line.length, line.rate) * line.gradient
+
+    def energy(self, motion: Motion) -> float:
+        """Elastic energy [J]; of a function that is not a `Table` by quadrature."""
+        extension = self.line(motion).length - self.free_length
+        if not callable(self.stiffness):
+            return 0.5 * self.stiffness * extension**2
+        if isinstance(self.stiffness, Table):
+            return self.stiffness.integral(0.0, extension)
+        return float(quad(self.stiffness, 0.0, extension)[0])
+
+
+@dataclass(frozen=True)
+class Actuator(_BetweenPoints):
+    """Pushes two points apart with a given force.
+
+    ``force`` [N], > 0 pushing apart: a number, or a function (a `Table`) of time [s].
+    """
+
+    force: float | Callable[[float], float] = 0.0
+
+    def generalised(self, motion: Motion, time: float) -> np.ndarray:
+        """Generalised forces (6 n,)."""
+        push = self.force(time) if callable(self.force) else self.force
+        return push * self.line(motion).gradient
+
+    def energy(self, motion: Motion) -> float:
+        """Stores none."""
+        return 0.0
+
+
+@dataclass(frozen=True)
+class BumpStop(_BetweenPoints):
+    """Keeps the distance of two points between two limits, by a spring and a damper that push only.
+
+    ``shortest``, ``longest`` [m]; ``stiffness`` [N/m], ``damping`` [N s/m] of each stop.
+    """
+
+    shortest: float = 0.0
+    longest: float = np.inf
+    stiffness: float = 0.0
+    damping: float = 0.0
+
+    def _depth(self, length: float) -> tuple[float, float]:
+        """How far beyond a limit [m], and the sign of the way back in length."""
+        if length < self.shortest:
+            return self.shortest - length, 1.0
+        return max(length - self.longest, 0.0), -1.0
+
+    def pull_at(self, length: float, rate: float) -> float:
+        """Force [N] that pulls the points together, at a length [m] and its rate [m/s]."""
+        depth, way_back = self._depth(length)
+        if depth == 0.0:
+            return 0.0
+        # A stop does not hold back what is leaving it.
+        return -way_back * max(self.stiffness * depth - way_back * self.damping * rate, 0.0)
+
+    def generalised(self, motion: Motion, time: float) -> np.ndarray:
+        """Generalised forces (6 n,)."""
+        line = self.line(motion)
+        return -self.pull_at(line.length, line.rate) * line.gradient
+
+    def energy(self, motion: Motion) -> float:
+        """Elastic energy [J]."""
+        return 0.5 * self.stiffness * self._depth(self.line(motion).length)[0] ** 2
+
+
+@dataclass(frozen=True)
+class PointForce:
+    """A force on a point of a body, its direction fixed in space.
+
+    ``force`` (3,) [N], or a function of time [s] that gives it.
+    """
+
+    name: str
+    body: str
+    force: Vector | Callable[[float], Vector]
+    at: Vector = ORIGIN
+
+    def generalised(self, motion: Motion, time: float) -> np.ndarray:
+        """Generalised forces (6 n,)."""
+        force = self.force(time) if callable(self.force) else self.force
+        return np.asarray(force, dtype=float) @ point(motion, self.body, self.at).jacobian
+
+    def energy(self, motion: Motion) -> float:
+        """Counts as work from outside, not as energy stored."""
+        return 0.0
+
+
+@dataclass(frozen=True)
+class Gravity:
+    """Weight of all bodies, downward.
+
+    ``masses`` (n,) [kg] in the order of the bodies; ``acceleration`` [m/s^2].
+    """
+
+    masses: Vector
+    acceleration: float = 9.81
+    name: str = "gravity"
+    _forces: np.ndarray = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        forces = np.zeros((len(self.masses), 6))
+        forces[:, 2] = -self.acceleration * np.asarray(self.masses)
+        object.__setattr__(self, "_forces", forces.ravel())
+
+    def generalised(self, motion: Motion, time: float) -> np.ndarray:
+        """Generalised forces (6 n,)."""
+        return self._forces.copy()
+
+    def energy(self, motion: Motion) -> float:
+        """Potential energy [J], zero at height zero."""
+        return float(self.acceleration * np.dot(self.masses, motion.position[:-1, 2]))

@@ -1,0 +1,78 @@
+"""A multibody system set up the other way round: half a turn about the vertical.
+
+Bodies, joints and forces between them are the same; what is given in space (places, orientations,
+points and axes of joints to the ground) turns with them. Forces whose direction is fixed in space,
+such as the wind's, keep it: they meet a pantograph that runs knee first where they met one that
+runs knee trailing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+
+from catenary.mbs.rigid.bodies import SPACE, Body, Vector, quaternion_product
+from catenary.mbs.rigid.forces import Force, PointForce
+from catenary.mbs.rigid.joints import Fixed, Joint, PointOnCurve, PrescribedPoint
+from catenary.mbs.rigid.system import System
+
+_HALF_TURN = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+def turned_round(system: System) -> System:
+    """The same system after half a turn about the z axis of space. Not collective."""
+    return System(
+        tuple(_body(body) for body in system.bodies),
+        tuple(_joint(joint) for joint in system.joints),
+        tuple(_force(force) for force in system.forces),
+    )
+
+
+def _across(vector: Vector) -> tuple[float, float, float]:
+    """A vector of space after half a turn."""
+    x, y, z = (float(value) for value in vector)
+    return (-x, -y, z)
+
+
+def _parameters(parameters: np.ndarray) -> tuple[float, ...]:
+    """Euler parameters (4,) of an orientation in space after half a turn, e0 >= 0."""
+    after = quaternion_product(_HALF_TURN, parameters)
+    return tuple(float(value) for value in (-after if after[0] < 0.0 else after))
+
+
+def _body(body: Body) -> Body:
+    turn = np.asarray(body.turn, dtype=float)
+    e0 = np.sqrt(max(0.0, 1.0 - turn @ turn))
+    after = _parameters(np.concatenate([[e0], turn]))
+    return replace(body, position=_across(body.position), turn=after[1:])
+
+
+def _joint(joint: Joint) -> Joint:
+    if isinstance(joint, PointOnCurve):
+        # Curves are given for growing x.
+        x, y = (tuple(-float(v) for v in reversed(values)) for values in (joint.x, joint.y))
+        return replace(joint, x=x, y=y, z=tuple(reversed(tuple(joint.z))))
+    if isinstance(joint, PrescribedPoint):
+        return replace(joint, along=_across(joint.along))
+    changes = _in_space(joint)
+    if isinstance(joint, Fixed) and joint.i == SPACE:
+        changes["parameters"] = _parameters(np.asarray(joint.parameters, dtype=float))
+    return replace(joint, **changes)  # type: ignore[type-var]
+
+
+def _force(force: Force) -> Force:
+    if isinstance(force, PointForce) or not hasattr(force, "i"):
+        return force
+    return replace(force, **_in_space(force))  # type: ignore[type-var]
+
+
+def _in_space(what: Any) -> dict[str, Any]:
+    """Points and axes of a joint or force that are those of space, after half a turn."""
+    return {
+        field.name: _across(getattr(what, field.name))
+        for field in fields(what)
+        for end in ("i", "j")
+        if field.name.endswith(f"_{end}") and getattr(what, end) == SPACE
+    }

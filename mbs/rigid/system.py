@@ -1,0 +1,301 @@
+"""A system of bodies, joints and forces: its equations of motion, reactions and assembly.
+
+    [M  Phi_q^T] [dv/dt ]   [g    ]
+    [Phi_q    0] [lambda] = [gamma]        (3.6)
+
+in velocities v and angular velocities in body axes, so that M is constant, block diagonal and
+regular, and Euler parameters need no equation but their rates and p^T p = 1. Joints act on bodies
+with -Phi_q^T lambda.
+
+Sources: P. E. Nikravesh, 1988, chapters 6 and 11; Ambrosio et al., 2012, equation (3.6).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import linalg
+
+from catenary.mbs.rigid import kernels
+from catenary.mbs.rigid.arrays import FlatLines, FlatRows, line_of
+from catenary.mbs.rigid.bodies import Body, Motion, initial_motion
+from catenary.mbs.rigid.forces import Force
+from catenary.mbs.rigid.joints import Joint
+from catenary.mbs.rigid.kinematics import Quantity
+from catenary.mbs.rigid.least_squares import least_squares
+from catenary.solver.base.errors import InputError, RunBroken
+
+# A row of Phi_q that the rows before it explain but for this part of its length is redundant.
+DEPENDENT = 1e-8
+
+
+class Miss(NamedTuple):
+    """By how much a joint is open: ``gap`` [m], and ``tilt``, cosines off right angles."""
+
+    joint: str
+    gap: float
+    tilt: float
+
+
+class Assembly(NamedTuple):
+    """Result of a position projection: ``missed`` holds what each joint missed before it."""
+
+    motion: Motion
+    missed: tuple[Miss, ...]
+    n_iterations: int
+
+
+class Accelerations(NamedTuple):
+    """``acceleration`` (6 n,) [m/s^2, rad/s^2]; ``multipliers`` (m,), zero for redundant rows."""
+
+    acceleration: np.ndarray
+    multipliers: np.ndarray
+
+
+class Reaction(NamedTuple):
+    """Force of a joint on a body, in space axes (3,) [N], and moment about the body's centre of
+    mass, in body axes (3,) [N m]."""
+
+    force: np.ndarray
+    moment: np.ndarray
+
+
+def independent_rows(jacobian: np.ndarray) -> np.ndarray:
+    """Numbers of rows, from the first on, that are not combinations of rows before them.
+
+    Gram-Schmidt row by row, so that of several rows that say the same the first one is kept.
+    """
+    return kernels.independent_rows(np.ascontiguousarray(jacobian), DEPENDENT)
+
+
+@dataclass(frozen=True)
+class System:
+    """Bodies with what joins them and acts on them. Not changed by what is computed from it."""
+
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+    forces: tuple[Force, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = [joint.name for joint in self.joints] + [force.name for force in self.forces]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise InputError(f"Joints and forces must have different names: {twice}.")
+
+    def start(self) -> Motion:
+        """All bodies at rest where their data put them; joints need not be closed."""
+        return initial_motion(self.bodies)
+
+    def with_joints(self, *joints: Joint) -> System:
+        """The same with further joints."""
+        return replace(self, joints=(*self.joints, *joints))
+
+    def with_forces(self, *forces: Force) -> System:
+        """The same with further forces."""
+        return replace(self, forces=(*self.forces, *forces))
+
+    def force(self, name: str) -> Force:
+        """The force of this name; raises InputError if there is none."""
+        for force in self.forces:
+            if force.name == name:
+                return force
+        raise InputError(f"There is no force {name!r} among {[f.name for f in self.forces]}.")
+
+    def with_force_changed(self, name: str, **changes: Any) -> System:
+        """The same with other values in the force of this name."""
+        self.force(name)
+        return replace(
+            self,
+            forces=tuple(
+                replace(force, **changes) if force.name == name else force  # type: ignore[type-var]
+                for force in self.forces
+            ),
+        )
+
+    @cached_property
+    def inverse_mass(self) -> np.ndarray:
+        """1 / M, which is diagonal in principal axes, shape (6 n,)."""
+        result = 1.0 / self.mass
+        result.flags.writeable = False
+        return result
+
+    @cached_property
+    def mass(self) -> np.ndarray:
+        """M, which is diagonal in principal axes, shape (6 n,) [kg, kg m^2]."""
+        result = np.concatenate([[b.mass] * 3 + list(b.inertia) for b in self.bodies])
+        result.flags.writeable = False
+        return result
+
+    def constraints(self, motion: Motion, time: float) -> Quantity:
+        """Phi of all joints with its derivatives, m rows."""
+        return self._rows(motion, time)
+
+    @cached_property
+    def _rows(self) -> FlatRows:
+        return FlatRows(self.joints, self.start())
+
+    @cached_property
+    def lines(self) -> FlatLines:
+        """The forces that act along lines."""
+        return FlatLines(self.forces, self.start())
+
+    @cached_property
+    def other_forces(self) -> tuple[Force, ...]:
+        """The forces that do not."""
+        return tuple(force for force in self.forces if line_of(force) is None)
+
+    @cached_property
+    def _inertia(self) -> np.ndarray:
+        return np.array([body.inertia for body in self.bodies], dtype=float)
+
+    def generalised_forces(self, motion: Motion, time: float) -> np.ndarray:
+        """g (6 n,) [N, N m]: all forces, and the gyroscopic moments -omega x J omega."""
+        length, rate, gradient = self.lines.geometry(motion)
+        result = self.lines.pulls(length, rate, time) @ -gradient
+        for force in self.other_forces:
+            result += force.generalised(motion, time)
+        kernels.add_gyroscopic_moments(result, self._inertia, motion.spin)
+        return result
+
+    def energy(self, motion: Motion) -> float:
+        """Kinetic energy and all energy stored in forces [J]."""
+        kinetic = 0.5 * float(self.mass @ motion.velocities**2)
+        return kinetic + sum(force.energy(motion) for force in self.forces)
+
+    def accelerations(
+        self,
+        motion: Motion,
+        time: float,
+        rows: Quantity | None = None,
+        more_forces: np.ndarray | float = 0.0,
+    ) -> Accelerations:
+        """Solve (3.6); ``rows`` replace those of the joints, gamma being minus their drift.
+
+        ``more_forces`` (6 n,) act besides those of the system.
+
+        Raises
+        ------
+        RunBroken
+            Accelerations are not finite.
+        """
+        if rows is None:
+            rows = self.constraints(motion, time)
+        force, softness = self.generalised_forces(motion, time) + more_forces, self.inverse_mass
+        kept = independent_rows(rows.jacobian)
+        jacobian = rows.jacobian[kept]
+        multipliers = np.zeros(len(rows.value))
+        if len(kept):
+            schur = (jacobian * softness) @ jacobian.T
+            right = jacobian @ (softness * force) + rows.drift[kept]
+            multipliers[kept] = linalg.solve(schur, right, assume_a="pos")
+        acceleration = softness * (force - rows.jacobian.T @ multipliers)
+        if not np.isfinite(acceleration).all():
+            raise RunBroken(
+                f"The multibody system has no finite accelerations at {time:g} s: "
+                "reduce the forces or check the joints."
+            )
+        return Accelerations(acceleration, multipliers)
+
+    def row_ranges(self, motion: Motion, time: float = 0.0) -> dict[str, slice]:
+        """Which rows belong to which joint."""
+        ranges, begin = {}, 0
+        for joint in self.joints:
+            end = begin + len(joint.rows(motion, time).value)
+            ranges[joint.name] = slice(begin, end)
+            begin = end
+        return ranges
+
+    def reaction(
+        self, joint: str, body: str, motion: Motion, time: float, multipliers: np.ndarray
+    ) -> Reaction:
+        """What a joint does to a body, of multipliers (m,) of all joints."""
+        rows = self.row_ranges(motion, time)[joint]
+        jacobian = self.constraints(motion, time).jacobian[rows]
+        force = -(jacobian.T @ multipliers[rows]).reshape(-1, 6)[motion.numbers[body]]
+        return Reaction(force[:3], force[3:])
+
+    def redundant(self, motion: Motion, time: float = 0.0) -> tuple[str, ...]:
+        """Names of joints with rows that joints before them imply, with how many: 'hinge (3)'."""
+        jacobian = self.constraints(motion, time).jacobian
+        kept = set(independent_rows(jacobian))
+        counts = {
+            name: sum(row not in kept for row in range(rows.start, rows.stop))
+            for name, rows in self.row_ranges(motion, time).items()
+        }
+        return tuple(f"{name} ({count})" for name, count in counts.items() if count)
+
+    def n_degrees_of_freedom(self, motion: Motion, time: float = 0.0) -> int:
+        """6 n without as many as there are independent rows."""
+        return 6 * motion.n_bodies - len(independent_rows(self.constraints(motion, time).jacobian))
+
+    def misses(self, motion: Motion, time: float = 0.0) -> tuple[Miss, ...]:
+        """By how much each joint is open."""
+        result = []
+        for joint in self.joints:
+            error = joint.rows(motion, time).value
+            gap, tilt = error[: joint.n_lengths], error[joint.n_lengths :]
+            result.append(Miss(joint.name, float(np.linalg.norm(gap)), float(np.linalg.norm(tilt))))
+        return tuple(result)
+
+    def assemble(
+        self,
+        motion: Motion,
+        time: float = 0.0,
+        tolerance: float = 1e-12,
+        max_iterations: int = 30,
+    ) -> Assembly:
+        """Close all joints by the smallest displacements (position projection).
+
+        Newton's method; redundant rows do no harm. Velocities stay as they are.
+
+        Parameters
+        ----------
+        tolerance : largest error of a row afterwards [m, cosine], relative to the largest distance
+            of a body from the origin where that is above 1 m (what round-off allows)
+
+        Raises
+        ------
+        InputError
+            The joints cannot be closed from there; it names the one that misses most.
+        """
+        missed = self.misses(motion, time)
+        if not self.joints:
+            return Assembly(motion, missed, 0)
+        limit = tolerance * max(1.0, float(np.abs(motion.position).max()))
+        for number in range(max_iterations + 1):
+            rows = self.constraints(motion, time)
+            if np.abs(rows.value).max() <= limit:
+                return Assembly(motion, missed, number)
+            step = least_squares(rows.jacobian, -rows.value, DEPENDENT)
+            # Newton's method must not turn bodies around on its way.
+            motion = motion.moved(step / max(1.0, float(np.abs(step).max())))
+        worst = max(self.misses(motion, time), key=lambda miss: max(miss.gap, miss.tilt))
+        raise InputError(
+            f"The joints cannot be closed at {time:g} s: joint {worst.joint!r} misses by "
+            f"{worst.gap:.3g} m and {worst.tilt:.3g} (cosine); check its points and axes."
+        )
+
+    def project_velocities(self, motion: Motion, time: float = 0.0) -> Motion:
+        """The velocities that joints allow, nearest in kinetic energy (velocity projection).
+
+        Raises
+        ------
+        InputError
+            No velocities satisfy all joints, because prescribed motions contradict each other.
+        """
+        if not self.joints:
+            return motion
+        rows = self.constraints(motion, time)
+        scale = np.sqrt(self.inverse_mass)
+        step = scale * least_squares(rows.jacobian * scale, -rows.rate, DEPENDENT)
+        velocities = motion.velocities + step
+        left = np.abs(rows.rate + rows.jacobian @ step).max()
+        if left > 1e-8 * (1.0 + np.abs(velocities).max()):
+            raise InputError(
+                f"Prescribed motions contradict each other at {time:g} s: "
+                f"velocities miss by {left:.3g} m/s or 1/s."
+            )
+        return motion.with_velocities(velocities)

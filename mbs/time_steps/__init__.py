@@ -1,0 +1,1 @@
+"""Time integration of rigid bodies with constraints."""

@@ -1,0 +1,285 @@
+"""Motion of a multibody system with fixed steps: Newmark's method with multipliers, implicit.
+
+A step of length h from places q, velocities v and accelerations a predicts
+
+    q* = q + h v + h^2 / 2 a,    v* = v + h a
+
+(turns by vectors in body axes) and solves (3.6) for the change d of the accelerations, with forces
+linear around the prediction and the rows of joints taken there:
+
+    (M + gamma h C + beta h^2 K) d + J^T lambda = g(q*, v*, t + h) - M a + W f,
+    J d = -(J a + drift(q*, v*)),
+
+C and K those of springs and dampers along their lines, W the directions of the forces f of the
+coming step. Then q = q* + beta h^2 d, v = v* + gamma h d, a = a + d, and errors of joints, of order
+h^3 from the prediction, are removed from places and velocities. With beta = 1/4 and gamma = 1/2,
+the trapezoidal rule, it is of second order; what C and K leave out is of order h^3 in a step.
+
+A step may be cut into substeps, over which the forces change evenly from those of the step before
+to f: what comes out at the end is affine in f all the same, and of second order.
+
+Sources: N. M. Newmark, J. Eng. Mech. Div. ASCE 85, 1959; Ambrosio et al., 2012, equation (3.6).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from catenary.mbs.rigid.bodies import Motion
+from catenary.mbs.rigid.kinematics import Quantity
+from catenary.mbs.rigid.system import System
+from catenary.mbs.time_steps.step_solvers import StepSolver, step_solver
+from catenary.solver.base.errors import InputError, NotConverged, RunBroken
+
+# Generalised forces (6 n, s) of unit forces at a motion.
+Ways = Callable[[Motion], np.ndarray]
+
+# Largest error of a row that is left [m, cosine; 1/s], where errors are removed.
+TOLERANCE = 1e-12
+MAX_REMOVALS = 8
+
+
+class Prediction(NamedTuple):
+    """The end of the coming step, affine in the forces f (s,) in it.
+
+    ``motion``: prediction of the last substep; ``displacement``, ``velocity``, ``acceleration``
+    (6 n,): what is to be added to its place, its velocities and the accelerations before that
+    substep when f are the ``forces`` (s,) last taken; ``by_force``: the same per unit of force,
+    shapes (6 n, s). ``ways`` (6 n, s) of unit forces there.
+    """
+
+    motion: Motion
+    displacement: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    by_force: tuple[np.ndarray, np.ndarray, np.ndarray]
+    forces: np.ndarray
+    ways: np.ndarray
+
+    def changes(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Displacement, change of velocity and of acceleration (6 n,) with these forces (s,)."""
+        more = forces - self.forces
+        return (
+            self.displacement + self.by_force[0] @ more,
+            self.velocity + self.by_force[1] @ more,
+            self.acceleration + self.by_force[2] @ more,
+        )
+
+
+class _Solved(NamedTuple):
+    """A substep solved: prediction, change d (6 n,) and what a unit force does to q, v and a."""
+
+    motion: Motion
+    change: np.ndarray
+    by_force: tuple[np.ndarray, np.ndarray, np.ndarray]
+    ways: np.ndarray
+
+
+class Stepper:
+    """A system of bodies, one step of fixed length at a time.
+
+    Parameters
+    ----------
+    system : System
+    dt : length of a step [s]
+    solver : way of keeping constraints, or its name in `step_solvers.METHODS`
+    ways : generalised forces of unit forces that are given step by step; none if left out
+    substeps : into how many a step is cut
+    beta, gamma : Newmark's parameters
+
+    Raises
+    ------
+    InputError
+        A step that is not positive, or no substep.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        dt: float,
+        solver: StepSolver | str = "coordinate_partitioning",
+        ways: Ways | None = None,
+        substeps: int = 1,
+        beta: float = 0.25,
+        gamma: float = 0.5,
+    ) -> None:
+        if dt <= 0.0 or substeps < 1:
+            raise InputError(
+                f"A step of {dt:g} s in {substeps} substeps is none: both must be positive."
+            )
+        self.system = system
+        self._solver = step_solver(solver) if isinstance(solver, str) else solver
+        self._ways = ways or (lambda motion: np.zeros((6 * motion.n_bodies, 0)))
+        self._dt, self._substeps = dt, substeps
+        self._beta, self._gamma = beta, gamma
+        self._predicted: Prediction | None = None
+
+    def begin(self, motion: Motion, time: float, forces: np.ndarray | None = None) -> None:
+        """Start from a motion, joints closed by projection, under ``forces`` (s,) [N]."""
+        system = self.system
+        motion = system.assemble(motion, time).motion
+        self.motion, self.time = system.project_velocities(motion, time), time
+        ways = self._ways(self.motion)
+        self.forces = np.zeros(ways.shape[1]) if forces is None else np.array(forces, dtype=float)
+        self.acceleration = system.accelerations(
+            self.motion, time, more_forces=ways @ self.forces
+        ).acceleration
+        self._predicted = None
+
+    def predict(self, time: float) -> Prediction:
+        """The end of the coming step, at ``time`` [s], as a function of the forces in it."""
+        h, forces = (time - self.time) / self._substeps, self.forces
+        motion, acceleration = self.motion, self.acceleration
+        none = np.zeros((len(acceleration), len(forces)))
+        by_force = none, none, none
+        for number in range(1, self._substeps + 1):
+            end = self.time + number * h
+            share = number / self._substeps
+            solved = self._solve(motion, acceleration, by_force, share, end, h)
+            by_force = solved.by_force
+            if number < self._substeps:
+                motion = self._finished(
+                    solved.motion,
+                    self._beta * h**2 * solved.change,
+                    self._gamma * h * solved.change,
+                    end,
+                )
+                acceleration = acceleration + solved.change
+        self._end = end
+        self._predicted = Prediction(
+            solved.motion,
+            self._beta * h**2 * solved.change,
+            self._gamma * h * solved.change,
+            acceleration + solved.change,
+            by_force,
+            forces,
+            solved.ways,
+        )
+        return self._predicted
+
+    def advance(self, forces: np.ndarray | None = None) -> None:
+        """Take the step predicted last with forces (s,) [N].
+
+        Raises
+        ------
+        RunBroken
+            Nothing was predicted, joints cannot be kept closed, or numbers are not finite.
+        """
+        if self._predicted is None:
+            raise RunBroken("A step of a multibody system is taken before it was predicted.")
+        taken = np.zeros(0) if forces is None else np.array(forces, dtype=float)
+        displacement, velocity, acceleration = self._predicted.changes(taken)
+        self.motion = self._finished(self._predicted.motion, displacement, velocity, self._end)
+        self.acceleration, self.time, self.forces = acceleration, self._end, taken
+        self._predicted = None
+
+    def step(self) -> None:
+        """A step of the whole length without further forces."""
+        self.predict(self.time + self._dt)
+        self.advance()
+
+    def violation(self) -> float:
+        """Largest error of a row of the joints now [m, cosine]."""
+        rows = self.system.constraints(self.motion, self.time)
+        return float(np.abs(rows.value).max(initial=0.0))
+
+    def _solve(
+        self,
+        motion: Motion,
+        acceleration: np.ndarray,
+        by_force: tuple[np.ndarray, np.ndarray, np.ndarray],
+        share: float,
+        end: float,
+        h: float,
+    ) -> _Solved:
+        """A substep: its prediction and what it changes with the forces last taken.
+
+        ``share`` of a change of forces has happened at its end.
+        """
+        system, beta, gamma = self.system, self._beta, self._gamma
+        velocities = motion.velocities
+        there = motion.moved(h * velocities + 0.5 * h**2 * acceleration).with_velocities(
+            velocities + h * acceleration
+        )
+        moved, sped, pushed = by_force
+        moved = moved + h * sped + 0.5 * h**2 * pushed
+        sped = sped + h * pushed
+        rows, ways = system.constraints(there, end), self._ways(there)
+        length, rate, gradient = system.lines.geometry(there)
+        stiffness, damping = system.lines.slopes(length, rate, end)
+        # What pulls less the longer it gets is left to the prediction, so that A stays positive.
+        stiffness, damping = np.maximum(stiffness, 0.0), np.maximum(damping, 0.0)
+        mass = system.mass
+        operator = (gradient.T * (gamma * h * damping + beta * h**2 * stiffness)) @ gradient
+        operator[np.diag_indices(len(mass))] += mass
+        self._solver.factor(operator, rows.jacobian)
+        force = system.generalised_forces(there, end) + ways @ self.forces - mass * acceleration
+        resisted = stiffness[:, None] * (gradient @ moved) + damping[:, None] * (gradient @ sped)
+        more = share * ways - mass[:, None] * pushed - gradient.T @ resisted
+        closing, part = self._closing(rows, acceleration, h)
+        solution = self._solver.solve(
+            np.column_stack([force, more]),
+            np.column_stack([closing, -part * (rows.jacobian @ pushed)]),
+        )
+        change, by = solution[:, 0], solution[:, 1:]
+        return _Solved(
+            there,
+            change,
+            (moved + beta * h**2 * by, sped + gamma * h * by, pushed + by),
+            ways,
+        )
+
+    def _closing(
+        self, rows: Quantity, acceleration: np.ndarray, h: float
+    ) -> tuple[np.ndarray, float]:
+        """J d (m,) that closes the joints, and the share of it that is left with feedback."""
+        open_by, share = rows.jacobian @ acceleration + rows.drift, 1.0
+        if self._solver.feedback is not None:
+            # d also changes the errors at the step's end: w^2 beta h^2 J d, 2 w gamma h J d.
+            per_step = self._solver.feedback
+            frequency = per_step / h
+            open_by += 2.0 * frequency * rows.rate + frequency**2 * rows.value
+            share = 1.0 / (1.0 + 2.0 * per_step * self._gamma + per_step**2 * self._beta)
+        return -share * open_by, share
+
+    def _finished(
+        self, there: Motion, displacement: np.ndarray, velocity: np.ndarray, time: float
+    ) -> Motion:
+        """The motion at the end of a substep, errors of joints removed."""
+        motion = there.moved(displacement)
+        velocities = there.velocities + velocity
+        if not np.isfinite(velocities).all() or not np.isfinite(displacement).all():
+            raise RunBroken(f"The multibody system's motion is not finite at {time:g} s.")
+        if self._solver.feedback is None and self.system.joints:
+            motion = self._closed(motion, time)
+            rows = self.system.constraints(motion.with_velocities(velocities), time)
+            error = rows.rate
+            for _ in range(MAX_REMOVALS):
+                if np.abs(error).max() <= TOLERANCE * (1.0 + np.abs(velocities).max()):
+                    break
+                step = self._solver.removal(error)
+                velocities = velocities + step
+                error = error + rows.jacobian @ step
+            else:
+                raise NotConverged(
+                    f"The velocities of the multibody system cannot be kept to its joints at "
+                    f"{time:g} s: they miss by {float(np.abs(error).max()):.2g} m/s or 1/s; take "
+                    "shorter steps."
+                )
+        return motion.with_velocities(velocities)
+
+    def _closed(self, motion: Motion, time: float) -> Motion:
+        """Errors of places removed with the rows of the prediction, which are nearly the same."""
+        limit = TOLERANCE * max(1.0, float(np.abs(motion.position).max()))
+        for _ in range(MAX_REMOVALS):
+            errors = self.system.constraints(motion, time).value
+            if np.abs(errors).max() <= limit:
+                return motion
+            motion = motion.moved(self._solver.removal(errors))
+        raise NotConverged(
+            f"The joints of the multibody system cannot be kept closed at {time:g} s: they are "
+            f"open by {float(np.abs(errors).max()):.2g} m; take shorter steps."
+        )

@@ -1,0 +1,100 @@
+"""How the vehicle moves the base of its pantographs: tables, harmonics, track irregularities.
+
+Up and to the left are positive. What is a function of the place along the track, such as the track
+itself, reaches every pantograph of the train when it gets there; what is a function of time reaches
+all at once. Velocities and accelerations are derivatives of the same splines and sines.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from catenary.mbs.head import head_kernels
+from catenary.mbs.vehicle.motion_sources import Harmonic, Source, Table, VehicleMotion
+
+
+class Motion(NamedTuple):
+    """Place [m], velocity [m/s] and acceleration [m/s^2] in one direction."""
+
+    place: float
+    velocity: float
+    acceleration: float
+
+
+class _Course(Protocol):
+    """A function of one variable with two derivatives."""
+
+    def __call__(self, x: float) -> tuple[float, float, float]: ...
+
+
+class _Spline:
+    def __init__(self, table: Table) -> None:
+        spline = CubicSpline(table.points, table.values, bc_type="natural")
+        self._breaks = spline.x
+        self._coefficients = np.ascontiguousarray(spline.c.T)
+
+    def __call__(self, x: float) -> tuple[float, float, float]:
+        value, first, second = head_kernels.spline_at(self._breaks, self._coefficients, x)
+        return value, first, second
+
+
+class _Sines:
+    def __init__(self, amplitudes: np.ndarray, rates: np.ndarray, phases: np.ndarray) -> None:
+        self._waves = (amplitudes, rates, phases)
+
+    def __call__(self, x: float) -> tuple[float, float, float]:
+        value, first, second = head_kernels.sines_at(*self._waves, x)
+        return value, first, second
+
+
+class BaseMotion:
+    """The base of one pantograph under way.
+
+    Parameters
+    ----------
+    vehicle : VehicleMotion
+    start : of the pantograph along the track at time 0 [m]
+    speed : of the train [m/s]
+    """
+
+    def __init__(self, vehicle: VehicleMotion, start: float, speed: float) -> None:
+        self._start, self._speed = start, speed
+        self._vertical = [_course(source, "vertical") for source in vehicle.vertical]
+        self._lateral = [_course(source, "lateral") for source in vehicle.lateral]
+
+    def vertical(self, time: float) -> Motion:
+        """Upward motion at ``time`` [s]."""
+        return self._sum(self._vertical, time)
+
+    def lateral(self, time: float) -> Motion:
+        """Motion to the left at ``time`` [s]."""
+        return self._sum(self._lateral, time)
+
+    def _sum(self, courses: list[tuple[_Course, bool]], time: float) -> Motion:
+        place = velocity = acceleration = 0.0
+        for course, along_track in courses:
+            if along_track:
+                value, first, second = course(self._start + self._speed * time)
+                place += value
+                velocity += self._speed * first
+                acceleration += self._speed**2 * second
+            else:
+                value, first, second = course(time)
+                place += value
+                velocity += first
+                acceleration += second
+        return Motion(place, velocity, acceleration)
+
+
+def _course(source: Source, direction: str) -> tuple[_Course, bool]:
+    """A source as a function, and whether it is one of the place along the track."""
+    if isinstance(source, Table):
+        return _Spline(source), source.along_track
+    if isinstance(source, Harmonic):
+        rate = 2.0 * np.pi * source.frequency
+        waves = (np.array([v]) for v in (source.amplitude, rate, source.phase))
+        return _Sines(*waves), False
+    return _Sines(*source.waves(direction)), True

@@ -1,0 +1,107 @@
+"""Compares two runs: statistics side by side, and the force histories where their times agree."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from catenary.postproc.evaluate import statistics as stats
+from catenary.postproc.read.records import Records
+from catenary.postproc.read.results import Results
+from catenary.postproc.report.wording import counted, fixed
+
+_FORCES = (
+    ("mean [N]", "mean", 1.0),
+    ("standard deviation [N]", "std", 1.0),
+    ("  0-5 Hz [N]", "std_0_5", 1.0),
+    ("  5-20 Hz [N]", "std_5_20", 1.0),
+    ("maximum [N]", "maximum", 1.0),
+    ("minimum [N]", "minimum", 1.0),
+    ("loss of contact [%]", "loss_percent", 1.0),
+    ("contact height range [mm]", "contact_height_range", 1e3),
+)
+
+
+def compare(
+    first: Path | str,
+    second: Path | str,
+    records: tuple[Records | None, Records | None] = (None, None),
+) -> str:
+    """A table of the differences of two runs, as text. Not collective.
+
+    Parameters
+    ----------
+    first, second : result folders or files
+    records : what ``evaluate.guard`` found in each, None to look for damage here
+
+    Raises
+    ------
+    InputError
+        If one of them is no result.
+    """
+    with Results(first, records[0]) as a, Results(second, records[1]) as b:
+        return "\n".join([*_heads(a, b), "", *_statistics(a, b), "", _histories(a, b)]) + "\n"
+
+
+def _heads(a: Results, b: Results) -> list[str]:
+    lines = []
+    for letter, run in (("A", a), ("B", b)):
+        about = run.attributes
+        lines.append(
+            f"{letter}: {run.path} ({about['case']}, {3.6 * about['speed_m_per_s']:.0f} km/h, "
+            f"dt {run.dt:g} s, {counted(about['n_ranks'], 'rank')}, "
+            f"{counted(run.n_steps, 'step')}, {run.outcome})"
+        )
+    return lines
+
+
+def _statistics(a: Results, b: Results) -> list[str]:
+    of_a, of_b = stats.evaluate(a), stats.evaluate(b)
+    lines = [f"{'':34}{'A':>14}{'B':>14}{'B - A':>14}"]
+    for p, q in zip(of_a.pantographs, of_b.pantographs, strict=False):
+        lines.append(p.name if p.name == q.name else f"{p.name} / {q.name}")
+        for label, name, factor in _FORCES:
+            lines.append(_row("  " + label, factor * getattr(p, name), factor * getattr(q, name)))
+    if len(of_a.pantographs) != len(of_b.pantographs):
+        lines.append(
+            f"A has {counted(len(of_a.pantographs), 'pantograph')}, B has "
+            f"{len(of_b.pantographs)}: "
+            "only the first are compared."
+        )
+    lines += [
+        "line",
+        _row("  max uplift at arms [mm]", 1e3 * of_a.supports.maximum, 1e3 * of_b.supports.maximum),
+        _row("  droppers slackened", of_a.droppers.n_slackened, of_b.droppers.n_slackened),
+        _row("  max dropper force [N]", of_a.droppers.maximum, of_b.droppers.maximum),
+        _row("  min dropper force [N]", of_a.droppers.minimum, of_b.droppers.minimum),
+    ]
+    return lines + of_a.complaints + of_b.complaints + a.damage + b.damage
+
+
+def _row(label: str, first: float, second: float) -> str:
+    difference = second - first + 0.0  # which makes no negative zero
+    return f"{label:34}{fixed(first, 4):>14}{fixed(second, 4):>14}{difference:14.3e}"
+
+
+def _histories(a: Results, b: Results) -> str:
+    """The largest difference of the unfiltered contact forces, if both have the same times."""
+    tolerance = 1e-6 * min(a.dt, b.dt)
+    same = a.n_pantographs == b.n_pantographs and a.n_rows("time") == b.n_rows("time")
+    if not same or not np.allclose(a.time, b.time, rtol=0, atol=tolerance):
+        return "The runs differ in their times or pantographs: force histories are not compared."
+    if not a.n_rows("time"):
+        return "The runs hold no steps: force histories are not compared."
+    largest, at, whose = -1.0, 0, 0
+    for p in range(a.n_pantographs):
+        difference = np.abs(a.column("contact_force", p) - b.column("contact_force", p))
+        step = int(difference.argmax())
+        # A difference that is no number is the largest, as ``argmax`` has it.
+        if not difference[step] <= largest:
+            largest, at, whose = float(difference[step]), step, p
+        if np.isnan(largest):
+            break
+    return (
+        f"Largest difference of the contact force histories: {largest:.3e} N "
+        f"at t = {a.time_at(at):.4f} s ({a.pantograph_names()[whose]})."
+    )

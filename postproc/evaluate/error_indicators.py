@@ -1,0 +1,287 @@
+"""Error indicators of a run from its own record: how coarse are time step and mesh?
+
+Neither needs a second run. The time indicator looks at the force that was found, the mesh
+indicator at the shortest waves that the elements carry. docs/accuracy.md compares both with true
+errors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import linalg, optimize, signal
+
+from catenary.postproc.evaluate import filters
+from catenary.postproc.evaluate.statistics import covers
+from catenary.postproc.read.results import Results
+from catenary.solver.base.errors import InputError
+from catenary.solver.model import elements
+from catenary.solver.problem.integrator_parameters import (
+    AVERAGE_ACCELERATION,
+    NEWMARK,
+    Integration,
+    integration_of,
+)
+
+# How long an error of phase goes on growing [s]: on the line without damping, where waves run
+# away from the pantograph, and at the pantograph itself, which no damping of the line shortens.
+# Both are calibrated, once, on the shipped cases (docs/accuracy.md).
+LINE_MEMORY, NEAR_MEMORY = 0.75, 0.025
+# Beyond this phase an error no longer grows with it [rad].
+_LARGEST_PHASE = 0.7
+# Above this share of the deviation the time step decides what is found.
+COARSE_STEP = 0.05
+# A wave is resolved while its frequency on the mesh is wrong by less than this.
+RESOLVED = 0.01
+_WAVE_NUMBERS = 400
+# Records longer than this are thinned before their spectrum is taken, to this rate at least [Hz].
+_SPECTRUM, _SAMPLED_HZ = 100_000, 1000.0
+# Waves of two elements belong to the lower branch, whatever rounding says.
+_ZONE = np.pi * (1.0 + 1e-9)
+
+
+@dataclass(frozen=True)
+class Indicators:
+    """What a run's record tells of its discretisation.
+
+    Attributes
+    ----------
+    force_error : (n_pantographs,) estimated rms error below 20 Hz of the force history due to the
+        time step [N], NaN where the record has no statistics
+    relative_error : (n_pantographs,) the same over the force's standard deviation
+    resolved_frequency : highest frequency of a wave on the contact wire that the elements carry
+        with less than 1 % error in frequency [Hz]
+    required_frequency : what the elements have to carry, ``required_frequency`` of 20 Hz [Hz];
+        infinite where the train is as fast as the wave
+    warnings : sentences, empty if the settings are fine enough
+    """
+
+    force_error: np.ndarray
+    relative_error: np.ndarray
+    resolved_frequency: float
+    required_frequency: float
+    warnings: tuple[str, ...]
+
+
+class Method(NamedTuple):
+    """What the time indicator needs of a run: proportional damping of the contact wire, C = alpha K
+    + beta M ([s], [1/s]), and the parameters of its integration."""
+
+    alpha: float
+    beta: float
+    integration: Integration = AVERAGE_ACCELERATION
+
+
+def indicate(results: Results) -> Indicators:
+    """The indicators of a run, as far as its record goes. Not collective."""
+    about = results.attributes
+    config = about["config"]
+    method = _method(config)
+    n = results.n_pantographs
+    error, deviation = np.full(n, np.nan), np.full(n, np.nan)
+    start, end = results.evaluation
+    for p in range(n):
+        position = results.column("contact_position", p)
+        within = (position >= start) & (position <= end)
+        if not covers(position, (start, end)) or np.count_nonzero(within) < 8:
+            continue
+        del position
+        try:
+            filtered = filters.low_pass(results.column("contact_force", p), results.dt)[within]
+        except InputError:  # the statistics say so
+            continue
+        deviation[p] = filtered.std()
+        error[p] = step_error(filtered, results.dt, method)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative = error / deviation
+    resolved = _resolved(results)
+    speed = float(about["speed_m_per_s"]) / float(about["wave_speed_m_per_s"])
+    required = required_frequency(filters.CUT_OFF, speed, method.alpha)
+    told = (*_step_warning(relative, results.dt), *_mesh_warning(resolved, required))
+    return Indicators(error, relative, resolved, required, told)
+
+
+def step_error(force: np.ndarray, dt: float, method: Method) -> float:
+    """Estimated rms error of a force history due to the time step [N]. Not collective.
+
+    The method moves what has the frequency w to w (1 - E (w dt)^2) and takes w D(w dt) from its
+    rate of growth, D being a damping ratio. Each component of the force is wrong by the product of
+    both with the time for which what caused it is remembered.
+
+    Parameters
+    ----------
+    force : (n,) filtered contact force in the evaluation stretch [N]
+    dt : time step [s]
+    """
+    deviation = float(force.std())
+    # What is filtered needs few samples; a long record has more than a spectrum has use for.
+    every = max(1, min(force.size // _SPECTRUM, int(1.0 / (_SAMPLED_HZ * dt))))
+    frequency, power = signal.periodogram(
+        force[::every], 1.0 / (every * dt), window="hann", detrend="constant", scaling="spectrum"
+    )
+    omega, power = 2.0 * np.pi * frequency[1:], power[1:]
+    if deviation == 0.0 or power.sum() == 0.0:
+        return 0.0
+    power = power * deviation**2 / power.sum()
+    own = method.integration
+    shift = own.frequency_error * omega**3 * dt**2
+    if own.is_second_order:
+        decay = own.third_order_damping * omega**4 * dt**3
+    else:
+        decay = own.first_order_damping * omega**2 * dt
+    phase = memory(omega, method.alpha, method.beta) * np.hypot(shift, decay)
+    phase = np.minimum(phase, _LARGEST_PHASE)
+    return float(np.sqrt(np.sum(power * (2.0 - 2.0 * np.cos(phase)))))
+
+
+def memory(omega: np.ndarray, alpha: float, beta: float) -> np.ndarray:
+    """How long a component of the contact force is remembered, shape (n,) [s].
+
+    A wave exp(i (w t - k x)) on a string with C = alpha K + beta M has
+    k = (w / c) sqrt((1 - i beta / w) / (1 + i alpha w)). Over the length 1 / |Im k| on which it
+    dies out, a change of w shifts its phase by |dk / dw| / |Im k|: that is the line's memory,
+    never longer than ``LINE_MEMORY``.
+
+    Parameters
+    ----------
+    omega : (n,) angular frequencies above zero [rad/s]
+    """
+    number = omega * np.sqrt((1.0 - 1j * beta / omega) / (1.0 + 1j * alpha * omega))
+    slope = number * (
+        1.0 / omega
+        + 0.5j * beta / omega**2 / (1.0 - 1j * beta / omega)
+        - 0.5j * alpha / (1.0 + 1j * alpha * omega)
+    )
+    return np.asarray(NEAR_MEMORY + 1.0 / (1.0 / LINE_MEMORY + np.abs(number.imag) / np.abs(slope)))
+
+
+def required_frequency(felt: float, speed: float, alpha: float) -> float:
+    """Frequency of the undamped wave that is as long as those which run ahead of the train [Hz].
+
+    A pantograph that moves with v and feels w_0 excites, ahead of itself, w = w_0 + v Re k; on a
+    string with C = alpha K the wave number is k = (w / c) / sqrt(1 + i alpha w). Without damping
+    that is w_0 / (1 - v / c); damping lets what dies out be longer, so that fewer elements carry
+    it. What they have to carry is the length 2 pi / |k|.
+
+    Parameters
+    ----------
+    felt : highest frequency that is felt at the pantograph [Hz]
+    speed : of the train over that of the waves [-]; at 1 and above there is no such wave: infinite
+    alpha : damping on stiffness of the contact wire [s]
+    """
+    if speed >= 1.0:
+        return float("inf")
+    own = 2.0 * np.pi * felt
+
+    def slowness(omega: float) -> complex:
+        return complex(1.0 / np.sqrt(1.0 + 1j * alpha * omega))
+
+    undamped = own / (1.0 - speed)
+    omega = optimize.brentq(
+        lambda w: w * (1.0 - speed * slowness(w).real) - own, own, undamped * (1.0 + 1e-9)
+    )
+    return float(omega * abs(slowness(omega)) / (2.0 * np.pi))
+
+
+def resolved_frequency(
+    length: float, tension: float, bending_stiffness: float, mass_per_length: float
+) -> float:
+    """Highest frequency of a wave that elements carry with less than 1 % error [Hz].
+
+    Free waves w_n = exp(i k n h) on an endless wire of equal elements against
+    w^2 = (F k^2 + EI k^4) / m; the first wave number whose frequency is wrong ends the search,
+    at most that of two waves an element.
+
+    Parameters
+    ----------
+    length : of an element [m]
+    tension, bending_stiffness, mass_per_length : of the wire [N], [N m2], [kg/m]
+    """
+    h = np.array([length])
+    stiffness = elements.stiffness(h, bending_stiffness, tension)[0]
+    mass = elements.mass(h, mass_per_length)[0]
+    numbers = np.linspace(0.0, 2.0 * np.pi / length, _WAVE_NUMBERS + 1)[1:]
+    exact = np.sqrt((tension + bending_stiffness * numbers**2) / mass_per_length) * numbers
+    best = 0.0
+    for k, omega in zip(numbers, exact, strict=True):
+        # Both nodes of an element in terms of the first one's deflection and slope.
+        shift = np.vstack([np.eye(2), np.exp(1j * k * length) * np.eye(2)])
+        both = linalg.eigvalsh(shift.conj().T @ stiffness @ shift, shift.conj().T @ mass @ shift)
+        # Two waves share the nodes' motion; the longer one lies on the lower branch.
+        square = both[0 if k * length < _ZONE else 1]
+        if abs(np.sqrt(max(square, 0.0)) / omega - 1.0) > RESOLVED:
+            break
+        best = omega
+    return float(best / (2.0 * np.pi))
+
+
+def as_table(indicators: Indicators) -> dict[str, Any]:
+    """The content of ``indicators`` in ``summary.json``."""
+    return {
+        "time_step": {
+            "force_error_N": indicators.force_error,
+            "force_error_percent_of_std": 100.0 * indicators.relative_error,
+            "limit_percent_of_std": 100.0 * COARSE_STEP,
+        },
+        "mesh": {
+            "resolved_hz": indicators.resolved_frequency,
+            "required_hz": indicators.required_frequency,
+        },
+        "warnings": list(indicators.warnings),
+    }
+
+
+def _method(config: dict[str, Any]) -> Method:
+    damping, numerics = config["line"]["damping"], config["numerics"]
+    own = (damping.get("per_component") or {}).get("contact_wire") or damping
+    return Method(
+        float(own["alpha_s"]),
+        float(own["beta_per_s"]),
+        integration_of(
+            str(numerics.get("integrator") or NEWMARK),
+            float(numerics.get("spectral_radius") or 0.0),
+            float(numerics.get("newmark_beta", 0.25)),
+            float(numerics.get("newmark_gamma", 0.5)),
+        ),
+    )
+
+
+def _resolved(results: Results) -> float:
+    """``resolved_frequency`` of the longest element of the contact wire where it is evaluated."""
+    x = results.line("node_points")[results.wires()["contact_wire"], 0]
+    start, end = results.evaluation
+    lengths = np.diff(x)[(x[1:] > start) & (x[:-1] < end)]
+    wire = results.attributes["config"]["line"]["contact_wire"]
+    return resolved_frequency(
+        float(lengths.max()),
+        float(wire["tension_N"]),
+        float(wire["bending_stiffness_N_m2"]),
+        float(wire["mass_kg_per_m"]),
+    )
+
+
+def _step_warning(relative: np.ndarray, dt: float) -> list[str]:
+    known = relative[np.isfinite(relative)]
+    if not known.size or known.max() <= COARSE_STEP:
+        return []
+    return [
+        f"The time step of {1e3 * dt:g} ms is too coarse: it is estimated to change the force "
+        f"history below 20 Hz by {100 * known.max():.0f} % of its standard deviation (rms). Take a "
+        "smaller numerics.dt_s."
+    ]
+
+
+def _mesh_warning(resolved: float, required: float) -> list[str]:
+    if resolved >= required:
+        return []
+    needs = (
+        f"20 Hz at the pantograph send waves ahead that are as short as those of {required:.0f} Hz"
+        if np.isfinite(required)
+        else "the train is as fast as the waves, which no mesh resolves"
+    )
+    return [
+        f"The longest elements of the contact wire carry waves of up to {resolved:.0f} Hz with "
+        f"less than 1 % error, but {needs}. Take a larger mesh.elements_per_gap."
+    ]

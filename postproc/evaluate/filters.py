@@ -1,0 +1,94 @@
+"""Filters for contact forces: 20 Hz low-pass and the bands 0-5 and 5-20 Hz, without phase shift.
+
+Source: EN 50317 (20 Hz, Butterworth, 6th order) and EN 50318 (bands). Each filter runs forward
+and backward over the record, which cancels its phase and squares its gain: at the cut-off the
+gain is 1/2 (-6 dB), at frequency f of a low-pass 1 / (1 + (tan(pi f dt)/tan(pi fc dt))^12).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import signal
+
+from catenary.solver.base.errors import InputError
+
+CUT_OFF = 20.0
+BAND_LIMIT = 5.0
+ORDER = 6
+# The slowest pole of the 6th-order low-pass decays with sin(pi/12) 2 pi fc, thus to 1e-4 in
+# 5.7 / fc; the record is continued by that much at both ends before it is filtered.
+_PADDING_PERIODS = 6.0
+# Rows that are filtered at once.
+_BLOCK = 1 << 16
+
+
+def check_sampling(dt: float, cut_off: float = CUT_OFF) -> None:
+    """Raise InputError if a time step ``dt`` [s] is too long for a filter at ``cut_off`` [Hz]."""
+    if 1.0 / dt <= 2.0 * cut_off:
+        raise InputError(
+            f"numerics.dt_s = {dt:g} s records at {1.0 / dt:.4g} Hz, too slowly for the "
+            f"{cut_off:g} Hz filter of the contact force: it must be below {0.5 / cut_off:g} s"
+        )
+
+
+def low_pass(values: np.ndarray, dt: float, cut_off: float = CUT_OFF) -> np.ndarray:
+    """``values`` without what is faster than ``cut_off``, shape as ``values``. Not collective.
+
+    Parameters
+    ----------
+    values : (n,) or (n, columns), equidistant in time, the whole record
+    dt : time between two records [s]
+    cut_off : where the gain is 1/2 [Hz]
+
+    Raises
+    ------
+    InputError
+        If the record is sampled at no more than twice the cut-off.
+    """
+    check_sampling(dt, cut_off)
+    sos = signal.butter(ORDER, cut_off, btype="low", fs=1.0 / dt, output="sos")
+    return _both_ways(sos, values, dt, cut_off)
+
+
+def band_0_5(values: np.ndarray, dt: float) -> np.ndarray:
+    """Part of ``values`` up to 5 Hz, the mean included: a 5 Hz low-pass."""
+    return low_pass(values, dt, BAND_LIMIT)
+
+
+def band_5_20(values: np.ndarray, dt: float) -> np.ndarray:
+    """Part of ``values`` between 5 and 20 Hz, free of the mean: a band-pass of 6th-order edges."""
+    check_sampling(dt, CUT_OFF)
+    edges = (BAND_LIMIT, CUT_OFF)
+    sos = signal.butter(ORDER, edges, btype="bandpass", fs=1.0 / dt, output="sos")
+    return _both_ways(sos, values, dt, BAND_LIMIT)
+
+
+def _both_ways(sos: np.ndarray, values: np.ndarray, dt: float, slowest: float) -> np.ndarray:
+    """Like ``scipy.signal.sosfiltfilt`` along the first axis, to the last bit.
+
+    It takes the memory of one more record, not of five: a record is filtered in place, in blocks,
+    each of which goes on from the state that the one before has left.
+    """
+    values = np.asarray(values, dtype=float)
+    n = values.shape[0]
+    if n == 0:
+        return values.copy()
+    padding = min(n - 1, int(np.ceil(_PADDING_PERIODS / (slowest * dt))))
+    # Continued at both ends by the record itself, turned about its end points.
+    extended = np.empty((n + 2 * padding, *values.shape[1:]))
+    extended[padding : padding + n] = values
+    if padding:
+        extended[:padding] = 2.0 * values[:1] - values[padding:0:-1]
+        extended[padding + n :] = 2.0 * values[-1:] - values[-2 : -padding - 2 : -1]
+    _in_place(sos, extended)
+    _in_place(sos, extended[::-1])
+    return extended[padding : padding + n]
+
+
+def _in_place(sos: np.ndarray, record: np.ndarray) -> None:
+    """Filter a record along its first axis, from the steady state of its first value on."""
+    at_rest = signal.sosfilt_zi(sos)
+    state = at_rest.reshape(*at_rest.shape, *[1] * (record.ndim - 1)) * record[:1]
+    for start in range(0, record.shape[0], _BLOCK):
+        block = record[start : start + _BLOCK]
+        block[:], state = signal.sosfilt(sos, block, axis=0, zi=state)

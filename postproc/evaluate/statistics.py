@@ -1,0 +1,287 @@
+"""Statistics of contact forces, uplifts and dropper forces as EN 50317 and EN 50318 define them.
+
+Contact forces are filtered over the whole record first and cut to the evaluation stretch then, so
+that the ends of the stretch see no end effects of the filter. Each pantograph is evaluated while
+it is itself within the stretch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from catenary.postproc.evaluate import filters
+from catenary.postproc.read.results import Results
+from catenary.solver.base.errors import InputError
+
+SHORTEST_ARC = 5e-3
+HISTOGRAM_BIN, MOST_BINS = 10.0, 1000
+_NAN = float("nan")
+
+
+@dataclass(frozen=True)
+class PantographStatistics:
+    """One pantograph in the evaluation stretch; NaN throughout if ``complaint`` is not empty.
+
+    Attributes
+    ----------
+    name : "leading", "trailing", ...
+    mean, std, maximum, minimum : of the contact force, 20 Hz low-pass [N]
+    std_0_5, std_5_20 : standard deviations of the bands 0-5 and 5-20 Hz [N]
+    stat_max, stat_min : mean + 3 std and mean - 3 std [N]
+    loss_percent : share of time without contact, from the unfiltered force [%]
+    arcing_percent : the same without losses shorter than 5 ms [%]
+    contact_height_range : highest minus lowest height of the contact wire at the pan head, 20 Hz
+        low-pass [m]
+    histogram_edges : (n + 1,) edges of the bins of the 20 Hz force [N]
+    histogram_percent : (n,) share of time in each bin [%]
+    complaint : why there are no statistics, a sentence
+    """
+
+    name: str
+    mean: float = _NAN
+    std: float = _NAN
+    std_0_5: float = _NAN
+    std_5_20: float = _NAN
+    maximum: float = _NAN
+    minimum: float = _NAN
+    stat_max: float = _NAN
+    stat_min: float = _NAN
+    loss_percent: float = _NAN
+    arcing_percent: float = _NAN
+    contact_height_range: float = _NAN
+    histogram_edges: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    histogram_percent: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    complaint: str = ""
+
+
+@dataclass(frozen=True)
+class SupportStatistics:
+    """Uplift of the contact wire at the steady arms over every step of the run.
+
+    Attributes
+    ----------
+    x : (n_arms,) positions of all arms [m]
+    uplift : (n_arms,) largest uplift at each [m]
+    evaluated : (n_arms,) bool, whether the arm stands in the evaluation stretch
+    maximum : largest uplift of the evaluated ones [m], NaN if there are none
+    """
+
+    x: np.ndarray
+    uplift: np.ndarray
+    evaluated: np.ndarray
+    maximum: float
+
+
+@dataclass(frozen=True)
+class DropperStatistics:
+    """Dropper forces over every step of the run.
+
+    Attributes
+    ----------
+    x : (n_droppers,) positions of all droppers [m]
+    highest, lowest : (n_droppers,) largest and smallest force of each [N]
+    evaluated : (n_droppers,) bool, whether the dropper hangs in the evaluation stretch
+    n_slackened : evaluated droppers whose force was zero at some time, 0 if none can slacken
+    maximum, minimum : largest and smallest force of the evaluated ones [N], NaN if there are none
+    """
+
+    x: np.ndarray
+    highest: np.ndarray
+    lowest: np.ndarray
+    evaluated: np.ndarray
+    n_slackened: int
+    maximum: float
+    minimum: float
+
+
+@dataclass(frozen=True)
+class RunStatistics:
+    """All statistics of a run."""
+
+    pantographs: Sequence[PantographStatistics]
+    supports: SupportStatistics
+    droppers: DropperStatistics
+
+    @property
+    def complaints(self) -> list[str]:
+        """Sentences that say which statistics could not be formed, and why."""
+        return [p.complaint for p in self.pantographs if p.complaint]
+
+
+def evaluate(results: Results) -> RunStatistics:
+    """Statistics of a run, as far as its record goes. Not collective."""
+    names = results.pantograph_names()
+    pantographs = [_pantograph(name, p, results) for p, name in enumerate(names)]
+    return RunStatistics(pantographs, _supports(results), _droppers(results))
+
+
+def covers(position: np.ndarray, evaluation: tuple[float, float]) -> bool:
+    """Whether a pantograph's record runs through the whole stretch, to within one step.
+
+    Parameters
+    ----------
+    position : (n,) ascending [m]
+    evaluation : from and to [m]
+    """
+    if position.size < 2:
+        return False
+    step = float(np.diff(position).max())
+    return bool(position[0] <= evaluation[0] + step and position[-1] >= evaluation[1] - step)
+
+
+def contact_statistics(
+    name: str,
+    position: np.ndarray,
+    force: np.ndarray,
+    wire_height: np.ndarray,
+    dt: float,
+    evaluation: tuple[float, float],
+) -> PantographStatistics:
+    """Statistics of one pantograph whose record covers the evaluation stretch. Not collective.
+
+    Parameters
+    ----------
+    position : (n,) along the track [m]
+    force : (n,) unfiltered contact force [N]
+    wire_height : (n,) of the contact wire at the pan head [m]
+    dt : time step [s]
+    evaluation : from and to [m]
+
+    Raises
+    ------
+    InputError
+        If the time step is too long for the 20 Hz filter.
+    """
+    within = (position >= evaluation[0]) & (position <= evaluation[1])
+    return PantographStatistics(
+        name=name,
+        **_of_force(force, within, dt),
+        contact_height_range=_range(wire_height, within, dt),
+    )
+
+
+def _of_force(force: np.ndarray, within: np.ndarray, dt: float) -> dict[str, Any]:
+    """What the force of a pantograph gives; at no time more than a few records are in memory."""
+    filtered = filters.low_pass(force, dt)[within]
+    mean, std = float(filtered.mean()), float(filtered.std())
+    edges, percent = histogram(filtered)
+    maximum, minimum = float(filtered.max()), float(filtered.min())
+    del filtered
+    lost = force[within] <= 0.0
+    return {
+        "mean": mean,
+        "std": std,
+        "std_0_5": float(filters.band_0_5(force, dt)[within].std()),
+        "std_5_20": float(filters.band_5_20(force, dt)[within].std()),
+        "maximum": maximum,
+        "minimum": minimum,
+        "stat_max": mean + 3.0 * std,
+        "stat_min": mean - 3.0 * std,
+        "loss_percent": 100.0 * float(lost.mean()),
+        "arcing_percent": 100.0 * float(without_short_losses(lost, dt).mean()),
+        "histogram_edges": edges,
+        "histogram_percent": percent,
+    }
+
+
+def _range(wire_height: np.ndarray, within: np.ndarray, dt: float) -> float:
+    return float(np.ptp(filters.low_pass(wire_height, dt)[within]))
+
+
+def without_short_losses(lost: np.ndarray, dt: float, shortest: float = SHORTEST_ARC) -> np.ndarray:
+    """``lost`` with the intervals shorter than ``shortest`` [s] set to contact, (n,) bool."""
+    padded = np.concatenate([[0], lost.astype(np.int8), [0]])
+    change = np.diff(padded)
+    starts, ends = np.flatnonzero(change == 1), np.flatnonzero(change == -1)
+    kept = np.zeros_like(lost)
+    for start, end in zip(starts, ends, strict=True):
+        if (end - start) * dt >= shortest * (1.0 - 1e-9):  # exactly the shortest counts
+            kept[start:end] = True
+    return kept
+
+
+def histogram(force: np.ndarray, width: float = HISTOGRAM_BIN) -> tuple[np.ndarray, np.ndarray]:
+    """Edges (n + 1,) [N] at multiples of ``width`` and share of time (n,) [%] of a force record.
+
+    Bins are ten times as wide, or more, where there would be too many of them: an unstable run may
+    have reached any force.
+    """
+    while np.ptp(force) > MOST_BINS * width:
+        width *= 10.0
+    first = np.floor(force.min() / width)
+    last = np.floor(force.max() / width) + 1
+    edges = width * np.arange(first, last + 1)
+    counts, _ = np.histogram(force, edges)
+    return edges, 100.0 * counts / force.size
+
+
+def _pantograph(name: str, number: int, results: Results) -> PantographStatistics:
+    """Statistics of a pantograph; its histories are read one after the other."""
+    start, end = results.evaluation
+    position = results.column("contact_position", number)
+    if not covers(position, (start, end)):
+        seen = f"{position[0]:.0f} to {position[-1]:.0f} m" if position.size else "nothing"
+        return PantographStatistics(
+            name,
+            complaint=f"No statistics of the {_noun(name)}: its record covers {seen}, the "
+            f"evaluation stretch is {start:.0f} to {end:.0f} m.",
+        )
+    within = (position >= start) & (position <= end)
+    del position
+    taken = max(np.count_nonzero(within) - 1, 0) * results.dt
+    period = 1.0 / filters.CUT_OFF
+    if taken < period:
+        return PantographStatistics(
+            name,
+            complaint=f"No statistics of the {_noun(name)}: it passes the evaluation stretch "
+            f"within {1e3 * taken:.3g} ms, less than a period of the 20 Hz filter "
+            f"({1e3 * period:g} ms).",
+        )
+    try:
+        return PantographStatistics(
+            name=name,
+            **_of_force(results.column("contact_force", number), within, results.dt),
+            contact_height_range=_range(results.column("wire_height", number), within, results.dt),
+        )
+    except InputError as error:
+        return PantographStatistics(name, complaint=f"No statistics of the {_noun(name)}: {error}.")
+
+
+def _noun(name: str) -> str:
+    return name if name == "pantograph" else f"{name} pantograph"
+
+
+def _supports(results: Results) -> SupportStatistics:
+    x = results.line("arm_x")
+    uplift = results.extremes("arm_uplift")[1]
+    evaluated = _inside(x, results.evaluation)
+    return SupportStatistics(x, uplift, evaluated, _of(uplift[evaluated], np.max))
+
+
+def _droppers(results: Results) -> DropperStatistics:
+    x = results.line("dropper_x")
+    lowest, highest = results.extremes("dropper_force")
+    evaluated = _inside(x, results.evaluation)
+    # Droppers that may push, or that carry nothing at rest, do not slacken at zero force.
+    slackens = any(name == "dropper_slackening" for name, *_ in results.attributes["effects_on"])
+    return DropperStatistics(
+        x,
+        highest,
+        lowest,
+        evaluated,
+        int(np.count_nonzero(lowest[evaluated] <= 0.0)) if slackens else 0,
+        _of(highest[evaluated], np.max),
+        _of(lowest[evaluated], np.min),
+    )
+
+
+def _inside(x: np.ndarray, evaluation: tuple[float, float]) -> np.ndarray:
+    return np.asarray((x >= evaluation[0]) & (x <= evaluation[1]))
+
+
+def _of(values: np.ndarray, which: Callable[..., Any]) -> float:
+    return float(which(values)) if values.size else _NAN

@@ -1,0 +1,1 @@
+"""Files of results: their layout, and how they are kept whole."""

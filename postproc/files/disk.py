@@ -1,0 +1,234 @@
+"""What the writers of result files share: attributes, room on the disk, files that appear whole."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import math
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from catenary.postproc.files.checked import FORMAT_BOUNDS
+from catenary.postproc.files.disk_errors import reason, remedy
+from catenary.postproc.files.own_files import part_of
+from catenary.solver.base.errors import RunBroken
+
+# Room for HDF5's own tables and for the last words of a run that has filled the disk [bytes].
+MARGIN = 128 * 1024
+
+
+def plain(value: Any) -> Any:
+    """``value`` made of what JSON knows: NumPy types converted, NaN and infinity as None."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (set, frozenset)):
+        return [plain(item) for item in sorted(value)]
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if value is None or isinstance(value, (str, bool, int, float)):
+        return value
+    return str(value)
+
+
+def as_attribute(value: Any) -> Any:
+    """``value`` as an HDF5 attribute: text and numbers as they are, lists and tables as JSON."""
+    if isinstance(value, (str, bool, int, float, np.generic)):
+        return value
+    return json.dumps(plain(value), ensure_ascii=False)
+
+
+class NoRoom(OSError):
+    """The disk, a quota or a limit of the process leaves no room; nothing was written yet."""
+
+
+class Elsewhere(OSError):
+    """The path no longer names the file that is being written; says where the file is."""
+
+
+def reserve(handle: int, start: int, n_bytes: int) -> None:
+    """Claim ``n_bytes`` [bytes] on the disk behind an open file's end. Not collective.
+
+    HDF5 updates its tables in place and appends the data: if the disk fills up in between, the
+    tables point to data that are not there and the file is lost. Claimed space excludes that.
+
+    Parameters
+    ----------
+    handle : descriptor of the file, open for writing; its path may name another file by now
+    start : end of the file [bytes]
+
+    Raises
+    ------
+    NoRoom
+    """
+    try:
+        _claim(handle, start, n_bytes)
+    except OSError as error:
+        raise NoRoom(error.errno, error.strerror) from error
+
+
+def check_in_place(path: Path, handle: int) -> None:
+    """Raise ``Elsewhere`` unless ``path`` names the file open as ``handle``. Not collective."""
+    with contextlib.suppress(OSError):
+        if os.path.samestat(os.stat(path), os.fstat(handle)):
+            return
+    if os.fstat(handle).st_nlink == 0:
+        if os.path.lexists(path):
+            raise Elsewhere(
+                f"{path} was replaced by another file while the run went on; that file is left as "
+                "it is, what the run had written is lost"
+            )
+        what = path if path.parent.is_dir() else f"the folder {path.parent}"
+        raise Elsewhere(f"{what} was removed while the run went on; what it had written is lost")
+    try:
+        now = Path(os.readlink(f"/proc/self/fd/{handle}"))
+    except OSError:  # not Linux
+        raise Elsewhere(
+            f"{path} was moved while the run went on; what the run had written is there"
+        ) from None
+    raise Elsewhere(
+        f"{path} is now {now}, moved while the run went on: what was written is there, and "
+        f"`catenary restart {now.parent}` continues the run"
+    )
+
+
+def _claim(handle: int, start: int, n_bytes: int) -> None:
+    if hasattr(os, "posix_fallocate"):
+        try:
+            os.posix_fallocate(handle, start, n_bytes)
+            return
+        except OSError as error:
+            if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):
+                raise
+    # Neither the system nor the file system can claim: occupy the place.
+    while n_bytes > 0:
+        written = os.pwrite(handle, bytes(min(n_bytes, 1 << 20)), start)
+        start, n_bytes = start + written, n_bytes - written
+
+
+def abandon(file: h5py.File) -> None:
+    """Close a file to which a write has failed, without touching the disk again.
+
+    HDF5 would repeat the failed writes until the program ends, spoil more of the file and crash
+    the interpreter at its exit; so it gets memory to write to.
+    """
+    if hasattr(os, "memfd_create"):
+        sink = os.memfd_create("abandoned")
+        os.dup2(sink, file.id.get_vfd_handle())
+        os.close(sink)
+    with contextlib.suppress(OSError, RuntimeError):
+        file.close()
+
+
+@contextlib.contextmanager
+def opened(path: Path, mode: str) -> Iterator[h5py.File]:
+    """An HDF5 file for writing, abandoned if something fails. A context manager."""
+    file = h5py.File(path, mode, libver=FORMAT_BOUNDS)
+    try:
+        yield file
+        file.flush()
+    except Exception:
+        abandon(file)
+        raise
+    file.close()
+
+
+def broken_write(
+    path: Path, time: float, error: Exception, kept: str = "what was written before stays readable"
+) -> RunBroken:
+    """The error for the user when writing ``path`` failed at ``time`` [s] of the simulation.
+
+    ``kept`` says what the failure leaves.
+    """
+    if isinstance(error, Elsewhere):
+        return RunBroken(f"the run ended at t = {time:.3f} s because {error}")
+    return RunBroken(
+        f"writing {path} failed at t = {time:.3f} s ({reason(error)}): {remedy(error)}; {kept}"
+    )
+
+
+@contextlib.contextmanager
+def appears_whole(path: Path) -> Iterator[Path]:
+    """Another name for ``path`` while it is made, which takes its own when it is whole.
+
+    A context manager. If something fails there is nothing new.
+    """
+    partial = part_of(path, os.getpid())
+    try:
+        yield partial
+        os.replace(partial, path)
+    except BaseException:
+        partial.unlink(missing_ok=True)
+        raise
+
+
+def write_whole(path: Path, content: bytes | str) -> None:
+    """Write a file so that it appears whole or not at all."""
+    data = content.encode() if isinstance(content, str) else content
+    with appears_whole(path) as partial:
+        partial.write_bytes(data)
+
+
+def write_at(handle: int, offset: int, numbers: np.ndarray) -> None:
+    """Write a contiguous array into a place of an open file, ``offset`` [bytes] from its beginning.
+
+    Raises
+    ------
+    OSError
+        If not all of it could be written.
+    """
+    left = numbers.data.cast("B")
+    while left.nbytes:
+        written = os.pwrite(handle, left, offset)
+        left, offset = left[written:], offset + written
+
+
+def write_all(folder: Path, content: Mapping[str, bytes | str]) -> list[Path]:
+    """Write files of a folder by name, each as ``write_whole``; returns their paths.
+
+    The folder is made if it is not there.
+
+    Raises
+    ------
+    RunBroken
+        If one cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _unwritten(folder, error) from error
+    return write_into(folder, content)
+
+
+def write_into(folder: Path, content: Mapping[str, bytes | str]) -> list[Path]:
+    """The same for a folder that is there already.
+
+    Raises
+    ------
+    RunBroken
+        If one cannot be written.
+    """
+    for name, data in content.items():
+        try:
+            write_whole(folder / name, data)
+        except OSError as error:
+            raise _unwritten(folder / name, error) from error
+    return [folder / name for name in content]
+
+
+def _unwritten(path: Path, error: OSError) -> RunBroken:
+    return RunBroken(
+        f"writing {path} failed ({reason(error)}): {remedy(error)}; what was written before stays "
+        "readable"
+    )

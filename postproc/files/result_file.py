@@ -1,0 +1,374 @@
+"""The result file as its only writer, rank 0, handles it. Nothing here is collective.
+
+Everything that grows does so in ``append`` alone, which leaves a file that is readable as it
+stands; room on the disk is claimed one append ahead, so that a full disk costs no record. HDF5
+writes its tables in no order that helps one who reads a file whose writer was killed: a table may
+have got longer, and its rows not be there yet. Hence ``COMPLETE``, which is told after the rows.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import h5py
+import numpy as np
+
+from catenary.postproc.files.checked import (
+    FORMAT_BOUNDS,
+    create_checked,
+    seal_arrays,
+    seal_attributes,
+    set_attribute,
+)
+from catenary.postproc.files.chunk_shapes import Chunk, chunks_of, room_of
+from catenary.postproc.files.disk import MARGIN, abandon, as_attribute, check_in_place, reserve
+from catenary.postproc.files.kept_extremes import drop_extremes, extremes_at, store_extremes
+from catenary.postproc.files.own_files import part_of
+from catenary.postproc.files.trimming import trimmed
+from catenary.postproc.files.windowed_rows import write_window
+from catenary.postproc.record import channels
+from catenary.postproc.record.channels import Channel
+from catenary.postproc.record.header import Header
+from catenary.postproc.record.line_record import GZIP, GZIP_LEVEL, LineRecord
+from catenary.solver.time_loop.observers import Stage
+
+FORMAT = "catenary-run-2"
+# Rows that are whole, of the channels, of the energies and of the line's channels; a table may be
+# longer after a kill.
+COMPLETE = "complete_rows"
+LINE_TIME = "line_channels/time"
+RUNNING, DONE, INTERRUPTED = "running", "done", "interrupted"
+# What tells the times of the three kinds of rows.
+_CLOCKS = ("time", "energy/time", LINE_TIME)
+# The state to continue from is kept twice and written in turn: a run that is killed while it
+# writes one still has the other.
+_SLOTS = ("0", "1")
+
+
+class LineBlock(NamedTuple):
+    """Rows of the line's channels.
+
+    Attributes
+    ----------
+    time : (rows,) [s]
+    position : (rows, n_pantographs) along the track [m], where the window is
+    values : name -> (rows, recorded columns)
+    extremes : name -> (2, all columns), smallest and largest of every step up to this flush
+    """
+
+    time: np.ndarray
+    position: np.ndarray
+    values: Mapping[str, np.ndarray]
+    extremes: Mapping[str, np.ndarray]
+
+
+class ResultFile:
+    """A result file open for writing.
+
+    A new one is made under another name, and takes its own when its first rows are on the disk:
+    until then an earlier file, or a link, stays as it is. All writes go through one descriptor.
+
+    Parameters
+    ----------
+    path : the file, replaced at the end of the first ``append`` unless ``resume``
+    stage : of the run
+    header : what the runner knows before the first step
+    n_ranks : size of the run's communicator
+    rows_per_append : largest number of rows of an append
+    with_energies : whether energies will be appended
+    record : which part of the line's channels is recorded
+    resume : continue a file; what it holds from the stage's start time on is dropped
+    on_begun : called when a new file has taken its place
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        stage: Stage,
+        header: Header,
+        n_ranks: int,
+        *,
+        rows_per_append: int,
+        with_energies: bool,
+        record: LineRecord,
+        resume: bool,
+        on_begun: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._path = path
+        self._made_as = path if resume else part_of(path, os.getpid())
+        self._begun = resume
+        self._on_begun = on_begun
+        self._record = record
+        places = {channels.ARM: stage.arm_x, channels.DROPPER: stage.dropper_x}
+        self._columns = {
+            name: record.columns(places[channels.CHANNELS[name].per]) for name in record.names
+        }
+        self._x = {
+            name: places[channels.CHANNELS[name].per][columns]
+            for name, columns in self._columns.items()
+        }
+        table = _table(stage, with_energies, record, self._x)
+        shapes = chunks_of(table, stage.n_steps, rows_per_append, record.every)
+        rows = min(rows_per_append, stage.n_steps + 1)
+        self._room = room_of(table, shapes, rows, record) + MARGIN
+        self._start_time = stage.start_time
+        self._n_states = 0
+        self._file = h5py.File(self._made_as, "r+" if resume else "w", libver=FORMAT_BOUNDS)
+        try:
+            if resume:
+                _cut(self._file, stage.start_time - 0.5 * stage.dt)
+            else:
+                _write_head(self._file, stage, header, n_ranks, record)
+                for name, columns_of in self._columns.items():
+                    create_checked(self._file, f"line_columns/{name}", columns_of)
+                for name, (channel, columns) in table.items():
+                    _create_growing(self._file, name, channel, columns, shapes[name], record)
+            # Kept open: closing a dataset writes what is left of it, and h5py ignores errors there.
+            self._growing = {name: self._file[name] for name in table}
+            self._complete = self._file[COMPLETE]
+            set_attribute(self._file, "outcome", RUNNING)
+            self._file.flush()
+            self._reserve()
+        except (OSError, RuntimeError):
+            self.abandon()
+            raise
+
+    def append(
+        self, blocks: Mapping[str, np.ndarray], line: LineBlock, state: Mapping[str, Any] | None
+    ) -> None:
+        """Append rows to growing datasets and store a state to continue from.
+
+        Parameters
+        ----------
+        blocks : path in the file -> (rows, ...) array
+        line : rows of the line's channels
+        state : what ``checkpoint`` is to hold, None to leave it
+
+        Raises
+        ------
+        NoRoom
+            If there is no room for another append; this one is complete.
+        OSError, RuntimeError
+            If HDF5 could not write.
+        """
+        for name, block in blocks.items():
+            dataset = self._growing[name]
+            start = dataset.shape[0]
+            dataset.resize(start + block.shape[0], axis=0)
+            dataset[start:] = block
+        self._append_line(line)
+        store_extremes(self._file, self._growing["time"].shape[0], line.extremes)
+        self._file.flush()
+        self._complete[...] = _rows(self._file)
+        self._file.flush()
+        if state is not None:
+            self._store(state)
+        self._reserve()
+        if not self._begun:
+            os.replace(self._made_as, self._path)
+            self._begun = True
+            self._on_begun()
+
+    def check_in_place(self) -> None:
+        """Raise ``storage.Elsewhere`` if the path names this file no longer."""
+        if self._begun:
+            check_in_place(self._path, self._file.id.get_vfd_handle())
+
+    def extremes(self) -> dict[str, np.ndarray] | None:
+        """The extremes of the rows that are there by channel, (2, columns); None if not kept."""
+        return extremes_at(self._file, self._growing["time"].shape[0])
+
+    def conclude(self, outcome: str) -> None:
+        """Store how the run ended."""
+        time = self._growing["time"]
+        attributes = self._file.attrs
+        set_attribute(self._file, "outcome", outcome)
+        attributes["n_steps"] = max(time.shape[0] - 1, 0)
+        attributes["simulated_s"] = float(time[-1] - time[0]) if time.shape[0] else 0.0
+        # Of a resumed run the part that its wall time belongs to.
+        attributes["marched_s"] = float(time[-1]) - self._start_time if time.shape[0] else 0.0
+        self._file.flush()
+
+    def close(self, performance: Mapping[str, Any]) -> None:
+        """Store ``performance`` as root attributes and close the file."""
+        for name, value in performance.items():
+            set_attribute(self._file, name, as_attribute(value))
+        self._file.flush()
+        with trimmed(self._file):
+            self._file.close()
+        self._forget()
+
+    def _append_line(self, line: LineBlock) -> None:
+        """Append rows of the line's channels; blocks that are outside of the window are left out,
+        so that they take no room."""
+        start = self._growing[LINE_TIME].shape[0]
+        edges = self._record.within(line.position)
+        for name, values in line.values.items():
+            dataset = self._growing[f"line_channels/{name}"]
+            dataset.resize(start + line.time.size, axis=0)
+            if edges is None:
+                dataset[start:] = values
+            elif values.size:
+                write_window(dataset, start, values, self._x[name], edges)
+        self._growing[LINE_TIME].resize(start + line.time.size, axis=0)
+        self._growing[LINE_TIME][start:] = line.time
+
+    def abandon(self) -> None:
+        """Close the file without writing to it, after a write has failed."""
+        abandon(self._file)
+        self._forget()
+
+    def _forget(self) -> None:
+        """Remove a new file that never held a row."""
+        if not self._begun:
+            self._made_as.unlink(missing_ok=True)
+
+    def _store(self, state: Mapping[str, Any]) -> None:
+        """Write a state, the first one into both slots, any other into the older one."""
+        group = self._file.require_group("checkpoint")
+        slots = (_SLOTS[self._n_states % 2],) if self._n_states else _SLOTS
+        for slot in slots:
+            place = group.require_group(slot)
+            for name in set(place) - set(state):  # of the line as it was before an incident
+                del place[name]
+            for name, value in state.items():
+                _replace(place, name, value)
+            seal_arrays(place, state)
+            self._file.flush()
+            set_attribute(group, "latest", slot)
+        self._file.flush()
+        self._n_states += 1
+
+    def _reserve(self) -> None:
+        handle = self._file.id.get_vfd_handle()
+        reserve(handle, self._file.id.get_filesize(), self._room)
+
+
+def _table(
+    stage: Stage, with_energies: bool, record: LineRecord, x: Mapping[str, np.ndarray]
+) -> dict[str, tuple[Channel, int]]:
+    """Growing datasets: path -> channel and columns, 0 columns for one value a row."""
+    table = {"time": (channels.TIME, 0)}
+    for channel in channels.CHANNELS.values():
+        if channel.per == channels.PANTOGRAPH:
+            table[f"channels/{channel.name}"] = (channel, stage.n_pantographs)
+    if stage.several_strips:
+        table[f"channels/{channels.STRIP_FORCE.name}"] = (channels.STRIP_FORCE, sum(stage.n_strips))
+    if stage.joints_in_loop:
+        channel = channels.CONSTRAINT_VIOLATION
+        table[f"channels/{channel.name}"] = (channel, stage.n_pantographs)
+    table[LINE_TIME] = (channels.TIME, 0)
+    for name in record.names:
+        table[f"line_channels/{name}"] = (channels.CHANNELS[name], int(x[name].size))
+    if with_energies:
+        table.update({f"energy/{c.name}": (c, 0) for c in channels.ENERGIES.values()})
+    return table
+
+
+def _write_head(
+    file: h5py.File, stage: Stage, header: Header, n_ranks: int, record: LineRecord
+) -> None:
+    fixed = {
+        "format": FORMAT,
+        "dt_s": stage.dt,
+        "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        "n_steps_planned": stage.n_steps,
+        "n_strips": list(stage.n_strips),
+        "line_record": record.as_table(),
+    }
+    for name, value in {**header.attributes, **fixed}.items():
+        set_attribute(file, name, as_attribute(value))
+    seal_attributes(file)
+    # A restart changes it.
+    file.attrs["n_ranks"] = n_ranks
+    known = {
+        "line/arm_x": stage.arm_x,
+        "line/dropper_x": stage.dropper_x,
+        "line/node_points": stage.node_points,
+    }
+    for name, array in {**header.datasets, **known, COMPLETE: [0, 0, 0]}.items():
+        create_checked(file, name, array)
+
+
+def _create_growing(
+    file: h5py.File, path: str, channel: Channel, columns: int, chunk: Chunk, record: LineRecord
+) -> None:
+    # A fixed dimension of zero is narrower than any chunk: leave it open.
+    shape, limit, chunks = (
+        ((0,), (None,), (chunk.rows,))
+        if channel.per == channels.RUN
+        else ((0, columns), (None, columns or None), tuple(chunk))
+    )
+    known: dict[str, Any] = {}
+    if channel.name in channels.LINE_CHANNELS and record.compression == GZIP:
+        known = {"compression": "gzip", "compression_opts": GZIP_LEVEL, "shuffle": True}
+    # A chunk that HDF5's index has lost, or that was never written, reads as NaN, not as zeros.
+    dataset = file.create_dataset(
+        path,
+        shape=shape,
+        maxshape=limit,
+        chunks=chunks,
+        dtype="f8",
+        fletcher32=True,
+        fillvalue=np.nan,
+        **known,
+    )
+    set_attribute(dataset, "unit", channel.unit)
+    set_attribute(dataset, "meaning", channel.meaning)
+
+
+def _rows(file: h5py.File) -> list[int]:
+    """Rows of the channels, of the energies and of the line's channels."""
+    return [file[name].shape[0] if name in file else 0 for name in _CLOCKS]
+
+
+def complete_rows(file: h5py.File) -> list[int]:
+    """Rows of the channels, of the energies and of the line's channels that are whole; all of them
+    in files of earlier versions."""
+    found = file[COMPLETE][...].tolist() if COMPLETE in file else []
+    return [*found, *_rows(file)[len(found) :]]
+
+
+def _cut(file: h5py.File, time: float) -> None:
+    """Drop the records from ``time`` [s] on."""
+    parts = [
+        [file["time"], *file["channels"].values()],
+        list(file["energy"].values()) if "energy" in file else [],
+        list(file["line_channels"].values()),
+    ]
+    for clock, datasets, complete in zip(_CLOCKS, parts, complete_rows(file), strict=True):
+        keep = rows_before(file[clock], complete, time) if clock in file else 0
+        for dataset in datasets:
+            dataset.resize(keep, axis=0)
+    counted = _rows(file)
+    _replace(file, COMPLETE, counted)
+    drop_extremes(file, counted[0])
+
+
+def rows_before(clock: h5py.Dataset, n: int, time: float) -> int:
+    """How many of the first ``n`` ascending times of a dataset are before ``time``, by bisection:
+    nothing that grows with the run is read."""
+    low, high = 0, n
+    while low < high:
+        middle = (low + high) // 2
+        if clock[middle] < time:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+def _replace(group: h5py.Group, name: str, value: Any) -> None:
+    """Overwrite in place if shape and type are the same, so that the file does not grow."""
+    array = np.asarray(value)
+    old = group.get(name)
+    if old is not None and old.shape == array.shape and old.dtype == array.dtype:
+        old[...] = array
+        return
+    if old is not None:
+        del group[name]
+    group.create_dataset(name, data=value)

@@ -1,1 +1,0 @@
-"""Pages and pictures of results: what reports and figures are made of."""

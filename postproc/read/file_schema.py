@@ -1,0 +1,309 @@
+"""The attributes and datasets of a result file, declared once: kind, range, what may be missing.
+
+``sound_file`` reads a file against these tables.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from catenary.postproc.evaluate.standards import EDITIONS, SYSTEMS
+from catenary.postproc.record import channels
+from catenary.postproc.record.line_record import LineRecord, from_table
+
+# Beyond these sizes a recorded value is damage, by unit; the march itself ends a run whose contact
+# force passes 1e9 N.
+LARGEST = {"s": 1e9, "m": 1e9, "N": 1e12, "J": 1e21, "-": 1e12}
+REQUIRED = object()
+# Files whose line channels stand beside the others, at every step, without extremes.
+EARLIER_FORMAT = "catenary-run-1"
+
+
+class Attribute(NamedTuple):
+    """A root attribute.
+
+    ``must_be`` says in words what ``sound`` tests, for a message; ``is_json`` whether it is stored
+    as JSON; ``fallback`` is the value taken in place of a missing or damaged one, ``REQUIRED`` if
+    there is none.
+    """
+
+    must_be: str
+    sound: Callable[[Any], bool]
+    is_json: bool = False
+    fallback: Any = REQUIRED
+
+
+class Constant(NamedTuple):
+    """A dataset that is written once: letters for its dimensions, and bounds of its values.
+
+    A letter stands for the same size in all datasets; a digit is that size itself. ``low`` and
+    ``high`` are inclusive; ``ascending`` means strictly. ``whole`` numbers are stored as integers.
+    """
+
+    shape: str
+    low: float = -LARGEST["m"]
+    high: float = LARGEST["m"]
+    whole: bool = False
+    ascending: bool = False
+
+
+class Growing(NamedTuple):
+    """A dataset that grows by a row a step.
+
+    ``columns`` is the letter of the columns' number, empty for one value a row; ``essential``
+    whether the run ends, for a reader, where this one is damaged; ``may_be_nan`` whether NaN is a
+    value.
+    """
+
+    unit: str
+    columns: str
+    essential: bool = False
+    may_be_nan: bool = False
+
+
+def is_number(value: Any, low: float = -math.inf, high: float = math.inf) -> bool:
+    """Whether ``value`` is a finite number within bounds."""
+    known = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return known and math.isfinite(value) and low <= value <= high
+
+
+def is_whole(value: Any, low: int = 0, high: int = 10**12) -> bool:
+    """Whether ``value`` is an integer within bounds."""
+    return isinstance(value, int) and not isinstance(value, bool) and low <= value <= high
+
+
+def is_text(value: Any) -> bool:
+    """Whether ``value`` is text without control characters."""
+    return isinstance(value, str) and not any(ord(letter) < 32 for letter in value)
+
+
+def _number(low: float, high: float, unit: str, fallback: Any = REQUIRED) -> Attribute:
+    """A number above ``low``."""
+    return Attribute(
+        f"a number above {low:g} and up to {high:g} {unit}",
+        lambda value: is_number(value, low, high) and value > low,
+        fallback=fallback,
+    )
+
+
+def _not_negative(fallback: Any) -> Attribute:
+    return Attribute(
+        "a number of zero or more", lambda value: is_number(value, 0.0, 1e12), fallback=fallback
+    )
+
+
+def _whole(low: int, fallback: Any = REQUIRED) -> Attribute:
+    return Attribute(
+        f"a whole number from {low}", lambda value: is_whole(value, low), fallback=fallback
+    )
+
+
+def _text(fallback: Any = REQUIRED) -> Attribute:
+    return Attribute("text", is_text, fallback=fallback)
+
+
+def _one_of(known: Mapping[str, Any]) -> Attribute:
+    return Attribute(
+        "one of " + ", ".join(known), lambda value: isinstance(value, str) and value in known
+    )
+
+
+def _table_of_numbers(value: Any) -> bool:
+    return isinstance(value, dict) and all(is_number(v) for v in value.values())
+
+
+def _line_record(value: Any) -> bool:
+    try:
+        record = from_table(value)
+    except (KeyError, TypeError, ValueError, IndexError):
+        return False
+    ends = [*(record.window or ()), *(record.stretch or ())]
+    return (
+        1 <= record.every <= 10**9
+        and all(map(math.isfinite, ends))
+        and set(record.names) <= set(channels.LINE_CHANNELS)
+    )
+
+
+def _effects(value: Any) -> bool:
+    return isinstance(value, list) and all(
+        isinstance(row, list) and len(row) == 3 and all(isinstance(word, str) for word in row)
+        for row in value
+    )
+
+
+def _incidents(value: Any) -> bool:
+    return isinstance(value, list) and all(
+        isinstance(fact, dict)
+        and is_number(fact.get("time_s"))
+        and isinstance(fact.get("says"), str)
+        for fact in value
+    )
+
+
+def _arrivals(value: Any) -> bool:
+    if not isinstance(value, dict):
+        return False
+    rows, warnings = value.get("pantographs", []), value.get("warnings", [])
+    return (
+        isinstance(rows, list)
+        and all(isinstance(row, dict) and isinstance(row.get("says"), str) for row in rows)
+        and isinstance(warnings, list)
+        and all(isinstance(text, str) for text in warnings)
+    )
+
+
+_FACT_TEXTS, _FACT_NUMBERS = ("kind", "description"), ("static_force_N",)
+
+
+def _pantographs(value: Any) -> bool:
+    def sound(facts: Any) -> bool:
+        if not isinstance(facts, dict):
+            return False
+        if not facts:
+            return True
+        mass = facts.get("touching_mass_kg")
+        return (
+            all(isinstance(facts.get(name), str) for name in _FACT_TEXTS)
+            and all(is_number(facts.get(name), 0.0) for name in _FACT_NUMBERS)
+            and (mass is None or is_number(mass, 1e-9))
+        )
+
+    return isinstance(value, list) and all(map(sound, value))
+
+
+# What reports read of a scene: path, whether required, and what it must be.
+_CONFIG: tuple[tuple[tuple[str, ...], bool, Callable[[Any], bool]], ...] = (
+    (("line", "contact_wire", "tension_N"), True, lambda v: is_number(v, 1e-6)),
+    (("line", "contact_wire", "mass_kg_per_m"), True, lambda v: is_number(v, 1e-9)),
+    (("line", "contact_wire", "bending_stiffness_N_m2"), True, lambda v: is_number(v, 0.0)),
+    (("line", "damping", "alpha_s"), True, lambda v: is_number(v, 0.0)),
+    (("line", "damping", "beta_per_s"), True, lambda v: is_number(v, 0.0)),
+    (("line", "damping", "per_component"), False, lambda v: isinstance(v, dict)),
+    (("line", "damping", "per_component", "contact_wire"), False, _table_of_numbers),
+    (("line", "damping", "per_component", "droppers"), False, _table_of_numbers),
+    (("line", "dropper"), False, lambda v: isinstance(v, dict)),
+    (("line", "dropper", "stiffness_N_per_m"), False, lambda v: is_number(v, 0.0)),
+    (("numerics", "dt_s"), True, lambda v: is_number(v, 1e-12)),
+    (("numerics", "integrator"), False, is_text),
+    (("numerics", "spectral_radius"), False, lambda v: is_number(v, 0.0, 1.0)),
+    (("numerics", "newmark_beta"), False, lambda v: is_number(v, 0.0)),
+    (("numerics", "newmark_gamma"), False, lambda v: is_number(v, 0.0)),
+    (("numerics", "iterations"), False, is_whole),
+    (("numerics", "adaptive_tolerance_N"), False, lambda v: is_number(v, 0.0)),
+    (("numerics", "smallest_dt_s"), False, lambda v: is_number(v, 1e-12)),
+    (("contact",), False, lambda v: isinstance(v, dict)),
+    (("contact", "law"), False, is_text),
+    (("contact", "stiffness_N_per_m"), False, lambda v: is_number(v, 0.0)),
+    (("contact", "hertz_stiffness_N_per_m1_5"), False, lambda v: is_number(v, 0.0)),
+)
+
+
+def config_fault(config: Any) -> str:
+    """The first key of a scene that reports cannot take, empty if there is none."""
+    for path, required, sound in _CONFIG:
+        place = config
+        for key in path:
+            place = place.get(key) if isinstance(place, dict) else None
+        if (place is None and required) or (place is not None and not sound(place)):
+            return ".".join(path)
+    return ""
+
+
+ATTRIBUTES: dict[str, Attribute] = {
+    "case": _text(),
+    "title": _text(""),
+    "n_dofs": _whole(1),
+    "speed_m_per_s": _number(0.0, 1e4, "m/s"),
+    "wave_speed_m_per_s": _number(0.0, 1e6, "m/s"),
+    "system": _one_of(SYSTEMS),
+    "edition": _one_of(EDITIONS),
+    "dt_s": _number(0.0, 1e3, "s"),
+    "n_steps_planned": _whole(1),
+    "n_ranks": _whole(1, 1),
+    "created": _text("unknown"),
+    "outcome": Attribute("text", lambda v: isinstance(v, str) and bool(v), fallback="running"),
+    "n_steps": _whole(0, None),
+    "simulated_s": _not_negative(None),
+    "marched_s": _not_negative(None),
+    "march_wall_s": _not_negative(None),
+    "config": Attribute("a scene as JSON", lambda v: not config_fault(v), is_json=True),
+    "versions": Attribute("a table", lambda v: isinstance(v, dict), True, {}),
+    "effects_on": Attribute("a list of names with titles and reasons", _effects, True),
+    "effects_off": Attribute("a list of names with titles and reasons", _effects, True),
+    "pantographs": Attribute("a list of tables of facts", _pantographs, True, []),
+    "incidents": Attribute("a list of times with sentences", _incidents, True, []),
+    "arrivals": Attribute("facts of waves from the ends, with sentences", _arrivals, True, {}),
+    "petsc_options": Attribute("a list", lambda v: isinstance(v, list), True, []),
+    "n_strips": Attribute(
+        "a list of whole numbers",
+        lambda v: isinstance(v, list) and all(is_whole(n, 1, 1000) for n in v),
+        True,
+        [],
+    ),
+    "line_record": Attribute("what is recorded of the line", _line_record, True, None),
+    "phase_wall_s": Attribute("a table of numbers", _table_of_numbers, True, {}),
+    "inner_iterations": Attribute("a table of numbers", _table_of_numbers, True, {}),
+}
+
+# Letters: A arms, D droppers, N nodes, M masts, C nodes of the contact wire, E of the elasticity.
+_NUMBERS = Constant("D", 0, 1e12, whole=True)
+CONSTANTS: dict[str, Constant] = {
+    "line/arm_x": Constant("A"),
+    "line/dropper_x": Constant("D"),
+    "line/node_points": Constant("N3"),
+    "line/support_x": Constant("M", ascending=True),
+    "line/dropper_span": _NUMBERS,
+    "line/running_range": Constant("2"),
+    "line/evaluation_range": Constant("2", ascending=True),
+    "line/droppers": _NUMBERS._replace(shape="D2"),
+    "line/wires/contact_wire": _NUMBERS._replace(shape="C"),
+    "static/dropper_length": Constant("D"),
+    "static/dropper_force": Constant("D", -LARGEST["N"], LARGEST["N"]),
+    "static/contact_x": Constant("C"),
+    "static/contact_height": Constant("C"),
+    "static/elasticity_x": Constant("E"),
+    "static/elasticity": Constant("E"),
+}
+
+# Columns that are recorded of a line's channel, in files that do not record all.
+LINE_COLUMNS: dict[str, tuple[str, str]] = {
+    "line_columns/arm_uplift": ("a", "A"),
+    "line_columns/dropper_force": ("d", "D"),
+}
+
+CLOCK = Growing("s", "", essential=True)
+GROWING: dict[str, Growing] = {
+    f"channels/{channel.name}": Growing(channel.unit, "P", essential=True)
+    for channel in channels.CHANNELS.values()
+    if channel.per == channels.PANTOGRAPH
+}
+# Channels that not every run has.
+OPTIONAL: dict[str, Growing] = {
+    f"channels/{channels.STRIP_FORCE.name}": Growing("N", "S"),
+    f"channels/{channels.CONSTRAINT_VIOLATION.name}": Growing("m", "P", may_be_nan=True),
+}
+ENERGIES: dict[str, Growing] = {
+    f"energy/{channel.name}": Growing(channel.unit, "", essential=True)
+    for channel in channels.ENERGIES.values()
+}
+LINE_CLOCK = "line_channels/time"
+
+
+def line_tables(about: Mapping[str, Any]) -> tuple[dict[str, Growing], dict[str, Growing]]:
+    """The line's channels of a file with these root attributes: with the steps, and apart.
+
+    In files of an earlier version they stand with the steps. Small letters are recorded columns.
+    """
+    known = {channels.CHANNELS[name].per: name for name in channels.LINE_CHANNELS}
+    letters = {known[channels.ARM]: "a", known[channels.DROPPER]: "d"}
+    of = {name: Growing(channels.CHANNELS[name].unit, letter) for name, letter in letters.items()}
+    if about.get("format") == EARLIER_FORMAT:
+        return {f"channels/{name}": declared for name, declared in of.items()}, {}
+    told = about.get("line_record")
+    record = LineRecord() if told is None else from_table(told)
+    gaps = record.window is not None
+    apart = {f"line_channels/{n}": of[n]._replace(may_be_nan=gaps) for n in record.names}
+    return {}, {LINE_CLOCK: CLOCK, **apart}

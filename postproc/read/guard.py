@@ -1,0 +1,117 @@
+"""Looks for damage in a result file in a process of its own: HDF5 crashes at some damaged tables,
+and runs in circles at others.
+
+Not collective. ``python -m catenary.postproc.read.guard FILE`` prints what it found as JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from catenary.postproc.read.records import Records
+from catenary.postproc.read.sound_file import SoundFile
+from catenary.solver.base.errors import InputError
+
+RESULT_FILE = "run.h5"
+# What reading a file may take: so long, and a second for each part of this size [s], [B].
+LIMIT, PER_SECOND = 30.0, 10e6
+# The process is to be no rank of a run, with its launcher's variables.
+_OF_LAUNCHERS = ("OMPI_", "PMIX_", "PMI_")
+_WALK = """
+import sys, h5py
+with h5py.File(sys.argv[1], "r") as file:
+    file.visititems(lambda name, item: print(name, getattr(item, "shape", None)))
+"""
+
+
+def examined(path: Path, limit: float | None = None) -> Records | None:
+    """Which records of a result file are sound; None if there is no file.
+
+    Parameters
+    ----------
+    path : the result file or the folder that holds it as ``run.h5``
+    limit : after how long the file counts as damaged [s], None for one that follows from its size
+
+    Raises
+    ------
+    InputError
+        If it is no result file, or damaged so that no report can be made of it; also where HDF5
+        crashes at it or does not come to an end.
+    """
+    path = path / RESULT_FILE if path.is_dir() else path
+    if not path.is_file():
+        return None
+    if limit is None:
+        limit = LIMIT + path.stat().st_size / PER_SECOND
+    try:
+        done = _child(["-m", __name__, str(path)], limit)
+    except subprocess.TimeoutExpired as error:
+        raise InputError(
+            f"{path} is damaged: HDF5 does not come to an end of reading it within {limit:.0f} s; "
+            "nothing in it can be used"
+        ) from error
+    if done.returncode < 0:
+        name = signal.Signals(-done.returncode).name
+        raise InputError(
+            f"{path} is damaged: HDF5 crashes at its tables ({name}); nothing in it can be used"
+        )
+    try:
+        found = json.loads(done.stdout)
+    except ValueError as error:
+        last = done.stderr.decode(errors="replace").strip().splitlines()[-1:] or ["no word"]
+        raise InputError(
+            f"{path} is damaged: it cannot be examined ({last[0]}); nothing in it can be used"
+        ) from error
+    if "refused" in found:
+        raise InputError(found["refused"])
+    damaged = {
+        name: [(int(begin), int(end)) for begin, end in parts]
+        for name, parts in found["damaged"].items()
+    }
+    return Records(found["rows"], damaged, found["told"], float(found["last"]))
+
+
+def _child(words: list[str], limit: float) -> subprocess.CompletedProcess[bytes]:
+    """What a Python of its own makes of ``words`` within ``limit`` [s]."""
+    return subprocess.run(
+        [sys.executable, "-P", *words],
+        env=_environment(),
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        timeout=limit,
+        check=False,
+    )
+
+
+def survives(path: Path, limit: float = LIMIT) -> bool:
+    """Whether HDF5 opens every dataset of a file, without a crash and within ``limit`` [s]."""
+    try:
+        done = _child(["-c", _WALK, str(path)], limit)
+    except subprocess.TimeoutExpired:
+        return False
+    return done.returncode == 0
+
+
+def _environment() -> dict[str, str]:
+    return {k: v for k, v in os.environ.items() if not k.startswith(_OF_LAUNCHERS)}
+
+
+def examine(path: Path) -> str:
+    """What is found in a file as JSON: the fields of ``Records``, or why it is refused."""
+    try:
+        file = SoundFile(path)
+        found = file.records
+        file.read_states()
+        file.close()
+    except InputError as error:
+        return json.dumps({"refused": str(error)})
+    return json.dumps(found._asdict())
+
+
+if __name__ == "__main__":
+    sys.stdout.write(examine(Path(sys.argv[1])))

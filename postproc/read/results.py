@@ -1,0 +1,361 @@
+"""Reads a result file, finished or not. Everything after the run goes through this reader."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from catenary.postproc.files import block_reading
+from catenary.postproc.files.result_file import DONE, FORMAT, LINE_TIME, RUNNING, complete_rows
+from catenary.postproc.read.records import Records
+from catenary.postproc.read.sound_file import SoundFile
+from catenary.postproc.record import channels
+from catenary.postproc.record.line_record import LineRecord, from_table
+from catenary.solver.base.errors import InputError
+
+logger = logging.getLogger("catenary.results")
+
+RESULT_FILE = "run.h5"
+
+
+class Results:
+    """A result file opened for reading. A context manager; not collective.
+
+    All channels are cut to the rows that are whole, so that a file whose writer was killed reads
+    like a shorter run.
+
+    Parameters
+    ----------
+    path : the result file or the folder that holds it as ``run.h5``
+    records : what ``evaluate.guard`` found in it, None to look for damage here
+
+    Raises
+    ------
+    InputError
+        If there is no such file, if it is not a result file of this program, or if it is damaged
+        so that no report can be made of it.
+    """
+
+    def __init__(self, path: Path | str, records: Records | None = None) -> None:
+        path = Path(path)
+        self.path = path / RESULT_FILE if path.is_dir() else path
+        if not self.path.is_file():
+            raise InputError(f"{self.path} does not exist: name a result file or its folder")
+        self._file = SoundFile(self.path, records)
+
+    def __enter__(self) -> Results:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    # ---- what the run was -------------------------------------------------------------------
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Root attributes, lists and tables decoded, numbers as Python's."""
+        return self._file.attrs
+
+    @property
+    def damage(self) -> list[str]:
+        """A sentence that names the file's damage and what is used of it, none if it is sound."""
+        return self._file.told
+
+    @property
+    def outcome(self) -> str:
+        """ "done", "interrupted", "running" (also if the program was killed), or what broke."""
+        return str(self.attributes.get("outcome", RUNNING))
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run came to its planned end."""
+        return self.outcome == DONE
+
+    @property
+    def dt(self) -> float:
+        """Time step [s]."""
+        return float(self.attributes["dt_s"])
+
+    @property
+    def n_steps(self) -> int:
+        """Steps recorded, without the initial state."""
+        return max(self._length - 1, 0)
+
+    @property
+    def simulated(self) -> float:
+        """Time between the first and the last record [s]."""
+        clock, n = self._file["time"], self._length
+        return float(clock[n - 1] - clock[0]) if n else 0.0
+
+    # ---- channels ---------------------------------------------------------------------------
+
+    @cached_property
+    def _length(self) -> int:
+        return complete_rows(self._file)[0]
+
+    @cached_property
+    def _line_length(self) -> int:
+        """Rows of the line's channels, none of which is later than the last step."""
+        if LINE_TIME not in self._file:
+            return self._length
+        n = complete_rows(self._file)[2]
+        return min(n, (self._length - 1) // self.line_record.every + 1) if self._length else 0
+
+    @cached_property
+    def line_record(self) -> LineRecord:
+        """Which part of the line's channels is recorded; all in files of earlier versions."""
+        told = self.attributes.get("line_record")
+        return LineRecord() if told is None else from_table(told)
+
+    @property
+    def time(self) -> np.ndarray:
+        """Times of the records, shape (n,) [s], read anew at each call."""
+        return np.asarray(self._file["time"][: self._length])
+
+    def times(self, part: slice) -> np.ndarray:
+        """Times of some records [s]."""
+        return np.asarray(self._file["time"][part])
+
+    def time_at(self, row: int) -> float:
+        """Time of a record [s]."""
+        return float(self._file["time"][row])
+
+    @property
+    def line_time(self) -> np.ndarray:
+        """Times of the rows of the line's channels, shape (m,) [s], read anew at each call."""
+        clock = self._file[LINE_TIME if LINE_TIME in self._file else "time"]
+        return np.asarray(clock[: self._line_length])
+
+    def times_of(self, name: str) -> np.ndarray:
+        """Times of the rows of a channel [s]."""
+        return self.line_time if name in channels.LINE_CHANNELS else self.time
+
+    def n_rows(self, name: str) -> int:
+        """Rows of a channel; those of the line may be fewer than the steps."""
+        return self._line_length if name in channels.LINE_CHANNELS else self._length
+
+    def channel(self, name: str) -> np.ndarray:
+        """A channel of ``postproc.channels``, shape (n, columns), read anew at each call.
+
+        What is not recorded of the line is NaN. Reads all of it into memory: see ``column`` and
+        ``blocks``.
+        """
+        return self.rows(name, slice(0, self.n_rows(name)))
+
+    def rows(self, name: str, part: slice) -> np.ndarray:
+        """Some rows of a channel, shape (rows, columns), NaN where the line is not recorded."""
+        table = self._table(name)
+        if table is None or name not in channels.LINE_CHANNELS:
+            return self._unrecorded(name, part) if table is None else np.asarray(table[part])
+        columns = self.recorded_columns(name)
+        if columns.size == self._n_places(name):
+            return np.asarray(table[part])
+        whole = self._unrecorded(name, part)
+        whole[:, columns] = table[part]
+        return whole
+
+    def column(self, name: str, index: int, part: slice | None = None) -> np.ndarray:
+        """One column of a channel, all of its rows or ``part`` of them, from ``start`` to ``stop``;
+        NaN where the line is not recorded."""
+        table = self._table(name)
+        part = slice(0, self.n_rows(name)) if part is None else part
+        if name in channels.LINE_CHANNELS:
+            place = np.flatnonzero(self.recorded_columns(name) == index)
+            if table is None or not place.size:
+                return np.full(part.stop - part.start, np.nan)
+            index = int(place[0])
+        assert table is not None
+        return block_reading.column(table, part, index)
+
+    def blocks(self, name: str) -> Iterator[tuple[slice, np.ndarray]]:
+        """All rows of a channel in order, by blocks: which rows, and their values as ``rows``."""
+        table = self._table(name)
+        step = table.chunks[0] if table is not None and table.chunks else 1
+        if table is None or name in channels.LINE_CHANNELS:
+            n_columns = self._n_places(name)
+        else:
+            n_columns = table.shape[1]
+        for part in block_reading.row_blocks(self.n_rows(name), n_columns, step):
+            yield part, self.rows(name, part)
+
+    def recorded_columns(self, name: str) -> np.ndarray:
+        """Which arms or droppers have a column in the table of a line's channel, (n,) int."""
+        if name not in self.line_record.names:
+            return np.zeros(0, dtype=np.int64)
+        path = f"line_columns/{name}"
+        if path in self._file:
+            return np.asarray(self._file[path][...])
+        return np.arange(self._n_places(name))
+
+    def extremes(self, name: str) -> np.ndarray:
+        """Smallest and largest value of each column of a channel, shape (2, columns).
+
+        Over every step, whatever is recorded of the line; NaN if there are no steps.
+        """
+        if name not in channels.LINE_CHANNELS:
+            return block_reading.extremes(self._file[f"channels/{name}"], self._length)
+        kept = self._file.extremes(self._length)
+        if kept is not None:
+            return kept[name]
+        table = self._table(name)
+        if table is None or not self.line_record.whole:
+            return np.full((2, self._n_places(name)), np.nan)
+        return block_reading.extremes(table, self._line_length)
+
+    def _table(self, name: str) -> Any:
+        """The table of a channel, None if the channel was not recorded."""
+        if name in channels.LINE_CHANNELS and f"line_channels/{name}" in self._file:
+            return self._file[f"line_channels/{name}"]
+        return self._file[f"channels/{name}"] if f"channels/{name}" in self._file else None
+
+    def _n_places(self, name: str) -> int:
+        """Columns that a channel of the line has if all are recorded."""
+        of = {channels.ARM: "line/arm_x", channels.DROPPER: "line/dropper_x"}
+        return int(self._file[of[channels.CHANNELS[name].per]].shape[0])
+
+    def _unrecorded(self, name: str, part: slice) -> np.ndarray:
+        n = len(range(*part.indices(self.n_rows(name))))
+        return np.full((n, self._n_places(name)), np.nan)
+
+    @property
+    def n_pantographs(self) -> int:
+        """Number of pantographs."""
+        return int(self._file["channels/contact_force"].shape[1])
+
+    def n_strips(self) -> list[int]:
+        """Number of strips of each pantograph, by their order; one each in files without."""
+        told: list[int] = self.attributes.get("n_strips", [])
+        return told or [1] * self.n_pantographs
+
+    @property
+    def several_strips(self) -> bool:
+        """Whether a pantograph has more than one strip."""
+        return max(self.n_strips(), default=1) > 1
+
+    def strip_columns(self) -> list[range]:
+        """Columns of ``strip_force`` of each pantograph."""
+        ends = np.cumsum([0, *self.n_strips()]).tolist()
+        return [range(*pair) for pair in itertools.pairwise(ends)]
+
+    def strip_forces(self) -> list[np.ndarray]:
+        """Shares of the strips in the contact force of each pantograph, (n, its strips) each [N].
+
+        Empty if no pantograph has more than one. Reads all of them into memory.
+        """
+        if not self.several_strips:
+            return []
+        whole = self.channel(channels.STRIP_FORCE.name)
+        return [whole[:, columns.start : columns.stop] for columns in self.strip_columns()]
+
+    @property
+    def has_violations(self) -> bool:
+        """Whether a pantograph has joints in the time loop."""
+        return f"channels/{channels.CONSTRAINT_VIOLATION.name}" in self._file
+
+    def constraint_violations(self) -> np.ndarray | None:
+        """Largest open joint of each pantograph at each record, (n, n_pantographs) [m].
+
+        NaN where a pantograph has no joints in the time loop, None if none has.
+        """
+        name = channels.CONSTRAINT_VIOLATION.name
+        return self.channel(name) if self.has_violations else None
+
+    def largest_violations(self) -> list[float | None]:
+        """The same over the whole run (n_pantographs,) [m], None without joints in the loop."""
+        name = channels.CONSTRAINT_VIOLATION.name
+        if not self.has_violations or not self._length:
+            return [None] * self.n_pantographs
+        found = self.extremes(name)[1]
+        return [None if np.isnan(largest) else float(largest) for largest in found]
+
+    def pantograph_facts(self) -> list[dict[str, Any]]:
+        """What is told of each pantograph, by their order: ``kind``, ``model``, ``description``,
+        ``static_force_N``, ``actuator_force_N``; empty tables in files without."""
+        told: list[dict[str, Any]] = self.attributes.get("pantographs", [])
+        return told or [{} for _ in range(self.n_pantographs)]
+
+    def pantograph_names(self) -> list[str]:
+        """How the pantographs are called, by their order on the train."""
+        n = self.n_pantographs
+        if n == 1:
+            return ["pantograph"]
+        first = self.first_position if self._length else -np.arange(n, dtype=float)
+        names = [""] * n
+        for place, index in enumerate(np.argsort(-first, kind="stable")):
+            middle = f"no. {place + 1}"
+            names[index] = "leading" if place == 0 else "trailing" if place == n - 1 else middle
+        return names
+
+    @property
+    def first_position(self) -> np.ndarray:
+        """Where the pantographs are in the first record, (n_pantographs,) [m]."""
+        return np.asarray(self._file["channels/contact_position"][0])
+
+    def energies(self) -> dict[str, np.ndarray]:
+        """Energies by name, each (m,), empty if the run did not record them."""
+        if "energy" not in self._file:
+            return {}
+        n = complete_rows(self._file)[1]
+        return {name: np.asarray(self._file[f"energy/{name}"][:n]) for name in channels.ENERGIES}
+
+    # ---- constants --------------------------------------------------------------------------
+
+    def line(self, name: str) -> np.ndarray:
+        """A dataset of ``/line``, for instance ``support_x``."""
+        return np.asarray(self._file[f"line/{name}"][...])
+
+    def wires(self) -> dict[str, np.ndarray]:
+        """Node numbers of each wire in order of x."""
+        return {name: np.asarray(nodes[...]) for name, nodes in self._file["line/wires"].items()}
+
+    def static(self, name: str) -> np.ndarray:
+        """A dataset of ``/static``, for instance ``dropper_length``."""
+        return np.asarray(self._file[f"static/{name}"][...])
+
+    @cached_property
+    def evaluation(self) -> tuple[float, float]:
+        """From and to of the stretch whose statistics are judged [m]."""
+        start, end = self.line("evaluation_range")
+        return float(start), float(end)
+
+    @cached_property
+    def reference_span(self) -> int:
+        """The span in the middle of the evaluation stretch, counted from 0, shown for all."""
+        masts = self.line("support_x")
+        middle = 0.5 * sum(self.evaluation)
+        return int(np.clip(np.searchsorted(masts, middle, side="right") - 1, 0, masts.size - 2))
+
+    @property
+    def checkpoint(self) -> dict[str, Any]:
+        """The latest sound state to continue from.
+
+        Raises
+        ------
+        InputError
+            If the file holds none, or is of an earlier version.
+        """
+        if self.attributes["format"] != FORMAT:
+            raise InputError(
+                f"{self.path} was written by an earlier version of Catenary, which this one reads "
+                "but cannot continue; start the run anew"
+            )
+        state, told = self._file.state()
+        for sentence in told:
+            logger.warning("%s", sentence)
+        return state

@@ -1,0 +1,216 @@
+"""A result file opened for reading, of which nothing is given out that is not sound."""
+
+from __future__ import annotations
+
+import contextlib
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from catenary.postproc.files.checked import text_of
+from catenary.postproc.files.kept_extremes import extremes_at
+from catenary.postproc.files.result_file import COMPLETE, FORMAT
+from catenary.postproc.read.attributes import HDF5_ERRORS, read_attributes
+from catenary.postproc.read.checkpoint import read_slot, slots_of
+from catenary.postproc.read.constants import constant_faults
+from catenary.postproc.read.file_schema import (
+    EARLIER_FORMAT,
+    ENERGIES,
+    OPTIONAL,
+    line_tables,
+)
+from catenary.postproc.read.records import Records, scan, table_faults
+from catenary.postproc.read.tables import PartialTable
+from catenary.solver.base.errors import InputError
+
+# More faults of one file than these are not listed.
+_LISTED = 3
+
+
+class SoundFile:
+    """A result file whose attributes, constants and tables have been checked. Not collective.
+
+    Reads like an ``h5py.File``: rows from the first damaged one of an essential table on are not
+    there, damaged rows of other tables are NaN.
+
+    Parameters
+    ----------
+    path : the result file
+    records : what ``scan`` found in it, None to scan it when records are first asked for
+
+    Attributes
+    ----------
+    attrs : sound root attributes, lists and tables decoded, numbers as Python's
+
+    Raises
+    ------
+    InputError
+        If it is no result file, or damaged so that no report can be made of it.
+    """
+
+    def __init__(self, path: Path, records: Records | None = None) -> None:
+        self.path = path
+        try:
+            # Without a lock, so that a run that is still going on can be looked at.
+            self._file = h5py.File(path, "r", locking=False)
+        except HDF5_ERRORS as error:
+            reason = " ".join(str(error).split())
+            raise InputError(
+                f"{path} cannot be read as HDF5 ({reason}): it is damaged or no result file; "
+                "nothing in it can be used"
+            ) from error
+        self._sizes: dict[str, int] = {}
+        try:
+            self._refuse_other_format()
+            self.attrs, fatal, self._partial = read_attributes(self._file)
+            faults, self._sizes = constant_faults(self._file)
+            self._faults = [] if fatal else table_faults(self._file, self.attrs, self._sizes)
+            fatal += faults + [f"{f.path} {f.fault}" for f in self._faults if f.essential]
+            fatal += self._strip_faults() if not fatal else []
+            if fatal:
+                raise InputError(_refusal(path, fatal, self._usable()))
+        except BaseException:
+            self.close()
+            raise
+        if records is not None:
+            self.records = records
+
+    @cached_property
+    def records(self) -> Records:
+        """Which records are sound."""
+        return scan(self._file, self.attrs, self._faults)
+
+    @property
+    def told(self) -> list[str]:
+        """A sentence that names the file's damage and what is used of it, none if it is sound."""
+        damage = [*self._partial, *self.records.told]
+        if not damage:
+            return []
+        return [f"{self.path.name} is damaged: {_listed(damage)}; {_up_to(self.records.last)}."]
+
+    def state(self) -> tuple[dict[str, Any], list[str]]:
+        """The latest sound state to continue from, and what is told of later ones.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        told: list[str] = []
+        for slot in slots_of(self._file):
+            try:
+                state = read_slot(self._file, slot, self.records.rows[0])
+            except ValueError as error:
+                told.append(f"the state in checkpoint/{slot} is damaged, {error}")
+                continue
+            if told:
+                told = [f"{self.path}: {_listed(told)}; the one of step {state['step']} is taken"]
+            return state, told
+        if not told:
+            raise InputError(f"{self.path} holds no state to continue from")
+        raise InputError(
+            f"{self.path} holds no sound state to continue from: {_listed(told)}; "
+            f"{_up_to(self.records.last)} and can be reported; to go on, start the run anew"
+        )
+
+    def read_states(self) -> None:
+        """Read all states and extremes once, sound or not."""
+        for slot in slots_of(self._file):
+            with contextlib.suppress(ValueError):
+                read_slot(self._file, slot, self.records.rows[0])
+        self.extremes(self.records.rows[0])
+
+    def __contains__(self, path: str) -> bool:
+        if path == "energy" and any(fault.path in ENERGIES for fault in self._faults):
+            return False
+        if path == COMPLETE or path in self.records.damaged:
+            return True
+        try:
+            return path in self._file
+        except HDF5_ERRORS:  # `records` tells it
+            return False
+
+    def __getitem__(self, path: str) -> Any:
+        if path == COMPLETE:
+            return np.array(self.records.rows)
+        if path in self.records.damaged:
+            return self._around(path)
+        try:
+            return self._file[path]
+        except HDF5_ERRORS as error:
+            raise InputError(f"{self.path} is damaged: {path} cannot be read") from error
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def _around(self, path: str) -> PartialTable:
+        with_steps, apart = line_tables(self.attrs)
+        columns = {**OPTIONAL, **with_steps, **apart}[path].columns
+        n = self.records.rows[2 if path in apart else 0]
+        shape = (n, self._sizes[columns]) if columns else (n,)
+        unusable = any(fault.path == path for fault in self._faults)
+        table = None if unusable else self._file[path]
+        return PartialTable(table, shape, self.records.damaged[path])
+
+    def extremes(self, n_rows: int) -> dict[str, np.ndarray] | None:
+        """Extremes of the line's channels over the first ``n_rows`` steps by channel,
+        (2, columns); None if they are not kept, or damaged."""
+        try:
+            return extremes_at(self._file, n_rows)
+        except HDF5_ERRORS:
+            return None
+
+    def _refuse_other_format(self) -> None:
+        try:
+            found = text_of(self._file.attrs.get("format"))
+        except HDF5_ERRORS as error:
+            raise InputError(
+                f"{self.path} is damaged: the head of the file cannot be read; nothing in it can "
+                "be used"
+            ) from error
+        if not isinstance(found, str) or found not in (FORMAT, EARLIER_FORMAT):
+            raise InputError(
+                f'{self.path} is no result file of this program: its attribute "format" is '
+                f"{found!r}, not {FORMAT!r}"
+            )
+
+    def _strip_faults(self) -> list[str]:
+        """What does not fit the number of pantographs."""
+        n = self._sizes["P"]
+        if n < 1:
+            return ["channels/contact_force has no columns"]
+        for name in ("n_strips", "pantographs"):
+            if self.attrs[name] and len(self.attrs[name]) != n:
+                return [f'its attribute "{name}" has {len(self.attrs[name])} entries for {n}']
+        strips = sum(self.attrs["n_strips"] or [1] * n)
+        path = "channels/strip_force"
+        if strips > n and self._sizes.get("S") != strips:
+            return [f"{path} does not have {strips} columns"]
+        return []
+
+    def _usable(self) -> str:
+        """What can still be used of a file of which no report can be made."""
+        if any(f.essential for f in self._faults) or "dt_s" not in self.attrs:
+            return "no part of it can be reported"
+        about = {"n_steps": None, "outcome": "running", **self.attrs}
+        last = scan(self._file, about, self._faults).last
+        return f"{_up_to(last)} and can be read with h5py"
+
+
+def _refusal(path: Path, faults: list[str], usable: str) -> str:
+    return f"{path} is damaged: {_listed(faults)}; {usable}"
+
+
+def _listed(faults: list[str]) -> str:
+    more = len(faults) - _LISTED
+    return "; ".join(faults[:_LISTED]) + (f"; and {more} more faults" if more > 0 else "")
+
+
+def _up_to(last: float) -> str:
+    if last != last:
+        return "none of its records can be read"
+    return f"its records up to t = {last:.3f} s are sound"

@@ -1,0 +1,77 @@
+"""Blocks of rows whose columns are spread over the ranks, put together on rank 0."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from catenary.solver.base.parallel import on_root
+
+
+class ColumnGather:
+    """Gathers (rows, owned columns) blocks of all ranks into one (rows, all columns) on rank 0.
+
+    Collective. All buffers are made here, so that a gather allocates nothing that grows with the
+    line.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+    owned : (n_owned,) int, global numbers of this rank's columns; may be empty
+    n_columns : number of columns over all ranks
+    max_rows : rows of the largest block
+
+    Raises
+    ------
+    ValueError
+        On rank 0, RuntimeError elsewhere, if a column has no owner or more than one.
+    """
+
+    def __init__(self, comm: Any, owned: np.ndarray, n_columns: int, max_rows: int) -> None:
+        self._comm = comm
+        owned = np.asarray(owned, dtype=np.int64)
+        parts = comm.gather(owned, root=0)
+        self._parts: list[np.ndarray] = parts if parts is not None else []
+        on_root(comm, lambda: _check_partition(self._parts, n_columns))
+        self.n_owned = int(owned.size)
+        self.n_columns = n_columns
+        # One rank's columns need no putting together.
+        self._in_order = comm.size == 1 and np.array_equal(owned, np.arange(n_columns))
+        if comm.rank == 0 and not self._in_order:
+            self._received = np.empty(max_rows * n_columns)
+            self._whole = np.empty((max_rows, n_columns))
+
+    def __call__(self, block: np.ndarray) -> np.ndarray:
+        """All columns of the ranks' blocks on rank 0, an empty array elsewhere. Collective.
+
+        Parameters
+        ----------
+        block : (rows, n_owned) float64, C-contiguous, the same number of rows on all ranks
+
+        Returns
+        -------
+        (rows, n_columns) view that the next call overwrites, or the block itself
+        """
+        rows = block.shape[0]
+        if self._comm.rank != 0:
+            self._comm.Gatherv(block, None, root=0)
+            return np.empty((rows, 0))
+        if self._in_order:
+            return block
+        whole = self._whole[:rows]
+        counts = [rows * part.size for part in self._parts]
+        self._comm.Gatherv(block, [self._received, counts], root=0)
+        start = 0
+        for part, count in zip(self._parts, counts, strict=True):
+            whole[:, part] = self._received[start : start + count].reshape(rows, part.size)
+            start += count
+        return whole
+
+
+def _check_partition(parts: list[np.ndarray], n_columns: int) -> None:
+    claimed = np.sort(np.concatenate(parts))
+    if not np.array_equal(claimed, np.arange(n_columns)):
+        raise ValueError(
+            f"the ranks own {claimed.size} of {n_columns} columns, each must have one owner"
+        )

@@ -1,0 +1,89 @@
+"""What is known before the first step: the head of a result file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from catenary.meshgen.line import Line
+from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
+
+if TYPE_CHECKING:
+    from catenary.solver.statics.equilibrium import Elasticity, Equilibrium
+
+REQUIRED_ATTRIBUTES = (
+    "case",
+    "title",
+    "n_dofs",
+    "speed_m_per_s",
+    "wave_speed_m_per_s",
+    "system",
+    "edition",
+    "versions",
+    "config",
+    "effects_on",
+    "effects_off",
+)
+
+
+@dataclass(frozen=True)
+class Header:
+    """Root attributes and constant datasets of a result file; only rank 0 needs it.
+
+    Attributes
+    ----------
+    attributes : at least ``REQUIRED_ATTRIBUTES``; text and numbers are stored as they are, lists
+        and tables as JSON. ``speed_m_per_s`` is the train's and ``wave_speed_m_per_s`` the contact
+        wire's [m/s]; ``system`` and ``edition`` are keys of ``postproc.standards``;
+        ``effects_on`` and ``effects_off`` are lists of (name, title, reason).
+    datasets : path in the file -> array, from ``line_datasets`` and ``static_datasets``
+    """
+
+    attributes: Mapping[str, Any]
+    datasets: Mapping[str, np.ndarray]
+
+    def __post_init__(self) -> None:
+        missing = [name for name in REQUIRED_ATTRIBUTES if name not in self.attributes]
+        if missing:
+            raise ValueError(f"the head of a result file lacks {', '.join(missing)}")
+
+
+def line_datasets(
+    line: Line, mesh: LineMesh, evaluation: tuple[float, float]
+) -> dict[str, np.ndarray]:
+    """Datasets of ``/line``: masts, spans of the droppers, ranges, chains of nodes. Not collective.
+
+    Parameters
+    ----------
+    evaluation : from and to of the stretch whose statistics are judged [m]
+    """
+    masts = line.support_positions
+    dropper_x = mesh.x(mesh.droppers[:, 1])
+    datasets = {
+        "line/support_x": masts,
+        "line/dropper_span": np.searchsorted(masts, dropper_x, side="right") - 1,
+        "line/running_range": np.array(line.running_range),
+        "line/evaluation_range": np.array(evaluation, dtype=float),
+        "line/droppers": np.asarray(mesh.droppers, dtype=np.int64),
+    }
+    for name, nodes in mesh.wires.items():
+        datasets[f"line/wires/{name}"] = np.asarray(nodes, dtype=np.int64)
+    return datasets
+
+
+def static_datasets(
+    mesh: LineMesh, equilibrium: Equilibrium, elasticity: Elasticity
+) -> dict[str, np.ndarray]:
+    """Datasets of ``/static``: droppers, profile and elasticity at rest. Not collective."""
+    contact = mesh.wires[CONTACT_WIRE]
+    return {
+        "static/dropper_length": equilibrium.dropper_length,
+        "static/dropper_force": equilibrium.dropper_force,
+        "static/contact_x": mesh.x(contact),
+        "static/contact_height": equilibrium.height[contact],
+        "static/elasticity_x": elasticity.x,
+        "static/elasticity": elasticity.lift,
+    }

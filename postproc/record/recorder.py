@@ -1,0 +1,238 @@
+"""Writes the channels of a run into its result file while the run goes on.
+
+Between flushes a step only copies numbers into buffers. A flush gathers them to rank 0, which
+appends them with the serial driver, stores the state to continue from and makes HDF5 write all
+tables, so that a killed run leaves a file that is readable up to its last flush.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catenary.postproc.files.disk import Elsewhere, NoRoom, broken_write
+from catenary.postproc.files.result_file import DONE, INTERRUPTED, LineBlock, ResultFile
+from catenary.postproc.record import channels
+from catenary.postproc.record.header import Header
+from catenary.postproc.record.line_record import LineRecord
+from catenary.postproc.record.line_rows import LineGather, LineRows
+from catenary.solver.base.errors import RunBroken
+from catenary.solver.base.parallel import on_root
+from catenary.solver.time_loop.observers import Stage, StepView
+
+# What a run leaves that breaks before its first step.
+_NOTHING = "nothing was written, and results of an earlier run are as they were"
+_OF_PANTOGRAPHS = ("contact_position", "contact_force", "head_height", "wire_height")
+
+
+class Recorder:
+    """Observer that writes ``run.h5``.
+
+    Collective, like all its methods except ``observe`` between flushes. Call ``close`` after
+    ``finish``.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+    path : the result file; its folder is made. A new file takes the place of an earlier one when
+        its first step is on the disk
+    header : on rank 0 what the runner knows before the first step; ignored elsewhere
+    flush_every : steps between two flushes
+    energy_every : steps between two records of the energies, None for none
+    record : which part of the line's channels is recorded
+    resume : continue a file: what it holds from the stage's start time on is replaced
+    on_begun : called on rank 0 when a new file has taken its place
+    """
+
+    def __init__(
+        self,
+        comm: Any,
+        path: Path | str,
+        header: Header | None,
+        *,
+        flush_every: int = 500,
+        energy_every: int | None = None,
+        record: LineRecord | None = None,
+        resume: bool = False,
+        on_begun: Callable[[], None] = lambda: None,
+    ) -> None:
+        if comm.rank == 0 and header is None:
+            raise ValueError("rank 0 needs the head of the result file")
+        self._comm = comm
+        self._path = Path(path)
+        self._header = header
+        self._flush_every = flush_every
+        self._energy_every = energy_every
+        self._record = record or LineRecord()
+        self._resume = resume
+        self._on_begun = on_begun
+        self._file: ResultFile | None = None
+        self._broken = False
+        self._view: StepView | None = None
+        self._where: dict[str, slice] = {}
+        self._flushed_once = False
+        self._extremes: dict[str, np.ndarray] = {}
+        self._rows = 0
+        self._first_step = 0
+        self._energies: list[tuple[float, float, float]] = []
+
+    @property
+    def begun(self) -> bool:
+        """Whether the result file holds this run; not before its first step. The same on all."""
+        return self._resume or self._flushed_once
+
+    def start(self, stage: Stage) -> None:
+        """Make the buffers and open the file. Collective.
+
+        Raises
+        ------
+        RunBroken
+            On all ranks, if the file cannot be written.
+        """
+        rows = self._flush_every
+        self._last_time = stage.start_time
+        self._line = LineGather(self._comm, stage, self._record, rows)
+        self._time = np.zeros(rows)
+        self._names = [*_OF_PANTOGRAPHS]
+        if stage.several_strips:
+            self._names.append(channels.STRIP_FORCE.name)
+        if stage.joints_in_loop:
+            self._names.append(channels.CONSTRAINT_VIOLATION.name)
+        self._guarded(lambda: self._open(stage))
+        if self._resume:
+            self._guarded(self._read_extremes)
+            self._line.restore(self._comm.bcast(self._extremes, root=0))
+
+    def observe(self, view: StepView) -> None:
+        """Copy a step into the buffers; collective at the first step and whenever they are full."""
+        row = self._rows
+        if row == 0:
+            self._first_step = view.step
+        if not self._where:
+            self._where = view.columns
+            self._kept = np.zeros((self._flush_every, view.row.size))
+        self._time[row] = view.time
+        self._kept[row] = view.row
+        self._rows = row + 1
+        self._view = view
+        self._last_time = view.time
+        if self._energy_every and view.step % self._energy_every == 0:
+            self._energies.append((view.time, *view.energies()))
+        # The first step is written at once: it makes room for the state to continue from. After it
+        # each flush ends with a chunk of the file: a chunk is written once, so that a kill in the
+        # midst of writing one spoils no checksum of earlier rows.
+        if (view.step + 1) % self._flush_every == 0 or not self._flushed_once:
+            self._flush(view)
+
+    def finish(self, outcome: str) -> None:
+        """Write what is left and the outcome. Collective.
+
+        The state to continue from is renewed only if the run ended in good order.
+        """
+        if self._broken:
+            return
+        if self._where:
+            self._flush(self._view if outcome in (DONE, INTERRUPTED) else None)
+        self._guarded(lambda: self._open_file.conclude(outcome))
+
+    def close(self, performance: Mapping[str, Any] | None = None) -> None:
+        """Write what is known at the very end as root attributes and close the file. Collective.
+
+        Parameters
+        ----------
+        performance : for instance ``phase_wall_s``, ``march_wall_s``, ``inner_iterations``;
+            needed on rank 0 only
+        """
+        if not self._broken:
+            self._guarded(lambda: self._close(performance or {}))
+
+    def _flush(self, view: StepView | None) -> None:
+        """Gather the buffers, append them, and store the state of ``view``. Collective."""
+        line = self._line(self._first_step, self._columns)
+        state = view.checkpoint() if view is not None else None
+        self._guarded(lambda: self._append(self._blocks(), self._block(line), state))
+        self._rows = 0
+        self._energies.clear()
+        self._flushed_once = True
+
+    def _columns(self, name: str) -> np.ndarray:
+        """What is kept of a channel here, shape (rows, columns)."""
+        return np.ascontiguousarray(self._kept[: self._rows, self._where[name]])
+
+    # ---- rank 0 ------------------------------------------------------------------------------
+
+    def _guarded(self, work: Callable[[], None]) -> None:
+        """Run ``work`` on rank 0; if it fails, all ranks raise RunBroken. Collective."""
+
+        def attempt() -> None:
+            try:
+                work()
+            except (OSError, RuntimeError) as error:  # h5py raises both when a disk is full
+                words = (self._path, self._last_time, error)
+                broken = broken_write(*words) if self.begun else broken_write(*words, _NOTHING)
+                if isinstance(error, (NoRoom, Elsewhere)) and self._file is not None:
+                    self._file.conclude(str(broken))
+                    self._file.close({})
+                elif self._file is not None:
+                    self._file.abandon()
+                raise broken from error
+
+        try:
+            on_root(self._comm, attempt)
+        except RunBroken:
+            self._broken = True
+            raise
+
+    def _open(self, stage: Stage) -> None:
+        assert self._header is not None
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        self._file = ResultFile(
+            self._path,
+            stage,
+            self._header,
+            self._comm.size,
+            rows_per_append=self._flush_every,
+            with_energies=bool(self._energy_every),
+            record=self._record,
+            resume=self._resume,
+            on_begun=self._on_begun,
+        )
+
+    def _append(
+        self, blocks: Mapping[str, np.ndarray], line: LineBlock, state: Mapping[str, Any] | None
+    ) -> None:
+        # In this order nothing is lost of a file that was moved.
+        self._open_file.append(blocks, line, state)
+        self._open_file.check_in_place()
+
+    def _close(self, performance: Mapping[str, Any]) -> None:
+        self._open_file.check_in_place()
+        self._open_file.close(performance)
+
+    def _read_extremes(self) -> None:
+        found = self._open_file.extremes()
+        if found is None:
+            raise OSError("the extremes up to the state to continue from are missing")
+        self._extremes = found
+
+    def _block(self, line: LineRows) -> LineBlock:
+        """The rows of the line's channels with their times and positions of the train."""
+        position = self._kept[line.chosen, self._where["contact_position"]]
+        return LineBlock(self._time[line.chosen], position, line.values, line.extremes)
+
+    def _blocks(self) -> dict[str, np.ndarray]:
+        """What a flush appends of each step."""
+        blocks = {f"channels/{name}": self._columns(name) for name in self._names}
+        if self._energies:
+            table = np.array(self._energies)
+            blocks.update({f"energy/{n}": table[:, i] for i, n in enumerate(channels.ENERGIES)})
+        return {**blocks, "time": self._time[: self._rows]}
+
+    @property
+    def _open_file(self) -> ResultFile:
+        if self._file is None:
+            raise RuntimeError("the recorder was not started")
+        return self._file

@@ -1,0 +1,98 @@
+"""Tables for spreadsheets: the droppers as they are cut, the channels of the pantographs."""
+
+from __future__ import annotations
+
+import io
+from typing import NamedTuple, TextIO
+
+import numpy as np
+
+from catenary.postproc.files.csv_text import csv_text
+from catenary.postproc.read.results import Results
+from catenary.postproc.record import channels
+
+# Steps that are written at once.
+_ROWS = 10_000
+
+
+class DropperRow(NamedTuple):
+    """A dropper for the installer: span and number from 1, position from the span's left support
+    and along the track [m], length [m], force at rest [N]."""
+
+    span: int
+    number: int
+    position: float
+    x: float
+    length: float
+    force: float
+
+
+def dropper_table(results: Results) -> list[DropperRow]:
+    """All droppers of the line in order of x. Not collective."""
+    span = results.line("dropper_span")
+    x = results.line("dropper_x")
+    masts = results.line("support_x")
+    length, force = results.static("dropper_length"), results.static("dropper_force")
+    rows = []
+    for i in np.argsort(x, kind="stable"):
+        number = int(np.count_nonzero((span == span[i]) & (x <= x[i])))
+        rows.append(
+            DropperRow(
+                int(span[i]) + 1,
+                number,
+                float(x[i] - masts[span[i]]),
+                float(x[i]),
+                float(length[i]),
+                float(force[i]),
+            )
+        )
+    return rows
+
+
+def droppers_csv(results: Results) -> str:
+    """The dropper table as CSV text, lengths to a tenth of a millimetre."""
+    heads = ("span", "dropper", "position in span [m]", "position [m]", "length [m]", "force [N]")
+    rows = (
+        (
+            row.span,
+            row.number,
+            f"{row.position:.4f}",
+            f"{row.x:.4f}",
+            f"{row.length:.4f}",
+            f"{row.force:.2f}",
+        )
+        for row in dropper_table(results)
+    )
+    return csv_text(heads, rows)
+
+
+def pantographs_csv(results: Results) -> str:
+    """Time and the channels of all pantographs as CSV text, one line a step. Not collective."""
+    stream = io.StringIO()
+    write_pantographs_csv(results, stream)
+    return stream.getvalue()
+
+
+def write_pantographs_csv(results: Results, stream: TextIO) -> None:
+    """The same into an open text file, by blocks of steps. Not collective."""
+    names = results.pantograph_names()
+    prefixes = [f"{name} " if len(names) > 1 else "" for name in names]
+    tables = [c for c in channels.CHANNELS.values() if c.per == channels.PANTOGRAPH]
+    if results.has_violations:
+        tables.append(channels.CONSTRAINT_VIOLATION)
+    heads = [channels.TIME.label]
+    heads += [prefix + channel.label for channel in tables for prefix in prefixes]
+    strips = []
+    if results.several_strips:
+        for prefix, columns in zip(prefixes, results.strip_columns(), strict=True):
+            for number, column in enumerate(columns if len(columns) > 1 else []):
+                heads.append(f"{prefix}strip {number + 1} {channels.STRIP_FORCE.label}")
+                strips.append(column)
+    stream.write(csv_text(heads, ()))
+    for start in range(0, results.n_rows("time"), _ROWS):
+        part = slice(start, min(start + _ROWS, results.n_rows("time")))
+        blocks = [results.times(part)[:, None]]
+        blocks += [results.rows(channel.name, part) for channel in tables]
+        if strips:
+            blocks.append(results.rows(channels.STRIP_FORCE.name, part)[:, strips])
+        np.savetxt(stream, np.hstack(blocks), fmt="%.9g", delimiter=",")

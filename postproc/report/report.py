@@ -1,0 +1,309 @@
+"""The report of a run: ``report.html`` with its pictures, ``summary.json``, ``droppers.csv``.
+
+It reads the result file and nothing else, and works for unfinished runs as well.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import logging
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from matplotlib.figure import Figure
+
+from catenary.postproc.evaluate import standards
+from catenary.postproc.evaluate import statistics as stats
+from catenary.postproc.evaluate.comparing import decimals_that_tell
+from catenary.postproc.evaluate.error_indicators import Indicators, indicate
+from catenary.postproc.evaluate.remarks import remarks
+from catenary.postproc.evaluate.standards import KMH, Criterion
+from catenary.postproc.evaluate.statistics import RunStatistics
+from catenary.postproc.files.disk import write_into
+from catenary.postproc.read.records import Records
+from catenary.postproc.read.results import Results
+from catenary.postproc.record.line_record import says
+from catenary.postproc.report import csv_tables, plots
+from catenary.postproc.report.summary import as_json, real_time_factor, summarise
+from catenary.postproc.report.wording import counted, fixed
+
+logger = logging.getLogger("catenary.report")
+
+_TEMPLATES = Path(__file__).parent / "templates"
+_STATISTICS_ROWS = (
+    ("mean", "mean", "N", 1.0, 1),
+    ("standard deviation", "std", "N", 1.0, 1),
+    ("standard deviation, 0-5 Hz", "std_0_5", "N", 1.0, 1),
+    ("standard deviation, 5-20 Hz", "std_5_20", "N", 1.0, 1),
+    ("maximum", "maximum", "N", 1.0, 1),
+    ("minimum", "minimum", "N", 1.0, 1),
+    ("mean + 3 sigma", "stat_max", "N", 1.0, 1),
+    ("mean - 3 sigma", "stat_min", "N", 1.0, 1),
+    ("loss of contact (unfiltered)", "loss_percent", "%", 1.0, 3),
+    ("losses of 5 ms and longer", "arcing_percent", "%", 1.0, 3),
+    ("contact height range", "contact_height_range", "mm", 1e3, 1),
+)
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was written and found: the files, the criteria, and ``verdict`` (None: not judged)."""
+
+    files: list[Path]
+    criteria: list[Criterion]
+    verdict: bool | None
+
+
+@dataclass(frozen=True)
+class _Picture:
+    name: str
+    caption: str
+    data: bytes
+
+    @property
+    def uri(self) -> str:
+        return "data:image/png;base64," + base64.b64encode(self.data).decode("ascii")
+
+
+def write_report(
+    result_path: Path | str, out_dir: Path | str, records: Records | None = None
+) -> Report:
+    """Write summary, report, pictures and dropper table of a run into a folder. Not collective.
+
+    Each file appears whole or not at all.
+
+    Parameters
+    ----------
+    result_path : result file or its folder
+    out_dir : folder that exists
+    records : what ``evaluate.guard`` found in the file, None to look for damage here
+
+    Raises
+    ------
+    InputError
+        If ``result_path`` is no result file, or too damaged.
+    RunBroken
+        If a file cannot be written.
+    """
+    out = Path(out_dir)
+    with Results(result_path, records) as results:
+        for sentence in results.damage:
+            logger.warning("%s", sentence)
+        statistics = stats.evaluate(results)
+        criteria = judge(results, statistics)
+        pictures = _pictures(results, statistics)
+        content: dict[str, bytes | str] = {f"{p.name}.png": p.data for p in pictures}
+        content["droppers.csv"] = csv_tables.droppers_csv(results)
+        content["report.html"] = _html(results, statistics, criteria, pictures)
+        content["summary.json"] = as_json(summarise(results, statistics, criteria))
+        verdict = standards.verdict(criteria) if results.complete else None
+    return Report(write_into(out, content), criteria, verdict)
+
+
+def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
+    """Write ``summary.json`` of a run alone; returns the verdict as ``Report``. Not collective.
+
+    Raises
+    ------
+    InputError
+        If ``result_path`` is no result file.
+    """
+    with Results(result_path) as results:
+        statistics = stats.evaluate(results)
+        criteria = judge(results, statistics)
+        text = as_json(summarise(results, statistics, criteria))
+        verdict = standards.verdict(criteria) if results.complete else None
+    write_into(Path(out_dir), {"summary.json": text})
+    return verdict
+
+
+def judge(results: Results, statistics: RunStatistics) -> list[Criterion]:
+    """The criteria of the edition and system that the result file names. Not collective."""
+    about = results.attributes
+    return standards.judge(
+        statistics,
+        about["speed_m_per_s"],
+        about["wave_speed_m_per_s"],
+        about["system"],
+        about["edition"],
+    )
+
+
+def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
+    drawn: list[tuple[str, str, Figure | None]] = []
+    if results.n_rows("time") > 1:
+        drawn.append(
+            ("contact_force", "Contact force along the track.", plots.contact_force(results))
+        )
+        if results.several_strips:
+            caption = "Shares of the collector strips in the contact force, below 20 Hz."
+            drawn.append(("strip_forces", caption, plots.strip_forces(results)))
+        if len(statistics.complaints) < len(statistics.pantographs):
+            drawn += [
+                (
+                    "statistics",
+                    "Contact force in the evaluation stretch.",
+                    plots.force_statistics(results, statistics),
+                ),
+                (
+                    "histogram",
+                    "Distribution of the contact force in the evaluation stretch.",
+                    plots.force_histogram(results, statistics),
+                ),
+            ]
+        if statistics.supports.x.size:
+            limit = standards.EDITIONS[results.attributes["edition"]].arm_uplift
+            drawn.append(
+                (
+                    "uplift",
+                    "Uplift of the contact wire at the steady arms.",
+                    plots.arm_uplift(results, statistics, limit),
+                )
+            )
+        if statistics.droppers.x.size:
+            drawn.append(("droppers", "Dropper forces.", plots.dropper_force(results, statistics)))
+    drawn.append(("static", "Profile and elasticity of the line.", plots.static_line(results)))
+    drawn.append(("energy", "Energies of the line.", plots.energies(results)))
+    return [_Picture(name, text, plots.png(f)) for name, text, f in drawn if f is not None]
+
+
+def _html(
+    results: Results,
+    statistics: RunStatistics,
+    criteria: list[Criterion],
+    pictures: list[_Picture],
+) -> str:
+    environment = Environment(
+        loader=FileSystemLoader(_TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["number"] = _number
+    about = results.attributes
+    indicators = indicate(results)
+    return environment.get_template("report.html.j2").render(
+        about=about,
+        results=results,
+        statistics=statistics,
+        statistics_rows=_statistics_rows(statistics)
+        + _error_rows(indicators)
+        + _violation_row(results),
+        criteria=criteria,
+        digits=lambda c: decimals_that_tell(c.value, c.limit, 3 if c.unit == "%" else 1),
+        failed=[c for c in criteria if c.passed is False],
+        verdict=standards.verdict(criteria),
+        edition=standards.EDITIONS[about["edition"]].title,
+        system=standards.SYSTEMS[about["system"]],
+        speed_km_h=KMH * about["speed_m_per_s"],
+        wave_speed_km_h=KMH * about["wave_speed_m_per_s"],
+        droppers=csv_tables.dropper_table(results),
+        reference_span=results.reference_span + 1,
+        elasticity=1e3 * results.static("elasticity"),
+        remarks=[*results.damage, *indicators.warnings, *remarks(results)],
+        facts=_facts(results) + _mesh_facts(indicators),
+        phases=about.get("phase_wall_s", {}),
+        config=json.dumps(about["config"], indent=2, ensure_ascii=False),
+        pictures={p.name: p for p in pictures},
+    )
+
+
+def _statistics_rows(statistics: RunStatistics) -> list[tuple[str, str, list[str]]]:
+    """Label, unit and the figures of all pantographs, row by row."""
+    return [
+        (label, unit, [_number(factor * getattr(p, name), digits) for p in statistics.pantographs])
+        for label, name, unit, factor, digits in _STATISTICS_ROWS
+    ]
+
+
+def _error_rows(found: Indicators) -> list[tuple[str, str, list[str]]]:
+    """What the time step is estimated to change, pantograph by pantograph."""
+    label = "estimated error of the force history by the time step, 20 Hz, rms"
+    shares = [f"{_number(100.0 * share, 2)}" for share in found.relative_error]
+    return [
+        (label, "N", [_number(float(error), 2) for error in found.force_error]),
+        ("the same, of the standard deviation", "%", shares),
+    ]
+
+
+def _mesh_facts(found: Indicators) -> list[tuple[str, str]]:
+    """The shortest waves of the mesh beside those that matter."""
+    required = (
+        f"{found.required_frequency:.0f} Hz" if np.isfinite(found.required_frequency) else "–"
+    )
+    return [
+        (
+            "waves on the contact wire that the mesh carries within 1 %",
+            f"up to {found.resolved_frequency:.0f} Hz; waves that 20 Hz at the pantograph excite "
+            f"ahead of the train are as short as those of {required}",
+        )
+    ]
+
+
+def _violation_row(results: Results) -> list[tuple[str, str, list[str]]]:
+    """Joints of the whole run, where a pantograph has any in the time loop."""
+    if not results.has_violations:
+        return []
+    found = results.largest_violations()
+    return [
+        ("largest open joint, whole run", "m", ["–" if v is None else f"{v:.1e}" for v in found])
+    ]
+
+
+def _facts(results: Results) -> list[tuple[str, str]]:
+    about = results.attributes
+    n_cells = sum(len(nodes) - 1 for nodes in results.wires().values())
+    facts = [
+        (
+            "line",
+            f"{counted(results.line('support_x').size - 1, 'span')}, "
+            f"{results.line('support_x')[-1] - results.line('support_x')[0]:.0f} m, "
+            f"{counted(results.line('dropper_x').size, 'dropper')}, "
+            f"{counted(results.line('arm_x').size, 'steady arm')}",
+        ),
+        *(
+            (name, f"{told['kind']}, {told['description']}")
+            for name, told in zip(
+                results.pantograph_names(), results.pantograph_facts(), strict=True
+            )
+            if told
+        ),
+        ("mesh", f"{results.line('node_points').shape[0]} nodes, {n_cells} wire elements"),
+        ("unknowns", f"{about['n_dofs']}"),
+        ("ranks", f"{about['n_ranks']}"),
+        *(
+            (f"incident at {fact['time_s']:.4g} s", fact["says"])
+            for fact in about.get("incidents", [])
+        ),
+        *(
+            ("waves and run-in", fact["says"])
+            for fact in about.get("arrivals", {}).get("pantographs", [])
+        ),
+        ("arm uplift and dropper forces", says(results.line_record, results.dt)),
+        ("time step", f"{1e3 * results.dt:g} ms"),
+        ("steps", f"{results.n_steps} of {about['n_steps_planned']}"),
+        ("simulated time", f"{results.simulated:.3f} s"),
+    ]
+    if "march_wall_s" in about:
+        facts.append(("wall time of the march", f"{about['march_wall_s']:.2f} s"))
+    factor = real_time_factor(results)
+    if factor is not None:
+        facts.append(("real-time factor (simulated / wall)", f"{factor:.2f}"))
+    facts += [
+        (name.replace("_", " "), f"{value}")
+        for name, value in about.get("inner_iterations", {}).items()
+    ]
+    facts.append(("started", str(about["created"])))
+    return facts
+
+
+def _number(value: Any, digits: int = 1) -> str:
+    """``value`` with ``digits`` decimals, a dash for NaN and None."""
+    if value is None or value != value:
+        return "–"
+    return fixed(value, digits)

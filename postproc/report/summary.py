@@ -1,0 +1,144 @@
+"""``summary.json``: the figures of a run under keys that other programs rely on.
+
+Keys end in the unit that a reader expects (mm, km/h); what a run does not give is null.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from catenary.postproc.evaluate import error_indicators
+from catenary.postproc.evaluate.standards import KMH, Criterion, verdict
+from catenary.postproc.evaluate.statistics import PantographStatistics, RunStatistics
+from catenary.postproc.files.disk import plain
+from catenary.postproc.read.results import Results
+
+
+def summarise(
+    results: Results, statistics: RunStatistics, criteria: list[Criterion]
+) -> dict[str, Any]:
+    """The content of ``summary.json``: plain Python values, NaN as None. Not collective."""
+    attributes = results.attributes
+    start, end = results.evaluation
+    summary = {
+        "case": attributes["case"],
+        "title": attributes["title"],
+        "outcome": results.outcome,
+        "speed_km_h": KMH * attributes["speed_m_per_s"],
+        "n_dofs": attributes["n_dofs"],
+        "n_ranks": attributes["n_ranks"],
+        "n_steps": results.n_steps,
+        "dt_s": results.dt,
+        "simulated_s": results.simulated,
+        "march_wall_s": attributes.get("march_wall_s"),
+        "real_time_factor": real_time_factor(results),
+        "phase_wall_s": attributes.get("phase_wall_s", {}),
+        "inner_iterations": attributes.get("inner_iterations", {}),
+        "evaluation_m": [start, end],
+        "pantographs": [
+            _pantograph(p, told, violation)
+            for p, told, violation in zip(
+                statistics.pantographs,
+                results.pantograph_facts(),
+                results.largest_violations(),
+                strict=True,
+            )
+        ],
+        "supports": _supports(statistics),
+        "incidents": attributes.get("incidents", []),
+        "arrivals": attributes.get("arrivals", {}),
+        "droppers": {
+            "n_slackened": statistics.droppers.n_slackened,
+            "max_force_N": statistics.droppers.maximum,
+            "min_force_N": statistics.droppers.minimum,
+        },
+        "static": _static(results),
+        "acceptance": [_criterion(c) for c in criteria],
+        "passed": verdict(criteria) if results.complete else None,
+        "indicators": error_indicators.as_table(error_indicators.indicate(results)),
+        "complaints": statistics.complaints + results.damage,
+        "effects_on": [name for name, _, _ in attributes["effects_on"]],
+        "effects_off": [name for name, _, _ in attributes["effects_off"]],
+        "versions": attributes["versions"],
+    }
+    return dict(plain(summary))
+
+
+def as_json(summary: dict[str, Any]) -> str:
+    """``summary`` as the text of a JSON file."""
+    return json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def real_time_factor(results: Results) -> float | None:
+    """Simulated time over the wall time of the march: above 1 the run is faster than the train.
+
+    Of a resumed run this is the speed of its last part.
+    """
+    wall, marched = (results.attributes.get(name) for name in ("march_wall_s", "marched_s"))
+    return marched / wall if wall and marched is not None else None
+
+
+def _pantograph(
+    p: PantographStatistics, told: Mapping[str, Any], violation: float | None
+) -> dict[str, Any]:
+    return {
+        "name": p.name,
+        "kind": told.get("kind"),
+        "model": told.get("model"),
+        "static_force_N": told.get("static_force_N"),
+        "actuator_force_N": told.get("actuator_force_N"),
+        "mean_N": p.mean,
+        "std_N": p.std,
+        "std_0_5_N": p.std_0_5,
+        "std_5_20_N": p.std_5_20,
+        "max_N": p.maximum,
+        "min_N": p.minimum,
+        "stat_max_N": p.stat_max,
+        "stat_min_N": p.stat_min,
+        "loss_percent": p.loss_percent,
+        "arcing_percent": p.arcing_percent,
+        "contact_height_range_mm": 1e3 * p.contact_height_range,
+        "max_constraint_violation_m": violation,
+    }
+
+
+def _supports(statistics: RunStatistics) -> dict[str, Any]:
+    supports = statistics.supports
+    rows = zip(supports.x, supports.uplift, supports.evaluated, strict=True)
+    return {
+        "max_uplift_mm": 1e3 * supports.maximum,
+        "per_support": [
+            {"x_m": x, "max_uplift_mm": 1e3 * uplift, "evaluated": evaluated}
+            for x, uplift, evaluated in rows
+        ],
+    }
+
+
+def _static(results: Results) -> dict[str, Any]:
+    in_span = results.line("dropper_span") == results.reference_span
+    elasticity = 1e3 * results.static("elasticity")
+    return {
+        "span": results.reference_span + 1,
+        "dropper_lengths_m": results.static("dropper_length")[in_span],
+        "dropper_forces_N": results.static("dropper_force")[in_span],
+        "elasticity_mm_per_N": {
+            "max": np.max(elasticity, initial=-np.inf),
+            "min": np.min(elasticity, initial=np.inf),
+        },
+    }
+
+
+def _criterion(c: Criterion) -> dict[str, Any]:
+    return {
+        "criterion": c.criterion,
+        "value": c.value,
+        "limit": c.limit,
+        "unit": c.unit,
+        "relation": c.relation,
+        "passed": c.passed,
+        "clause": c.clause,
+    }

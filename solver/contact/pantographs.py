@@ -1,0 +1,232 @@
+"""The train's pantographs: models on rank 0, their contacts' places on all ranks."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy import integrate
+
+from catenary.mbs.build import Operation, has_joints, make_pantograph
+from catenary.mbs.head.roll import roll_of
+from catenary.mbs.head.wire_crossing import LateralPath
+from catenary.mbs.interface import Pantograph
+from catenary.mbs.lowering import LoweredPantograph
+from catenary.mbs.mechanism.full_pantograph import FullPantograph
+from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.meshgen.mesh import CONTACT_WIRE
+from catenary.solver.base.bound import bound
+from catenary.solver.base.parallel import on_root
+from catenary.solver.contact.contact_wire import ContactWire
+from catenary.solver.contact.head_states import Heads
+from catenary.solver.contact_problem import complementarity_kernels
+from catenary.solver.integrators import state_kernels
+from catenary.solver.model.model import Model
+from catenary.solver.problem.contact_laws import KinematicLaw
+from catenary.solver.problem.problem import Placement, Problem
+from catenary.solver.statics.equilibrium import Elasticity, Equilibrium
+
+
+class Pantographs:
+    """All pantographs of a train, n of them, with their n_contacts strips. Collective to make.
+
+    Each is placed at the wire at rest, or ``start_below`` it. With a kinematic contact it already
+    moves up and down with the wire under way, V dw/dx: a head at rest would have to be brought to
+    that within one step.
+
+    Attributes
+    ----------
+    models : the models on rank 0, empty elsewhere
+    n_contacts : number of strips that may touch the wire
+    contact_place : (n_contacts,) of these along the track [m], all ranks
+    position : (n,) of the pantographs along the track [m], all ranks
+    contact_force, head_height, wire_height : (n,) after the latest step, rank 0 only: the sum over
+        a pantograph's strips, and their means
+    strip_force : (n_contacts,) the same of each strip
+    joints_in_loop : whether a pantograph has joints that may open, all ranks
+    constraint_violation : (n,) largest open joint after the latest step [m], NaN for pantographs
+        without joints in the loop, rank 0 only
+    told : ``position`` and all these of the latest step one after another
+
+    Raises
+    ------
+    CatenaryError
+        On all ranks, if a pantograph does not reach the wire.
+    """
+
+    def __init__(
+        self,
+        comm: Any,
+        problem: Problem,
+        wire: ContactWire,
+        nominal_height: Callable[[Placement], float],
+    ) -> None:
+        train = problem.train
+        self._wire = wire
+        self._start = np.array([train.start - p.behind for p in train.placements])
+        self._speed = train.speed
+        offsets = [placement.data.strip_offsets for placement in train.placements]
+        counts = [len(own) for own in offsets]
+        ends = np.cumsum([0, *counts])
+        self._strips = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
+        self._ends = ends.astype(np.int64)
+        contact_start = np.repeat(self._start, counts) + np.concatenate(offsets)
+        # Places of contacts and of pantographs move together, in one sum.
+        self.n_contacts = contact_start.size
+        self._all_start = np.concatenate([contact_start, self._start])
+        sizes = (self.n, 3 * self.n, self.n_contacts, self.n)
+        places_and_told = np.zeros(self.n_contacts + sum(sizes))
+        self._all_places = places_and_told[: self._all_start.size]
+        self._move = bound(state_kernels.shift, self._all_start, self._all_places, later=(0.0,))
+        self.contact_place = places_and_told[: self.n_contacts]
+        self.told = places_and_told[self.n_contacts :]
+        self.position, forces, self.strip_force, self.constraint_violation = np.split(
+            self.told, np.cumsum(sizes)[:-1]
+        )
+        self._all_places[:] = self._all_start
+        self.contact_force, self.head_height, self.wire_height = forces.reshape(3, self.n)
+        # Those of them that a step fills after its forces are known.
+        self._of_step = self.told[self.n : 4 * self.n + self.n_contacts]
+        self.wire_height[:] = wire.rest_height(self._start)
+        self.head_height[:] = self.wire_height - train.start_below
+        self._heads = Heads(self.n_contacts)
+        self.joints_in_loop = any(has_joints(placement.data) for placement in train.placements)
+        self.constraint_violation[:] = np.nan
+        self.models: list[Pantograph] = []
+        on_root(comm, lambda: self._make_all(problem, nominal_height))
+
+    @property
+    def n(self) -> int:
+        """Number of pantographs."""
+        return int(self._start.size)
+
+    @property
+    def n_strips(self) -> tuple[int, ...]:
+        """Number of strips of each pantograph."""
+        return tuple(strips.stop - strips.start for strips in self._strips)
+
+    def move_to(self, time: float) -> None:
+        """Move pantographs and contacts to where they are at ``time`` [s]."""
+        self._move(self._speed * time)
+
+    def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Heights and velocities (n_contacts,) at ``time`` from the motion alone. Rank 0 only."""
+        height, velocity = np.empty(self.n_contacts), np.empty(self.n_contacts)
+        for model, strips in self._models_with_strips:
+            height[strips], velocity[strips] = model.extrapolate(time)
+        return height, velocity
+
+    def predict(self, time: float) -> Heads:
+        """Strips at ``time`` as functions of the contact forces. Rank 0 only."""
+        if len(self.models) == 1:
+            self._heads.adopt(self.models[0].predict(time))
+            return self._heads
+        for model, strips in self._models_with_strips:
+            self._heads.put(strips, model.predict(time))
+        return self._heads
+
+    def advance(self, contact_force: np.ndarray, reported: np.ndarray, depth: np.ndarray) -> None:
+        """Take the step with these forces and depths (n_contacts,). Rank 0 only.
+
+        ``reported`` is what of the forces counts as contact force in the records.
+        """
+        if len(self.models) == 1:
+            self.models[0].advance(contact_force)
+        else:
+            for model, strips in self._models_with_strips:
+                model.advance(contact_force[strips])
+        if self.joints_in_loop:
+            self.look_at_joints()
+        complementarity_kernels.tell(
+            contact_force, reported, self._heads.numbers, depth, self._ends, self._of_step
+        )
+
+    def look_at_joints(self) -> None:
+        """Note by how much joints are open now. Does nothing where there are no models."""
+        for number, model in enumerate(self.models):
+            moved = model.model if isinstance(model, LoweredPantograph) else model
+            if isinstance(moved, FullPantograph):
+                self.constraint_violation[number] = moved.constraint_violation()
+
+    def take_over(self, other: Pantographs) -> None:
+        """Go on from where ``other`` are, the same train made for another step. Not collective."""
+        self.told[:] = other.told
+        for mine, theirs in zip(self.models, other.models, strict=True):
+            mine.restore(theirs.state())
+
+    def _make_all(self, problem: Problem, nominal_height: Callable[[Placement], float]) -> None:
+        """Make and place all models. Rank 0 only."""
+        velocity = np.zeros(self.n)
+        if isinstance(problem.contact, KinematicLaw):
+            velocity = self._speed * self._wire.rest_slope(self._start)
+        for number, placement in enumerate(problem.train.placements):
+            model = self._make(problem, placement, nominal_height(placement))
+            model.place(float(self.head_height[number]), float(velocity[number]))
+            self.models.append(model)
+        self._models_with_strips = list(zip(self.models, self._strips, strict=True))
+        self.look_at_joints()
+
+    def _make(self, problem: Problem, placement: Placement, nominal_height: float) -> Pantograph:
+        numerics = problem.numerics
+        base = _base_of(problem, placement)
+        operation = Operation(
+            placement.static_force,
+            nominal_height,
+            problem.train.raise_time,
+            numerics.dt,
+            numerics.beta,
+            numerics.gamma,
+            _lateral_path(problem, placement, base),
+            base,
+            placement.lowering if "lowering" in problem.effects else None,
+        )
+        return make_pantograph(placement.data, operation)
+
+
+def _base_of(problem: Problem, placement: Placement) -> BaseMotion | None:
+    """How the vehicle moves the base of a pantograph, None if it is not simulated."""
+    train = problem.train
+    if "vehicle_motion" not in problem.effects or train.vehicle is None:
+        return None
+    return BaseMotion(train.vehicle, train.start - placement.behind, train.speed)
+
+
+def _lateral_path(
+    problem: Problem, placement: Placement, base: BaseMotion | None
+) -> LateralPath | None:
+    """Where the wire crosses the strips of a pantograph, None if its head does not roll."""
+    if "head_roll" not in problem.effects or roll_of(placement.data) is None:
+        return None
+    line, train = problem.line, problem.train
+    return LateralPath(
+        line.support_positions,
+        line.stagger,
+        train.start - placement.behind,
+        placement.data.strip_offsets,
+        train.speed,
+        base,
+    )
+
+
+def nominal_height_rule(
+    model: Model, form: Equilibrium, elasticity: Elasticity
+) -> Callable[[Placement], float]:
+    """Head height at which the static force is defined.
+
+    That of the placement, or else the mean height of the contact wire in the stretch of
+    ``elasticity`` when the static force lifts it, so that the base spring neither adds to the
+    mean force nor takes from it.
+    """
+    nodes = model.mesh.wires[CONTACT_WIRE]
+    x = elasticity.x
+    at_rest = np.interp(x, model.mesh.x(nodes), form.height[nodes])
+
+    def height(placement: Placement) -> float:
+        if placement.nominal_height is not None:
+            return placement.nominal_height
+        lifted = at_rest + placement.static_force * elasticity.lift
+        return float(integrate.trapezoid(lifted, x) / (x[-1] - x[0]))
+
+    return height

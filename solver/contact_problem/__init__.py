@@ -1,0 +1,1 @@
+"""The small complementarity problem of a step: contact forces and slack droppers."""

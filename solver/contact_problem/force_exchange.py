@@ -1,0 +1,180 @@
+"""The step's messages: every rank's share of the inner problem to rank 0, the forces back.
+
+One reduction to rank 0 and one broadcast of fixed size a step, whatever the number of ranks; what
+a rank sends besides are rows of droppers that may slacken, if it owns any. Both also carry the wish
+to stop and the news of a failure, so that all ranks leave the loop at the same step.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+
+from catenary.solver.base.petsc_events import event
+from catenary.solver.contact.line_response import LineResponse
+
+_FIRST_CAPACITY = 32
+# Numbers before the forces in a reply, and the tag of rows.
+_HEAD, _ROWS = 4, 7
+_NO_NUMBERS, _NO_FORCES = np.zeros(0, dtype=np.int64), np.zeros(0)
+
+
+class Verdict(IntEnum):
+    """What rank 0 tells the others after the inner problem."""
+
+    ADVANCE = 0
+    ADVANCE_AND_STOP = 1
+    REPEAT = 2
+    ENLARGE = 3
+    BROKEN = 4
+    REJECT = 5
+
+
+class Reply(NamedTuple):
+    """Rank 0's answer: verdict, contact forces (n,) [N], slack droppers and compensations [N].
+
+    ``room`` is how many droppers a rank needs room for, with the verdict ``ENLARGE``; ``level`` is
+    that of the next step, where steps adapt.
+    """
+
+    verdict: Verdict
+    contact_force: np.ndarray
+    droppers: np.ndarray = _NO_NUMBERS
+    compensation: np.ndarray = _NO_FORCES
+    room: int = 0
+    level: int = 0
+
+
+class Exchange:
+    """Sums up and broadcasts for ``n_contacts``. All methods are collective.
+
+    Attributes
+    ----------
+    share : this rank's share of the inner problem, to be filled in before ``to_root``
+    messages, bytes_sent : that this rank sent since it was made; a sum or broadcast counts as one
+
+    Parameters
+    ----------
+    early : whether shares hold what the line extrapolates to
+    limits : those of all shares, see ``LineResponse``
+    """
+
+    def __init__(self, comm: Any, n_contacts: int, early: bool, limits: np.ndarray) -> None:
+        self._comm = comm
+        self._n = n_contacts
+        self._early, self._limits = early, limits
+        self.messages = self.bytes_sent = 0
+        self._reduce, self._reply = event("ContactReduce"), event("ContactReply")
+        self.enlarge(_FIRST_CAPACITY)
+
+    def enlarge(self, capacity: int) -> None:
+        """Make room for at least ``capacity`` droppers a rank."""
+        n = self._n
+        self.share = LineResponse(n, capacity, self._early, self._limits)
+        self._merged = LineResponse(n, capacity, self._early, self._limits)
+        self._answer = np.zeros(_HEAD + n + 2 * capacity)
+        # Said once how long they are and of what, messages cost half a microsecond less.
+        self._told = _message(self._answer)
+        self._sums = _message(self.share.summed), _message(self._merged.summed)
+
+    def to_root(self) -> LineResponse | None:
+        """Sum of all shares on rank 0, with the rows of all; None elsewhere."""
+        comm, share = self._comm, self.share
+        if comm.size == 1:
+            return share
+        is_root = comm.rank == 0
+        self._reduce.begin()
+        # Two ranks at most own the ends of an element: the order of summing does not matter.
+        mine, all_together = self._sums
+        comm.Reduce(mine, all_together if is_root else None, op=MPI.SUM, root=0)
+        self._count(share.summed.nbytes)
+        if not is_root:
+            if share.count:
+                rows = share.rows[: share.count]
+                comm.Send(rows, dest=0, tag=_ROWS)
+                self._count(rows.nbytes)
+        else:
+            self._receive_rows()
+        self._reduce.end()
+        return self._merged if is_root else None
+
+    def from_root(self, reply: Reply | None) -> Reply:
+        """Rank 0's reply on all ranks; None is passed elsewhere."""
+        comm, answer, n = self._comm, self._answer, self._n
+        if comm.size == 1:
+            assert reply is not None
+            return reply
+        self._reply.begin()
+        room = (answer.size - _HEAD - n) // 2
+        if reply is not None:
+            count = reply.droppers.size
+            # One by one: numpy takes longer over a tuple than the rest of this.
+            answer[0], answer[1] = reply.verdict, count
+            answer[2], answer[3] = reply.room, reply.level
+            answer[_HEAD : _HEAD + n] = reply.contact_force
+            if 0 < count <= room:
+                answer[_HEAD + n : _HEAD + n + count] = reply.droppers
+                answer[_HEAD + n + count : _HEAD + n + 2 * count] = reply.compensation
+        comm.Bcast(self._told, root=0)
+        self._count(answer.nbytes)
+        count = int(answer[1])
+        pairs = answer[_HEAD + n : _HEAD + n + 2 * count]
+        if count > room:
+            # More slack droppers at once than a rank reports: rare, and told in a second message.
+            pairs = np.zeros(2 * count)
+            if reply is not None:
+                pairs[:count], pairs[count:] = reply.droppers, reply.compensation
+            comm.Bcast(pairs, root=0)
+            self._count(pairs.nbytes)
+        self._reply.end()
+        if reply is not None:
+            return reply
+        return Reply(
+            Verdict(int(answer[0])),
+            answer[_HEAD : _HEAD + n].copy(),
+            pairs[:count].astype(np.int64),
+            pairs[count : 2 * count].copy(),
+            int(answer[2]),
+            int(answer[3]),
+        )
+
+    def _count(self, n_bytes: int) -> None:
+        self.messages += 1
+        self.bytes_sent += n_bytes
+
+    def _receive_rows(self) -> None:
+        """Rows of all ranks one after the other, rank by rank."""
+        comm, share, merged = self._comm, self.share, self._merged
+        total = merged.count
+        if total == 0:
+            return
+        if total > merged.capacity:
+            larger = LineResponse(self._n, 2 * total, self._early, self._limits)
+            larger.summed[:] = merged.summed
+            self._merged = merged = larger
+            self._sums = self._sums[0], _message(larger.summed)
+        end = share.count
+        merged.rows[:end] = share.rows[:end]
+        missing = total - end
+        if not missing:
+            return
+        parts, status = {}, MPI.Status()
+        while missing > 0:
+            comm.Probe(source=MPI.ANY_SOURCE, tag=_ROWS, status=status)
+            rows = np.empty(
+                (status.Get_count(MPI.DOUBLE) // share.rows.shape[1], share.rows.shape[1])
+            )
+            comm.Recv(rows, source=status.Get_source(), tag=_ROWS)
+            parts[status.Get_source()] = rows
+            missing -= len(rows)
+        for source in sorted(parts):
+            merged.rows[end : end + len(parts[source])] = parts[source]
+            end += len(parts[source])
+
+
+def _message(array: np.ndarray) -> list[Any]:
+    """An array as MPI takes it."""
+    return [array, array.size, MPI.DOUBLE]

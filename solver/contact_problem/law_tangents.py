@@ -1,0 +1,226 @@
+"""Contact laws while they are marched: linearised at an iterate, with what they remember.
+
+Each gives, for n contacts, own f = offset + by_depth d + by_rate d' with depth d [m] and rate d'
+[m/s], which is the law itself or its tangent. Lives on rank 0; not collective.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from catenary.solver.base.errors import RunBroken
+from catenary.solver.contact_problem import complementarity_kernels
+from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
+from catenary.solver.problem.problem import Problem
+
+# Largest difference between the law and its last tangent, relative to the force.
+_TOLERANCE = 1e-10
+# How well depths [m] and rates [m/s] are known: differences of heights of 5 m and of speeds of some
+# m/s, a few roundings of 4e-16 to 9e-16 each. No force is known better than that times the slope.
+_KNOWN = 5e-15
+
+
+class LawInSteps(Protocol):
+    """A law for n contacts.
+
+    Attributes
+    ----------
+    n : number of contacts
+    tangents : (4, n), rows own [-], offset [N], by_depth [N/m] and by_rate [N s/m]
+    is_linear : whether the tangents are the law
+    pulls : whether forces below zero are part of the law
+    """
+
+    n: int
+    tangents: np.ndarray
+    is_linear: bool
+    pulls: bool
+
+    def linearise(self, depth: np.ndarray, rate: np.ndarray) -> None:
+        """Put the tangents at depths and rates (n,)."""
+
+    def force(self, depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        """The law itself without the cut at zero (n,) [N]."""
+
+    def agrees(self, force: np.ndarray, rounding: np.ndarray) -> bool:
+        """Whether forces (n,) found with tangents are those of the law where it was linearised
+        last.
+
+        ``rounding`` (2, n) is what depths [m] and rates [m/s] may be wrong by because terms much
+        larger than heights of some metres and speeds of some m/s cancel in them.
+        """
+
+    def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
+        """Remember a step to ``time`` [s]: depths, rates and forces (n,) at its end.
+
+        Raises
+        ------
+        RunBroken
+            The law does not hold any longer.
+        """
+
+    def reported(self, force: np.ndarray) -> np.ndarray:
+        """What of the forces (n,) of the latest step is to be recorded [N]."""
+
+    def state(self) -> np.ndarray:
+        """All that is remembered, as one array."""
+
+    def restore(self, state: np.ndarray) -> None:
+        """Continue from what ``state`` returned."""
+
+
+class _Tangents:
+    """What is common to laws that remember nothing."""
+
+    is_linear = True
+
+    def __init__(self, n: int, own: float, by_depth: float, by_rate: float, pulls: bool) -> None:
+        self.n = n
+        self.tangents = np.zeros((4, n))
+        self.tangents[0] = own
+        self.tangents[2:] = [[by_depth], [by_rate]]
+        self.pulls = pulls
+
+    def linearise(self, depth: np.ndarray, rate: np.ndarray) -> None:
+        """It is linear already."""
+
+    def force(self, depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        """Spring and damper (n,) [N]."""
+        return np.asarray(self.tangents[2] * depth + self.tangents[3] * rate)
+
+    def agrees(self, force: np.ndarray, rounding: np.ndarray) -> bool:
+        """Always."""
+        return True
+
+    def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
+        """Nothing is remembered."""
+
+    def reported(self, force: np.ndarray) -> np.ndarray:
+        """The forces themselves."""
+        return force
+
+    def state(self) -> np.ndarray:
+        """Nothing."""
+        return np.zeros(0)
+
+    def restore(self, state: np.ndarray) -> None:
+        """Nothing."""
+
+
+class LinearInSteps(_Tangents):
+    """The linear law."""
+
+    def __init__(self, law: LinearLaw, n: int, pulls: bool) -> None:
+        super().__init__(n, 1.0, law.stiffness, law.damping, pulls)
+
+
+class HertzInSteps(_Tangents):
+    """Hertz's law with hysteresis, which remembers the speed of each contact's last impact.
+
+    That is the rate at the start of the step in which the gap closes.
+    """
+
+    is_linear = False
+
+    def __init__(self, law: HertzLaw, n: int) -> None:
+        super().__init__(n, 1.0, 0.0, 0.0, pulls=False)
+        self._law = law
+        self._speed = np.full(n, law.least_speed)
+        self._force = np.zeros(n)
+
+    def linearise(self, depth: np.ndarray, rate: np.ndarray) -> None:
+        """Tangents at depths and rates (n,)."""
+        law = self._law
+        complementarity_kernels.hertz(
+            depth,
+            rate,
+            self._speed,
+            law.stiffness,
+            law.exponent,
+            law.hysteresis,
+            self.tangents[1],
+            self.tangents[2],
+            self.tangents[3],
+            self._force,
+        )
+
+    def force(self, depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        """The law (n,) [N]."""
+        self.linearise(depth, rate)
+        return self._force
+
+    def agrees(self, force: np.ndarray, rounding: np.ndarray) -> bool:
+        """Whether law and tangents give the same forces."""
+        law = np.maximum(self._force, 0.0)
+        within = _TOLERANCE * (1.0 + law)
+        within += ((_KNOWN + rounding) * self.tangents[2:]).sum(axis=0)
+        return bool((np.abs(law - force) <= within).all())
+
+    def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
+        """Remember how fast those come who do not touch yet."""
+        free = depth <= 0.0
+        self._speed[free] = np.maximum(rate[free], self._law.least_speed)
+
+    def state(self) -> np.ndarray:
+        """Speeds of impact of those that touch, or of the next impact."""
+        return self._speed.copy()
+
+    def restore(self, state: np.ndarray) -> None:
+        """Continue from what ``state`` returned."""
+        self._speed[:] = state
+
+
+class KinematicInSteps(_Tangents):
+    """Head and wire as one: d + tau d' = 0, with which a depth is gone after two steps.
+
+    A force at the end of a step acts on heights and velocities through its mean with the one
+    before, w f + (1 - w) f_before with Newmark's w = gamma. That mean is the contact force; the
+    force itself alternates about it from step to step. While the pantographs are being raised,
+    until ``from_time`` [s], the wire may pull them along.
+    """
+
+    def __init__(self, n: int, dt: float, gamma: float, from_time: float) -> None:
+        super().__init__(n, 0.0, 1.0, 0.5 * dt, pulls=True)
+        self._gamma = gamma
+        self._from_time = from_time
+        self._force = np.zeros(n)
+        self._mean = np.zeros(n)
+
+    def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
+        """End the run where head and wire would have to pull at each other."""
+        self._mean = self._gamma * force + (1.0 - self._gamma) * self._force
+        self._force[:] = force
+        if time > self._from_time and (self._mean < 0.0).any():
+            number = int(np.argmin(self._mean)) + 1
+            raise RunBroken(
+                f"contact {number} would have to pull with {-self._mean.min():.3g} N: the "
+                "kinematic contact law holds only while contact lasts; take contact.law = "
+                '"linear"'
+            )
+
+    def reported(self, force: np.ndarray) -> np.ndarray:
+        """The mean over the step."""
+        return self._mean
+
+    def state(self) -> np.ndarray:
+        """The latest force itself."""
+        return self._force.copy()
+
+    def restore(self, state: np.ndarray) -> None:
+        """Continue from what ``state`` returned."""
+        self._force[:] = state
+
+
+def law_in_steps(problem: Problem, n: int) -> LawInSteps:
+    """The law of a problem for n contacts, as its effects ask for it."""
+    law, numerics = problem.contact, problem.numerics
+    may_lose_contact = "contact_loss" in problem.effects
+    if "contact_damping" not in problem.effects:
+        law = law.without_damping()
+    if isinstance(law, KinematicLaw):
+        return KinematicInSteps(n, numerics.dt, numerics.gamma, problem.train.raise_time)
+    if isinstance(law, HertzLaw):
+        return HertzInSteps(law, n)
+    return LinearInSteps(law, n, pulls=not may_lose_contact)

@@ -1,0 +1,284 @@
+"""The effects that Catenary ships, in building order. Importing this module registers them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from catenary.mbs.head.roll import roll_of
+from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.solver.effects.effect import Effect, register
+from catenary.solver.problem.contact_laws import KinematicLaw
+from catenary.solver.problem.incidents import DropperBreak, TensionLoss
+from catenary.solver.problem.problem import slowest_wave_speed
+
+if TYPE_CHECKING:
+    from catenary.solver.model.model import ModelBuilder
+
+
+def _vertical(builder: ModelBuilder) -> None:
+    mesh, line, model = builder.mesh, builder.problem.line, builder.model
+    builder.add_wire(MESSENGER_WIRE)
+    builder.add_wire(CONTACT_WIRE)
+    builder.add_links("droppers", mesh.droppers, "w", model.dropper_stiffness)
+    builder.add_springs("supports", mesh.supports, "w", line.support_stiffness)
+    builder.hold(mesh.anchors, "w")
+
+
+def _dropper_mass(builder: ModelBuilder) -> None:
+    half = 0.5 * builder.problem.line.dropper.mass_per_length * builder.model.dropper_lengths
+    for side in (0, 1):
+        builder.add_masses("droppers", builder.mesh.droppers[:, side], half)
+
+
+def _clamp_mass(builder: ModelBuilder) -> None:
+    kind, mesh = builder.problem.line.dropper, builder.mesh
+    builder.add_masses(MESSENGER_WIRE, mesh.droppers[:, 0], kind.messenger_clamp_mass)
+    builder.add_masses(CONTACT_WIRE, mesh.droppers[:, 1], kind.contact_clamp_mass)
+
+
+def _arm_inertia(builder: ModelBuilder) -> None:
+    arm, nodes = builder.problem.line.steady_arm, builder.mesh.steady_arms
+    rod = arm.mass_per_length * arm.length
+    # A rod hinged at its far end: a third of its mass moves with the wire, half of it hangs there.
+    builder.add_masses(
+        "steady_arms", nodes, rod / 3 + arm.clamp_mass, hanging_mass=rod / 2 + arm.clamp_mass
+    )
+
+
+def _arm_stiffness(builder: ModelBuilder) -> None:
+    nodes = builder.mesh.steady_arms
+    builder.add_springs("steady_arms", nodes, "w", builder.problem.line.steady_arm.stiffness)
+
+
+register(
+    Effect(
+        "vertical",
+        "vertical motion of the tensioned wires",
+        "wire bending and tension, droppers, messenger supports, anchors",
+        "paper eq. (2.1)",
+        default=True,
+        unknowns=("w", "theta_y"),
+        always=True,
+        build=_vertical,
+    )
+)
+register(
+    Effect(
+        "gravity",
+        "gravity and form finding",
+        "weights, static equilibrium, dropper pre-tension and lengths",
+        "paper section 2; static equilibrium of a tensioned beam",
+        default=True,
+        build=lambda builder: builder.set_gravity(builder.problem.gravity),
+    )
+)
+register(
+    Effect(
+        "pre_sag",
+        "pre-sag of the contact wire",
+        "target heights of the form finding",
+        "paper section 1 (pre-sag of 1/1000)",
+        default=True,
+        requires=("gravity",),
+        applies=lambda p: any(any(sag) for sag in p.line.pre_sag),
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "transition_spans",
+        "transition spans in which the contact wire rises to the tensioner",
+        "target heights of the form finding at both ends",
+        "paper section 5, figure 4",
+        default=True,
+        applies=lambda p: any(p.line.n_transition) and p.line.transition_rise > 0,
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "dropper_mass",
+        "mass of the droppers",
+        "half of each dropper's mass at either end",
+        "paper Table 1",
+        default=True,
+        applies=lambda p: p.line.dropper.mass_per_length > 0,
+        build=_dropper_mass,
+    )
+)
+register(
+    Effect(
+        "clamp_mass",
+        "mass of the dropper clamps",
+        "lumped masses on both wires",
+        "paper section 2 and Table 1",
+        default=True,
+        applies=lambda p: (
+            p.line.dropper.messenger_clamp_mass + p.line.dropper.contact_clamp_mass > 0
+        ),
+        build=_clamp_mass,
+    )
+)
+register(
+    Effect(
+        "arm_inertia",
+        "inertia and weight of the steady arms",
+        "a third of the hinged arm's mass and its clamp on the contact wire",
+        "paper Table 1; hinged rod",
+        default=True,
+        applies=lambda p: (
+            p.line.steady_arm.clamp_mass
+            + p.line.steady_arm.mass_per_length * p.line.steady_arm.length
+            > 0
+        ),
+        build=_arm_inertia,
+    )
+)
+register(
+    Effect(
+        "arm_stiffness",
+        "vertical stiffness of the steady arms",
+        "springs from the contact wire to the ground at the arms",
+        "EN 50318:2002 reference model",
+        default=True,
+        applies=lambda p: p.line.steady_arm.stiffness > 0,
+        build=_arm_stiffness,
+    )
+)
+register(
+    Effect(
+        "structural_damping",
+        "structural damping of the line",
+        "C = alpha K + beta M, globally or per component",
+        "paper eq. (2.2)",
+        default=True,
+        applies=lambda p: (
+            p.damping.alpha > 0
+            or p.damping.beta > 0
+            or any(any(pair) for pair in p.damping.per_component.values())
+        ),
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "dropper_slackening",
+        "droppers that slacken",
+        "compensation of the droppers that would be pushed",
+        "paper eq. (2.7)",
+        default=True,
+        requires=("gravity",),
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "residual_dropper_stiffness",
+        "residual stiffness of slack droppers",
+        "a share of the stiffness is kept in compression",
+        "paper section 2 (about 1/100)",
+        default=False,
+        requires=("dropper_slackening",),
+        applies=lambda p: p.residual_stiffness_ratio > 0,
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "contact_loss",
+        "loss and regain of contact",
+        "the contact force cannot pull",
+        "paper section 4",
+        default=True,
+        applies=lambda p: not isinstance(p.contact, KinematicLaw),
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "contact_damping",
+        "damping of the contact",
+        "a force on the gap rate, its convective part V dw/dx included",
+        "penalty contact with a viscous term, or hysteresis (paper eq. 4.1)",
+        default=False,
+        applies=lambda p: p.contact.dissipates,
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "several_pantographs",
+        "several pantographs on one train",
+        "one contact and one pantograph each",
+        "paper section 5",
+        default=True,
+        applies=lambda p: len(p.train.placements) > 1,
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "head_roll",
+        "roll of the pan heads under a wire that moves along their strips",
+        "a roll of each head, on which the contact force acts with the stagger as its lever",
+        "rigid head on two springs beside each other",
+        default=False,
+        applies=lambda p: any(roll_of(place.data) is not None for place in p.train.placements),
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "vehicle_motion",
+        "motion of the vehicle under its pantographs",
+        "height and lateral place of the pantographs' bases as functions of time and place",
+        "given motion, or spectra of track irregularities (FRA; ORE B176)",
+        default=False,
+        applies=lambda p: p.train.vehicle is not None,
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "dropper_break",
+        "droppers that break during the run",
+        "matrices without the dropper and the balance that it leaves, from its time on",
+        "equation of motion of the line without it; [[incidents]]",
+        default=True,
+        applies=lambda p: any(isinstance(incident, DropperBreak) for incident in p.incidents),
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "tension_loss",
+        "wires that lose tension during the run",
+        "matrices with what is left of the tension and the balance lost, from its time on",
+        "equation of motion of the line with it; [[incidents]]",
+        default=True,
+        applies=lambda p: any(isinstance(incident, TensionLoss) for incident in p.incidents),
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "lowering",
+        "pantographs that are lowered during the run",
+        "a static force that goes over to a lower one, and what catches the head",
+        "the course of the raising, the other way; [[incidents]]",
+        default=True,
+        applies=lambda p: any(place.lowering is not None for place in p.train.placements),
+        build=lambda builder: builder.count_term(),
+    )
+)
+register(
+    Effect(
+        "supercritical_speed",
+        "train speed at or above the wave speed of the contact wire",
+        "nothing: it lifts the check on the speed",
+        "paper eq. (1.1)",
+        default=False,
+        applies=lambda p: p.train.speed >= slowest_wave_speed(p),
+        build=lambda builder: builder.count_term(),
+    )
+)

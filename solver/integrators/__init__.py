@@ -1,0 +1,1 @@
+"""The line advanced in time: Newmark's family, a step in two passes."""

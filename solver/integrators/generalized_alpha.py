@@ -1,0 +1,90 @@
+"""The line advanced by the generalized-alpha method, of which HHT is a member.
+
+The method balances forces between two states, M a(1 - a_m) + C v(1 - a_f) + K d(1 - a_f) =
+f(1 - a_f). Let b be the acceleration that balances the forces at the end of each step itself,
+M b = f - C v - K d. As the equations are linear in M, C, K and f, the method is the same as
+
+    (1 - a_m) a_new + a_m a_old = (1 - a_f) b_new + a_f b_old                            (*)
+
+with Newmark's formulas in a. So a step has the form of Newmark's with b in place of a: no force of
+an earlier step is needed, contacts and droppers meet the state at the end of the step, and one
+product with K is enough. Source of (*): M. Arnold, O. Brüls, Multibody Syst. Dyn. 18 (2007)
+185-202.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from catenary.solver.integrators import alpha_kernels
+from catenary.solver.integrators.line_integrator import LineMotion
+from catenary.solver.model.model import Model
+from catenary.solver.model.partition import Ownership
+from catenary.solver.problem.integrator_parameters import Integration
+
+
+class GeneralizedAlphaLine(LineMotion):
+    """The line by the generalized-alpha method. Collective to make.
+
+    With r = (1 - a_f) / (1 - a_m) the algorithm's acceleration is a = p + r b, p being known when a
+    step begins: sigma = r beta dt^2, tau = r gamma dt. The attribute ``acceleration`` is b.
+    """
+
+    def __init__(
+        self, comm: Any, model: Model, ownership: Ownership, dt: float, integration: Integration
+    ) -> None:
+        beta, gamma, mass_weight, force_weight = integration
+        ratio = (1.0 - force_weight) / (1.0 - mass_weight)
+        super().__init__(comm, model, ownership, ratio * beta * dt**2, ratio * gamma * dt)
+        alpha_kernels.warm_up()
+        self._known = np.zeros(ownership.n_local)
+        self._coefficients = np.array(
+            [
+                dt,
+                ratio,
+                force_weight / (1.0 - mass_weight),
+                -mass_weight / (1.0 - mass_weight),
+                dt**2 * (0.5 - beta),
+                dt**2 * beta,
+                dt * (1.0 - gamma),
+                dt * gamma,
+                self._alpha_share,
+            ]
+        )
+
+    def predict(self) -> None:
+        """Turn displacement and velocity into what they are at the end of the step if b is zero."""
+        alpha_kernels.predict(
+            self.displacement,
+            self.velocity,
+            self.acceleration,
+            self._known,
+            self.operators.factor,
+            self._coefficients,
+        )
+
+    def start(
+        self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray
+    ) -> None:
+        """Start from a state, (n_local,) each, whose acceleration balances its forces.
+
+        The algorithm's acceleration is the same there.
+        """
+        super().start(displacement, velocity, acceleration)
+        self._known[:] = (1.0 - self._coefficients[1]) * acceleration
+
+    def state(self) -> Mapping[str, np.ndarray]:
+        """All that the next step starts from, by name; to be read before that."""
+        return {**super().state(), "known_acceleration": self._known}
+
+    def kept(self) -> tuple[np.ndarray, ...]:
+        """The arrays themselves that a step changes."""
+        return *super().kept(), self._known
+
+    def restore(self, state: Mapping[str, np.ndarray]) -> None:
+        """Continue from what ``state`` returned, here or elsewhere."""
+        super().restore(state)
+        self._known[:] = state["known_acceleration"]

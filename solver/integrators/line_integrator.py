@@ -1,0 +1,208 @@
+"""The line's state and step operator, whichever method of Newmark's family advances it.
+
+The step operator A = M + tau C + sigma K is factored once, sigma and tau being what displacement
+and velocity gain from the step's unknown acceleration. With proportional damping the step's
+right-hand side needs a single product with K: M v is eliminated by A itself.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from catenary.solver.base import aligned_arrays, flush_to_zero
+from catenary.solver.base.petsc import PETSc
+from catenary.solver.contact import contact_kernels
+from catenary.solver.contact_problem import complementarity_kernels
+from catenary.solver.integrators import state_kernels, two_pass_step
+from catenary.solver.integrators.line_state import Motion
+from catenary.solver.linear import station_factors, station_products, unique_rows
+from catenary.solver.linear.decay_length import reach
+from catenary.solver.linear.step_operators import LineOperators, Loads
+from catenary.solver.linear.unit_responses import Windows
+from catenary.solver.model.model import Model
+from catenary.solver.model.partition import Ownership
+
+
+class LineMotion(ABC):
+    """State and step operator of the distributed line, relative to its equilibrium.
+
+    Collective to make; ``destroy`` is collective too. Arrays are this rank's part, shape
+    (n_local,). A step is ``free_step``, or the three parts of that; forces that are known later
+    only change the acceleration, displacement and velocity by A^-1, sigma A^-1 and tau A^-1.
+
+    Attributes
+    ----------
+    motion : Motion, the state as it is kept
+    position_factor, velocity_factor : sigma [s2] and tau [s]
+    operators : LineOperators
+    solution : the displacement as a PETSc vector, once ``fill_solution`` has filled it
+    """
+
+    def __init__(
+        self,
+        comm: Any,
+        model: Model,
+        ownership: Ownership,
+        position_factor: float,
+        velocity_factor: float,
+    ) -> None:
+        state_kernels.warm_up()
+        contact_kernels.warm_up()
+        complementarity_kernels.warm_up()
+        unique_rows.warm_up()
+        station_products.warm_up()
+        station_factors.warm_up()
+        two_pass_step.warm_up()
+        flush_to_zero.warm_up()
+        self._comm = comm
+        self.ownership = ownership
+        self.position_factor = position_factor
+        self.velocity_factor = velocity_factor
+        coefficients = (1.0, self.position_factor, self.velocity_factor)
+        self.windows = Windows(_row_positions(model), model.block_size, reach(model, coefficients))
+        self.operators = LineOperators(comm, model, ownership, coefficients, self.windows)
+        self._proportional = model.damping_is_proportional
+        # What is folded into the product with K, and what is left to do after the solve.
+        self._alpha_share = self._beta_share = 0.0
+        if self._proportional:
+            alpha, beta_damping = (
+                model.damping_of(model.blocks[0].component) if model.blocks else (0.0, 0.0)
+            )
+            stiffness_share = self.position_factor + self.velocity_factor * alpha
+            self._beta_share = beta_damping / (1.0 + self.velocity_factor * beta_damping)
+            self._alpha_share = alpha - self._beta_share * stiffness_share
+        n = ownership.n_local
+        gains = self.position_factor, self.velocity_factor
+        self.motion = Motion(
+            aligned_arrays.zeros(n, 2), aligned_arrays.zeros(n, 3), self.operators.answer, gains
+        )
+        self.look_at(np.zeros((0, 2), np.int64), np.zeros((0, 4)), np.zeros(0))
+        # PETSc's time loop wants the solution as a vector; it wraps our array.
+        self.solution = PETSc.Vec().createWithArray(self.displacement, size=(n, None), comm=comm)
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """[m], [rad]; the array itself, if the motion is kept as it is."""
+        return self.motion.displacement
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """[m/s], [rad/s]; the array itself, if the motion is kept as it is."""
+        return self.motion.velocity
+
+    @property
+    def acceleration(self) -> np.ndarray:
+        """The one that balances the forces, M a = f - C v - K d [m/s2], [rad/s2]; the array
+        itself."""
+        return self.motion.acceleration
+
+    @abstractmethod
+    def predict(self) -> None:
+        """Turn displacement and velocity into their values at the end of the step without the
+        step's unknown acceleration, and ``operators.factor`` into -(d + ``_alpha_share`` v). Not
+        collective."""
+
+    def start(
+        self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray
+    ) -> None:
+        """Start from a state, (n_local,) each, whose acceleration balances its forces."""
+        self.motion.put(displacement, velocity, acceleration)
+
+    def state(self) -> Mapping[str, np.ndarray]:
+        """All that the next step starts from, by name; to be read before that."""
+        return {
+            "displacement": self.displacement,
+            "velocity": self.velocity,
+            "acceleration": self.acceleration,
+        }
+
+    def kept(self) -> tuple[np.ndarray, ...]:
+        """The arrays themselves that a step changes, however the motion is kept: copied and copied
+        back, they take steps of this line back."""
+        return self.motion.read[:3]
+
+    def exact_state(self) -> Mapping[str, np.ndarray]:
+        """``state`` and all that steps like these need to go on as if nothing had happened."""
+        return {**self.state(), **self.motion.carried()}
+
+    def restore(self, state: Mapping[str, np.ndarray]) -> None:
+        """Continue from what ``state`` returned, here or elsewhere, or from an ``exact_state``."""
+        self.motion.take(state)
+
+    def look_at(self, ends: np.ndarray, laws: np.ndarray, tension: np.ndarray) -> None:
+        """Fill ``tension`` (n,) [N] at the end of each ``free_step``, see ``kernels.tension``.
+
+        The droppers stand in the order along the track. Without this there are none. Not
+        collective.
+        """
+        self._droppers = ends, laws, tension
+
+    def free_step(self, loads: Loads | None = None) -> None:
+        """Take the step without contacts and slack droppers: ``predict``, ``free_acceleration``
+        and ``correct``. Collective."""
+        self.predict()
+        self.free_acceleration(loads)
+        self.correct()
+        state_kernels.tension(self.motion.read, *self._droppers)
+
+    def free_acceleration(self, loads: Loads | None = None) -> None:
+        """Fill the acceleration from the predictions and local loads. Collective.
+
+        ``loads`` are pairs of local unknowns and forces [N], None on all ranks if there are none
+        anywhere; contact and slack droppers are left out, so that ``correct`` must follow.
+        """
+        self.internal_forces()
+        self.solve(loads)
+
+    def internal_forces(self) -> None:
+        """Right-hand side -C v - K d of the step; only right after ``predict``. Collective."""
+        operators = self.operators
+        operators.exchange()
+        operators.multiply_stiffness()
+        if not self._proportional:
+            np.negative(self.velocity, out=operators.factor)
+            operators.exchange()
+            operators.add_damping()
+
+    def solve(self, loads: Loads | None = None) -> None:
+        """Acceleration for the internal forces plus ``loads``, but for its part by damping on mass,
+        which ``correct`` takes off. May be called again for other loads. Collective."""
+        self.operators.solve(loads)
+
+    def correct(self) -> None:
+        """Turn predictions into the new displacement and velocity."""
+        state_kernels.correct(
+            self.displacement,
+            self.velocity,
+            self.acceleration,
+            self.position_factor,
+            self.velocity_factor,
+            self._beta_share,
+        )
+
+    def fill_solution(self) -> None:
+        """Make ``solution`` the present displacement. Not collective."""
+        self.solution.setArray(self.displacement)
+
+    def energies(self) -> tuple[float, float]:
+        """Kinetic and elastic energy relative to equilibrium, all droppers taut [J]. Collective."""
+        operators, displacement, velocity = self.operators, self.displacement, self.velocity
+        np.copyto(operators.factor, velocity)
+        kinetic = 0.5 * operators.square("mass")
+        np.copyto(operators.factor, displacement)
+        return kinetic, 0.5 * operators.square("stiffness")
+
+    def destroy(self) -> None:
+        """Free all PETSc objects. Collective."""
+        self.operators.destroy()
+        self.solution.destroy()
+
+
+def _row_positions(model: Model) -> np.ndarray:
+    positions = np.empty(model.mesh.n_nodes)
+    positions[model.row_of_node] = model.mesh.points[:, 0]
+    return positions

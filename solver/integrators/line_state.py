@@ -1,0 +1,148 @@
+"""How a line's state is kept: as it is, or as it is predicted for the coming step.
+
+What kernels read at single unknowns are displacement and velocity at the end of the latest step,
+
+    d = s0 x + s1 y + s2 z,    v = s3 y + s4 z,
+
+with arrays x, y and z that a step carries on, and five shares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from catenary.solver.integrators import state_kernels
+
+
+class Steps(NamedTuple):
+    """What a step of Newmark's method is made of; see ``kernels.predict`` and ``correct``."""
+
+    dt: float
+    predict_position: float
+    predict_velocity: float
+    work_velocity: float
+    position_factor: float
+    velocity_factor: float
+    damping_share: float
+
+
+class Motion:
+    """State of a rank's part of a line, as it is. Not collective.
+
+    Attributes
+    ----------
+    read : x, y and z (n_local,) each, and their shares (5,), as kernels read the motion
+    gains : (2,) what x and y gain from a unit of acceleration that is found later in the step; z
+        gains the unit
+
+    Parameters
+    ----------
+    displacement, velocity, acceleration : arrays (n_local,) that it keeps its state in
+    gains : [s2], [s]
+    """
+
+    def __init__(
+        self,
+        displacement: np.ndarray,
+        velocity: np.ndarray,
+        acceleration: np.ndarray,
+        gains: tuple[float, float],
+    ) -> None:
+        shares = np.array([1.0, 0.0, 0.0, 1.0, 0.0])
+        self.read = displacement, velocity, acceleration, shares
+        self.gains = np.array(gains)
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """At the end of the latest step (n_local,) [m]; the array itself."""
+        return self.read[0]
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """At the end of the latest step (n_local,) [m/s]; the array itself."""
+        return self.read[1]
+
+    @property
+    def acceleration(self) -> np.ndarray:
+        """At the end of the latest step (n_local,) [m/s2]; the array itself."""
+        return self.read[2]
+
+    def put(self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:
+        """Take a state, (n_local,) each."""
+        x, y, z, _ = self.read
+        x[:], y[:], z[:] = displacement, velocity, acceleration
+
+    def carried(self) -> Mapping[str, np.ndarray]:
+        """What of a state is kept otherwise than as it is, by name: the arrays themselves."""
+        return {}
+
+    def take(self, state: Mapping[str, np.ndarray]) -> None:
+        """Go on from displacement, velocity, acceleration and what else was carried, by name."""
+        self.put(state["displacement"], state["velocity"], state["acceleration"])
+
+
+class MotionAhead(Motion):
+    """The same kept one prediction ahead, for Newmark's method.
+
+    Kept are what the coming step's product with K reads, x = -(d* + c v*) with the predictions d*
+    and v* of eq. (2.5), then y = v*, and the acceleration z. A step that starts from d and v reads
+    all three to predict and writes two of them; from here it starts by reading one.
+
+    Parameters
+    ----------
+    ahead, velocity, acceleration : arrays (n_local,) for x, y and z
+    shown : array (n_local,) that is filled when displacements are asked for
+    steps : of the steps to come, all alike
+    """
+
+    def __init__(
+        self,
+        ahead: np.ndarray,
+        velocity: np.ndarray,
+        acceleration: np.ndarray,
+        shown: np.ndarray,
+        steps: Steps,
+    ) -> None:
+        dt, c_position, c_velocity, c_work, position_factor, velocity_factor, _ = steps
+        by_velocity = velocity_factor + c_velocity
+        by_position = position_factor + dt * velocity_factor + c_position + c_work * by_velocity
+        super().__init__(ahead, velocity, acceleration, (-by_position, by_velocity))
+        shares = [-1.0, -(c_work + dt), dt * c_velocity - c_position, 1.0, -c_velocity]
+        self.read[3][:] = shares
+        self._steps, self._shown = steps, shown
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """At the end of the latest step (n_local,) [m]; overwritten when asked for again."""
+        state_kernels.displacements(self.read, self._shown)
+        return self._shown
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """At the end of the latest step (n_local,) [m/s]; a new array."""
+        velocity = np.empty_like(self._shown)
+        state_kernels.velocities(self.read, velocity)
+        return velocity
+
+    def put(self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:
+        """Take a state, (n_local,) each."""
+        dt, c_position, c_velocity, c_work = self._steps[:4]
+        x, y, z, _ = self.read
+        predicted = displacement + dt * velocity + c_position * acceleration
+        z[:] = acceleration
+        y[:] = velocity + c_velocity * acceleration
+        x[:] = -(predicted + c_work * y)
+
+    def carried(self) -> Mapping[str, np.ndarray]:
+        """The predictions, by name: the arrays themselves."""
+        return {"ahead": self.read[0], "velocity_ahead": self.read[1]}
+
+    def take(self, state: Mapping[str, np.ndarray]) -> None:
+        """Go on from displacement, velocity, acceleration, and exactly so if predictions for steps
+        like these were carried, too."""
+        super().take(state)
+        for name, array in self.carried().items():
+            array[:] = state.get(name, array)

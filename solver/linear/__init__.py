@@ -1,0 +1,1 @@
+"""Products with the line's matrices and solves with the step operator, on a rank and across."""

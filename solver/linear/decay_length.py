@@ -1,0 +1,98 @@
+"""How far the response to a point load reaches within one time step.
+
+The step operator A = M + gamma dt C + beta dt^2 K is nearly a mass matrix: the columns of its
+inverse decay exponentially along the track and vanish to round-off within about a span. The
+parallel solver and the compliance table are both built on this length.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import linalg as sparse_linalg
+
+from catenary.solver.model.model import Model, iterate_entries
+
+# Beyond the reach a column is below this share of its peak; two orders under what an iteration
+# over a whole run may add up to and still agree to 1e-9.
+DECAY = 1e-16
+# The probes look at two places of the line; spans differ, so take this much more.
+_MARGIN = 1.25
+_WINDOW = 400.0
+# How far around the longest element loads are tried, about a span to either side [m].
+_NEAR = 75.0
+# Nodes closer than this along the track belong to one station [m].
+_SAME_STATION = 1e-6
+
+
+def reach(model: Model, coefficients: tuple[float, float, float]) -> float:
+    """Distance along the track beyond which a column of A^-1 vanishes [m]. Not collective.
+
+    ``coefficients`` are those of M, K and C in A. Solves with A on windows of the line, for loads
+    in the middle and at the gaps' ends around the longest element: every element takes its share
+    of the decay, so that this needs more way where elements are long. Returns the length of the
+    line if a column does not decay within its window.
+    """
+    positions = np.empty(model.mesh.n_nodes)
+    positions[model.row_of_node] = model.mesh.points[:, 0]
+    total = float(positions[-1] - positions[0])
+    furthest = 0.0
+    for place, loads in (_in_the_middle(positions), _around_the_longest(positions)):
+        found, seen = _reach_of(loads, place, model, coefficients, positions)
+        if found > 0.9 * seen:
+            return total
+        furthest = max(furthest, found)
+    return min(total, _MARGIN * furthest)
+
+
+def _in_the_middle(positions: np.ndarray) -> tuple[float, np.ndarray]:
+    """The middle of the line [m] and the station there."""
+    middle = 0.5 * float(positions[0] + positions[-1])
+    return middle, positions[[np.argmin(np.abs(positions - middle))]]
+
+
+def _around_the_longest(positions: np.ndarray) -> tuple[float, np.ndarray]:
+    """Where the longest element is [m], and the stations near it where element lengths change."""
+    stations = positions[np.append(True, np.diff(positions) > _SAME_STATION)]
+    lengths = np.diff(stations)
+    place = float(stations[np.argmax(lengths)])
+    changes = np.abs(np.diff(lengths)) > 0.01 * lengths[1:]
+    ends = stations[1:-1][changes]
+    near = ends[np.abs(ends - place) <= _NEAR]
+    return place, near if near.size else np.array([place])
+
+
+def _reach_of(
+    loads: np.ndarray,
+    place: float,
+    model: Model,
+    coefficients: tuple[float, float, float],
+    positions: np.ndarray,
+) -> tuple[float, float]:
+    """Largest reach of loads at stations [m], and the least way that was looked at [m].
+
+    The window lies around ``place``. At an end of the line only one side is there to be seen.
+    """
+    low, high = np.searchsorted(positions, [place - _WINDOW, place + _WINDOW])
+    first, last = int(low) * model.block_size, int(high) * model.block_size
+    parts = list(iterate_entries(model, first, last, *coefficients))
+    rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+    inside = (columns >= first) & (columns < last)
+    matrix = sparse.csc_matrix(
+        (values[inside], (rows[inside] - first, columns[inside] - first)),
+        shape=(last - first, last - first),
+    )
+    empty = matrix.diagonal() == 0
+    factor = sparse_linalg.splu((matrix + sparse.diags(empty.astype(float))).tocsc())
+    x = np.repeat(positions[low:high], model.block_size)
+    furthest, seen = 0.0, np.inf
+    for station in loads:
+        ahead, behind = float(positions[-1] - station), float(station - positions[0])
+        seen = min(seen, _WINDOW - abs(station - place), max(ahead, behind))
+        for load in np.flatnonzero((np.abs(x - station) <= _SAME_STATION) & ~empty):
+            unit = np.zeros(last - first)
+            unit[load] = 1.0
+            column = np.abs(factor.solve(unit))
+            big = column > DECAY * column.max()
+            furthest = max(furthest, float(np.abs(x[big] - x[load]).max()))
+    return furthest, float(seen)

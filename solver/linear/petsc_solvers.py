@@ -1,0 +1,264 @@
+"""Solvers for the constant step operator: factored once, by stations or by PETSc.
+
+On several ranks each solves for its own part of the line and as much of its neighbours' as can
+influence it: restricted additive Schwarz with an overlap as wide as the reach of A^-1, which is a
+direct solver. ``LineOperators`` verifies that, and iterates where it does not hold.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from catenary.solver.base.errors import InputError
+from catenary.solver.base.petsc import PETSc
+from catenary.solver.linear.station_factors import StationFactors, station_factors
+from catenary.solver.model.matrices import as_petsc
+from catenary.solver.model.partition import Ownership
+
+PREFIX, PART_PREFIX = "march_", "march_sub_"
+# Options that show a solver and change nothing.
+_LOOKS = (f"{PREFIX}ksp_view", f"{PREFIX}ksp_monitor", f"{PREFIX}ksp_converged_reason")
+# A direct solve of a matrix as well conditioned as A (below 1e6) leaves about 1e-15.
+DIRECT = 1e-12
+
+
+@contextmanager
+def refused_options() -> Iterator[None]:
+    """Turn PETSc's error about an option into one for the user. Every rank meets the same one.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        yield
+    except PETSc.Error as error:
+        words = [line for line in str(error).splitlines() if line.strip()]
+        last = words[-1].partition("] ")[2] or words[-1]
+        raise InputError(
+            f"PETSc refuses the options under -{PREFIX}, which the scene's [petsc] table and the "
+            f"words after -- give: {last}"
+        ) from error
+
+
+class Wrapped(NamedTuple):
+    """An array and the PETSc vector that wraps it: the same numbers for both."""
+
+    array: np.ndarray
+    vector: PETSc.Vec
+
+
+class PartSolver:
+    """Factors of this rank's part of the step operator, all of it on one rank.
+
+    Not collective. With an overlap as wide as the reach of A^-1 the rank's own unknowns come out
+    exactly, without a word to other ranks; ``residual`` of ``LineOperators`` verifies that.
+
+    Parameters
+    ----------
+    part : rows and columns of what it solves for, in blocks of stations or of nodes
+    own : the rank's own among them, in blocks
+    in_stations : whether its blocks are stations
+    is_whole : whether it is the whole line, which decides the prefix of its options
+
+    Attributes
+    ----------
+    matrix : ``part`` as a sequential PETSc matrix
+    factors : our own, None if PETSc's are used
+    """
+
+    def __init__(
+        self, part: sparse.bsr_matrix, own: slice, in_stations: bool, is_whole: bool
+    ) -> None:
+        prefix = PREFIX if is_whole else PART_PREFIX
+        self.matrix = as_petsc(part, PETSc.COMM_SELF)
+        self._ksp = PETSc.KSP().create(PETSc.COMM_SELF)
+        # PETSc cannot free a PC in Python when Python has ended, so that it is freed before,
+        # whatever error kept ``destroy`` from being called. No other rank takes part.
+        self._free = weakref.finalize(self, _destroy, self._ksp, self.matrix)
+        self._ksp.setOptionsPrefix(prefix)
+        self._ksp.setOperators(self.matrix)
+        _choose_direct(self._ksp, in_stations)
+        self.factors: StationFactors | None = None
+        if in_stations and not _is_given(f"{prefix}pc_"):
+            self.factors = station_factors(part, own.start, own.stop)
+        if self.factors is not None:
+            self._ksp.getPC().setType(PETSc.PC.Type.PYTHON)
+            self._ksp.getPC().setPythonContext(self.factors)
+        # Of an iteration that the options ask for; a direct solver has no tolerance.
+        self._ksp.setTolerances(rtol=DIRECT)
+        with refused_options():
+            self._ksp.setFromOptions()
+            self._ksp.setUp()
+        self._solve = self._solve_by_petsc
+
+    def solve(self, right: Wrapped, solution: Wrapped) -> None:
+        """Solve A ``solution`` = ``right`` here."""
+        self._solve(right, solution)
+
+    def _solve_by_petsc(self, right: Wrapped, solution: Wrapped) -> None:
+        self._ksp.solve(right.vector, solution.vector)
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether a solve cannot fail to converge: neither options nor ``iterate`` ask for more."""
+        return bool(self._ksp.getType() == PETSc.KSP.Type.PREONLY)
+
+    @property
+    def failure(self) -> int:
+        """PETSc's reason why the last solve did not converge; 0 if it did."""
+        return min(0, self._ksp.getConvergedReason())
+
+    def hurry(self) -> None:
+        """Use the bare factors from now on, if the solver is direct.
+
+        What PETSc does around them is a tenth of a solve with a short line.
+        """
+        pc = self._ksp.getPC()
+        if not self.is_direct:
+            return
+        if self.factors is not None:
+            solve_with = self.factors.solve
+            self._solve = lambda right, solution: solve_with(right.array, solution.array)
+        elif pc.getType() in (PETSc.PC.Type.CHOLESKY, PETSc.PC.Type.LU):
+            factored = pc.getFactorMatrix().solve
+            self._solve = lambda right, solution: factored(right.vector, solution.vector)
+
+    def view(self) -> None:
+        """Print what PETSc says of the solver."""
+        self._ksp.view()
+
+    def iterate(self) -> None:
+        """Use the factors as a preconditioner of GMRES from now on."""
+        _use_gmres(self._ksp)
+
+    def destroy(self) -> None:
+        """Free matrix and factors."""
+        self._free()
+
+
+class SchwarzSolver:
+    """PETSc's restricted additive Schwarz on all ranks. Collective to make and to use.
+
+    Takes the place of ``PartSolver`` where that is not exact, or where options ask for another
+    solver: the same overlap, two scatters more.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+    part : this rank's rows of the operator A
+    ownership : Ownership
+    overlap : range of unknowns [low, high) that influences this rank's own, in whole blocks
+    in_stations : whether the matrix has blocks of stations
+
+    Attributes
+    ----------
+    matrix : A as PETSc's distributed matrix
+    """
+
+    def __init__(
+        self,
+        comm: Any,
+        part: sparse.bsr_matrix,
+        ownership: Ownership,
+        overlap: tuple[int, int],
+        in_stations: bool,
+    ) -> None:
+        self.matrix = as_petsc(part, comm)
+        self._ksp = PETSc.KSP().create(comm)
+        self._ksp.setOptionsPrefix(PREFIX)
+        self._ksp.setOperators(self.matrix)
+        self._ksp.setType(PETSc.KSP.Type.PREONLY)
+        pc = self._ksp.getPC()
+        pc.setType(PETSc.PC.Type.ASM)
+        pc.setASMType(PETSc.PC.ASMType.RESTRICT)
+        own = PETSc.IS().createStride(ownership.n_local, ownership.first, 1, comm=PETSc.COMM_SELF)
+        low, high = overlap if ownership.n_local else (ownership.first, ownership.first)
+        wide = PETSc.IS().createStride(high - low, low, 1, comm=PETSc.COMM_SELF)
+        pc.setASMLocalSubdomains(1, [wide], [own])
+        self._ksp.setTolerances(rtol=DIRECT)
+        with refused_options():
+            self._ksp.setFromOptions()
+            self._ksp.setUp()
+            if pc.getType() == PETSc.PC.Type.ASM:
+                for solver in pc.getASMSubKSP():
+                    # A rank may own nothing, of which there is no Cholesky factor.
+                    has_any = solver.getOperators()[0].getSize()[0] > 0
+                    _choose_direct(solver, in_stations and has_any)
+                    solver.setFromOptions()
+            self._ksp.setUpOnBlocks()
+
+    def solve(self, right: Wrapped, solution: Wrapped) -> None:
+        """Solve A ``solution`` = ``right``. Collective."""
+        self._ksp.solve(right.vector, solution.vector)
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether one application of the preconditioner is all of a solve."""
+        return bool(self._ksp.getType() == PETSc.KSP.Type.PREONLY)
+
+    @property
+    def failure(self) -> int:
+        """PETSc's reason why the last solve did not converge, the same on all ranks; 0 if it
+        did."""
+        return min(0, self._ksp.getConvergedReason())
+
+    def iterate(self) -> None:
+        """Use what is set up as a preconditioner of GMRES from now on."""
+        _use_gmres(self._ksp)
+
+    def destroy(self) -> None:
+        """Free matrix and factors. Collective."""
+        self._ksp.destroy()
+        self.matrix.destroy()
+
+
+def wants_distributed_solver() -> bool:
+    """Whether PETSc's options name a solver for the whole line on all ranks, not only a look."""
+    return any(
+        name.startswith((f"{PREFIX}ksp_", f"{PREFIX}pc_")) and not name.startswith(_LOOKS)
+        for name in PETSc.Options().getAll()
+    )
+
+
+def wants_view() -> bool:
+    """Whether PETSc's options ask to see the solver of the line."""
+    return _is_given(f"{PREFIX}ksp_view")
+
+
+def wants_solution() -> bool:
+    """Whether PETSc's options ask to see the solution of the time loop, or to store it."""
+    return _is_given(f"{PREFIX}ts_monitor_", f"{PREFIX}ts_save_trajectory")
+
+
+def _destroy(*objects: PETSc.Object) -> None:
+    for held in objects:
+        held.destroy()
+
+
+def _is_given(*prefixes: str) -> bool:
+    return any(name.startswith(prefixes) for name in PETSc.Options().getAll())
+
+
+def _choose_direct(ksp: PETSc.KSP, in_stations: bool) -> None:
+    """Make a sequential solver direct, by PETSc's factorisation that is fastest here.
+
+    In blocks of stations a line is block tridiagonal: Cholesky's factor in the order along the
+    track has no more blocks than the matrix, and fewest numbers of all. In blocks of nodes, where
+    nodes do not pair, nested dissection takes two thirds of the time of that.
+    """
+    pc, ordering = ksp.getPC(), PETSc.Mat.OrderingType
+    ksp.setType(PETSc.KSP.Type.PREONLY)
+    pc.setType(PETSc.PC.Type.CHOLESKY if in_stations else PETSc.PC.Type.LU)
+    pc.setFactorOrdering(str(ordering.NATURAL if in_stations else ordering.ND))
+
+
+def _use_gmres(ksp: PETSc.KSP) -> None:
+    ksp.setType(PETSc.KSP.Type.GMRES)
+    ksp.setTolerances(rtol=1e-14, max_it=200)

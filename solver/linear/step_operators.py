@@ -1,0 +1,354 @@
+"""What a step does with a line's operators: a product with K, and a solve with A.
+
+Every rank holds the rows of its own part of the line and of its overlap with the neighbours'. It is
+told what a product reads there, once a step, and then needs no other word: product and solve are
+its own.
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from scipy import sparse
+
+from catenary.solver.base import aligned_arrays
+from catenary.solver.base.errors import NotConverged, RunBroken
+from catenary.solver.base.petsc import PETSc
+from catenary.solver.base.petsc_events import event
+from catenary.solver.integrators.line_state import MotionAhead, Steps
+from catenary.solver.integrators.two_pass_step import StationPasses
+from catenary.solver.linear.halo import Halo, Subdomain
+from catenary.solver.linear.petsc_solvers import (
+    DIRECT,
+    PREFIX,
+    PartSolver,
+    SchwarzSolver,
+    Wrapped,
+    wants_distributed_solver,
+    wants_view,
+)
+from catenary.solver.linear.station_products import StationProduct, station_product
+from catenary.solver.linear.unique_rows import RepeatedRows, repeated_rows
+from catenary.solver.linear.unit_responses import Windows
+from catenary.solver.model.matrices import as_petsc, columns_of, part_of, station_block
+from catenary.solver.model.model import Model
+from catenary.solver.model.partition import Ownership
+
+logger = logging.getLogger(__name__)
+
+Loads = list[tuple[np.ndarray, np.ndarray]]
+_COEFFICIENTS = {
+    "mass": (1.0, 0.0, 0.0),
+    "stiffness": (0.0, 1.0, 0.0),
+    "damping": (0.0, 0.0, 1.0),
+}
+
+
+class LineOperators:
+    """K, C and the factored A of the distributed line. Collective to make.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+    model : Model, on all ranks
+    ownership : Ownership
+    coefficients : of M, K and C in A
+    windows : Windows, whose reach is that of A^-1
+
+    Attributes
+    ----------
+    factor : (n_local,) what products multiply: this rank's part, to be filled in
+    answer : (n_local,) this rank's part of the last solution
+    domain : Subdomain
+    """
+
+    # None on a rank that owns nothing.
+    _solver: PartSolver | SchwarzSolver | None = None
+    _is_direct = True
+
+    def __init__(
+        self,
+        comm: Any,
+        model: Model,
+        ownership: Ownership,
+        coefficients: tuple[float, float, float],
+        windows: Windows,
+    ) -> None:
+        self._comm = comm
+        self._model = model
+        self._ownership = ownership
+        self._coefficients = coefficients
+        self._block = station_block(model, ownership)
+        self._product_event, self._solve_event = event("LineProduct"), event("LineSolve")
+        if comm.size > 1 and wants_distributed_solver():
+            self._solve_together(windows)
+            residual = self.residual()
+        else:
+            self._solve_apart(windows)
+            residual = self.residual()
+            if not residual <= DIRECT and comm.size > 1:
+                logger.warning(
+                    "solving on each rank by itself leaves a residual of %.1e; taking PETSc's "
+                    "distributed solver instead",
+                    residual,
+                )
+                self.destroy()
+                self._solve_together(windows)
+                residual = self.residual()
+        if not np.isfinite(residual):
+            raise RunBroken("the step operator cannot be factored: it is singular or not finite")
+        if residual > DIRECT and self._is_direct:
+            logger.warning(
+                "the solver leaves a residual of %.1e in one application; iterating with GMRES",
+                residual,
+            )
+            if self._solver is not None:
+                self._solver.iterate()
+            self._is_direct = False
+        if isinstance(self._solver, PartSolver):
+            if comm.size > 1 and comm.rank == 0 and wants_view():
+                self._solver.view()  # one for all; on one rank PETSc shows it at its first solve
+            self._solver.hurry()
+        self._rows_by_kinds("stiffness")  # that no step has to wait for them
+
+    def passes(self, motion: MotionAhead, steps: Steps) -> StationPasses | None:
+        """Free steps of Newmark's method in two passes over a motion, if they can be.
+
+        ``motion`` is kept in ``factor``, ``answer`` and an array of its own.
+
+        For that the operator is to be factored and multiplied by stations. Not collective.
+        """
+        stiffness, solver = self._rows_by_kinds("stiffness"), self._solver
+        if not (isinstance(stiffness, StationProduct) and isinstance(solver, PartSolver)):
+            return None
+        if solver.factors is None or not self._is_direct:
+            return None
+        padded, answer = self._read_padded, self._solution.array
+        return StationPasses(stiffness, solver.factors, padded, answer, motion, steps)
+
+    def exchange(self) -> None:
+        """Bring ``factor`` up to date where it is others'. Collective."""
+        self._halo.exchange()
+
+    def multiply_stiffness(self) -> None:
+        """Make K ``factor`` the internal force. Right after ``exchange``. Not collective."""
+        self._product_event.begin()
+        self._multiply("stiffness", self._force.array, self._force_here)
+        self._product_event.end()
+
+    def add_damping(self) -> None:
+        """Add C ``factor`` to the internal force. Right after ``exchange``. Not collective."""
+        if self.domain.size:
+            self._product("damping").multAdd(self._read, self._force_here, self._force_here)
+
+    def add_force(self, force: np.ndarray) -> None:
+        """Add a force on all that is solved for, shape (domain.size,) [N], to the internal force.
+
+        Not collective.
+        """
+        self._force.array[:] += force
+
+    def solve(self, loads: Loads | None = None) -> None:
+        """Make ``answer`` that to the internal force and to ``loads``. Collective with loads.
+
+        ``loads`` are pairs of local unknowns and forces [N], perhaps none here; None on all ranks
+        if no rank has any, which saves an exchange.
+
+        Raises
+        ------
+        RunBroken
+            On all ranks, if an iteration does not converge; a direct solver was verified.
+        """
+        right = self._force
+        if loads is not None:
+            right, owned = self._loaded, self.domain.owned
+            right.array[owned] = self._force.array[owned]
+            for dofs, values in loads:
+                np.add.at(right.array[owned], dofs, values)
+            self._loaded_halo.exchange()
+        self._solve_event.begin()
+        self._solve(right)
+        self._solve_event.end()
+
+    def solve_for(self, dofs: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+        """Answer to forces ``coefficients`` at global unknowns ``dofs``. Collective.
+
+        All ranks pass the same. Returns ``answer``, shape (n_local,).
+        """
+        low, high = self.domain.low, self.domain.high
+        here = (dofs >= low) & (dofs < high)
+        self._loaded.array[:] = 0.0
+        np.add.at(self._loaded.array, dofs[here] - low, coefficients[here])
+        self._solve(self._loaded)
+        return self.answer
+
+    def square(self, name: str) -> float:
+        """x M x or x K x of the whole line for x in ``factor``, by ``name``. Collective."""
+        self.exchange()
+        local = 0.0
+        if self.domain.size:
+            self._multiply(name, self._loaded.array, self._loaded_here)
+            local = float(self._loaded.array[self.domain.owned] @ self.factor)
+        return float(self._comm.allreduce(local))
+
+    def residual(self) -> float:
+        """Relative residual of a solve with a load on every unknown. Collective.
+
+        Overwrites ``factor`` and ``answer``.
+        """
+        owned = self.domain.owned
+        load = np.cos(1.0 + 3.7 * np.arange(self.domain.low, self.domain.high))
+        self._loaded.array[:] = load
+        self._solve(self._loaded)
+        self.factor[:] = self.answer
+        self.answer[:] = 0.0
+        self.exchange()
+        if self._solver is not None:
+            self._solver.matrix.mult(self._read_domain, self._loaded.vector)
+        missing = self._loaded.array[owned] - load[owned]
+        squares = np.array([missing @ missing, load[owned] @ load[owned]])
+        self._comm.Allreduce(MPI.IN_PLACE, squares)
+        return float(np.sqrt(squares[0] / squares[1]))
+
+    @property
+    def traffic(self) -> tuple[int, int]:
+        """Messages and bytes that this rank sends at an exchange."""
+        return self._halo.messages, self._halo.bytes_sent
+
+    def destroy(self) -> None:
+        """Free all PETSc objects and messages. Collective."""
+        for halo in (self._halo, self._loaded_halo):
+            halo.destroy()
+        for held in (self._solver, *self._products.values(), *self._vectors):
+            if held is not None:
+                held.destroy()
+
+    def _solve_apart(self, windows: Windows) -> None:
+        """Let each rank solve by itself, for its own part and as much as can influence it."""
+        low, high = self._overlap(windows)
+        self._make_arrays(low, high, PETSc.COMM_SELF)
+        is_direct = True
+        if self.domain.size:
+            rows = (low, high)
+            part = part_of(self._model, rows, rows, self._coefficients, 1.0, self._block)
+            owned = self.domain.owned
+            own = slice(owned.start // self._block, owned.stop // self._block)
+            solver = PartSolver(part, own, self._in_stations, self._comm.size == 1)
+            self._solver, is_direct = solver, solver.is_direct
+        self._is_direct = bool(self._comm.allreduce(int(is_direct), op=MPI.MIN))
+
+    def _solve_together(self, windows: Windows) -> None:
+        """Let PETSc solve for the whole line on all ranks."""
+        first, last = self._ownership.first, self._ownership.last
+        self._make_arrays(first, last, self._comm)
+        rows, whole = (first, last), (0, self._model.n_dofs)
+        part = part_of(self._model, rows, whole, self._coefficients, 1.0, self._block)
+        solver = SchwarzSolver(
+            self._comm, part, self._ownership, self._overlap(windows), self._in_stations
+        )
+        self._solver, self._is_direct = solver, solver.is_direct
+
+    @property
+    def _in_stations(self) -> bool:
+        return self._block > self._model.block_size
+
+    def _overlap(self, windows: Windows) -> tuple[int, int]:
+        """Range of unknowns that influence this rank's own within a step, in whole blocks."""
+        model, ownership, block = self._model, self._ownership, self._block
+        first, last = ownership.first, ownership.last
+        if first == last:
+            return first, last
+        ends = windows.positions[[first // model.block_size, last // model.block_size - 1]]
+        near, coupled = windows.around(*map(float, ends)), columns_of(model, (first, last))
+        low, high = min(near[0], coupled[0]), max(near[1], coupled[1])
+        # There are none but whole blocks, and ends of the line are ends of blocks.
+        return low - low % block, high + -high % block
+
+    def _make_arrays(self, low: int, high: int, comm: Any) -> None:
+        """Arrays for [low, high) and what products over it read, and vectors that wrap them.
+
+        Nothing in the loop makes or copies arrays. An array asked from a vector would keep it, and
+        the communicator, alive beyond ``destroy``.
+        """
+        own, block = self._ownership, self._block
+        read_low, read_high = columns_of(self._model, (low, high))
+        read_low, read_high = read_low - read_low % block, read_high + -read_high % block
+        self.domain = domain = Subdomain(own.first, own.last, low, high, read_low, read_high)
+        # Products by stations read one more at both ends, which is zero where the line ends.
+        self._read_padded = aligned_arrays.zeros(read_high - read_low + 2 * block, 0)
+        self._read_array = read = self._read_padded[block : block + read_high - read_low]
+        answer, force = aligned_arrays.zeros(domain.size, 1), aligned_arrays.zeros(domain.size, 2)
+        loaded = aligned_arrays.zeros(domain.size, 3)
+        # What products fill is this rank's, what is solved for perhaps the line's: two views.
+        self._read, self._force_here, self._loaded_here = here = [
+            PETSc.Vec().createWithArray(array, comm=PETSc.COMM_SELF)
+            for array in (read, force, loaded)
+        ]
+        self._force, self._loaded, self._solution, read_domain = solved = [
+            Wrapped(array, PETSc.Vec().createWithArray(array, size=(domain.size, None), comm=comm))
+            for array in (force, loaded, answer, read[low - read_low : high - read_low])
+        ]
+        self._read_domain = read_domain.vector
+        self._vectors = (*here, *(pair.vector for pair in solved))
+        self._products: dict[str, PETSc.Mat] = {}
+        self._by_kinds: dict[str, StationProduct | RepeatedRows | None] = {}
+        self.factor, self.answer = read[domain.owned_of_read], answer[domain.owned]
+        self._halo = Halo(self._comm, own, read_low, read)
+        self._loaded_halo = Halo(self._comm, own, low, loaded)
+
+    def _product(self, name: str) -> PETSc.Mat:
+        """M, K or C for the rows of the subdomain, made when it is first asked for."""
+        if name not in self._products:
+            rows = self._rows_of(name, self._model.block_size)
+            self._products[name] = as_petsc(rows, PETSc.COMM_SELF)
+        return self._products[name]
+
+    def _multiply(self, name: str, result: np.ndarray, wrapped: PETSc.Vec) -> None:
+        """Make ``result``, and the vector around it, the product of M or K with what is read."""
+        by_kinds = self._rows_by_kinds(name)
+        if isinstance(by_kinds, StationProduct):
+            by_kinds.multiply(self._read_padded, result)
+        elif by_kinds is not None:
+            by_kinds.multiply(self._read_array, result)
+        elif self.domain.size:
+            self._product(name).mult(self._read, wrapped)
+
+    def _rows_by_kinds(self, name: str) -> StationProduct | RepeatedRows | None:
+        """Products with M or K that read each kind of rows once, by the fastest way that it allows.
+
+        Made when they are first asked for.
+        """
+        if name not in self._by_kinds:
+            domain, product = self.domain, None
+            if self._in_stations and domain.size:
+                first = (domain.low - domain.read_low) // self._block
+                product = station_product(self._rows_of(name, self._block), first)
+            rows = product or repeated_rows(self._rows_of(name, self._model.block_size))
+            self._by_kinds[name] = rows
+        return self._by_kinds[name]
+
+    def _rows_of(self, name: str, block: int) -> sparse.bsr_matrix:
+        domain = self.domain
+        return part_of(
+            self._model,
+            (domain.low, domain.high),
+            (domain.read_low, domain.read_high),
+            _COEFFICIENTS[name],
+            0.0,
+            block,
+        )
+
+    def _solve(self, right: Wrapped) -> None:
+        if self._solver is not None:
+            self._solver.solve(right, self._solution)
+        if not self._is_direct:
+            reason = 0 if self._solver is None else self._solver.failure
+            reason = self._comm.allreduce(reason, op=MPI.MIN)
+            if reason:
+                raise NotConverged(
+                    f"the linear solver did not converge (PETSc reason {reason}); drop the options "
+                    f"under -{PREFIX} or give the scene a smaller numerics.dt_s"
+                )

@@ -1,0 +1,1 @@
+"""The discrete line: unknowns, elements, matrices, and which rank owns what."""

@@ -1,0 +1,313 @@
+"""The discrete model of a line: element blocks, point masses, springs, weights, constraints.
+
+Plain arrays, the same on every rank; nothing here is distributed. Which terms exist is decided
+by the effects, each of which adds its own through a ``ModelBuilder``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
+from catenary.solver.effects import effect as effects
+from catenary.solver.model import elements
+from catenary.solver.problem.problem import Problem
+
+# Nodes closer than this along the track belong to one station [m].
+SAME_STATION = 1e-6
+
+
+class StepLoad(Protocol):
+    """A load that changes with time: ``values(time)`` [N] or [N m] on the unknowns ``dofs``."""
+
+    dofs: np.ndarray
+
+    def values(self, time: float) -> np.ndarray:
+        """Load at ``time`` [s], shape as ``dofs``; called once a step on ranks that own any."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """Equal-sized element matrices of one component.
+
+    dofs : (n, m) int; mass, stiffness : (n, m, m) or None
+    """
+
+    component: str
+    dofs: np.ndarray
+    mass: np.ndarray | None
+    stiffness: np.ndarray | None
+
+
+@dataclass
+class Model:
+    """A line as matrices to be. Unknown k of the node in row i has number ``n_unknowns`` i + k.
+
+    Attributes
+    ----------
+    unknowns : names of the unknowns at each node
+    row_of_node : (n_nodes,) place of each mesh node in the order along the track
+    blocks : element blocks; their sums are M and K
+    constrained : (n,) int, unknowns held at zero
+    weight : (n_dofs,) gravity load [N], [N m]
+    dropper_lengths : (n_droppers,) [m]
+    dropper_stiffness, dropper_damping : (n_droppers,) [N/m], [N s/m], of the taut dropper
+    released_damping : (n_droppers,) the part of ``dropper_damping`` that goes slack with the spring
+    broken : (n_droppers,) droppers that carry nothing; what they weigh stays on their clamps
+    step_loads : loads that change with time
+    terms_of : effect name -> number of terms that it added
+    """
+
+    problem: Problem
+    mesh: LineMesh
+    active: list[effects.Effect]
+    unknowns: tuple[str, ...]
+    row_of_node: np.ndarray
+    dropper_lengths: np.ndarray
+    blocks: list[Block] = field(default_factory=list)
+    constrained: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    weight: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    step_loads: list[StepLoad] = field(default_factory=list)
+    terms_of: dict[str, int] = field(default_factory=dict)
+    broken: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    @property
+    def block_size(self) -> int:
+        return len(self.unknowns)
+
+    @property
+    def n_dofs(self) -> int:
+        return self.mesh.n_nodes * self.block_size
+
+    def dofs(self, nodes: np.ndarray, unknown: str = "w") -> np.ndarray:
+        """Numbers of one unknown at mesh nodes, shape as ``nodes``."""
+        return self.row_of_node[nodes] * self.block_size + self.unknowns.index(unknown)
+
+    @property
+    def dropper_stiffness(self) -> np.ndarray:
+        kind = self.problem.line.dropper
+        if kind.stiffness is not None:
+            stiffness = np.full(self.mesh.droppers.shape[0], kind.stiffness)
+        else:
+            assert kind.axial_stiffness is not None
+            stiffness = kind.axial_stiffness / self.dropper_lengths
+        return np.where(self.broken, 0.0, stiffness)
+
+    @property
+    def dropper_damping(self) -> np.ndarray:
+        if "structural_damping" not in self.terms_of:
+            return np.zeros(self.mesh.droppers.shape[0])
+        return self.damping_of("droppers")[0] * self.dropper_stiffness
+
+    @property
+    def released_damping(self) -> np.ndarray:
+        damping = self.dropper_damping
+        return np.zeros_like(damping) if self.problem.slack_dampers_act else damping
+
+    def damping_of(self, component: str) -> tuple[float, float]:
+        """Damping factors (alpha [s], beta [1/s]) of a component; zero without the effect."""
+        if "structural_damping" not in self.terms_of:
+            return 0.0, 0.0
+        damping = self.problem.damping
+        return damping.per_component.get(component, (damping.alpha, damping.beta))
+
+    @property
+    def damping_is_proportional(self) -> bool:
+        """Whether C = alpha K + beta M holds for the whole line with one alpha and one beta."""
+        return len({self.damping_of(block.component) for block in self.blocks}) <= 1
+
+    def wire_elements(self, wire: str) -> tuple[np.ndarray, np.ndarray]:
+        """Element unknowns (n, 4) in the vertical plane and lengths (n,) [m] of a wire."""
+        return _wire_elements(self, wire, ("w", "theta_y"))
+
+    @property
+    def contact_x(self) -> np.ndarray:
+        """Positions of the contact wire's nodes [m], ascending."""
+        return self.mesh.x(self.mesh.wires[CONTACT_WIRE])
+
+
+class ModelBuilder:
+    """What an effect sees of a model under construction."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.problem: Problem = model.problem
+        self.mesh = model.mesh
+        self._gravity = 0.0
+        self._hanging: list[tuple[np.ndarray, np.ndarray]] = []
+        self._constrained: list[np.ndarray] = []
+        self._n_terms = 0
+
+    def add_wire(self, wire: str, unknowns: tuple[str, str] = ("w", "theta_y")) -> None:
+        """Bending and tension of a wire in the plane of two unknowns; its mass and weight."""
+        dofs, length = _wire_elements(self.model, wire, unknowns)
+        data = getattr(self.problem.line, wire)
+        self._add_block(
+            wire,
+            dofs,
+            elements.mass(length, data.mass_per_length),
+            elements.stiffness(length, data.bending_stiffness, data.tension),
+        )
+        if unknowns[0] == "w":
+            load = data.mass_per_length * elements.uniform_load(length)
+            self._hanging.append((dofs.ravel(), load.ravel()))
+
+    def add_springs(
+        self, component: str, nodes: np.ndarray, unknown: str, stiffness: float | np.ndarray
+    ) -> None:
+        """Springs from nodes to the ground [N/m], without force in the equilibrium."""
+        values = np.broadcast_to(np.asarray(stiffness, dtype=float), nodes.shape)
+        self._add_block(
+            component, self.model.dofs(nodes, unknown)[:, None], None, values[:, None, None].copy()
+        )
+
+    def add_masses(
+        self,
+        component: str,
+        nodes: np.ndarray,
+        mass: float | np.ndarray,
+        hanging_mass: float | np.ndarray | None = None,
+        unknown: str = "w",
+    ) -> None:
+        """Point masses [kg]; ``hanging_mass`` is what the node carries if it is not the same."""
+        values = np.broadcast_to(np.asarray(mass, dtype=float), nodes.shape)
+        dofs = self.model.dofs(nodes, unknown)
+        self._add_block(component, dofs[:, None], values[:, None, None].copy(), None)
+        if unknown == "w":
+            hanging = values if hanging_mass is None else hanging_mass
+            self._hanging.append((dofs, np.broadcast_to(np.asarray(hanging), nodes.shape)))
+
+    def add_links(
+        self, component: str, pairs: np.ndarray, unknown: str, stiffness: np.ndarray
+    ) -> None:
+        """Springs between pairs of nodes, shape (n, 2) and (n,) [N/m]."""
+        unit = np.array([[1.0, -1.0], [-1.0, 1.0]])
+        self._add_block(
+            component, self.model.dofs(pairs, unknown), None, stiffness[:, None, None] * unit
+        )
+
+    def add_step_load(self, load: StepLoad) -> None:
+        """A load that changes with time."""
+        self.model.step_loads.append(load)
+        self._n_terms += len(load.dofs)
+
+    def hold(self, nodes: np.ndarray, unknown: str) -> None:
+        """Hold an unknown of some nodes at its equilibrium value."""
+        self._constrained.append(self.model.dofs(nodes, unknown))
+
+    def set_gravity(self, gravity: float) -> None:
+        """Let all masses hang, those of effects built later included [m/s2]."""
+        self._gravity = gravity
+        self._n_terms += 1
+
+    def count_term(self) -> None:
+        """Count a term that is no matrix, such as a law in the time loop."""
+        self._n_terms += 1
+
+    def take_count(self) -> int:
+        """Terms added since the last call."""
+        count, self._n_terms = self._n_terms, 0
+        return count
+
+    def finish(self) -> Model:
+        """The model, its weights and constraints put together."""
+        model = self.model
+        model.weight = np.zeros(model.n_dofs)
+        if self._gravity:
+            for dofs, mass in self._hanging:
+                np.add.at(model.weight, dofs, -self._gravity * mass)
+        if self._constrained:
+            model.constrained = np.unique(np.concatenate(self._constrained))
+        return model
+
+    def _add_block(
+        self,
+        component: str,
+        dofs: np.ndarray,
+        mass: np.ndarray | None,
+        stiffness: np.ndarray | None,
+    ) -> None:
+        self.model.blocks.append(Block(component, dofs, mass, stiffness))
+        self._n_terms += dofs.shape[0]
+
+
+def _along_the_track(mesh: LineMesh) -> np.ndarray:
+    """Nodes in the order along the track, those of a station in the order of the wires."""
+    wire = np.zeros(mesh.n_nodes, dtype=np.int64)
+    for number, nodes in enumerate(mesh.wires.values()):
+        wire[nodes] = number
+    x = mesh.points[:, 0]
+    order = np.argsort(x, kind="stable")
+    station = np.cumsum(np.diff(x[order], prepend=x[order[:1]]) > SAME_STATION)
+    return order[np.lexsort((wire[order], station))]
+
+
+def build(
+    problem: Problem,
+    mesh: LineMesh,
+    dropper_lengths: np.ndarray,
+    broken: np.ndarray | None = None,
+) -> Model:
+    """The model of a problem on a mesh, for given dropper lengths [m]. Not collective.
+
+    ``broken`` (n_droppers,) bool tells which droppers carry nothing; none if not given.
+    """
+    active = effects.active(problem)
+    row_of_node = np.empty(mesh.n_nodes, dtype=np.int64)
+    row_of_node[_along_the_track(mesh)] = np.arange(mesh.n_nodes)
+    model = Model(
+        problem,
+        mesh,
+        active,
+        effects.unknowns_per_node(active),
+        row_of_node,
+        dropper_lengths,
+    )
+    model.broken = np.zeros(mesh.droppers.shape[0], dtype=bool) if broken is None else broken
+    model.terms_of = {effect.name: 0 for effect in active}
+    builder = ModelBuilder(model)
+    for effect in active:
+        if effect.build is not None:
+            effect.build(builder)
+        model.terms_of[effect.name] = builder.take_count()
+    return builder.finish()
+
+
+def iterate_entries(
+    model: Model, first: int, last: int, mass: float, stiffness: float, damping: float
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Entries (rows, columns, values) of ``mass`` M + ``stiffness`` K + ``damping`` C.
+
+    Only rows in [first, last); rows and columns of constrained unknowns are left out.
+    """
+    free = np.ones(model.n_dofs, dtype=bool)
+    free[model.constrained] = False
+    for block in model.blocks:
+        alpha, beta = model.damping_of(block.component)
+        near = ((block.dofs >= first) & (block.dofs < last)).any(axis=1)
+        if not near.any():
+            continue
+        dofs = block.dofs[near]
+        matrix = np.zeros((dofs.shape[0], dofs.shape[1], dofs.shape[1]))
+        if block.mass is not None:
+            matrix += (mass + damping * beta) * block.mass[near]
+        if block.stiffness is not None:
+            matrix += (stiffness + damping * alpha) * block.stiffness[near]
+        rows = np.broadcast_to(dofs[:, :, None], matrix.shape)
+        columns = np.broadcast_to(dofs[:, None, :], matrix.shape)
+        keep = (rows >= first) & (rows < last) & free[rows] & free[columns]
+        yield rows[keep], columns[keep], matrix[keep]
+
+
+def _wire_elements(
+    model: Model, wire: str, unknowns: tuple[str, str]
+) -> tuple[np.ndarray, np.ndarray]:
+    nodes = model.mesh.wires[wire]
+    w = model.dofs(nodes, unknowns[0])
+    theta = model.dofs(nodes, unknowns[1])
+    dofs = np.stack([w[:-1], theta[:-1], w[1:], theta[1:]], axis=1)
+    return dofs, np.diff(model.mesh.x(nodes))

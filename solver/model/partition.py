@@ -1,0 +1,72 @@
+"""Which rank owns which part of the line: contiguous runs of stations, cut between droppers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catenary.solver.model.model import SAME_STATION, Model
+
+# Nodes whose steps take as long as what rank 0 does for pantographs while the others are at the
+# line: some 7 us, more where a long line leaves the caches cold.
+PANTOGRAPH_NODES = 1500
+# Times as many nodes are the least that a rank is to have before one of them has less.
+_LONG = 3
+
+
+@dataclass(frozen=True)
+class Ownership:
+    """Contiguous ranges of unknowns, the same on every rank.
+
+    Attributes
+    ----------
+    bounds : (n_ranks + 1,) rank r owns the unknowns [bounds[r], bounds[r + 1])
+    rank : this rank
+    """
+
+    bounds: np.ndarray
+    rank: int
+
+    @property
+    def first(self) -> int:
+        return int(self.bounds[self.rank])
+
+    @property
+    def last(self) -> int:
+        return int(self.bounds[self.rank + 1])
+
+    @property
+    def n_local(self) -> int:
+        return self.last - self.first
+
+    def owned(self, dofs: np.ndarray) -> np.ndarray:
+        """Mask of the unknowns that this rank owns, shape as ``dofs``."""
+        return (dofs >= self.first) & (dofs < self.last)
+
+
+def distribute(model: Model, n_ranks: int, rank: int) -> Ownership:
+    """Cut a line into ``n_ranks`` runs that take nearly the same time. Not collective.
+
+    They are of nearly equal size but for rank 0, which has fewer nodes of a long line because it
+    moves the pantographs besides. A cut never separates nodes of one station nor the two ends of a
+    dropper, so that dropper forces need no communication. Ranks beyond the number of stations own
+    nothing.
+    """
+    n_nodes = model.mesh.n_nodes
+    x = np.empty(n_nodes)
+    x[model.row_of_node] = model.mesh.points[:, 0]
+    can_cut = np.ones(n_nodes + 1, dtype=bool)
+    can_cut[1:-1] = np.diff(x) > SAME_STATION
+    ends = np.sort(model.row_of_node[model.mesh.droppers], axis=1)
+    # +1 where a dropper's range of rows begins to forbid cuts, -1 where it ends.
+    steps = np.zeros(n_nodes + 2)
+    np.add.at(steps, ends[:, 0] + 1, 1)
+    np.add.at(steps, ends[:, 1] + 1, -1)
+    can_cut &= np.cumsum(steps)[: n_nodes + 1] == 0
+    cuts = np.flatnonzero(can_cut)
+    spared = PANTOGRAPH_NODES if n_nodes >= _LONG * PANTOGRAPH_NODES * n_ranks else 0
+    wanted = np.linspace(-spared, n_nodes, n_ranks + 1)
+    wanted[0] = 0.0
+    nearest = cuts[np.clip(np.searchsorted(cuts, wanted), 0, cuts.size - 1)]
+    return Ownership(nearest * model.block_size, rank)

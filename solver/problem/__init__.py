@@ -1,0 +1,1 @@
+"""Everything that a run is made of, in SI units: data only."""

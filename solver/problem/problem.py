@@ -1,0 +1,140 @@
+"""Everything that a run is made of, in SI units: what a scene says once units are converted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from catenary.mbs.vehicle.motion_sources import VehicleMotion
+from catenary.meshgen.line import Line
+from catenary.meshgen.mesh import CONTACT_WIRE
+from catenary.solver.problem.contact_laws import ContactLaw
+from catenary.solver.problem.incidents import LineIncident, TensionLoss
+
+if TYPE_CHECKING:
+    from catenary.mbs.build import PantographData
+    from catenary.mbs.lowering import Lowering
+
+# Halvings of a step where the scene names no smallest one.
+DEFAULT_HALVINGS = 5
+
+
+@dataclass(frozen=True)
+class Damping:
+    """Proportional damping C = alpha K + beta M (paper, section 2).
+
+    ``alpha`` [s] acts on stiffness, ``beta`` [1/s] on mass. ``per_component`` replaces both for
+    the components that it names (``contact_wire``, ``messenger_wire``, ``droppers``,
+    ``steady_arms``, ``supports``) with a pair (alpha, beta).
+    """
+
+    alpha: float
+    beta: float
+    per_component: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A pantograph on the train.
+
+    ``behind`` [m] is its distance behind the train's reference point (0 for the leading one),
+    ``static_force`` [N] the force on the wire at rest at ``nominal_height`` [m] of the head;
+    None stands for the mean height of the wire under the static force. ``lowering`` is how it is
+    lowered on the way, with the effect of that name.
+    """
+
+    data: PantographData
+    static_force: float
+    behind: float
+    nominal_height: float | None = None
+    lowering: Lowering | None = None
+
+
+@dataclass(frozen=True)
+class Train:
+    """``speed`` [m/s]; ``start`` and ``end`` [m] of the leading pantograph; ``raise_time`` [s] in
+    which the static force grows from zero to its value; ``vehicle`` is how the pantographs' bases
+    move, with the effect ``vehicle_motion``; heads start ``start_below`` [m] below the wire at
+    rest."""
+
+    speed: float
+    start: float
+    end: float
+    raise_time: float
+    placements: tuple[Placement, ...]
+    vehicle: VehicleMotion | None = None
+    start_below: float = 0.0
+
+
+@dataclass(frozen=True)
+class Numerics:
+    """Time step [s], scheme, integrator, tolerances of the fixed-point correction.
+
+    ``integrator`` of the line is ``newmark`` with ``beta`` and ``gamma``, or ``hht`` or
+    ``generalized_alpha`` with ``spectral_radius``; ``beta`` and ``gamma`` are also those of the
+    pantographs, which step by Newmark's method always.
+
+    ``scheme`` is ``one_solve``, ``ts_alpha2`` (PETSc's own stepper on the whole system) or
+    ``fixed_point`` (paper eqs. 2.4-2.7); ``eps_d`` [m] and ``eps_v`` [m/s] end its iteration, at
+    most ``max_iterations`` times a step.
+    ``coupling`` of ``one_solve`` is ``implicit``, ``iterated`` (until contact forces change by
+    less than ``eps_force`` [N], at most ``max_iterations`` times) or ``explicit``. ``iterations``
+    of ``fixed_point`` are done in every step whatever they reach; None iterates until it agrees.
+
+    ``adaptive_tolerance`` [N] is the error of a contact force accepted in one step: steps are
+    halved where they need it, down to ``smallest_dt`` [s]. None leaves all steps as they are.
+    """
+
+    dt: float
+    scheme: str
+    beta: float
+    gamma: float
+    eps_d: float
+    eps_v: float
+    max_iterations: int
+    coupling: str = "implicit"
+    eps_force: float = 1e-6
+    integrator: str = "newmark"
+    spectral_radius: float = 1.0
+    iterations: int | None = None
+    adaptive_tolerance: float | None = None
+    smallest_dt: float | None = None
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One run. ``effects`` holds the names of the effects that are simulated, and no others.
+
+    ``evaluation`` (from, to) [m] is the stretch whose statistics are judged;
+    ``residual_stiffness_ratio`` is the share of its stiffness that a compressed dropper keeps;
+    ``slack_dampers_act`` whether the damper of a dropper goes on acting when its spring is slack;
+    ``incidents`` are what happens to the line on the way.
+    """
+
+    line: Line
+    damping: Damping
+    contact: ContactLaw
+    train: Train
+    numerics: Numerics
+    evaluation: tuple[float, float]
+    residual_stiffness_ratio: float
+    effects: frozenset[str]
+    gravity: float = 9.81
+    incidents: tuple[LineIncident, ...] = ()
+    slack_dampers_act: bool = False
+
+
+def n_halvings(dt: float, smallest: float | None) -> int:
+    """How often a step of ``dt`` may be halved if it is to be no shorter than ``smallest`` [s]."""
+    if smallest is None:
+        return DEFAULT_HALVINGS
+    return math.floor(math.log2(dt / smallest) + 1e-9)
+
+
+def slowest_wave_speed(problem: Problem) -> float:
+    """Least wave speed of the contact wire in a run, losses of its tension included [m/s]."""
+    losses = (i for i in problem.incidents if isinstance(i, TensionLoss) and i.wire == CONTACT_WIRE)
+    share = min((loss.share for loss in losses), default=1.0)
+    return share**0.5 * problem.line.contact_wire.wave_speed

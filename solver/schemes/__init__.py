@@ -1,0 +1,1 @@
+"""Ways through one step, and steps that adapt."""

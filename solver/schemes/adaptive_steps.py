@@ -1,0 +1,264 @@
+"""Steps that adapt: an interval of the record is divided into shorter steps where that is needed.
+
+The record keeps its step dt, on which filters and statistics rely. Within an interval steps have
+the size dt / 2^level. Each level has operators, columns, pantographs and a scheme of its own, made
+when it is first needed and kept. Level 0 holds the state whenever an interval ends, so that
+records, checkpoints and incidents know nothing of the others.
+
+A step is repeated with a shorter one if its estimated error is above the tolerance (`step_error`),
+or if it has no solution; which size is next is up to PETSc's TSAdapt (`step_control`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from catenary.solver.base.errors import RunBroken
+from catenary.solver.base.parallel import on_root
+from catenary.solver.problem.problem import Numerics, n_halvings
+from catenary.solver.schemes.fixed_point import FixedPoint
+from catenary.solver.schemes.make_scheme import Parts
+from catenary.solver.schemes.one_solve import OneSolve
+from catenary.solver.schemes.scheme import Counters, Decision, StepRejected
+from catenary.solver.schemes.step_error import StepError
+from catenary.solver.schemes.ts_adapt import StepControl
+
+# A size that is shorter than a level's by less than this share of a halving is taken for it, so
+# that the safety factor alone does not shorten steps that are good enough.
+_ROUNDED = 0.2
+
+
+@dataclass
+class LevelCounters(Counters):
+    """Counts of steps of all sizes.
+
+    ``rejected_steps``: repeated because of their estimated error; ``failed_steps``: repeated
+    because they had no solution; ``steps_above_tolerance``: taken all the same, being the shortest
+    (counted on rank 0). ``taken`` are those of each level, of ``sizes`` [s].
+    """
+
+    rejected_steps: int = 0
+    failed_steps: int = 0
+    steps_above_tolerance: int = 0
+    taken: list[int] = field(default_factory=list)
+    sizes: list[float] = field(default_factory=list)
+
+    def as_dict(self) -> dict[str, int]:
+        """Names and counts, those of sizes named after them."""
+        counts = super().as_dict()
+        for name in ("taken", "sizes"):
+            del counts[name]
+        sizes = zip(self.sizes, self.taken, strict=True)
+        return {**counts, **{f"steps_of_{1e3 * size:.4g}_ms": n for size, n in sizes}}
+
+
+class StepLevels:
+    """A scheme that takes the interval of the record in steps of another one. Collective.
+
+    Attributes
+    ----------
+    pantographs : those of the level that was stepped last
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+    numerics : of the run, with ``adaptive_tolerance`` and ``smallest_dt``
+    whole : what steps the whole interval; its maker destroys it, but for its scheme
+    finer : makes what takes steps of dt / 2^level; collective
+    """
+
+    def __init__(
+        self, comm: Any, numerics: Numerics, whole: Parts, finer: Callable[[int], Parts]
+    ) -> None:
+        assert numerics.adaptive_tolerance is not None
+        self._comm = comm
+        self._dt = numerics.dt
+        self._tolerance = numerics.adaptive_tolerance
+        self._finest = n_halvings(numerics.dt, numerics.smallest_dt)
+        self._finer = finer
+        self._levels: dict[int, Parts] = {}
+        self._counters = LevelCounters(
+            taken=[0] * (self._finest + 1),
+            sizes=[self._dt / 2**level for level in range(self._finest + 1)],
+        )
+        self._error = StepError(whole.pantographs.n_contacts)
+        self.pantographs = whole.pantographs
+        self._active = self._wanted = self._tried = 0
+        self._before: dict[int, list[np.ndarray]] = {}
+        smallest = self._dt / 2**self._finest
+        self._control: StepControl | None = None
+
+        def control() -> None:
+            self._control = StepControl(self._tolerance, self._dt, smallest)
+
+        on_root(comm, control)  # options may be refused, which all ranks must know
+        self._take_in(0, whole)
+
+    @property
+    def counters(self) -> Counters:
+        """Of all levels together."""
+        return self._counters
+
+    @counters.setter
+    def counters(self, counters: Counters) -> None:
+        assert isinstance(counters, LevelCounters)  # those of the line before an incident
+        self._counters = counters
+        for parts in self._levels.values():
+            parts.scheme.counters = counters
+
+    def step(self, time: float, stop: bool) -> bool:
+        """Advance by one interval of the record to ``time`` [s]; see `schemes.Scheme`."""
+        whole, done, goes_on = 2**self._finest, 0, True
+        while done < whole:
+            level = self._wanted
+            while done % (whole >> level):
+                level += 1  # a longer step would not end where the interval does
+            size = whole >> level
+            at = time - self._dt * (whole - done - size) / whole
+            answer = self._try(level, at, stop)
+            if answer is not None:
+                goes_on &= answer
+                done += size
+        # Observers look at level 0, from which a continued run starts: so does this one.
+        self._go_to(0)
+        return goes_on
+
+    def look(
+        self,
+        time: float,
+        depth: np.ndarray,
+        force: np.ndarray,
+        stiffness: np.ndarray,
+        compliance: np.ndarray,
+    ) -> Decision:
+        """Decide on a step. Rank 0 only; see `schemes.Judge`."""
+        level, size = self._tried, self._dt / 2**self._tried
+        error = self._error.of(time, depth, force, stiffness, compliance)
+        decision = Decision(True, level)
+        if error is not None:
+            assert self._control is not None  # on rank 0
+            accepted, wanted = self._control.choose(error, time, size)
+            accepted |= level == self._finest
+            decision = Decision(accepted, self._level_of(wanted))
+            self._counters.steps_above_tolerance += accepted and error > self._tolerance
+        if decision.accepted:
+            self._error.accept(time, depth, force)
+        return decision
+
+    def hear(self, level: int) -> None:
+        """Learn which level is wanted next. All ranks."""
+        self._wanted = level
+
+    def state(self) -> np.ndarray:
+        """The level of the next step, what the estimate remembers, and what the scheme does."""
+        return np.concatenate(
+            [[self._wanted], self._error.state(), self._levels[0].scheme.state()], dtype=float
+        )
+
+    def restore(self, state: np.ndarray) -> None:
+        """Continue from what ``state`` returned; line and pantographs are those of level 0."""
+        n = self._error.state().size
+        self._wanted, self._active = int(state[0]), 0
+        self._error.restore(state[1 : 1 + n])
+        self._levels[0].scheme.restore(state[1 + n :])
+
+    @property
+    def traffic(self) -> None:
+        """Not counted: intervals differ in what they need."""
+        return None
+
+    def destroy(self) -> None:
+        """Free all PETSc objects but those of the line at level 0. Collective."""
+        if self._control is not None:
+            self._control.destroy()
+        self._levels.pop(0).scheme.destroy()
+        for parts in self._levels.values():
+            parts.destroy()
+
+    def _try(self, level: int, time: float, stop: bool) -> bool | None:
+        """A step of a level to ``time`` [s]: what its scheme says, None if it is to be repeated."""
+        parts = self._go_to(level)
+        self._tried = level
+        take_back = self._remember(level)
+        try:
+            goes_on = parts.scheme.step(time, stop)
+        except StepRejected:
+            self._counters.rejected_steps += 1
+        except RunBroken:
+            if level == self._finest:
+                raise
+            self._counters.failed_steps += 1
+            self._wanted = self._after_failure(time, level)
+        else:
+            self._counters.taken[level] += 1
+            return goes_on
+        take_back()
+        self._wanted = max(self._wanted, level + 1)
+        return None
+
+    def _after_failure(self, time: float, level: int) -> int:
+        """The level with which to repeat a step to ``time`` [s] that failed. Collective."""
+
+        def wanted() -> int:
+            assert self._control is not None
+            return self._level_of(self._control.after_failure(time, self._dt / 2**level))
+
+        return on_root(self._comm, wanted)
+
+    def _level_of(self, size: float) -> int:
+        """The level whose steps are at most of this size [s], or nearly."""
+        level = math.ceil(math.log2(self._dt / size) - _ROUNDED)
+        return min(max(level, 0), self._finest)
+
+    def _go_to(self, level: int) -> Parts:
+        """What takes steps of a level, made if need be and brought to the present state."""
+        if level not in self._levels:
+            self._take_in(level, self._finer(level))
+        if level != self._active:
+            _hand_over(self._levels[self._active], self._levels[level])
+            self._active, self.pantographs = level, self._levels[level].pantographs
+        return self._levels[level]
+
+    def _take_in(self, level: int, parts: Parts) -> None:
+        assert isinstance(parts.scheme, OneSolve | FixedPoint)
+        parts.scheme.judge = self
+        parts.scheme.counters = self._counters
+        self._levels[level] = parts
+        self._before[level] = [np.empty_like(values) for values in parts.line.kept()]
+
+    def _remember(self, level: int) -> Callable[[], None]:
+        """Keep the state before a step; returns what brings it back.
+
+        A step that is repeated has moved the line. It has moved pantographs, and what contacts
+        remember, only if it failed after the forces were found, which joints alone can make it do.
+        """
+        parts, before = self._levels[level], self._before[level]
+        kept = parts.line.kept()
+        for copied, values in zip(before, kept, strict=True):
+            np.copyto(copied, values)
+        moved = parts.pantographs
+        models = [model.state() for model in moved.models] if moved.joints_in_loop else []
+        contacts = (self._error.state(), parts.scheme.state()) if moved.joints_in_loop else None
+
+        def take_back() -> None:
+            for copied, values in zip(before, kept, strict=True):
+                np.copyto(values, copied)
+            for model, state in zip(moved.models, models, strict=False):
+                model.restore(state)
+            if contacts is not None:
+                self._error.restore(contacts[0])
+                parts.scheme.restore(contacts[1])
+
+        return take_back
+
+
+def _hand_over(source: Parts, target: Parts) -> None:
+    """Bring ``target`` to the state of ``source``. Not collective."""
+    target.line.restore(source.line.state())
+    target.scheme.restore(source.scheme.state())
+    target.pantographs.take_over(source.pantographs)

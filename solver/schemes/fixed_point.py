@@ -1,0 +1,179 @@
+"""The paper's way through a step: whole solves, repeated until they agree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from catenary.solver.base.errors import NotConverged
+from catenary.solver.base.parallel import on_root
+from catenary.solver.contact.forces_on_line import Interaction
+from catenary.solver.contact.head_states import Heads
+from catenary.solver.contact.pantographs import Pantographs
+from catenary.solver.contact_problem.coupling import DIVERGED
+from catenary.solver.contact_problem.law_tangents import LawInSteps
+from catenary.solver.problem.problem import Numerics
+from catenary.solver.schemes.scheme import Counters, Judge, LoadSource, StepRejected
+
+# A correction that moves any of the line by more than this [m] will not come back.
+_FAR = 10.0
+
+
+@dataclass
+class FixedPoint:
+    """The paper's correction: eqs. (2.4) to (2.7) repeated until the iterates agree.
+
+    Contact forces and the compensation of slack droppers are evaluated from the latest iterate
+    and the whole system is solved again. With a fixed number of ``numerics.iterations`` a step
+    goes on with what they have reached; those above the tolerances are counted.
+    """
+
+    comm: Any
+    interaction: Interaction
+    pantographs: Pantographs
+    numerics: Numerics
+    law: LawInSteps
+    kept_ratio: float
+    may_slacken: bool
+    loads: LoadSource
+    counters: Counters = field(default_factory=Counters)
+    judge: Judge | None = None
+
+    def __post_init__(self) -> None:
+        n = self.interaction.line.ownership.n_local
+        self._predicted = np.zeros((2, n))
+        self._latest = np.zeros((2, n))
+        self._heads = Heads(self.pantographs.n_contacts)
+        self._force = np.zeros(self.pantographs.n_contacts)
+
+    # Iterates that grow beyond all numbers are told by ``_settled``, not by NumPy.
+    @np.errstate(over="ignore", invalid="ignore")
+    def step(self, time: float, stop: bool) -> bool:
+        line = self.interaction.line
+        if self.comm.size > 1:
+            stop = self.comm.allreduce(int(stop)) > 0
+        line.predict()
+        self._predicted[0] = line.displacement
+        self._predicted[1] = line.velocity
+        line.internal_forces()
+        self.pantographs.move_to(time)
+        self.interaction.locate()
+        heads = self._heads_everywhere(time)
+        external = self.loads(time) or []
+        force = self._force
+        fixed = self.numerics.iterations
+        for number in range(1, (fixed or self.numerics.max_iterations) + 1):
+            force, depth, rate = self._contact(heads, force)
+            compensation = self._compensation()
+            self._latest[0] = line.displacement
+            self._latest[1] = line.velocity
+            np.copyto(line.displacement, self._predicted[0])
+            np.copyto(line.velocity, self._predicted[1])
+            line.solve(external + self.interaction.loads(force, compensation))
+            line.correct()
+            self.counters.rounds += 1
+            # How far a fixed number of them has come is only asked after the last.
+            if (fixed is None or number == fixed) and self._settled():
+                break
+        else:
+            if fixed is None:
+                raise self._broken("does not converge")
+            self.counters.unconverged_steps += 1
+        if fixed is not None and not (np.abs(force) < DIVERGED).all():
+            raise self._broken("diverges")
+        if self.judge is not None:
+            self._ask(self.judge, time, depth, force, heads)
+        self.counters.steps += 1
+        self.counters.solves = self.counters.rounds
+        self._force = force
+        # All ranks hold the same forces, so that all remember the same impacts.
+        self.law.accept(time, depth, rate, force)
+        moved = self.pantographs
+        on_root(self.comm, lambda: moved.advance(force, self.law.reported(force), depth))
+        return not stop
+
+    def _ask(
+        self, judge: Judge, time: float, depth: np.ndarray, force: np.ndarray, heads: Heads
+    ) -> None:
+        """Raise StepRejected on all ranks if the step is not to be taken. Collective."""
+        stiffness = self.law.tangents[2]
+        # Of the line's compliance this scheme knows nothing.
+        yielding = heads.height_compliance.diagonal()
+        decision = on_root(self.comm, lambda: judge.look(time, depth, force, stiffness, yielding))
+        judge.hear(decision.level)
+        if not decision.accepted:
+            raise StepRejected
+
+    def state(self) -> np.ndarray:
+        """The latest forces, and what the law remembers, as one array."""
+        return np.concatenate([self._force, self.law.state()])
+
+    def restore(self, state: np.ndarray) -> None:
+        """Continue from what ``state`` returned."""
+        n = self._force.size
+        self._force = state[:n].copy()
+        self.law.restore(state[n:])
+
+    @property
+    def traffic(self) -> None:
+        """Not counted: rounds of messages, many a step."""
+        return None
+
+    def destroy(self) -> None:
+        """Nothing: there are no PETSc objects of its own."""
+
+    def _heads_everywhere(self, time: float) -> Heads:
+        """Rank 0's prediction on all ranks, which all know if there is none."""
+        if self.comm.size == 1:
+            return self.pantographs.predict(time)
+        heads = self._heads
+        heads.numbers[:] = on_root(self.comm, lambda: self.pantographs.predict(time).numbers)
+        return heads
+
+    def _contact(
+        self, heads: Heads, force: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Contact forces [N], depths [m] and their rates [m/s] from the latest iterate, on all
+        ranks."""
+        both = np.zeros((2, force.size))
+        self.interaction.heights(both[0], both[1])
+        if self.comm.size > 1:
+            self.comm.Allreduce(MPI.IN_PLACE, both)
+        height, rate = both
+        depth = heads.height - heads.height_compliance @ force - height
+        speed = heads.velocity - heads.velocity_compliance @ force - rate
+        new = self.law.force(depth, speed).copy()
+        return (new if self.law.pulls else np.maximum(new, 0.0)), depth, speed
+
+    def _compensation(self) -> np.ndarray:
+        """Forces that cancel what owned droppers push (eq. 2.7), as far as it is released [N]."""
+        if not self.may_slacken:
+            return np.zeros(0)
+        tension = self.interaction.droppers.tension()
+        return np.asarray((1.0 - self.kept_ratio) * np.maximum(0.0, -tension))
+
+    def _settled(self) -> bool:
+        line, numerics = self.interaction.line, self.numerics
+        moved = np.abs(line.displacement - self._latest[0]).max(initial=0.0)
+        sped = np.abs(line.velocity - self._latest[1]).max(initial=0.0)
+        largest = float(max(moved / numerics.eps_d, sped / numerics.eps_v))
+        if not (moved < _FAR and np.isfinite(sped)):  # also true for what is no number
+            largest = np.inf
+        if self.comm.size > 1:
+            largest = self.comm.allreduce(largest, op=MPI.MAX)
+        if not np.isfinite(largest):
+            raise self._broken("diverges")
+        return largest < 1.0
+
+    def _broken(self, how: str) -> NotConverged:
+        fixed, most = self.numerics.iterations, self.numerics.max_iterations
+        allowed = f"at most {most} iterations, numerics.max_iterations"
+        if fixed is not None:
+            allowed = f"numerics.iterations is {fixed}"
+        return NotConverged(
+            f'the fixed-point correction {how} ({allowed}); take numerics.scheme = "one_solve" '
+            "or a smaller numerics.dt_s"
+        )

@@ -1,0 +1,150 @@
+"""All that steps a line and its train with steps of one size, made from a problem."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from catenary.solver.contact.forces_on_line import Interaction
+from catenary.solver.contact.pantographs import Pantographs
+from catenary.solver.contact_problem.coupling import make_coupling
+from catenary.solver.contact_problem.law_tangents import law_in_steps
+from catenary.solver.integrators.line_integrator import LineMotion
+from catenary.solver.integrators.make_line import make_line
+from catenary.solver.model.model import Model
+from catenary.solver.model.partition import Ownership
+from catenary.solver.problem.contact_laws import KinematicLaw
+from catenary.solver.problem.problem import Placement, Problem
+from catenary.solver.schemes.fixed_point import FixedPoint
+from catenary.solver.schemes.monolithic_system import WholeSystem
+from catenary.solver.schemes.one_solve import OneSolve
+from catenary.solver.schemes.scheme import LoadSource, Scheme
+from catenary.solver.schemes.ts_alpha2 import TSAlpha2
+from catenary.solver.statics.after_incidents import ChangedLine
+from catenary.solver.statics.equilibrium import Equilibrium
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Line, what acts on it, train, and the scheme that steps them. ``destroy`` is collective."""
+
+    line: LineMotion
+    interaction: Interaction
+    pantographs: Pantographs
+    scheme: Scheme
+
+    def destroy(self) -> None:
+        """Free all PETSc objects. Collective."""
+        self.scheme.destroy()
+        self.line.destroy()
+
+
+@dataclass(frozen=True)
+class SetUp:
+    """What parts are made of, whatever has happened to the line. ``make`` is collective.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+    form, ownership : the line's first rest shape, and which rank owns what
+    nominal_height : head height at which the static force of a placement is defined [m]
+    """
+
+    comm: Any
+    form: Equilibrium
+    ownership: Ownership
+    nominal_height: Callable[[Placement], float]
+
+    def make(self, problem: Problem, changed: ChangedLine, pantographs: Pantographs) -> Parts:
+        """The parts for the problem's numerics, of a line at rest. Collective.
+
+        ``pantographs`` are those of the problem, made for the same numerics.
+        """
+        comm, model, train = self.comm, changed.model, problem.train
+        numerics = problem.numerics
+        in_parts = numerics.scheme != "one_solve" or numerics.coupling == "explicit"
+        only_free = not (in_parts or model.step_loads)
+        line = make_line(comm, model, self.ownership, numerics, changed.load, only_free)
+        on = model.terms_of
+        trailing = max(placement.behind for placement in train.placements)
+        offsets = [x for placement in train.placements for x in placement.data.strip_offsets]
+        reach = (max(0.0, -min(offsets)), max(0.0, max(offsets)))
+        # A kinematic contact ends depths through their rates.
+        uses_rate = "contact_damping" in on or isinstance(problem.contact, KinematicLaw)
+        interaction = Interaction(
+            comm,
+            model,
+            self.form,
+            line,
+            (train.start - trailing - reach[0], train.end + reach[1]),
+            pantographs.contact_place,
+            train.speed,
+            uses_rate,
+            "dropper_slackening" in on,
+        )
+        scheme_of: dict[str, Callable[[Problem, Model, Interaction, Pantographs], Scheme]] = {
+            "one_solve": self._one_solve,
+            "fixed_point": self._fixed_point,
+            "ts_alpha2": self._ts_alpha2,
+        }
+        scheme = scheme_of[problem.numerics.scheme](problem, model, interaction, pantographs)
+        return Parts(line, interaction, pantographs, scheme)
+
+    def _one_solve(
+        self, problem: Problem, model: Model, interaction: Interaction, pantographs: Pantographs
+    ) -> Scheme:
+        slack = interaction.slack_coupling
+        band = np.zeros((0, 1)) if slack is None or slack.band is None else slack.band
+        law = law_in_steps(problem, pantographs.n_contacts)
+        coupling = make_coupling(law, kept_ratio(problem, model), band, problem.numerics)
+        return OneSolve(self.comm, interaction, pantographs, coupling, self._loads(model))
+
+    def _fixed_point(
+        self, problem: Problem, model: Model, interaction: Interaction, pantographs: Pantographs
+    ) -> Scheme:
+        return FixedPoint(
+            self.comm,
+            interaction,
+            pantographs,
+            problem.numerics,
+            law_in_steps(problem, pantographs.n_contacts),
+            kept_ratio(problem, model),
+            "dropper_slackening" in model.terms_of,
+            self._loads(model),
+        )
+
+    def _ts_alpha2(
+        self, problem: Problem, model: Model, interaction: Interaction, pantographs: Pantographs
+    ) -> Scheme:
+        slackens = "dropper_slackening" in model.terms_of
+        system = WholeSystem(
+            problem,
+            model,
+            self.form,
+            kept_ratio(problem, model) if slackens else 1.0,
+            self.nominal_height,
+            self._loads(model),
+        )
+        return TSAlpha2(self.comm, interaction, pantographs, system, problem.numerics)
+
+    def _loads(self, model: Model) -> LoadSource:
+        """This rank's part of the loads that change with time; without any, no calls are made."""
+        free = ~np.isin(np.arange(model.n_dofs), model.constrained)
+        parts = []
+        for load in model.step_loads:
+            mine = self.ownership.owned(load.dofs) & free[load.dofs]
+            if mine.any():
+                parts.append((load, mine, load.dofs[mine] - self.ownership.first))
+        if not model.step_loads:
+            return lambda time: None
+        return lambda time: [(dofs, load.values(time)[mine]) for load, mine, dofs in parts]
+
+
+def kept_ratio(problem: Problem, model: Model) -> float:
+    """Share of its stiffness that a slack dropper keeps."""
+    if "residual_dropper_stiffness" not in model.terms_of:
+        return 0.0
+    return problem.residual_stiffness_ratio

@@ -1,0 +1,216 @@
+"""The default way through a step: one solve, and a small exact problem."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from catenary.solver.base.errors import RunBroken
+from catenary.solver.base.parallel import on_root
+from catenary.solver.base.petsc_events import NAMES, event
+from catenary.solver.contact.forces_on_line import Interaction
+from catenary.solver.contact.head_states import Heads
+from catenary.solver.contact.line_response import LineResponse
+from catenary.solver.contact.pantographs import Pantographs
+from catenary.solver.contact_problem.complementarity import NOT_FINITE, InnerSolution
+from catenary.solver.contact_problem.coupling import Coupling
+from catenary.solver.contact_problem.force_exchange import Exchange, Reply, Verdict
+from catenary.solver.schemes.scheme import Counters, Judge, LoadSource, StepRejected
+
+# First guesses of what droppers elsewhere may lose [N] and of contact forces [N]; both grow when
+# a step shows that they were too small, and that step is repeated.
+_FIRST_MARGIN = 5.0
+_FIRST_BOUND = 200.0
+# Below it is no tension: no dropper is told of, but for one that is not finite.
+_NO_MARGIN = -np.finfo(float).max
+
+
+@dataclass
+class OneSolve:
+    """One solve for the free response, then the exact small problem of contacts and slack droppers.
+
+    The columns of A^-1 that the forces act through are tabulated, so that superposition needs no
+    second solve. Steps are taken as they come, unless a ``judge`` is put in.
+    """
+
+    comm: Any
+    interaction: Interaction
+    pantographs: Pantographs
+    coupling: Coupling
+    loads: LoadSource
+    counters: Counters = field(default_factory=Counters)
+    judge: Judge | None = None
+
+    def __post_init__(self) -> None:
+        n = self.pantographs.n_contacts
+        slackens = self.interaction.slack_coupling is not None
+        self._limits = np.append(
+            np.full(n, _FIRST_BOUND), _FIRST_MARGIN if slackens else _NO_MARGIN
+        )
+        self._exchange = Exchange(self.comm, n, self.coupling.extrapolates, self._limits)
+        self._respond = self.interaction.responder(self._exchange.share)
+        self._none = np.zeros(n)
+        self._found: InnerSolution | None = None
+        self._why: RunBroken | None = None
+        self._events = {name: event(name) for name in NAMES}
+
+    def step(self, time: float, stop: bool) -> bool:
+        line, interaction, events = self.interaction.line, self.interaction, self._events
+        events["LineColumns"].begin()
+        self.pantographs.move_to(time)
+        interaction.place()
+        events["LineColumns"].end()
+        events["LineFree"].begin()
+        if self.coupling.extrapolates:
+            line.predict()
+            share = self._exchange.share
+            interaction.heights(share.early_height, share.early_rate)
+            line.free_acceleration(self.loads(time))
+            line.correct()
+            interaction.droppers.tension()
+        else:
+            line.free_step(self.loads(time))
+        # From here on the line holds the end of the step without contacts and slack droppers.
+        events["LineFree"].end()
+        reply = self._solve_inner(time, stop)
+        if self.judge is not None:
+            self.judge.hear(reply.level)
+            if reply.verdict == Verdict.REJECT:
+                raise StepRejected
+        events["LineSuperpose"].begin()
+        interaction.superpose(reply.contact_force, reply.droppers, reply.compensation)
+        events["LineSuperpose"].end()
+        events["PantoAdvance"].begin()
+        if self.pantographs.joints_in_loop:
+            on_root(self.comm, self._advance)  # joints may fail to close, which all must know
+        else:
+            self._advance()
+        events["PantoAdvance"].end()
+        self.counters.steps += 1
+        self.counters.solves += 1
+        return reply.verdict == Verdict.ADVANCE
+
+    def _advance(self) -> None:
+        """Move the pantographs on. Does nothing but on rank 0."""
+        found = self._found
+        if found is not None:
+            force = found.contact_force
+            self.pantographs.advance(force, self.coupling.law.reported(force), found.depth)
+
+    def state(self) -> np.ndarray:
+        """What coupling and law remember, as one array."""
+        return self.coupling.state()
+
+    def restore(self, state: np.ndarray) -> None:
+        """Continue from what ``state`` returned."""
+        self.coupling.restore(state)
+
+    @property
+    def traffic(self) -> tuple[int, int]:
+        """Messages and bytes that this rank sent to agree on forces."""
+        return self._exchange.messages, self._exchange.bytes_sent
+
+    def destroy(self) -> None:
+        """Nothing: there are no PETSc objects of its own."""
+
+    def _solve_inner(self, time: float, stop: bool) -> Reply:
+        exchange, interaction, events = self._exchange, self.interaction, self._events
+        events["ContactInner"].begin()
+        heads = self._heads(time) if self.comm.rank == 0 else None
+        events["ContactInner"].end()
+        while True:
+            share = exchange.share
+            events["ContactShare"].begin()
+            self._respond()
+            events["ContactShare"].end()
+            share.put_stop(stop)
+            merged = exchange.to_root()
+            answer = None
+            if merged is not None:
+                events["ContactInner"].begin()
+                answer = self._answer(time, merged, heads)
+                events["ContactInner"].end()
+            reply = exchange.from_root(answer)
+            if reply.verdict == Verdict.BROKEN:
+                raise self._broken()
+            if reply.verdict == Verdict.ENLARGE:
+                early = share.early_height.copy(), share.early_rate.copy()
+                exchange.enlarge(2 * reply.room)
+                self._respond = interaction.responder(exchange.share)
+                exchange.share.early_height[:], exchange.share.early_rate[:] = early
+            elif reply.verdict == Verdict.REPEAT:
+                self._limits *= 2.0
+                self.counters.repeated_steps += 1
+            else:
+                return reply
+
+    def _heads(self, time: float) -> Heads | None:
+        """What rank 0 predicts of the heads, None if a pantograph cannot go on."""
+        try:
+            heads = self.pantographs.predict(time)
+            if self.coupling.extrapolates:
+                heads.early_height[:], heads.early_velocity[:] = self.pantographs.extrapolate(time)
+        except RunBroken as error:
+            # Told with the answer: the other ranks wait for that.
+            self._why = _alone(error)
+            return None
+        return heads
+
+    def _broken(self) -> RunBroken:
+        """Why the step has no solution, which rank 0 knows, on all ranks. Collective."""
+        why, self._why = self._why, None
+        if self.comm.size > 1:
+            why = self.comm.bcast(why, root=0)
+        assert why is not None
+        return why
+
+    def _answer(self, time: float, response: LineResponse, heads: Heads | None) -> Reply:
+        """What rank 0 makes of all shares."""
+        self._found = None
+        if heads is None:
+            return Reply(Verdict.BROKEN, self._none)
+        _, wants_to_stop, is_broken, missing_room = response.flags
+        if is_broken:
+            self._why = RunBroken(NOT_FINITE)
+            return Reply(Verdict.BROKEN, self._none)
+        if missing_room:
+            return Reply(Verdict.ENLARGE, self._none, room=int(missing_room))
+        law, level = self.coupling.law, 0
+        try:
+            found = self.coupling.solve(response, heads)
+            if not found.complete:
+                return Reply(Verdict.REPEAT, self._none)
+            if self.judge is not None:
+                yielding = heads.height_compliance.diagonal() + response.height_by_force.diagonal()
+                accepted, level = self.judge.look(
+                    time, found.depth, found.contact_force, law.tangents[2], yielding
+                )
+                if not accepted:
+                    return Reply(Verdict.REJECT, self._none, level=level)
+            law.accept(time, found.depth, found.rate, found.contact_force)
+        except RunBroken as error:
+            self._why = _alone(error)
+            return Reply(Verdict.BROKEN, self._none)
+        self._found = found
+        self.counters.rounds += found.rounds
+        self.counters.pivoted_steps += found.pivoted
+        verdict = Verdict.ADVANCE_AND_STOP if wants_to_stop else Verdict.ADVANCE
+        slack = found.compensation
+        n_slack = np.count_nonzero(slack)
+        if not n_slack:
+            return Reply(verdict, found.contact_force, level=level)
+        self.counters.slack_dropper_steps += n_slack
+        droppers = response.droppers
+        if n_slack < slack.size:
+            pushed = slack != 0.0
+            droppers, slack = droppers[pushed], slack[pushed]
+        return Reply(verdict, found.contact_force, droppers, slack, level=level)
+
+
+def _alone(error: RunBroken) -> RunBroken:
+    """The error without its traceback, whose frames would keep PETSc's objects alive on this rank
+    alone: PETSc then frees its communicator on the others only, and the next object made hangs."""
+    error.__cause__ = error.__context__ = None
+    return error.with_traceback(None)

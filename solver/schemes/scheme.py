@@ -1,0 +1,102 @@
+"""What a scheme is: a way through a time step for line and pantographs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from catenary.solver.contact.pantographs import Pantographs
+from catenary.solver.linear.step_operators import Loads
+
+# Loads at a time [s]; None on all ranks if there never are any.
+LoadSource = Callable[[float], Loads | None]
+
+
+@dataclass
+class Counters:
+    """What the steps of a run needed.
+
+    ``repeated_steps``: bounds of what may slacken were too small; ``pivoted_steps``: the active
+    set of contacts and slack droppers cycled, and pivoting found it; ``unconverged_steps``:
+    iterations ended above their tolerances, which ends the run (``Stepper`` counts that step)
+    unless their number is given.
+    """
+
+    steps: int = 0
+    rounds: int = 0
+    repeated_steps: int = 0
+    pivoted_steps: int = 0
+    slack_dropper_steps: int = 0
+    solves: int = 0
+    unconverged_steps: int = 0
+
+    def as_dict(self) -> dict[str, int]:
+        """Names and counts, for the result file."""
+        return dict(self.__dict__)
+
+
+class Decision(NamedTuple):
+    """Whether a step is taken, and the level of the next, or of its repetition."""
+
+    accepted: bool
+    level: int
+
+
+class Judge(Protocol):
+    """Decides on steps whose forces are found, where steps adapt (`step_levels`)."""
+
+    def look(
+        self,
+        time: float,
+        depth: np.ndarray,
+        force: np.ndarray,
+        stiffness: np.ndarray,
+        compliance: np.ndarray,
+    ) -> Decision:
+        """Decide on a step to ``time`` [s]. Rank 0 only.
+
+        At its contacts (n,) it has found depths [m], forces [N], stiffnesses [N/m] of the law's
+        tangent, and ``compliance`` is what a force takes off the depth within the step [m/N].
+        """
+
+    def hear(self, level: int) -> None:
+        """Learn the level of what was decided. All ranks."""
+
+
+class StepRejected(Exception):
+    """The judge wants the step repeated: nothing but the line has moved. On all ranks."""
+
+
+class Scheme(Protocol):
+    """Advances line and pantographs by one step."""
+
+    counters: Counters
+    pantographs: Pantographs
+
+    def step(self, time: float, stop: bool) -> bool:
+        """Advance to ``time`` [s]; False if any rank wants this step to be the last. Collective.
+
+        Raises
+        ------
+        RunBroken
+            On all ranks, if the step has no solution or holds something that is no number;
+            NotConverged if iterations ended before they were there. What it says needs no time and
+            no place: ``Stepper`` adds them.
+        """
+
+    @property
+    def traffic(self) -> tuple[int, int] | None:
+        """Messages and bytes that this rank sent so far, those to neighbours left out; None if
+        they are not counted."""
+
+    def state(self) -> np.ndarray:
+        """What has to be known of contacts to continue, as one array."""
+
+    def restore(self, state: np.ndarray) -> None:
+        """Continue from what ``state`` returned."""
+
+    def destroy(self) -> None:
+        """Free PETSc objects of the scheme's own. Collective."""

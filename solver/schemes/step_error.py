@@ -1,0 +1,82 @@
+"""How wrong a step makes the contact forces: an estimate from depths that are known anyway.
+
+Average acceleration misses h^3 / 12 times the third derivative of a motion in a step of h. At a
+contact the motion is the depth, of which a march knows the latest values. With the second
+derivatives a, twice the divided differences, of this step and the one before, the depth is wrong by
+h^2 / 12 (a_n - a_n-1) (Zienkiewicz and Xie 1991, for beta = 1/4), and the force by this times the
+stiffness of the contact. What changes within a step (a landing, a kink of the force) is thereby
+taken to happen in this step. Without contact at either end the depth moves no force.
+
+Where contact is made within a step, at a share s of it, the force f at its end acts for the whole
+step: the impulse is wrong by s h f / 2 < h f / 2, which sets head and wire swinging on the contact.
+With k its stiffness, m the mass that swings and D = h^2 / 4 m what a force takes off the depth
+within a step, the force is wrong by k h f / (2 m omega) = sqrt(k D) f. Likewise where it is lost.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from catenary.solver.schemes import step_error_kernels
+
+# Steps before this one that the estimate looks at.
+_PAST = 3
+
+
+class StepError:
+    """The estimate for n contacts, with the depths that it remembers. On rank 0; not collective."""
+
+    def __init__(self, n: int) -> None:
+        self._times = np.zeros(_PAST)
+        self._depths = np.zeros((_PAST, n))
+        self._forces = np.zeros(n)
+        self._known = 0
+        # Compile, or load from Numba's cache, before the clock of a march starts.
+        nothing = np.zeros(n)
+        step_error_kernels.largest(
+            1.0, nothing, nothing, nothing, nothing, np.arange(3.0), self._depths, self._forces
+        )
+        step_error_kernels.remember(0.0, nothing, nothing, self._times, self._depths, self._forces)
+
+    def of(
+        self,
+        time: float,
+        depth: np.ndarray,
+        force: np.ndarray,
+        stiffness: np.ndarray,
+        compliance: np.ndarray,
+    ) -> float | None:
+        """Largest error of a contact force by a step to ``time`` [N]; None while it is unknown.
+
+        Parameters
+        ----------
+        time : end of the step [s]
+        depth, force, stiffness : (n,) found there [m], [N], [N/m], the latter of the law's tangent
+        compliance : (n,) D, what a force takes off the depth within the step [m/N]
+        """
+        if self._known < _PAST:
+            return None
+        return float(
+            step_error_kernels.largest(
+                time, depth, force, stiffness, compliance, self._times, self._depths, self._forces
+            )
+        )
+
+    def accept(self, time: float, depth: np.ndarray, force: np.ndarray) -> None:
+        """Remember a step that was taken."""
+        step_error_kernels.remember(time, depth, force, self._times, self._depths, self._forces)
+        self._known = min(self._known + 1, _PAST)
+
+    def state(self) -> np.ndarray:
+        """All that is remembered, as one array of fixed length."""
+        return np.concatenate(
+            [[self._known], self._forces, self._times, self._depths.ravel()], dtype=float
+        )
+
+    def restore(self, state: np.ndarray) -> None:
+        """Continue from what ``state`` returned."""
+        n = self._forces.size
+        self._known = int(state[0])
+        self._forces[:] = state[1 : 1 + n]
+        self._times[:] = state[1 + n : 1 + n + _PAST]
+        self._depths[:] = state[1 + n + _PAST :].reshape(self._depths.shape)

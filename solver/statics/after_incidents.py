@@ -1,0 +1,177 @@
+"""A line after incidents: its model, the balance that it lost, and the jump of its acceleration.
+
+Displacements stay those from the first rest shape z, so that nothing that is recorded jumps. With
+matrices M, C', K' of the changed line
+
+    M a + C' v + K' d = f + g,      g = -(K' - K) z + sum_b l_b N0_b
+
+where K' - K is the part of the wires whose tension changed, and N0_b the force at rest of the
+droppers b that broke. Displacement and velocity go through an incident unchanged; forces jump, and
+with them the acceleration:
+
+    M (a+ - a-) = g' - g - (K' - K) d - (C' - C) v + sum_b l_b s_b
+
+with the compensations s of slack droppers among those that broke just now. Newmark's predictor uses
+the acceleration at the start of a step: with a- instead of a+ the step would begin with an error of
+velocity of order dt.
+
+The energy of the changed line is that of what it still consists of, counted from the first rest as
+before: 1/2 d K' d - g d + e0. At an incident it falls by what left the line, T^2 / 2k of a dropper
+and 1/2 (1 - share) T integral of z'^2 of a wire.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.solver.linear.decay_length import reach
+from catenary.solver.linear.step_operators import LineOperators
+from catenary.solver.linear.unit_responses import Windows
+from catenary.solver.model import elements
+from catenary.solver.model.model import Model, build, iterate_entries
+from catenary.solver.model.partition import Ownership
+from catenary.solver.problem.incidents import DropperBreak, LineIncident
+from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.equilibrium import Equilibrium
+
+
+@dataclass(frozen=True)
+class ChangedLine:
+    """A line on which incidents may have happened; plain arrays, the same on every rank.
+
+    Attributes
+    ----------
+    model : of the line as it is now; displacements count from the first rest
+    load : (n_dofs,) balance lost [N], [N m], zero at held unknowns
+    energy : what the line's energy at the first rest has changed by [J]
+    """
+
+    model: Model
+    load: np.ndarray
+    energy: float
+
+
+def unchanged(model: Model) -> ChangedLine:
+    """The line before anything has happened."""
+    return ChangedLine(model, np.zeros(model.n_dofs), 0.0)
+
+
+def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncident]) -> ChangedLine:
+    """The line after ``incidents``, in order of time, which began as ``first``. Not collective."""
+    mesh, problem = first.mesh, first.problem
+    broken = np.zeros(mesh.droppers.shape[0], dtype=bool)
+    shares: dict[str, float] = {}
+    for incident in incidents:
+        if isinstance(incident, DropperBreak):
+            broken[dropper_at(first, incident.x)] = True
+        else:
+            shares[incident.wire] = incident.share
+    after = replace(problem, line=replace(problem.line, **_wires(problem, shares)))
+    model = build(after, mesh, first.dropper_lengths, broken)
+    load, energy = np.zeros(model.n_dofs), 0.0
+    for wire, share in shares.items():
+        dofs, length = first.wire_elements(wire)
+        lost = (share - 1.0) * getattr(problem.line, wire).tension
+        nodes = mesh.wires[wire]
+        at = np.stack([form.height[nodes], form.slope[nodes]], axis=1)
+        shape = np.concatenate([at[:-1], at[1:]], axis=1)
+        pull = np.einsum("nij,nj->ni", elements.stiffness(length, 0.0, lost), shape)
+        np.add.at(load, dofs, -pull)
+        energy += 0.5 * float((shape * pull).sum())
+    rest = form.dropper_force[broken]
+    ends = model.dofs(mesh.droppers[broken])
+    np.add.at(load, ends, rest[:, None] * np.array([1.0, -1.0]))
+    energy -= float((rest**2 / (2.0 * first.dropper_stiffness[broken])).sum())
+    load[model.constrained] = 0.0
+    return ChangedLine(model, load, energy)
+
+
+def dropper_at(model: Model, x: float) -> int:
+    """Number of the dropper that stands nearest to ``x`` [m]."""
+    places = model.mesh.x(model.mesh.droppers[:, 1])
+    return int(np.argmin(np.abs(places - x)))
+
+
+def acceleration_jump(
+    comm: Any,
+    ownership: Ownership,
+    before: ChangedLine,
+    after: ChangedLine,
+    form: Equilibrium,
+    state: tuple[np.ndarray, np.ndarray],
+    pushed_share: float,
+) -> np.ndarray:
+    """What the acceleration changes by when ``before`` becomes ``after``, owned part. Collective.
+
+    Parameters
+    ----------
+    state : owned displacement and velocity, (n_local,) each [m], [m/s]
+    pushed_share : of what a dropper would push, what it does push
+
+    Returns
+    -------
+    ndarray, shape (n_local,) [m/s2], [rad/s2]
+    """
+    displacement, velocity = (np.concatenate(comm.allgather(part)) for part in state)
+    first, last = ownership.first, ownership.last
+    force = (after.load - before.load)[first:last]
+    force -= _times(after.model, ownership, 1.0, 0.0, displacement)
+    force += _times(before.model, ownership, 1.0, 0.0, displacement)
+    force -= _times(after.model, ownership, 0.0, 1.0, velocity)
+    force += _times(before.model, ownership, 0.0, 1.0, velocity)
+    new = after.model.broken & ~before.model.broken
+    ends = after.model.dofs(after.model.mesh.droppers[new])
+    stretch, rate = (values[ends[:, 0]] - values[ends[:, 1]] for values in (displacement, velocity))
+    tension = form.dropper_force[new] + before.model.dropper_stiffness[new] * stretch
+    tension += before.model.released_damping[new] * rate
+    compensation = (1.0 - pushed_share) * np.maximum(0.0, -tension)
+    for side, sign in ((0, 1.0), (1, -1.0)):
+        mine = ownership.owned(ends[:, side])
+        np.add.at(force, ends[mine, side] - first, sign * compensation[mine])
+    held = after.model.constrained[ownership.owned(after.model.constrained)] - first
+    force[held] = 0.0
+    return _divided_by_mass(comm, ownership, after.model, force)
+
+
+def _wires(problem: Problem, shares: dict[str, float]) -> dict[str, Any]:
+    """The wires of a line whose tension is a share of what it was, by field of the line."""
+    wires = {}
+    for name in (CONTACT_WIRE, MESSENGER_WIRE):
+        wire = getattr(problem.line, name)
+        wires[name] = replace(wire, tension=shares.get(name, 1.0) * wire.tension)
+    return wires
+
+
+def _times(
+    model: Model, ownership: Ownership, stiffness: float, damping: float, values: np.ndarray
+) -> np.ndarray:
+    """Owned rows of (``stiffness`` K + ``damping`` C) ``values``, values (n_dofs,). Not
+    collective."""
+    first, n = ownership.first, ownership.n_local
+    total = np.zeros(n)
+    for rows, columns, entries in iterate_entries(
+        model, first, ownership.last, 0.0, stiffness, damping
+    ):
+        total += np.bincount(rows - first, weights=entries * values[columns], minlength=n)
+    return total
+
+
+def _divided_by_mass(
+    comm: Any, ownership: Ownership, model: Model, force: np.ndarray
+) -> np.ndarray:
+    """M^-1 ``force``, owned parts (n_local,). Collective."""
+    only_mass = (1.0, 0.0, 0.0)
+    positions = np.empty(model.mesh.n_nodes)
+    positions[model.row_of_node] = model.mesh.points[:, 0]
+    windows = Windows(positions, model.block_size, reach(model, only_mass))
+    operators = LineOperators(comm, model, ownership, only_mass, windows)
+    try:
+        whole = np.concatenate(comm.allgather(force))
+        return operators.solve_for(np.arange(whole.size), whole).copy()
+    finally:
+        operators.destroy()

@@ -1,0 +1,250 @@
+"""Form finding: dropper forces and lengths for the wanted contact-wire profile, and elasticity.
+
+The wires' static shape is linear in the loads, so the profile is prescribed at the droppers and
+the forces that hold it there are the dropper tensions; the messenger wire then carries them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg, sparse
+from scipy.sparse import linalg as sparse_linalg
+
+from catenary.meshgen.line import Line
+from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
+from catenary.solver.base.errors import InputError
+from catenary.solver.model import elements
+from catenary.solver.model.model import Model, build, iterate_entries
+from catenary.solver.problem.problem import Problem
+
+# Lengths are printed to the millimetre; the iteration contracts by the ratio of dropper weight
+# to tension sag, about 1e-3, so that this costs one more pass and leaves no trace in the forces.
+_LENGTH_TOLERANCE = 1e-10
+_MAX_PASSES = 30
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """The line at rest.
+
+    Attributes
+    ----------
+    height : (n_nodes,) of every mesh node [m]
+    slope : (n_nodes,) dw/dx of the wires at every mesh node [-]
+    dropper_force : (n_droppers,) tension [N]
+    dropper_length : (n_droppers,) unstretched length, by which the dropper is cut [m]
+    """
+
+    height: np.ndarray
+    slope: np.ndarray
+    dropper_force: np.ndarray
+    dropper_length: np.ndarray
+
+
+@dataclass(frozen=True)
+class Elasticity:
+    """Static lift of the contact wire under a unit force, ``lift`` [m/N] at ``x`` [m], (n,)."""
+
+    x: np.ndarray
+    lift: np.ndarray
+
+
+def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
+    """The model of a line and its equilibrium under its own weight. Not collective.
+
+    Raises
+    ------
+    InputError
+        If a dropper would be slack at rest or would have no length, or if lengths do not settle.
+    """
+    length = mesh.points[mesh.droppers[:, 0], 2] - mesh.points[mesh.droppers[:, 1], 2]
+    for _ in range(_MAX_PASSES):
+        model = build(problem, mesh, length)
+        form = _form(model)
+        _check(problem.line, mesh, form)
+        geometric = form.height[mesh.droppers[:, 0]] - form.height[mesh.droppers[:, 1]]
+        change = np.abs(geometric - length).max(initial=0.0)
+        length = geometric
+        if change < _LENGTH_TOLERANCE:
+            return model, form
+    raise InputError(
+        f"the lengths of the droppers do not settle: they still change by {1e3 * change:.2g} mm "
+        f"after {_MAX_PASSES} passes, as each stretches the line by its own weight; make "
+        "line.dropper.mass_kg_per_m smaller, or the tensions greater"
+    )
+
+
+def _form(model: Model) -> Equilibrium:
+    mesh, line = model.mesh, model.problem.line
+    contact, messenger = mesh.wires[CONTACT_WIRE], mesh.wires[MESSENGER_WIRE]
+    weighted = "gravity" in model.terms_of
+    height = np.zeros(mesh.n_nodes)
+    slope = np.zeros(mesh.n_nodes)
+
+    lower = mesh.droppers[:, 1]
+    arms = mesh.steady_arms if line.steady_arm.holds_height else mesh.steady_arms[:0]
+    held = np.concatenate([lower, arms, mesh.anchors[np.isin(mesh.anchors, contact)]])
+    target = line.target_height(mesh.x(held))
+    if "transition_spans" not in model.terms_of:
+        target = np.full_like(target, line.contact_height)
+    if "pre_sag" in model.terms_of:
+        target -= pre_sag_at(line, mesh.x(held))
+    load = model.weight.copy()
+    reaction = _rest_on(model, CONTACT_WIRE, held, target, load, height, slope)
+    force = reaction[: lower.size] if weighted else np.zeros(lower.size)
+
+    np.add.at(load, model.dofs(mesh.droppers[:, 0]), -force)
+    top = line.contact_height + line.encumbrance
+    ends = mesh.anchors[np.isin(mesh.anchors, messenger)]
+    # A support is a spring relaxed at the encumbrance: it gives way under the line's weight.
+    springs = (mesh.supports, line.support_stiffness, top)
+    _rest_on(model, MESSENGER_WIRE, ends, np.full(ends.size, top), load, height, slope, springs)
+
+    stretched = height[mesh.droppers[:, 0]] - height[lower]
+    return Equilibrium(height, slope, force, stretched - force / model.dropper_stiffness)
+
+
+def pre_sag_at(line: Line, x: np.ndarray) -> np.ndarray:
+    """Pre-sag at positions ``x`` [m], linear between the droppers, zero at the masts."""
+    masts = line.support_positions
+    at, sag = [masts], [np.zeros(masts.size)]
+    for start, droppers, values in zip(
+        masts[:-1], line.dropper_positions, line.pre_sag, strict=True
+    ):
+        at.append(start + np.asarray(droppers))
+        sag.append(np.asarray(values, dtype=float))
+    position = np.concatenate(at)
+    order = np.argsort(position)
+    return np.interp(x, position[order], np.concatenate(sag)[order])
+
+
+def _rest_on(
+    model: Model,
+    wire: str,
+    held: np.ndarray,
+    target: np.ndarray,
+    load: np.ndarray,
+    height: np.ndarray,
+    slope: np.ndarray,
+    springs: tuple[np.ndarray, float, float] | None = None,
+) -> np.ndarray:
+    """Let one wire rest at prescribed heights of some nodes; fills height and slope of its nodes.
+
+    ``springs`` are nodes, stiffness [N/m] and relaxed height [m] of springs to the ground.
+    Returns the upward forces [N] that hold ``held``, in their order.
+    """
+    nodes = model.mesh.wires[wire]
+    length = np.diff(model.mesh.x(nodes))
+    data = getattr(model.problem.line, wire)
+    band = _chain_band(elements.stiffness(length, data.bending_stiffness, data.tension))
+    place = np.full(model.mesh.n_nodes, -1)
+    place[nodes] = np.arange(nodes.size)
+    fixed = 2 * place[held]
+    own = np.stack([model.dofs(nodes, "w"), model.dofs(nodes, "theta_y")], axis=1).ravel()
+    own_load = load[own]
+    if springs is not None:
+        at, stiffness, relaxed = springs
+        band[3, 2 * place[at]] += stiffness
+        own_load[2 * place[at]] += stiffness * relaxed
+    free_band = band.copy()
+    prescribed = np.zeros(own.size)
+    prescribed[fixed] = target
+    right = own_load - _band_times(band, prescribed)
+    right[fixed] = target
+    for offset in range(band.shape[0]):
+        low = fixed[fixed >= offset]
+        free_band[3 - offset, low] = float(offset == 0)
+        high = fixed[fixed + offset < own.size]
+        free_band[3 - offset, high + offset] = float(offset == 0)
+    solution = linalg.solveh_banded(free_band, right)
+    height[nodes] = solution[0::2]
+    slope[nodes] = solution[1::2]
+    return (_band_times(band, solution) - own_load)[fixed]
+
+
+def _chain_band(matrices: np.ndarray) -> np.ndarray:
+    """Upper band, shape (4, 2 n + 2), of a chain of n elements assembled node by node."""
+    n = 2 * matrices.shape[0] + 2
+    band = np.zeros((4, n))
+    first = 2 * np.arange(matrices.shape[0])
+    for i in range(4):
+        for j in range(i, 4):
+            band[3 - (j - i), first + j] += matrices[:, i, j]
+    return band
+
+
+def _band_times(band: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Product of a symmetric matrix in upper-band storage, shape (4, n), with ``x``, shape (n,)."""
+    result = band[3] * x
+    for offset in range(1, 4):
+        result[:-offset] += band[3 - offset, offset:] * x[offset:]
+        result[offset:] += band[3 - offset, offset:] * x[:-offset]
+    return np.asarray(result)
+
+
+def _check(line: Line, mesh: LineMesh, form: Equilibrium) -> None:
+    length = form.height[mesh.droppers[:, 0]] - form.height[mesh.droppers[:, 1]]
+    _refuse(line, mesh, length <= 0, lambda i: f"would have a length of {length[i]:.3f} m")
+    weighted = form.dropper_force.any()
+    slack = (form.dropper_force <= 0) & weighted
+    _refuse(
+        line, mesh, slack, lambda i: f"would be slack at rest (force {form.dropper_force[i]:.1f} N)"
+    )
+
+
+def _refuse(line: Line, mesh: LineMesh, bad: np.ndarray, what: Callable[[int], str]) -> None:
+    found = np.flatnonzero(bad)
+    if found.size == 0:
+        return
+    x = mesh.x(mesh.droppers[found, 1])
+    masts = line.support_positions
+    span = np.clip(np.searchsorted(masts, x, side="right") - 1, 0, line.n_spans - 1)
+    place = f"span {span[0] + 1} at {x[0] - masts[span[0]]:.2f} m from its left support"
+    more = f", and so would {found.size - 1} more" if found.size > 1 else ""
+    raise InputError(
+        f"the dropper in {place} {what(int(found[0]))}{more}: change line.dropper.pre_sag_mm, the "
+        "dropper positions, line.encumbrance_m or the tensions"
+    )
+
+
+def stiffness_matrix(model: Model) -> sparse.csc_matrix:
+    """K of the whole line on one process, constrained unknowns held by a unit diagonal."""
+    parts = list(iterate_entries(model, 0, model.n_dofs, 0.0, 1.0, 0.0))
+    rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+    held = model.constrained
+    rows = np.concatenate([rows, held])
+    columns = np.concatenate([columns, held])
+    values = np.concatenate([values, np.ones(held.size)])
+    return sparse.csc_matrix((values, (rows, columns)), shape=(model.n_dofs, model.n_dofs))
+
+
+def elasticity(model: Model, x_from: float, x_to: float) -> Elasticity:
+    """Static lift under a unit force at the contact wire's nodes in [x_from, x_to] [m].
+
+    Droppers taut, arms included. Not collective; solves once per node.
+    """
+    nodes = model.mesh.wires[CONTACT_WIRE]
+    x = model.mesh.x(nodes)
+    inside = np.flatnonzero((x >= x_from - 1e-9) & (x <= x_to + 1e-9))
+    factor = sparse_linalg.splu(stiffness_matrix(model))
+    dofs = model.dofs(nodes[inside])
+    # Where the wire is held it does not give way; the matrix has a one there, which is no spring.
+    gives_way = ~np.isin(dofs, model.constrained)
+    lift = np.zeros(inside.size)
+    unit = np.zeros(model.n_dofs)
+    for i, dof in zip(np.flatnonzero(gives_way), dofs[gives_way], strict=True):
+        unit[dof] = 1.0
+        lift[i] = factor.solve(unit)[dof]
+        unit[dof] = 0.0
+    return Elasticity(x[inside], lift)
+
+
+def middle_span(line: Line) -> tuple[float, float]:
+    """Ends of the running span in the middle of the line [m]."""
+    masts = line.support_positions
+    first, last = line.n_transition[0], line.n_spans - line.n_transition[1]
+    span = (first + last) // 2 if last > first else line.n_spans // 2
+    return float(masts[span]), float(masts[span + 1])

@@ -1,0 +1,1 @@
+"""The march: PETSc's time loop drives a scheme, observers see each step."""

@@ -1,0 +1,403 @@
+"""The march: PETSc's TS drives our stepper, and observers are shown every state.
+
+The Newmark family runs as a TS of type ``python``: PETSc owns the time loop, its options (prefix
+``march_``), its monitors and its events; the stepper advances line and pantographs by one step.
+
+Incidents cut a march into parts, each with a TS, matrices and columns of its own: a step of any
+part costs what it costs without incidents. What happens at the end of a step is shown before.
+"""
+
+from __future__ import annotations
+
+import gc
+import math
+import time as clock
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from catenary.solver.base.errors import CatenaryError, InputError, RunBroken
+from catenary.solver.base.flush_to_zero import taken_for_zero
+from catenary.solver.base.petsc import PETSc
+from catenary.solver.base.petsc_events import event
+from catenary.solver.contact.contact_wire import ContactWire
+from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
+from catenary.solver.linear.petsc_solvers import PREFIX, refused_options, wants_solution
+from catenary.solver.model.model import Model
+from catenary.solver.model.partition import distribute
+from catenary.solver.problem.incidents import DropperBreak, Happened, in_steps
+from catenary.solver.problem.problem import Problem
+from catenary.solver.schemes.adaptive_steps import StepLevels
+from catenary.solver.schemes.make_scheme import Parts, SetUp, kept_ratio
+from catenary.solver.schemes.scheme import Scheme
+from catenary.solver.statics.after_incidents import (
+    ChangedLine,
+    acceleration_jump,
+    changed_line,
+    unchanged,
+)
+from catenary.solver.statics.equilibrium import Elasticity, Equilibrium
+from catenary.solver.time_loop.observers import Observer, Stage
+from catenary.solver.time_loop.step_views import Showing
+from catenary.solver.time_loop.ts_stepper import Stepper
+
+
+@dataclass
+class Outcome:
+    """How a march ended.
+
+    ``outcome`` is "done", "interrupted" or the sentence of what broke; ``wall`` [s] the time of
+    the time loop alone, changes of the line on the way included; ``simulated`` [s]; ``n_steps``
+    taken; ``counters`` of the scheme; ``traffic`` is how many messages and bytes a rank sent a
+    step since the line changed last, the one that sent most: to its neighbours, and each sum and
+    broadcast as one; None on one rank, or if not counted.
+    """
+
+    outcome: str
+    wall: float
+    simulated: float
+    n_steps: int
+    counters: dict[str, int] = field(default_factory=dict)
+    traffic: tuple[float, float] | None = None
+
+
+class March:
+    """A line with its train, ready to run. Collective to make; ``destroy`` is collective too.
+
+    A context manager that destroys itself.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+    problem, model, form : what ``equilibrium.find_form`` was given and returned, on all ranks
+    elasticity : that of a running span, for the height at which static forces are defined
+    """
+
+    def __init__(
+        self,
+        comm: Any,
+        problem: Problem,
+        model: Model,
+        form: Equilibrium,
+        elasticity: Elasticity,
+    ) -> None:
+        self._comm = comm
+        self._problem = problem
+        if problem.numerics.scheme == "ts_alpha2" and comm.size > 1:
+            raise InputError(
+                f"numerics.scheme is ts_alpha2, which runs on one rank only, not on {comm.size}: "
+                'take "one_solve", or start it without mpirun'
+            )
+        self._first = model
+        self._form = form
+        self.ownership = distribute(model, comm.size, comm.rank)
+        self._nominal_height = nominal_height_rule(model, form, elasticity)
+        self._wire = ContactWire(model, form, self.ownership)
+        self._pantographs = Pantographs(comm, problem, self._wire, self._nominal_height)
+        self._set_ups = SetUp(comm, form, self.ownership, self._nominal_height)
+        self._show_event = event("Show")
+        self._set_up(unchanged(model))
+        self._first_step = 0
+        self._ahead = self._happening()
+
+    def _set_up(self, changed: ChangedLine) -> None:
+        """Make all that steps a line and shows it, from a line that is at rest. Collective."""
+        self._changed = changed
+        parts = self._set_ups.make(self._problem, changed, self._pantographs)
+        self._line, self._scheme = parts.line, parts.scheme
+        if self._problem.numerics.adaptive_tolerance is not None:
+            self._scheme = self._in_levels(changed, parts)
+        self._showing = Showing(
+            self._comm,
+            changed,
+            self._form,
+            parts.interaction,
+            self._pantographs,
+            self._scheme,
+            kept_ratio(self._problem, changed.model),
+        )
+
+    def _in_levels(self, changed: ChangedLine, whole: Parts) -> Scheme:
+        """The scheme of ``whole`` steps, with shorter ones where they are needed. Collective."""
+        problem = self._problem
+
+        def finer(level: int) -> Parts:
+            numerics = replace(problem.numerics, dt=problem.numerics.dt / 2**level)
+            finer_problem = replace(problem, numerics=numerics)
+            pantographs = Pantographs(self._comm, finer_problem, self._wire, self._nominal_height)
+            return self._set_ups.make(finer_problem, changed, pantographs)
+
+        return StepLevels(self._comm, problem.numerics, whole, finer)
+
+    def _happening(self) -> list[Happened]:
+        """What happens to the line, as far as it is simulated, in order of time."""
+        on = self._first.terms_of
+        simulated = [
+            incident
+            for incident in self._problem.incidents
+            if ("dropper_break" if isinstance(incident, DropperBreak) else "tension_loss") in on
+        ]
+        return in_steps(simulated, self._problem.numerics.dt)
+
+    def _happen(self, happened: Happened) -> None:
+        """Change the line under way; motion, contacts and counters go on. Collective."""
+        before, line, scheme = self._changed, self._line, self._scheme
+        after = changed_line(self._first, self._form, happened.incidents)
+        moving = line.displacement, line.velocity
+        slackens = "dropper_slackening" in self._first.terms_of
+        kept = kept_ratio(self._problem, self._changed.model)
+        pushed_share = kept if slackens else 1.0
+        jump = acceleration_jump(
+            self._comm, self.ownership, before, after, self._form, moving, pushed_share
+        )
+        try:
+            self._set_up(after)
+            # What the method keeps besides the state moves with the acceleration.
+            nothing = np.zeros_like(jump)
+            self._line.start(nothing, nothing, jump)
+            moved = line.state()
+            jumped = self._line.state()
+            self._line.restore({name: values + moved[name] for name, values in jumped.items()})
+            self._scheme.restore(scheme.state())
+            self._scheme.counters = scheme.counters
+        finally:
+            scheme.destroy()
+            line.destroy()
+
+    @property
+    def n_steps(self) -> int:
+        """Steps from the start of the run to its end."""
+        train = self._problem.train
+        duration = (train.end - train.start) / train.speed
+        return max(1, math.floor(duration / self._problem.numerics.dt + 1e-9))
+
+    def restore(self, checkpoint: dict[str, Any]) -> None:
+        """Continue from what ``StepView.checkpoint`` gave, on any number of ranks.
+
+        Collective; every rank passes the same checkpoint.
+
+        Raises
+        ------
+        InputError
+            On all ranks, if it is not one of this line, or beyond the end of the run.
+        """
+        self._first_step = int(checkpoint["step"])
+        if not 0 <= self._first_step <= self.n_steps:
+            raise InputError(
+                f"the state to continue from is of step {self._first_step}, and the run has "
+                f"{self.n_steps}; start the run anew"
+            )
+        past = [happened for happened in self._ahead if happened.step < self._first_step]
+        if past:
+            self.destroy()
+            self._set_up(changed_line(self._first, self._form, past[-1].incidents))
+            self._ahead = self._ahead[len(past) :]
+        self._pantographs.move_to(self._first_step * self._problem.numerics.dt)
+        self._showing.restore(checkpoint)
+
+    def run(
+        self,
+        observers: Sequence[Observer],
+        stop_requested: Callable[[], bool] = lambda: False,
+    ) -> Outcome:
+        """March to the end, or until any rank's ``stop_requested`` says so. Collective.
+
+        A step that breaks ends the march with its sentence as the outcome; observers have then
+        seen everything up to the last good step.
+
+        Raises
+        ------
+        InputError
+            If an option under ``-march_`` is refused; no observer was started then.
+        RunBroken
+            If an observer cannot start.
+        """
+        dt, first = self._problem.numerics.dt, self._first_step
+        since = first
+        ahead = [happened for happened in self._ahead if happened.step < self.n_steps]
+        ends = [*(happened.step for happened in ahead), self.n_steps]
+        show = self._shown_to_petsc(self._shown_to(observers))
+        ts = self._make_ts(show, stop_requested, first, ends[0])
+        try:
+            self._start(observers, self._showing.stage(dt, first * dt, self.n_steps))
+        except RunBroken:
+            ts.destroy()
+            raise
+        begin = clock.perf_counter()
+        try:
+            show(first, first * dt)
+        except RunBroken as error:
+            self._stepper.broken = str(error)
+        else:
+            self._advance(ts)
+        for happened, end in zip(ahead, ends[1:], strict=True):
+            if not self._stepper.goes_on_from(happened.step):
+                break
+            ts.destroy()
+            try:
+                self._happen(happened)
+            except RunBroken as error:
+                self._stepper.broken = str(error)
+                break
+            since = happened.step
+            ts = self._make_ts(show, stop_requested, since, end)
+            self._advance(ts)
+        wall = clock.perf_counter() - begin
+        if self._stepper.broken:
+            # The error's traceback may still hold the TS, which PETSc would then free, with the
+            # help of Python, when Python has ended.
+            gc.collect()
+        ts.destroy()
+        outcome = "done"
+        if self._stepper.broken:
+            outcome = self._stepper.broken
+        elif self._stepper.stopped or self._stepper.step_number < self.n_steps:
+            # The latter if PETSc was told to end early, for instance by -march_ts_max_steps.
+            outcome = "interrupted"
+        outcome = _finish(observers, outcome)
+        n_steps = self._stepper.step_number - first
+        return Outcome(
+            outcome,
+            wall,
+            n_steps * self._problem.numerics.dt,
+            n_steps,
+            self._scheme.counters.as_dict(),
+            self._traffic(max(1, self._stepper.step_number - since)),
+        )
+
+    def destroy(self) -> None:
+        """Free all PETSc objects. Collective."""
+        self._scheme.destroy()
+        self._line.destroy()
+
+    def __enter__(self) -> March:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        # Errors of ours reach all ranks; at any other the rest may be waiting elsewhere.
+        if error is None or isinstance(error, CatenaryError):
+            self.destroy()
+
+    def _advance(self, ts: PETSc.TS) -> None:
+        """March to the end of ``ts``. Collective."""
+        with taken_for_zero():
+            ts.solve(self._line.solution)
+
+    def _traffic(self, n_steps: int) -> tuple[float, float] | None:
+        """Messages and bytes a step of the rank that sent most; None if none. Collective."""
+        scheme = self._scheme.traffic
+        if self._comm.size == 1 or scheme is None:
+            return None
+        sent = np.array(scheme, dtype=float) / n_steps + np.array(self._line.operators.traffic)
+        self._comm.Allreduce(MPI.IN_PLACE, sent, op=MPI.MAX)
+        return float(sent[0]), float(sent[1])
+
+    @staticmethod
+    def _start(observers: Sequence[Observer], stage: Stage) -> None:
+        for number, observer in enumerate(observers):
+            try:
+                observer.start(stage)
+            except RunBroken as error:
+                _finish(observers[:number], str(error))
+                raise
+
+    def _shown_to(self, observers: Sequence[Observer]) -> Callable[[int, float], None]:
+        """How observers are shown a state: by number and time of its step."""
+        if not observers:
+            return lambda step, time: None
+
+        def show(step: int, time: float) -> None:
+            self._show_event.begin()
+            try:
+                view = self._showing.view(step, time)
+                for observer in observers:
+                    observer.observe(view)
+            finally:
+                self._show_event.end()
+
+        return show
+
+    def _shown_to_petsc(self, show: Callable[[int, float], None]) -> Callable[[int, float], None]:
+        """The same, followed by PETSc's monitors of the solution if there are any."""
+        if not wants_solution():
+            return show
+
+        def show_both(step: int, time: float) -> None:
+            show(step, time)
+            self._line.fill_solution()
+
+        return show_both
+
+    def _make_ts(
+        self,
+        show: Callable[[int, float], None],
+        stop_requested: Callable[[], bool],
+        first: int,
+        end: int,
+    ) -> PETSc.TS:
+        """The time loop from step ``first``, shown already, to step ``end``. Collective."""
+        dt = self._problem.numerics.dt
+        self._stepper = Stepper(self._scheme, first, dt, stop_requested, show)
+        ts = PETSc.TS().create(self._comm)
+        ts.setOptionsPrefix(PREFIX)
+        ts.setProblemType(PETSc.TS.ProblemType.NONLINEAR)
+        ts.createPython(self._stepper, comm=self._comm)
+        ts.setOptionsPrefix(PREFIX)
+        ts.setTime(first * dt)
+        ts.setTimeStep(dt)
+        ts.setStepNumber(first)
+        ts.setMaxSteps(self.n_steps)
+        ts.setMaxTime(2.0 * self.n_steps * dt)
+        ts.setExactFinalTime(PETSc.TS.ExactFinalTime.STEPOVER)
+        with refused_options():
+            ts.setFromOptions()
+        self._refuse_what_the_scene_says(ts, first * dt)
+        if end < self.n_steps:
+            ts.setMaxSteps(min(end, ts.getMaxSteps()))
+        return ts
+
+    def _refuse_what_the_scene_says(self, ts: PETSc.TS, start_time: float) -> None:
+        dt = self._problem.numerics.dt
+        found = ""
+        if abs(ts.getTimeStep() - dt) > 1e-12 * dt:
+            found = (
+                f"_dt is {ts.getTimeStep():g}; the time step is part of the scene: give "
+                f"numerics.dt_s instead, which is {dt:g} s"
+            )
+        elif ts.getTime() != start_time:
+            found = (
+                f"_init_time is {ts.getTime():g}, but the run starts at {start_time:g} s; "
+                "give train.start_m instead"
+            )
+        elif ts.getType() != PETSc.TS.Type.PYTHON:
+            found = (
+                f"_type is {ts.getType()}; the method is part of the scene: give "
+                "numerics.scheme, numerics.integrator, numerics.newmark_beta or "
+                "numerics.newmark_gamma instead"
+            )
+        if found:
+            ts.destroy()
+            raise InputError(f"the PETSc option -{PREFIX}ts{found}")
+
+
+def _finish(observers: Sequence[Observer], outcome: str) -> str:
+    """Tell observers how the march ended; return how it ended after that.
+
+    An observer that breaks now changes a good end to its sentence for those that follow.
+    """
+    for observer in observers:
+        try:
+            observer.finish(outcome)
+        except RunBroken as error:
+            if outcome in ("done", "interrupted"):
+                outcome = str(error)
+    return outcome

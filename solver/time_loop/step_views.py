@@ -1,0 +1,222 @@
+"""What a march shows its observers: the stage, the state after each step, and checkpoints."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from catenary.solver.base.bound import bound
+from catenary.solver.base.errors import InputError
+from catenary.solver.base.parallel import on_root
+from catenary.solver.contact.forces_on_line import Interaction
+from catenary.solver.contact.pantographs import Pantographs
+from catenary.solver.integrators import state_kernels
+from catenary.solver.schemes.scheme import Scheme
+from catenary.solver.statics.after_incidents import ChangedLine
+from catenary.solver.statics.equilibrium import Equilibrium
+from catenary.solver.time_loop.observers import Stage, StepView
+
+# What every state of a line has, and what is kept of the pantographs beside their own states.
+_MOTION = ("displacement", "velocity", "acceleration")
+_OF_PANTOGRAPHS = ("contact_force", "head_height", "wire_height", "strip_force")
+
+
+class Showing:
+    """The marched line and train as observers see them, from the arrays that the march steps.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+    line, form : the line as it is now, and its first rest, from which displacements count
+    kept_ratio : share of its stiffness that a slack dropper keeps
+    """
+
+    def __init__(
+        self,
+        comm: Any,
+        line: ChangedLine,
+        form: Equilibrium,
+        interaction: Interaction,
+        pantographs: Pantographs,
+        scheme: Scheme,
+        kept_ratio: float,
+    ) -> None:
+        self._comm = comm
+        model = line.model
+        self._model = model
+        self._changed = line
+        self._form = form
+        self._interaction = interaction
+        self._pantographs = pantographs
+        self._scheme = scheme
+        self._line = interaction.line
+        self._slackens = "dropper_slackening" in model.terms_of
+        self._kept_ratio = kept_ratio
+        self._unbalanced = bool(line.load.any())
+        # Of what a dropper would push: all of it where droppers do not slacken.
+        self._pushed_share = kept_ratio if self._slackens else 1.0
+        first, owned = self._line.ownership.first, self._line.ownership.owned
+        arms = model.dofs(model.mesh.steady_arms)
+        self._owned_arms = np.flatnonzero(owned(arms))
+        self._arm_rows = (arms[self._owned_arms] - first).astype(np.int64)
+        nodes = np.arange(model.mesh.n_nodes)
+        self._owned_nodes = nodes[owned(model.dofs(nodes))]
+        self._node_rows = model.dofs(self._owned_nodes) - first
+        self._view = StepView(
+            step=0,
+            time=0.0,
+            contact_position=pantographs.position,
+            contact_force=pantographs.contact_force,
+            head_height=pantographs.head_height,
+            wire_height=pantographs.wire_height,
+            dropper_force=np.zeros(interaction.droppers.shown.size),
+            arm_uplift=np.zeros(self._arm_rows.size),
+            node_uplift=lambda: self._line.displacement[self._node_rows],
+            energies=self._energies,
+            checkpoint=self._checkpoint,
+            strip_force=pantographs.strip_force,
+            constraint_violation=pantographs.constraint_violation,
+        )
+
+        self._show = bound(
+            state_kernels.show,
+            self._line.motion.read,
+            self._arm_rows,
+            interaction.droppers.shown_ends,
+            interaction.droppers.shown_laws,
+            self._pushed_share,
+            self._view.arm_uplift,
+            self._view.dropper_force,
+        )
+
+    def stage(self, dt: float, start_time: float, n_steps: int) -> Stage:
+        """What stays the same for the whole run."""
+        mesh = self._model.mesh
+        points = mesh.points.copy()
+        points[:, 2] = self._form.height
+        return Stage(
+            n_pantographs=self._pantographs.n,
+            dt=dt,
+            start_time=start_time,
+            n_steps=n_steps,
+            arm_x=mesh.x(mesh.steady_arms),
+            dropper_x=mesh.x(mesh.droppers[:, 1]),
+            owned_arms=self._owned_arms,
+            owned_droppers=self._interaction.droppers.shown,
+            node_points=points,
+            owned_nodes=self._owned_nodes,
+            n_strips=self._pantographs.n_strips,
+            joints_in_loop=self._pantographs.joints_in_loop,
+        )
+
+    def view(self, step: int, time: float) -> StepView:
+        """The state after a step; the same object each time."""
+        view, told = self._view, self._pantographs.told
+        view.step, view.time = step, time
+        view.row[: told.size] = told
+        self._show()
+        return view
+
+    def restore(self, checkpoint: dict[str, Any]) -> None:
+        """Continue from a checkpoint, which all ranks pass. Collective.
+
+        Raises
+        ------
+        InputError
+            If it does not say which node its unknowns belong to, or is not one of this line with
+            these pantographs and methods; nothing was restored then.
+        """
+        line, pantographs, model = self._line, self._pantographs, self._model
+        if "row_of_node" not in checkpoint:
+            raise InputError(
+                "the state to continue from was written by an earlier version of Catenary, which "
+                "this one cannot continue; start the run anew"
+            )
+        n_nodes = model.mesh.n_nodes
+        row_of_node = _like(checkpoint, "row_of_node", model.row_of_node)
+        if not np.array_equal(np.sort(row_of_node), np.arange(n_nodes)):
+            raise _impossible("row_of_node does not number the nodes of this line")
+        then = np.empty(n_nodes, dtype=np.int64)
+        then[model.row_of_node] = row_of_node
+        rows = slice(line.ownership.first, line.ownership.last)
+        whole = np.empty(n_nodes * model.block_size)
+        by_node = {
+            name: np.reshape(_like(checkpoint, name, whole), (-1, model.block_size))
+            for name in line.exact_state()
+            if name in checkpoint or name in _MOTION
+        }
+        told = {
+            name: _like(checkpoint, name, getattr(pantographs, name)) for name in _OF_PANTOGRAPHS
+        }
+        on_root(self._comm, lambda: self._refuse_other_states(checkpoint))
+        line.restore({name: values[then].ravel()[rows] for name, values in by_node.items()})
+        for name, values in told.items():
+            getattr(pantographs, name)[:] = values
+        self._scheme.restore(checkpoint["contacts"])
+        for i, pantograph in enumerate(pantographs.models):
+            pantograph.restore(checkpoint[f"pantograph_{i}"])
+        pantographs.look_at_joints()
+
+    def _refuse_other_states(self, checkpoint: dict[str, Any]) -> None:
+        """Raise InputError unless the states of contacts and pantographs are of their kinds.
+
+        On rank 0, which has them.
+        """
+        _like(checkpoint, "contacts", self._scheme.state())
+        for i, pantograph in enumerate(self._pantographs.models):
+            _like(checkpoint, f"pantograph_{i}", pantograph.state())
+
+    def _energies(self) -> tuple[float, float]:
+        """Kinetic and elastic energy relative to the first rest, slack droppers as they are [J].
+
+        Collective. After an incident it is that of what is left of the line; see `changed_line`.
+        """
+        kinetic, elastic = self._line.energies()
+        if self._unbalanced:
+            load = self._changed.load[self._line.ownership.first : self._line.ownership.last]
+            elastic -= self._comm.allreduce(float(load @ self._line.displacement))
+            elastic += self._changed.energy
+        if self._slackens:
+            pushing = self._comm.allreduce(self._interaction.droppers.energy_of_pushing())
+            elastic -= (1.0 - self._kept_ratio) * pushing
+        return kinetic, elastic
+
+    def _checkpoint(self) -> dict[str, Any] | None:
+        """Everything needed to continue after the step shown last, on rank 0. Collective."""
+        line, pantographs = self._line, self._pantographs
+        whole = {
+            name: self._comm.gather(values.copy(), root=0)
+            for name, values in line.exact_state().items()
+        }
+        if self._comm.rank != 0:
+            return None
+        result: dict[str, Any] = {k: np.concatenate(parts) for k, parts in whole.items() if parts}
+        result["row_of_node"] = self._model.row_of_node
+        result["step"] = self._view.step
+        result["contact_force"] = pantographs.contact_force.copy()
+        result["head_height"] = pantographs.head_height.copy()
+        result["wire_height"] = pantographs.wire_height.copy()
+        result["strip_force"] = pantographs.strip_force.copy()
+        result["contacts"] = self._scheme.state()
+        for i, pantograph in enumerate(pantographs.models):
+            result[f"pantograph_{i}"] = pantograph.state()
+        return result
+
+
+def _like(checkpoint: dict[str, Any], name: str, wanted: np.ndarray) -> np.ndarray:
+    """The finite array of a checkpoint that is to have the shape of ``wanted``."""
+    if name not in checkpoint:
+        raise _impossible(f"{name} is missing")
+    values, shape = np.asarray(checkpoint[name]), np.shape(wanted)
+    if values.dtype.kind not in "fiub" or values.shape != shape:
+        raise _impossible(f"{name} has the shape {values.shape} in place of {shape}")
+    if not np.isfinite(values).all():
+        raise _impossible(f"{name} holds NaN or infinity")
+    return values
+
+
+def _impossible(what: str) -> InputError:
+    return InputError(
+        f"the state to continue from does not belong to this scene: {what}; start the run anew"
+    )
