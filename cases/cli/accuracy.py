@@ -1,4 +1,4 @@
-"""The verb ``accuracy``. Imported by ``cli``, whose app it extends."""
+"""The verb ``accuracy``."""
 
 from __future__ import annotations
 
@@ -6,7 +6,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from catenary.cases.cli import main as cli
+from catenary.cases.cli.app import (
+    Assignments,
+    Case,
+    Force,
+    Out,
+    PetscOptions,
+    Shortened,
+    Verbose,
+    app,
+    begin,
+)
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import completion, console
 from catenary.solver.base.errors import InputError
@@ -17,7 +27,7 @@ if TYPE_CHECKING:
 _MOST_REPEATS = 99
 
 
-@cli.app.command(
+@app.command(
     "accuracy",
     help="Vary step, mesh, scheme, coupling and models of a case; print the error of each setting, "
     "its time, and what to take for a wanted accuracy. The same command continues a study that was "
@@ -26,9 +36,9 @@ _MOST_REPEATS = 99
 )
 @console.guarded
 def accuracy(
-    case: cli.Case,
-    out: cli.Out,
-    extras: cli.PetscOptions = None,
+    case: Case,
+    out: Out,
+    extras: PetscOptions = None,
     axes: Annotated[
         str | None,
         typer.Option(
@@ -51,10 +61,10 @@ def accuracy(
     repeats: Annotated[
         int, typer.Option("--repeats", metavar="N", help="How often short runs are timed.")
     ] = 3,
-    assignments: cli.Assignments = None,
-    shortened: cli.Shortened = False,
-    force: cli.Force = False,
-    verbose: cli.Verbose = False,
+    assignments: Assignments = None,
+    shortened: Shortened = False,
+    force: Force = False,
+    verbose: Verbose = False,
 ) -> int:
     """Collective."""
     from catenary.cases.process.petsc_options import split_extras
@@ -74,7 +84,7 @@ def accuracy(
         plan = make_plan(case, chosen, overrides, shortened, quick=quick, repeats=repeats)
         return plan, options
 
-    comm, plan, arguments = cli.begin(read, verbose, lambda made: made.jobs[0].scene)
+    comm, plan, arguments = begin(read, verbose, lambda made: made.jobs[0].scene)
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.accuracy import output as accuracy_output
     from catenary.cases.studies.accuracy import runs as study

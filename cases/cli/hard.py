@@ -1,7 +1,4 @@
-"""The verb ``hard``: runs the collection of hard cases and tells which limits they keep.
-
-Imported by ``cli``, whose app it extends.
-"""
+"""The verb ``hard``: runs the collection of hard cases and tells which limits they keep."""
 
 from __future__ import annotations
 
@@ -10,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from catenary.cases.cli import main as cli
+from catenary.cases.cli.app import Force, Verbose, app, begin
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
 from catenary.postproc.files.csv_text import csv_text
@@ -34,7 +31,7 @@ _COLUMNS = {
 _PLAIN = ("runs to its end", "everything is finite", "the fixed-point correction breaks")
 
 
-@cli.app.command(
+@app.command(
     "hard",
     help="Run the collection of hard cases and print which limits they keep: energy, bounds, "
     "refinement, schemes, and ranks under mpirun. Some two minutes; exits with 3 if a limit is "
@@ -59,8 +56,8 @@ def hard(
     shortened: Annotated[
         bool, typer.Option("--short", help="Shorter runs, steps halved once only.")
     ] = False,
-    force: cli.Force = False,
-    verbose: cli.Verbose = False,
+    force: Force = False,
+    verbose: Verbose = False,
 ) -> int:
     """Collective."""
 
@@ -70,7 +67,7 @@ def hard(
         _refuse_to_write(out, force)
         return hard_cases(names)
 
-    comm, cases, _ = cli.begin(lambda: (read(), []), verbose, lambda cases: cases[0].scene())
+    comm, cases, _ = begin(lambda: (read(), []), verbose, lambda cases: cases[0].scene())
     from mpi4py import MPI
 
     from catenary.cases.studies.hard.checks import check_case

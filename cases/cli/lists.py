@@ -1,4 +1,4 @@
-"""The verb ``list``. Imported by ``cli``, whose app it extends."""
+"""The verb ``list``."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from typing import Annotated
 
 import typer
 
-from catenary.cases.cli import main as cli
+from catenary.cases.cli.app import app
 from catenary.cases.terminal import completion, console
 from catenary.solver.base.errors import InputError
 
 
-@cli.app.command(
+@app.command(
     "list",
     help="List the shipped cases, or all keys of a scene.",
     epilog="Example: catenary list --keys damping",

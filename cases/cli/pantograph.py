@@ -1,4 +1,4 @@
-"""The verb ``pantograph``. Imported by ``cli``, whose app it extends."""
+"""The verb ``pantograph``."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from catenary.cases.cli import main as cli
+from catenary.cases.cli.app import Assignments, Case, Force, MoreAssignments, app, load
 from catenary.cases.terminal import console
 
 
-@cli.app.command(
+@app.command(
     "pantograph",
     help="Print static force, equivalent masses, natural frequencies and frequency response of a "
     "case's pantograph, and a lumped model fitted to it; with -o also write them as files.",
@@ -20,8 +20,8 @@ from catenary.cases.terminal import console
 @console.guarded
 @console.serial
 def pantograph(
-    case: cli.Case,
-    extras: cli.MoreAssignments = None,
+    case: Case,
+    extras: MoreAssignments = None,
     kind: Annotated[
         str | None,
         typer.Option(
@@ -61,8 +61,8 @@ def pantograph(
             help="Fit above this frequency: below it the raising decides, which no spring need be.",
         ),
     ] = 0.5,
-    assignments: cli.Assignments = None,
-    force: cli.Force = False,
+    assignments: Assignments = None,
+    force: Force = False,
 ) -> None:
     """Serial."""
     from catenary.cases.studies.pantograph.output import new_files, write_study
@@ -71,7 +71,7 @@ def pantograph(
     over = Range(low, high, points, fit_low).checked()
     if out is not None:
         new_files(out, force)
-    found = study(cli.load(case, assignments, extras), kind, masses, over)
+    found = study(load(case, assignments, extras), kind, masses, over)
     console.say(study_text(found))
     if out is not None:
         console.say("\n" + "\n".join(str(path) for path in write_study(found, out)))

@@ -1,4 +1,4 @@
-"""The verb ``stability-map``. Imported by ``cli``, whose app it extends."""
+"""The verb ``stability-map``."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from catenary.cases.cli import main as cli
+from catenary.cases.cli.app import Assignments, Case, Force, MoreAssignments, Out, Shortened, app
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
 from catenary.solver.base.errors import InputError
@@ -14,7 +14,7 @@ from catenary.solver.base.errors import InputError
 TABLE, PICTURE = "stability_map.csv", "stability_map.png"
 
 
-@cli.app.command(
+@app.command(
     "stability-map",
     help="Find the largest stable step of every coupling against contact stiffness and head mass, "
     "from the matrices of a step and by marching, and draw it. Some three minutes; exits with 3 "
@@ -24,13 +24,13 @@ TABLE, PICTURE = "stability_map.csv", "stability_map.png"
 @console.guarded
 @console.serial
 def stability_map(
-    case: cli.Case,
-    out: cli.Out,
-    extras: cli.MoreAssignments = None,
-    assignments: cli.Assignments = None,
+    case: Case,
+    out: Out,
+    extras: MoreAssignments = None,
+    assignments: Assignments = None,
     quick: Annotated[bool, typer.Option("--quick", help="Few stiffnesses and masses.")] = False,
-    shortened: cli.Shortened = False,
-    force: cli.Force = False,
+    shortened: Shortened = False,
+    force: Force = False,
 ) -> int:
     """Serial."""
     from mpi4py import MPI

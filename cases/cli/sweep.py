@@ -1,4 +1,4 @@
-"""The verb ``sweep`` and what ``run --study`` does. Imported by ``cli``, whose app it extends."""
+"""The verb ``sweep`` and what ``run --study`` does."""
 
 from __future__ import annotations
 
@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from catenary.cases.cli import main as cli
+from catenary.cases.cli.app import (
+    Assignments,
+    Case,
+    Force,
+    MoreAndPetscOptions,
+    Out,
+    Shortened,
+    Verbose,
+    app,
+    begin,
+)
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import completion, console
 from catenary.solver.base.errors import InputError
@@ -21,7 +31,7 @@ if TYPE_CHECKING:
 _SHOWN_BROKEN = 3
 
 
-@cli.app.command(
+@app.command(
     "sweep",
     help="Run variants of a case one after the other and put their statistics side by side. The "
     "same command continues a sweep that was stopped.",
@@ -30,9 +40,9 @@ _SHOWN_BROKEN = 3
 )
 @console.guarded
 def sweep(
-    case: cli.Case,
-    out: cli.Out,
-    extras: cli.MoreAndPetscOptions = None,
+    case: Case,
+    out: Out,
+    extras: MoreAndPetscOptions = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -49,7 +59,7 @@ def sweep(
             help='TOML file of named variants, each a line name = ["key=value", ...].',
         ),
     ] = None,
-    assignments: cli.Assignments = None,
+    assignments: Assignments = None,
     plotted: Annotated[
         str | None,
         typer.Option(
@@ -58,12 +68,12 @@ def sweep(
             help="Columns of sweep.csv to draw; mean_N,std_N,max_N,min_N,max_uplift_mm if absent.",
         ),
     ] = None,
-    shortened: cli.Shortened = False,
+    shortened: Shortened = False,
     reports: Annotated[
         bool, typer.Option("--reports", help="Also write the report of each run.")
     ] = False,
-    force: cli.Force = False,
-    verbose: cli.Verbose = False,
+    force: Force = False,
+    verbose: Verbose = False,
 ) -> int:
     """Collective."""
     from catenary.cases.process.petsc_options import split_extras
@@ -85,7 +95,7 @@ def sweep(
         _refuse_other_sweep(out, jobs, force)
         return jobs, options
 
-    comm, jobs, arguments = cli.begin(read, verbose, lambda made: made[0].scene)
+    comm, jobs, arguments = begin(read, verbose, lambda made: made[0].scene)
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.sweep import output as sweep_output
     from catenary.cases.studies.sweep.run_jobs import run_jobs
@@ -120,7 +130,7 @@ def run_study(
         console.say(f"--study runs the program {find_study(case)}, which may do all that you may")
         return make_plan(case, [*assignments, *more], shortened), options
 
-    comm, plan, arguments = cli.begin(read, verbose, lambda made: made.jobs[0].scene)
+    comm, plan, arguments = begin(read, verbose, lambda made: made.jobs[0].scene)
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies import case_study
 

@@ -14,7 +14,7 @@ WAITING = """
 import time
 from pathlib import Path
 from mpi4py import MPI
-from catenary.cases import {module}
+from catenary.cases.run import {module}
 from catenary.cases.cli.main import main
 
 before = {module}.{name}
@@ -81,7 +81,7 @@ def test_after_the_march(tmp_path: Path) -> None:
 
 
 VERBS = {
-    "check": ("meshing", "mesh_of", ["check", "ac_simple"]),
+    "check": ("scene_mesh", "mesh_of", ["check", "ac_simple"]),
     "static": ("runner", "find_form", ["static", "ac_simple"]),
     "hard": ("hard_runs", "March", ["hard", "--short"]),
 }

@@ -76,7 +76,8 @@ def test_the_shell_is_offered_what_fits(typed: str, offered: list[str]) -> None:
 
 def test_too_low_a_limit_of_memory_is_one_sentence() -> None:
     """OpenBLAS would try for ever to get memory, and llvmlite end in a traceback."""
-    bash = "ulimit -v 450000; exec \"$0\" -c 'from catenary.cases.cli.main import main; main()' report x"
+    program = "from catenary.cases.cli.main import main; main()"
+    bash = f"ulimit -v 450000; exec \"$0\" -c '{program}' report x"
     words = ["bash", "-c", bash, sys.executable]
     done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 2

@@ -20,6 +20,7 @@ MAY_IMPORT = {
     "cases": set(PARTS),
 }
 LEAVES = {
+    "catenary.solver.base.bound",
     "catenary.solver.base.compiled",
     "catenary.solver.base.loop_cache",
     "catenary.solver.base.errors",

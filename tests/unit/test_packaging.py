@@ -56,9 +56,9 @@ def data_files() -> set[str]:
         "cases/*/README.md",
         "cases/*/reference/*.csv",
         "cases/*/study.toml",
-        "cases/*/hard.toml",
+        "cases/studies/hard/hard.toml",
         "cases/*/*.py",
-        "postproc/templates/*",
+        "postproc/report/templates/*",
     )
     return {
         f"catenary/{path.relative_to(ROOT)}"

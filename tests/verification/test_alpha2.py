@@ -1,9 +1,10 @@
 """PETSc's TSALPHA2 as an independent second implementation of the same equations.
 
 What the scheme ``ts_alpha2`` shares with the default one are the matrices M, C and K alone. It
-takes line and pantographs as one nonlinear system (`solver/schemes/monolithic_system.py`), solves it by Newton's
-method with the generalized-alpha scheme, and knows neither of predictors, compliances nor of an
-inner problem. Both methods are of order 2, so their difference must fall with order 2.
+takes line and pantographs as one nonlinear system (`solver/schemes/monolithic_system.py`), solves
+it by Newton's method with the generalized-alpha scheme, and knows neither of predictors,
+compliances nor of an inner problem. Both methods are of order 2, so their difference must fall
+with order 2.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """HHT and the generalized-alpha method against their definition and their theory.
 
-The line steps them in a form of its own (`solver/integrators/generalized_alpha.py`), in which no force of an
-earlier step appears. What is compared here is the form of the textbooks,
+The line steps them in a form of its own (`solver/integrators/generalized_alpha.py`), in which no
+force of an earlier step appears. What is compared here is the form of the textbooks,
 
     M a(1 - a_m) + C v(1 - a_f) + K d(1 - a_f) = f(1 - a_f),      x(s) = s x_new + (1 - s) x_old,
 

@@ -185,4 +185,5 @@ def test_a_user_without_home_and_without_write_access(open_folder: Path, kept: b
         assert done.stderr.count("\n") == 1
     else:
         assert done.stderr == ""
-        assert list(open_folder.glob("catenary-65534/loops-*/solver_*/kernels.shift-*.nbc"))
+        kept_loops = "catenary-65534/loops-*/integrators_*/state_kernels.shift-*.nbc"
+        assert list(open_folder.glob(kept_loops))

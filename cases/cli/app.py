@@ -1,0 +1,155 @@
+"""The application of the command line, options that verbs share, and how a verb starts.
+
+Backends are imported inside the verbs, so that --help stays quick.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+import typer
+
+from catenary.cases.terminal import completion, console
+from catenary.solver.base.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from catenary.cases.scene.scene import Scene
+
+T = TypeVar("T")
+
+app: typer.Typer = typer.Typer(
+    name="catenary",
+    help="Finite elements for railway overhead lines coupled with pantographs.",
+    no_args_is_help=True,
+    add_completion=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+RunFolder = Annotated[
+    Path,
+    typer.Argument(
+        parser=console.run_folder, metavar="FOLDER", help="Folder of a run, or its run.h5."
+    ),
+]
+Case = Annotated[
+    str,
+    typer.Argument(
+        help="Name of a shipped case, or a case.toml, or a folder with one.",
+        autocompletion=completion.cases,
+    ),
+]
+Assignments = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Replace a key of the scene, KEY= takes it away; repeatable.",
+        autocompletion=completion.assignments,
+    ),
+]
+Out = Annotated[
+    Path,
+    typer.Option(
+        "-o", "--out", parser=console.folder, metavar="<path>", help="Folder for the results."
+    ),
+]
+MoreAssignments = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="KEY=VALUE",
+        help="Further assignments after --set.",
+        autocompletion=completion.assignments,
+    ),
+]
+Shortened = Annotated[
+    bool, typer.Option("--short", help="Apply the case's [test] table, which shortens it.")
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace what is there.")]
+
+
+def load(
+    case: str, assignments: list[str] | None, extras: list[str] | None, shortened: bool = False
+) -> Scene:
+    """The scene of a verb that takes no options for PETSc. Not collective."""
+    from catenary.cases.process.petsc_options import split_extras
+    from catenary.cases.scene.scene import load_scene
+
+    more, options = split_extras(extras or [])
+    if options:
+        raise InputError(f"{options[0]} after -- is a PETSc option; only run takes those")
+    return load_scene(case, [*(assignments or []), *more], shortened)
+
+
+PetscOptions = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="-- PETSC_OPTION", help="Options for PETSc, after --."),
+]
+MoreAndPetscOptions = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="KEY=VALUE -- PETSC_OPTION",
+        help="Further assignments after --set, and after -- options for PETSc.",
+        autocompletion=completion.assignments,
+    ),
+]
+Strict = Annotated[
+    bool, typer.Option("--strict", help="Exit with 3 if an acceptance criterion fails.")
+]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more.")]
+
+
+def _version(wanted: bool) -> None:
+    """Print all versions and end, if that is wanted."""
+    if wanted:
+        from catenary.cases.process.versions import versions_text
+
+        if console.speaks():
+            typer.echo(versions_text())
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version",
+            callback=_version,
+            is_eager=True,
+            help="Versions of Catenary, PETSc, MPI, HDF5, Numba and others.",
+        ),
+    ] = False,
+) -> None:
+    """Not collective."""
+
+
+def begin(
+    read: Callable[[], tuple[T, list[str]]], verbose: bool, scene_of: Callable[[T], Scene]
+) -> tuple[Any, T, list[str]]:
+    """Communicator, what ``read`` gives on rank 0, the options with which PETSc now runs.
+
+    Collective. ``read`` also gives the command line's options for PETSc, ``scene_of`` the scene
+    whose ``[petsc]`` table stands before them.
+    """
+    from catenary.cases.process.petsc_options import as_arguments, start_petsc
+    from catenary.solver.base.parallel import (
+        abort_on_unforeseen_error,
+        launched_by_mpirun,
+        on_root,
+        set_up_logging,
+    )
+
+    # A process of its own is refused before MPI has started.
+    read_before = None if launched_by_mpirun() else read()
+    comm = console.world()
+    abort_on_unforeseen_error(comm)
+    set_up_logging(comm, verbose, console.is_quiet())
+    what, options = read_before or on_root(comm, read)
+    arguments = as_arguments(scene_of(what).petsc.given(), options)
+    start_petsc(arguments)
+    return comm, what, arguments

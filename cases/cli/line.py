@@ -1,0 +1,137 @@
+"""The verbs ``plan``, ``check``, ``mesh`` and ``static``: a scene's line, before any run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from catenary.cases.cli.app import Assignments, Case, Force, MoreAssignments, Shortened, app, load
+from catenary.cases.terminal import console
+from catenary.postproc.report.wording import counted
+
+
+@app.command(
+    "plan",
+    help="Print what a case simulates and what not, and what it will cost.",
+    epilog="Example: catenary plan ac_simple --set train.speed_km_h=320",
+)
+@console.guarded
+@console.serial
+def plan(
+    case: Case,
+    extras: MoreAssignments = None,
+    assignments: Assignments = None,
+    shortened: Shortened = False,
+) -> None:
+    """Serial."""
+    scene = load(case, assignments, extras, shortened)
+    from catenary.cases.run.plan import make_plan, plan_text
+
+    console.say(plan_text(make_plan(scene)))
+
+
+@app.command(
+    "check",
+    help="Check a case: keys, bounds, geometry, effects, mesh, pantographs, and that no dropper is "
+    "slack at rest. Writes nothing.",
+    epilog="Example: catenary check my_line/case.toml --set line.dropper.pre_sag_mid_mm=60",
+)
+@console.guarded
+@console.serial
+def check(
+    case: Case,
+    extras: MoreAssignments = None,
+    assignments: Assignments = None,
+    shortened: Shortened = False,
+) -> int:
+    """Serial."""
+    from catenary.cases.scene.faults import SceneError
+
+    try:
+        scene = load(case, assignments, extras, shortened)
+    except SceneError as error:
+        for line in error.lines():
+            console.complain(line)
+        return console.BAD_INPUT
+    # What a refusal does not need is imported once the scene is sound.
+    from catenary.cases.run.describe_arrivals import arrival_facts
+    from catenary.cases.run.describe_pantographs import kind_lines
+    from catenary.cases.run.scene_mesh import mesh_of
+    from catenary.solver.statics.equilibrium import find_form
+
+    problem = scene.to_problem()
+    mesh = mesh_of(scene)
+    find_form(problem, mesh)
+    console.say(
+        f"{scene.case.name} is sound: {counted(problem.line.n_spans, 'span')}, "
+        f"{problem.line.support_positions[-1]:g} m, {counted(mesh.droppers.shape[0], 'dropper')}, "
+        f"{mesh.n_nodes} nodes"
+    )
+    for name, lines in kind_lines(scene, problem).items():
+        console.say(f"pantograph {name}, " + "\n  ".join(lines))
+    waves = arrival_facts(scene, problem)
+    for fact in waves["pantographs"]:
+        console.say(fact["says"])
+    for text in waves["warnings"]:
+        console.warn(text)
+    return console.DONE
+
+
+@app.command(
+    "mesh",
+    help="Write the mesh of a case as a Gmsh file.",
+    epilog="Example: catenary mesh ac_simple -o ac_simple.msh --set mesh.elements_per_gap=6",
+)
+@console.guarded
+@console.serial
+def mesh(
+    case: Case,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Mesh file to write, *.msh.")],
+    extras: MoreAssignments = None,
+    assignments: Assignments = None,
+    force: Force = False,
+) -> None:
+    """Serial."""
+    scene = load(case, assignments, extras)
+    from catenary.cases.run.scene_mesh import write_mesh_of
+
+    made = write_mesh_of(scene, out, force)
+    console.say(f"{out}: {made.n_nodes} nodes, {counted(made.droppers.shape[0], 'dropper')}")
+
+
+@app.command(
+    "static",
+    help="Print the dropper table, the sag and the elasticity of a case at rest.",
+    epilog="Example: catenary static ac_simple -o droppers.csv",
+)
+@console.guarded
+@console.serial
+def static(
+    case: Case,
+    extras: MoreAssignments = None,
+    assignments: Assignments = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--out",
+            help="Also write a file: *.csv holds the dropper table, *.json everything.",
+        ),
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Serial."""
+    from catenary.cases.result_folder.output_files import new_file, write_static
+    from catenary.cases.terminal import terminal_text
+
+    if out is not None:
+        new_file(out, (".csv", ".json"), force)
+    scene = load(case, assignments, extras)
+    from catenary.cases.run.runner import static_table
+
+    table = static_table(scene)
+    if out is not None:
+        write_static(out, table)
+    console.say(terminal_text.static_text(table, scene.to_line()))

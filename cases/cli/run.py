@@ -1,0 +1,139 @@
+"""The verbs ``run`` and ``restart``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from catenary.cases.cli.app import (
+    Assignments,
+    Case,
+    Force,
+    MoreAndPetscOptions,
+    Out,
+    PetscOptions,
+    RunFolder,
+    Shortened,
+    Strict,
+    Verbose,
+    app,
+    begin,
+)
+from catenary.cases.result_folder.output_folder import refuse_impossible
+from catenary.cases.terminal import console
+from catenary.solver.base.errors import InputError
+
+if TYPE_CHECKING:
+    from catenary.cases.run.runner import RunOutcome
+    from catenary.cases.scene.scene import Scene
+
+
+@app.command(
+    "run",
+    help="Simulate a case and write its results into a folder.",
+    epilog="Example: catenary run en50318_2002 -o results/en300 --set train.speed_km_h=300 "
+    "-- -log_view; catenary run ambrosio2012 --study -o results/study",
+)
+@console.guarded
+def run(
+    case: Case,
+    out: Out,
+    extras: MoreAndPetscOptions = None,
+    assignments: Assignments = None,
+    shortened: Shortened = False,
+    force: Force = False,
+    strict: Strict = False,
+    study: Annotated[
+        bool, typer.Option("--study", help="Run the case's study: variants, figures, verdicts.")
+    ] = False,
+    verbose: Verbose = False,
+) -> int:
+    """Collective."""
+    from catenary.cases.process.petsc_options import split_extras
+    from catenary.cases.scene.scene import load_scene
+
+    if study:
+        from catenary.cases.cli.sweep import run_study
+
+        if strict:
+            raise InputError("a study is not judged as a whole: give --study without --strict")
+        words = (extras or [], assignments or [])
+        return run_study(case, out, *words, shortened, force, verbose)
+
+    def read() -> tuple[Scene, list[str]]:
+        more, options = split_extras(extras or [])
+        refuse_impossible(out)
+        return load_scene(case, [*(assignments or []), *more], shortened), options
+
+    comm, scene, arguments = begin(read, verbose, lambda scene: scene)
+    from catenary.cases.run.describe_arrivals import arrival_warnings
+    from catenary.cases.run.runner import run_case
+
+    for text in arrival_warnings(scene):
+        console.warn(text)
+    tell = _teller(out)
+    result = run_case(scene, out, comm, force=force, petsc_options=arguments, tell=tell)
+    return _end(result, out, strict)
+
+
+@app.command(
+    "restart",
+    help="Continue an interrupted or broken run from the last state in its result file.",
+    epilog="Example: catenary restart results/en300",
+)
+@console.guarded
+def restart(
+    folder: RunFolder,
+    extras: PetscOptions = None,
+    strict: Strict = False,
+    verbose: Verbose = False,
+) -> int:
+    """Collective."""
+    from catenary.cases.process.petsc_options import split_extras
+    from catenary.cases.scene.error_sentences import Origin
+    from catenary.cases.scene.scene import scene_from
+
+    def read() -> tuple[Scene, list[str]]:
+        from catenary.postproc.read.guard import examined
+        from catenary.postproc.read.results import Results
+
+        more, options = split_extras(extras or [])
+        if more:
+            raise InputError(f"{more[0]} cannot be changed when a run is continued")
+        refuse_impossible(folder)
+        if not folder.is_dir():
+            raise InputError(f"{folder} is no folder; name the folder of a run")
+        with Results(folder, examined(folder)) as results:
+            config = results.attributes["config"]
+        return scene_from(config, Origin(str(results.path))), options
+
+    comm, scene, arguments = begin(read, verbose, lambda scene: scene)
+    from catenary.cases.run.runner import restart_case
+
+    result = restart_case(scene, folder, comm, petsc_options=arguments, tell=_teller(folder))
+    return _end(result, folder, strict)
+
+
+def _teller(folder: Path) -> Callable[[str], None]:
+    """What says how a run ended unless it is done. Not collective."""
+
+    def tell(outcome: str) -> None:
+        if outcome == "interrupted":
+            outcome = f"the run was interrupted; `catenary restart {folder}` continues it"
+        if outcome != "done":
+            console.complain(outcome)
+
+    return tell
+
+
+def _end(result: RunOutcome, folder: Path, strict: bool) -> int:
+    """Print the summary of a run that is done and return the exit code. Not collective."""
+    from catenary.cases.terminal import terminal_text
+
+    if result.outcome != "done":
+        return console.BROKEN
+    console.say(terminal_text.summary_text(result.summary, folder))
+    return console.NOT_ACCEPTED if strict and result.accepted is False else console.DONE
