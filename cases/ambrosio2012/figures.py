@@ -14,7 +14,7 @@ from catenary.cases.ambrosio2012.statements import AVERAGE, LIGHT, SINGLE, Force
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import histogram
 from catenary.postproc.read.results import Results
-from catenary.postproc.report import plots
+from catenary.postproc.report import figures
 from catenary.postproc.report.study_report import StudyFigure
 
 # damping -> train -> folder of its result file
@@ -77,7 +77,7 @@ def _filtered(results: Results) -> list[tuple[str, np.ndarray, np.ndarray]]:
 
 def _forces(folders: Folders) -> StudyFigure:
     trains = list(dict.fromkeys(train for own in folders.values() for train in own))
-    figure = plots.new_figure(0.6 + 1.55 * len(trains))
+    figure = figures.new_figure(0.6 + 1.55 * len(trains))
     grid = figure.subplots(len(trains), 2, sharey=True, squeeze=False)
     columns: Columns = {}
     for column, (damping, own) in enumerate(folders.items()):
@@ -86,9 +86,9 @@ def _forces(folders: Folders) -> StudyFigure:
             if train in own:
                 _force_panel(axes, own[train], train, damping, columns)
             title = f"{_PANELS[damping]}: {train}" if row == 0 else train
-            plots.tidy(axes, "", "force [N]" if column == 0 else "", title)
+            figures.tidy(axes, "", "force [N]" if column == 0 else "", title)
         grid[-1, column].set_xlabel("position of the pantograph [m]")
-    plots.legend_above(grid[min(1, len(trains) - 1), 1], columns=2)
+    figures.legend_above(grid[min(1, len(trains) - 1), 1], columns=2)
     return StudyFigure("figure_08", "Figure 8: contact force of each pantograph, 20 Hz low-pass.",
                        figure, columns)  # fmt: skip
 
@@ -96,7 +96,7 @@ def _forces(folders: Folders) -> StudyFigure:
 def _force_panel(axes: Axes, folder: Path, train: str, damping: str, columns: Columns) -> None:
     with Results(folder) as results:
         for number, (place, position, force) in enumerate(_filtered(results)):
-            colour = plots.colour(number)
+            colour = figures.colour(number)
             axes.plot(position, force, color=colour, linewidth=0.8, label=place)
             name = f"{damping} {_label(train, place)}"
             columns[f"{name} position [m]"] = position
@@ -105,7 +105,7 @@ def _force_panel(axes: Axes, folder: Path, train: str, damping: str, columns: Co
 
 def _overview(runs: Runs) -> StudyFigure:
     """Figure 9: statistics of all pantographs, a panel for each damping."""
-    figure = plots.new_figure(6.4)
+    figure = figures.new_figure(6.4)
     panels = figure.subplots(2, 1)
     columns: Columns = {"damping": [], "pantograph": []}
     columns |= {f"{name} [N]": [] for name, _ in _STATISTICS}
@@ -114,15 +114,15 @@ def _overview(runs: Runs) -> StudyFigure:
         for number, (name, value) in enumerate(_STATISTICS):
             at = np.arange(len(forces)) + 0.13 * (number - 2.5)
             values = [value(force) for force in forces.values()]
-            axes.bar(at, values, 0.12, color=plots.colour(number), label=name)
+            axes.bar(at, values, 0.12, color=figures.colour(number), label=name)
             columns[f"{name} [N]"] += values
         columns["damping"] += [damping] * len(forces)
         columns["pantograph"] += list(forces)
-        axes.axhline(0.0, color=plots.GREY, linewidth=0.8)
+        axes.axhline(0.0, color=figures.GREY, linewidth=0.8)
         axes.set_xticks(range(len(forces)), [label.replace(" ", "\n") for label in forces])
-        plots.tidy(axes, "", "contact force [N]", _PANELS[damping])
+        figures.tidy(axes, "", "contact force [N]", _PANELS[damping])
         axes.grid(False, axis="x")
-    plots.legend_above(panels[0], columns=6)
+    figures.legend_above(panels[0], columns=6)
     return StudyFigure(
         "figure_09", "Figure 9: statistics of the contact force.", figure, columns
     )  # fmt: skip
@@ -140,7 +140,7 @@ def _labelled(trains: Mapping[str, Run | None]) -> dict[str, Force]:
 
 def _histograms(folders: Folders) -> StudyFigure:
     """Figure 10: share of time in bins of the contact force, a panel for each damping."""
-    figure = plots.new_figure(6.4)
+    figure = figures.new_figure(6.4)
     panels = figure.subplots(2, 1, sharex=True, sharey=True)
     columns: Columns = {}
     for axes, (damping, trains) in zip(panels, folders.items(), strict=True):
@@ -153,12 +153,12 @@ def _histograms(folders: Folders) -> StudyFigure:
                 name = _label(train, place)
                 style = "--" if place == "trailing" else "-"
                 axes.plot(middle, percent, style, marker="o", ms=2.5, linewidth=1.1,
-                          color=plots.colour(number), label=name)  # fmt: skip
+                          color=figures.colour(number), label=name)  # fmt: skip
                 columns[f"{damping} {name} force [N]"] = middle
                 columns[f"{damping} {name} share [%]"] = percent
-        plots.tidy(axes, "", "share of time [%]", _PANELS[damping])
+        figures.tidy(axes, "", "share of time [%]", _PANELS[damping])
     panels[-1].set_xlabel(f"contact force, 20 Hz, bins of {_BIN:g} N [N]")
-    plots.legend_above(panels[0], columns=4)
+    figures.legend_above(panels[0], columns=4)
     return StudyFigure("figure_10", "Figure 10: histograms of the contact force.", figure, columns)
 
 
@@ -198,7 +198,7 @@ def _passages(
     caption: str,
 ) -> StudyFigure:
     """A record at one place of the line over the time since the leading head passed it."""
-    figure = plots.new_figure(5.6)
+    figure = figures.new_figure(5.6)
     panels = figure.subplots(2, 1, sharex=True, sharey=True)
     columns: Columns = {}
     for axes, (damping, trains) in zip(panels, shown.items(), strict=True):
@@ -210,23 +210,23 @@ def _passages(
                 speed = results.attributes["speed_m_per_s"]
             since = (position - x) / speed
             behind = float(np.ptp(first)) / speed
-            colour = plots.colour(number)
+            colour = figures.colour(number)
             axes.plot(since, values, color=colour, linewidth=1.1, label=train)
             axes.axvline(behind, color=colour, linestyle="--", linewidth=0.9)
             columns[f"{damping} {train} time since the leading head [s]"] = since
             columns[f"{damping} {train} {what}"] = values
-        axes.axvline(0.0, color=plots.GREY, linestyle="--", linewidth=0.9)
-        axes.axhline(0.0, color=plots.GREY, linewidth=0.6)
+        axes.axvline(0.0, color=figures.GREY, linestyle="--", linewidth=0.9)
+        axes.axhline(0.0, color=figures.GREY, linewidth=0.6)
         axes.set_xlim(-2.0, 5.0)
-        plots.tidy(axes, "", what, _PANELS[damping])
+        figures.tidy(axes, "", what, _PANELS[damping])
     panels[-1].set_xlabel("time since the leading head has passed [s]; dashed: heads pass")
-    plots.legend_above(panels[0], columns=2)
+    figures.legend_above(panels[0], columns=2)
     return StudyFigure(name, caption, figure, columns)
 
 
 def _by_separation(number: int, damping: str, runs: Runs) -> StudyFigure:
     """Figures 13 and 14: statistics over the separation beside the single pantograph's."""
-    figure = plots.new_figure(3.6)
+    figure = figures.new_figure(3.6)
     panels = figure.subplots(1, 2, sharey=True)
     trains = runs[damping]
     columns: Columns = {"pantograph": [], "train": []}
@@ -241,14 +241,14 @@ def _by_separation(number: int, damping: str, runs: Runs) -> StudyFigure:
         for index, (name, value) in enumerate(_STATISTICS):
             values = [value(force) for force in shown.values()]
             axes.plot(range(len(shown)), values, "o-", ms=4, linewidth=1.1,
-                      color=plots.colour(index), label=name)  # fmt: skip
+                      color=figures.colour(index), label=name)  # fmt: skip
             columns[f"{name} [N]"] += values
         columns["pantograph"] += [place] * len(shown)
         columns["train"] += list(shown)
-        axes.axhline(0.0, color=plots.GREY, linewidth=0.8)
+        axes.axhline(0.0, color=figures.GREY, linewidth=0.8)
         axes.set_xticks(range(len(shown)), list(shown))
         title = f"({'ab'[panel]}) {place}"
-        plots.tidy(axes, "separation", "contact force [N]" if panel == 0 else "", title)
+        figures.tidy(axes, "separation", "contact force [N]" if panel == 0 else "", title)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=6,
                   frameon=False, fontsize="small")  # fmt: skip
     return StudyFigure(

@@ -39,7 +39,7 @@ def stability_map(
     from catenary.cases.studies.stability.picture import draw
     from catenary.cases.studies.sweep.output import as_csv
     from catenary.postproc.files.disk import write_all
-    from catenary.postproc.report import plots
+    from catenary.postproc.report import figures
 
     refuse_impossible(out)
     if (out / TABLE).exists() and not force:
@@ -51,7 +51,7 @@ def stability_map(
     found = study.make_map(case, given, shortened, MPI.COMM_SELF, grid, console.say)
     content: dict[str, bytes | str] = {
         TABLE: as_csv(study.as_rows(found)),
-        PICTURE: plots.png(draw(found)),
+        PICTURE: figures.png(draw(found)),
     }
     files = write_all(out, content)
     console.say("\n" + study.as_text(found) + "\n" + "\n".join(map(str, files)))

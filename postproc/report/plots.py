@@ -3,99 +3,34 @@
 from __future__ import annotations
 
 import contextlib
-import io
-import warnings
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.text import Text
-from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import MaxNLocator
 
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.read.results import Results
 from catenary.postproc.record import channels
 from catenary.postproc.report.envelope import thinned
+from catenary.postproc.report.figures import (
+    COLOURS,
+    GREY,
+    LIGHT,
+    LIMIT,
+    SHADE,
+    colour,
+    legend_above,
+    stacked,
+    tidy,
+)
 from catenary.solver.base.errors import InputError
 
-COLOURS = ("#1f5fa8", "#d1641b", "#2f8f4e", "#7b4fa3", "#8c6d31", "#444444")
-GREY, LIGHT, SHADE, LIMIT = "#6b6b6b", "#c9c9c9", "#eef3e6", "#b3261e"
-WIDTH = 9.0
-_RESOLUTION = 130
 # Evaluated arms whose passage is drawn.
 _MOST_ARMS = 60
-
-
-def png(figure: Figure) -> bytes:
-    """``figure`` as the bytes of a PNG file. A dollar sign in a text is one, and no formula."""
-    ticks = {
-        label
-        for axes in figure.axes
-        for axis in (axes.xaxis, axes.yaxis)
-        for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks())
-        for label in (tick.label1, tick.label2)
-    }
-    for text in figure.findobj(Text):
-        if isinstance(text, Text) and text not in ticks and "$" in text.get_text():
-            text.set_parse_math(False)
-    stream = io.BytesIO()
-    with warnings.catch_warnings():
-        # Names may be written in letters that the font has not; boxes stand for them.
-        warnings.filterwarnings("ignore", message="Glyph .* missing from")
-        figure.savefig(stream, format="png", dpi=_RESOLUTION)
-    return stream.getvalue()
-
-
-def colour(pantograph: int) -> str:
-    """Colour of a pantograph, the same in all pictures."""
-    return COLOURS[pantograph % len(COLOURS)]
-
-
-def new_figure(height: float) -> Figure:
-    """An empty figure of the report's width; ``height`` in inches."""
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def tidy(axes: Axes, x_label: str, y_label: str, title: str = "") -> None:
-    """Labels, light grid and no box."""
-    axes.set_xlabel(x_label)
-    axes.set_ylabel(y_label)
-    if title:
-        axes.set_title(title, loc="left", fontsize="medium")
-    axes.grid(True, color="#e6e6e6", linewidth=0.6)
-    axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
-
-
-def log_log(axes: Axes) -> None:
-    """Logarithmic axes with plain numbers, 1, 2 and 5 of each decade."""
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter("{x:g}")
-        axis.set_minor_formatter(NullFormatter())
-
-
-def legend_above(axes: Axes, columns: int = 5) -> None:
-    """Legend above the axes at the right, where no curve can pass."""
-    axes.legend(
-        loc="lower right",
-        bbox_to_anchor=(1.0, 1.0),
-        ncols=columns,
-        frameon=False,
-        fontsize="small",
-        borderaxespad=0.1,
-        handlelength=1.6,
-        columnspacing=1.2,
-    )
 
 
 def mark_line(axes: Axes, results: Results, start: float, end: float) -> None:
@@ -127,8 +62,7 @@ def contact_force(results: Results) -> Figure:
     names = results.pantograph_names()
     n = results.n_pantographs
     start, end = _travelled(results)
-    figure = new_figure(0.7 + 2.7 * n)
-    panels = figure.subplots(n, 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    figure, panels = stacked(0.7 + 2.7 * n, n, shared=True)
     for p, axes in enumerate(panels):
         mark_line(axes, results, start, end)
         force = results.column("contact_force", p)
@@ -157,8 +91,7 @@ def strip_forces(results: Results) -> Figure:
     with more than one."""
     shown = [(p, own) for p, own in enumerate(results.strip_columns()) if len(own) > 1]
     start, end = _travelled(results)
-    figure = new_figure(0.7 + 2.7 * len(shown))
-    panels = figure.subplots(len(shown), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    figure, panels = stacked(0.7 + 2.7 * len(shown), len(shown), shared=True)
     for axes, (p, columns) in zip(panels, shown, strict=True):
         mark_line(axes, results, start, end)
         for number, column in enumerate(columns):
@@ -189,8 +122,7 @@ def force_statistics(results: Results, statistics: RunStatistics) -> Figure:
         "mean - 3 sigma",
     )
     shown = [(i, p) for i, p in enumerate(statistics.pantographs) if not p.complaint]
-    figure = new_figure(3.4)
-    axes = figure.subplots()
+    figure, (axes,) = stacked(3.4, 1)
     width = 0.8 / max(len(shown), 1)
     for place, (index, pantograph) in enumerate(shown):
         at = np.arange(len(groups)) + (place - 0.5 * (len(shown) - 1)) * width
@@ -210,8 +142,7 @@ def force_statistics(results: Results, statistics: RunStatistics) -> Figure:
 def force_histogram(results: Results, statistics: RunStatistics) -> Figure:
     """Share of time that the 20 Hz force of each pantograph spends in each bin."""
     shown = [(i, p) for i, p in enumerate(statistics.pantographs) if not p.complaint]
-    figure = new_figure(3.2)
-    axes = figure.subplots()
+    figure, (axes,) = stacked(3.2, 1)
     for place, (index, pantograph) in enumerate(shown):
         edges, percent = pantograph.histogram_edges, pantograph.histogram_percent
         bin_width = edges[1] - edges[0]
@@ -232,8 +163,7 @@ def arm_uplift(results: Results, statistics: RunStatistics, limit: float | None)
     ``limit`` is the allowed uplift [m], None for none.
     """
     supports = statistics.supports
-    figure = new_figure(5.6)
-    passing, along = figure.subplots(2, 1)
+    figure, (passing, along) = stacked(5.6, 2)
     _passing_train(passing, results, statistics)
 
     mark_line(along, results, float(supports.x.min(initial=0)), float(supports.x.max(initial=1)))
@@ -298,8 +228,7 @@ def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
     """Forces of the worst dropper and of a mid-span one, and the range of every dropper."""
     droppers = statistics.droppers
     x, evaluated = droppers.x, np.flatnonzero(droppers.evaluated)
-    figure = new_figure(5.6)
-    history, along = figure.subplots(2, 1)
+    figure, (history, along) = stacked(5.6, 2)
 
     masts, span = results.line("support_x"), results.reference_span
     middle = int(np.argmin(np.abs(x - 0.5 * (masts[span] + masts[span + 1]))))
@@ -340,8 +269,7 @@ def static_line(results: Results) -> Figure:
     x, height = results.static("contact_x"), results.static("contact_height")
     at, lift = results.static("elasticity_x"), results.static("elasticity")
     masts, span = results.line("support_x"), results.reference_span
-    figure = new_figure(5.2)
-    profile, compliance = figure.subplots(2, 1)
+    figure, (profile, compliance) = stacked(5.2, 2)
 
     start, end = masts[max(span - 1, 0)], masts[min(span + 2, masts.size - 1)]
     shown = (x >= start) & (x <= end)
@@ -381,8 +309,7 @@ def energies(results: Results) -> Figure | None:
     recorded = results.energies()
     if not recorded or not recorded["time"].size:
         return None
-    figure = new_figure(3.0)
-    axes = figure.subplots()
+    figure, (axes,) = stacked(3.0, 1)
     for number, name in enumerate(("kinetic", "elastic")):
         chosen = thinned(recorded[name])
         curve = recorded["time"][chosen], recorded[name][chosen]

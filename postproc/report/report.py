@@ -27,7 +27,7 @@ from catenary.postproc.files.disk import write_into
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.line_record import says
-from catenary.postproc.report import csv_tables, plots
+from catenary.postproc.report import csv_tables, figures, plots
 from catenary.postproc.report.summary import as_json, real_time_factor, summarise
 from catenary.postproc.report.wording import counted, fixed
 
@@ -168,7 +168,7 @@ def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
             drawn.append(("droppers", "Dropper forces.", plots.dropper_force(results, statistics)))
     drawn.append(("static", "Profile and elasticity of the line.", plots.static_line(results)))
     drawn.append(("energy", "Energies of the line.", plots.energies(results)))
-    return [_Picture(name, text, plots.png(f)) for name, text, f in drawn if f is not None]
+    return [_Picture(name, text, figures.png(f)) for name, text, f in drawn if f is not None]
 
 
 def _html(

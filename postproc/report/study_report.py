@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.files.disk import plain, write_all
-from catenary.postproc.report import plots
+from catenary.postproc.report import figures
 
 REPRODUCED, NOT_REPRODUCED, UNDECIDED = "reproduced", "not reproduced", "cannot be decided"
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -104,7 +104,7 @@ def write_study(
     rows : figures of every run, for ``study.json``
     facts : what is said of the study as a whole, such as its run time
     """
-    pictures = {figure.name: plots.png(figure.figure) for figure in study.figures}
+    pictures = {figure.name: figures.png(figure.figure) for figure in study.figures}
     content: dict[str, bytes | str] = {f"{name}.png": data for name, data in pictures.items()}
     for figure in study.figures:
         content[f"{figure.name}.csv"] = columns_csv(figure.columns)

@@ -26,7 +26,7 @@ from catenary.cases.studies.accuracy.markdown import uncertainty_text
 from catenary.cases.studies.accuracy.runs import Measured
 from catenary.cases.studies.sweep import output as sweep_output
 from catenary.postproc.files.disk import plain, write_all
-from catenary.postproc.report import plots
+from catenary.postproc.report import figures
 
 TABLE, RECORD, PAGE = "accuracy.csv", "accuracy.json", "accuracy.md"
 PICTURE = "work_precision.png"
@@ -45,7 +45,7 @@ def write(found: Measured, out_dir: Path, target: float) -> list[Path]:
         RECORD: json.dumps(plain(_record(found, target)), indent=1, ensure_ascii=False) + "\n",
     }
     if any(row.done for axis in _precise(found) for row in found.rows_of(axis.name)):
-        content[PICTURE] = plots.png(draw(found))
+        content[PICTURE] = figures.png(draw(found))
     orders = {
         planned.axis.name: _order_lines(planned.axis, found.rows_of(planned.axis.name))
         for planned in found.plan.axes
@@ -104,12 +104,12 @@ def advices(found: Measured, target: float) -> list[str]:
 
 def draw(found: Measured) -> Figure:
     """Error of the force history over the time of the march, with the Pareto front."""
-    figure = plots.new_figure(4.8)
+    figure = figures.new_figure(4.8)
     axes = figure.subplots()
     fronts = []
     for number, axis in enumerate(_precise(found)):
         rows = [row for row in found.rows_of(axis.name) if row.done and row.percent[HISTORY] > 0]
-        colour = plots.colour(number)
+        colour = figures.colour(number)
         axes.plot(
             [row.cost for row in rows],
             [row.percent[HISTORY] for row in rows],
@@ -129,15 +129,15 @@ def draw(found: Measured) -> Figure:
             label="Pareto front",
         )
         fronts += front
-    plots.log_log(axes)
+    figures.log_log(axes)
     _name(axes, fronts)
-    plots.tidy(
+    figures.tidy(
         axes,
         "wall time of the march per simulated second [s/s]",
         "error of the force history, 0-20 Hz [% of sigma]",
         f"{found.plan.case}: accuracy and cost",
     )
-    plots.legend_above(axes, columns=4)
+    figures.legend_above(axes, columns=4)
     return figure
 
 

@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 
 from catenary.cases.scene.tables.run import MAX_DT
 from catenary.cases.studies.stability.map import Limit, StabilityMap
-from catenary.postproc.report import plots
+from catenary.postproc.report import figures
 
 _MARKERS = {"explicit": "o", "iterated": "s", "fixed_point": "^"}
 _STABLE, _ONLY_IMPLICIT = "#eef3e6", "#fbeee6"
@@ -17,7 +17,7 @@ _STABLE, _ONLY_IMPLICIT = "#eef3e6", "#fbeee6"
 
 def draw(found: StabilityMap) -> Figure:
     """Largest step over contact stiffness and over head mass, both logarithmic."""
-    figure = plots.new_figure(5.6)
+    figure = figures.new_figure(5.6)
     left, right = figure.subplots(1, 2, sharey=True)
     by_mass = {
         f"head {mass:g} kg": _series(found, "stiffness", head_mass=mass)
@@ -29,8 +29,8 @@ def draw(found: StabilityMap) -> Figure:
     }
     _panel(left, by_mass, "stiffness")
     _panel(right, by_stiffness, "head_mass", named=True)
-    plots.tidy(left, "contact stiffness [N/m]", "largest stable step [ms]")
-    plots.tidy(right, "head mass [kg]", "")
+    figures.tidy(left, "contact stiffness [N/m]", "largest stable step [ms]")
+    figures.tidy(right, "head mass [kg]", "")
     stiffness, mass, dt = found.own
     if stiffness is not None:
         left.plot(stiffness, 1e3 * dt, "*", ms=11, color="black", zorder=5)
@@ -48,7 +48,7 @@ def draw(found: StabilityMap) -> Figure:
     right.text(0.97, 0.97, word, transform=right.transAxes, ha="right", va="top", fontsize="small")
     left.legend(
         handles=[
-            Line2D([], [], color=plots.colour(i), label=name) for i, name in enumerate(by_mass)
+            Line2D([], [], color=figures.colour(i), label=name) for i, name in enumerate(by_mass)
         ],
         loc="upper right",
         fontsize="small",
@@ -85,7 +85,7 @@ def _panel(
     axes.yaxis.set_major_formatter("{x:g}")
     lowest: tuple[np.ndarray, np.ndarray] | None = None
     for number, (label, series) in enumerate(curves.items()):
-        colour = plots.colour(number)
+        colour = figures.colour(number)
         for name, limits in series.items():
             x = np.array([getattr(one, along) for one in limits])
             theory = 1e3 * np.array([one.theory for one in limits])
@@ -119,10 +119,11 @@ def _panel(
 
 def _key() -> list[Line2D]:
     lines = (("-", "explicit, theory (ω dt = 2)"), ("--", "exchanges, theory"))
-    keys = [Line2D([], [], color=plots.GREY, lw=1.2, ls=style, label=name) for style, name in lines]
+    grey = figures.GREY
+    keys = [Line2D([], [], color=grey, lw=1.2, ls=style, label=name) for style, name in lines]
     for name, marker in _MARKERS.items():
         told = f"{name}, marched"
-        keys.append(Line2D([], [], color=plots.GREY, ls="", marker=marker, mfc="none", label=told))
+        keys.append(Line2D([], [], color=grey, ls="", marker=marker, mfc="none", label=told))
     return keys
 
 

@@ -20,7 +20,7 @@ from catenary.cases.studies.sweep.jobs import LINE_COLUMNS, PANTOGRAPH_COLUMNS, 
 from catenary.cases.studies.sweep.variants import NAMES
 from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.files.disk import plain, write_all
-from catenary.postproc.report import plots
+from catenary.postproc.report import figures
 from catenary.postproc.report.wording import fixed
 
 TABLE, RECORD, PICTURE = "sweep.csv", "sweep.json", "sweep.png"
@@ -153,7 +153,7 @@ def write(out_dir: Path, case: str, ended: Sequence[Ended], plotted: Sequence[st
         RECORD: json.dumps(plain(record), indent=1, ensure_ascii=False) + "\n",
     }
     if sum(one.done for one in ended) > 1:
-        content[PICTURE] = plots.png(draw(table, varied_keys(ended), plotted))
+        content[PICTURE] = figures.png(draw(table, varied_keys(ended), plotted))
     return write_all(out_dir, content)
 
 
@@ -176,7 +176,7 @@ def draw(table: Sequence[dict[str, Any]], keys: Sequence[str], plotted: Sequence
         label = ", ".join(part for part in (row["pantograph"], label) if part)
         curves.setdefault(label, []).append(row)
     places = list(dict.fromkeys(_cell(row[axis]) for row in done))
-    figure = plots.new_figure(0.6 + 2.0 * len(plotted))
+    figure = figures.new_figure(0.6 + 2.0 * len(plotted))
     panels = figure.subplots(len(plotted), 1, sharex=True, squeeze=False)[:, 0]
     for name, axes in zip(plotted, panels, strict=True):
         for number, (label, own) in enumerate(curves.items()):
@@ -189,12 +189,12 @@ def draw(table: Sequence[dict[str, Any]], keys: Sequence[str], plotted: Sequence
                 "o-",
                 ms=4,
                 linewidth=1.3,
-                color=plots.colour(number),
+                color=figures.colour(number),
                 label=label,
             )
-        plots.tidy(axes, "", STATISTICS_IN_WORDS[name])
+        figures.tidy(axes, "", STATISTICS_IN_WORDS[name])
     if len(curves) <= _MOST_LABELS:
-        plots.legend_above(panels[0], columns=min(len(curves), 3))
+        figures.legend_above(panels[0], columns=min(len(curves), 3))
     if key is None:
         panels[-1].set_xticks(range(len(places)), places, rotation=30, ha="right")
     panels[-1].set_xlabel(key_in_words(axis))

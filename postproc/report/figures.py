@@ -1,0 +1,164 @@
+"""Figures of matplotlib in one style: made empty, labelled, and turned into PNG.
+
+Nothing here needs a display or touches files.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Iterator
+
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.transforms import ScaledTranslation
+from PIL import Image
+
+COLOURS = ("#1f5fa8", "#d1641b", "#2f8f4e", "#7b4fa3", "#8c6d31", "#444444")
+GREY, LIGHT, SHADE, LIMIT = "#6b6b6b", "#c9c9c9", "#eef3e6", "#b3261e"
+WIDTH = 9.0
+_RESOLUTION = 130
+# Room around panels whose layout is not computed [inch]: tick labels of six characters and a
+# label at the left; a legend or a title above; tick labels and a label below.
+_LEFT, _RIGHT, _ABOVE, _BELOW = 0.9, 0.12, 0.32, 0.52
+# Between panels that share their x axis, whose inner tick labels are not drawn.
+_SHARED_GAP = 0.44
+# Compression of a PNG: a higher level costs half as much time again and saves a twentieth.
+_LEVEL = 3
+
+
+def new_figure(height: float) -> Figure:
+    """An empty figure of the report's width, its layout computed when it is drawn.
+
+    The computation costs as much as the drawing; ``stacked`` does without.
+
+    Parameters
+    ----------
+    height : [inch]
+    """
+    figure = Figure(figsize=(WIDTH, height), dpi=_RESOLUTION, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def stacked(height: float, n: int, *, shared: bool = False) -> tuple[Figure, list[Axes]]:
+    """A figure of the report's width with ``n`` panels one below the other, and the panels.
+
+    The layout is given, not computed: there is room for one line of title and legend above each
+    panel and for tick labels of six characters at its left.
+
+    Parameters
+    ----------
+    height : of the figure [inch]
+    n : number of panels, at least 1
+    shared : whether the panels have one x axis, whose labels stand below the last one, and one
+        scale of y
+    """
+    figure = Figure(figsize=(WIDTH, height), dpi=_RESOLUTION)
+    FigureCanvasAgg(figure)
+    gap = _SHARED_GAP if shared else _ABOVE + _BELOW
+    panel = (height - _ABOVE - _BELOW - (n - 1) * gap) / n
+    panels = figure.subplots(
+        n,
+        1,
+        sharex=shared,
+        sharey=shared,
+        squeeze=False,
+        gridspec_kw={
+            "left": _LEFT / WIDTH,
+            "right": 1.0 - _RIGHT / WIDTH,
+            "bottom": _BELOW / height,
+            "top": 1.0 - _ABOVE / height,
+            "hspace": gap / panel,
+        },
+    )
+    return figure, list(panels[:, 0])
+
+
+def colour(pantograph: int) -> str:
+    """Colour of a pantograph, the same in all pictures."""
+    return COLOURS[pantograph % len(COLOURS)]
+
+
+def tidy(axes: Axes, x_label: str, y_label: str, title: str = "") -> None:
+    """Labels, light grid and no box."""
+    axes.set_xlabel(x_label)
+    axes.set_ylabel(y_label)
+    _fix_labels(axes)
+    axes.set_title(title, loc="left", fontsize="medium", y=1.0)
+    axes.grid(True, color="#e6e6e6", linewidth=0.6)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+
+
+def log_log(axes: Axes) -> None:
+    """Logarithmic axes with plain numbers, 1, 2 and 5 of each decade."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
+
+
+def legend_above(axes: Axes, columns: int = 5) -> None:
+    """Legend above the axes at the right, where no curve can pass."""
+    axes.legend(
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        ncols=columns,
+        frameon=False,
+        fontsize="small",
+        borderaxespad=0.1,
+        handlelength=1.6,
+        columnspacing=1.2,
+    )
+
+
+def png(figure: Figure) -> bytes:
+    """``figure`` as the bytes of a PNG file. A dollar sign in a text is one, and no formula."""
+    for text in _texts(figure):
+        if "$" in text.get_text():
+            text.set_parse_math(False)
+    canvas = figure.canvas
+    assert isinstance(canvas, FigureCanvasAgg)
+    with warnings.catch_warnings():
+        # Names may be written in letters that the font has not; boxes stand for them.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        canvas.draw()  # once; savefig draws twice, to measure and to paint
+    picture = Image.frombuffer("RGBA", canvas.get_width_height(), canvas.buffer_rgba())
+    stream = io.BytesIO()
+    resolution = (_RESOLUTION, _RESOLUTION)
+    picture.convert("RGB").save(stream, "png", compress_level=_LEVEL, dpi=resolution)
+    return stream.getvalue()
+
+
+def _fix_labels(axes: Axes) -> None:
+    """Put the labels of a panel of ``stacked`` where their room is, without measuring ticks."""
+    figure = axes.figure
+    assert isinstance(figure, Figure)
+    if figure.get_layout_engine() is not None:
+        return
+    below = ScaledTranslation(0.0, 0.06 - _BELOW, figure.dpi_scale_trans)
+    beside = ScaledTranslation(0.06 - _LEFT, 0.0, figure.dpi_scale_trans)
+    axes.xaxis.set_label_coords(0.5, 0.0, axes.transAxes + below)
+    axes.yaxis.set_label_coords(0.0, 0.5, axes.transAxes + beside)
+    axes.xaxis.label.set_verticalalignment("bottom")
+    axes.yaxis.label.set_verticalalignment("top")
+
+
+def _texts(artist: Artist) -> Iterator[Text]:
+    """All texts of a figure but those of ticks, which are not there before it is drawn."""
+    for child in artist.get_children():
+        if isinstance(child, Text):
+            yield child
+        elif isinstance(child, Axis):
+            yield child.label
+        else:
+            yield from _texts(child)
