@@ -67,7 +67,8 @@ def contact_force(results: Results) -> Figure:
         mark_line(axes, results, start, end)
         force = results.column("contact_force", p)
         chosen = thinned(force)
-        curves = [(chosen, force[chosen], {"alpha": 0.3, "linewidth": 0.6, "label": "unfiltered"})]
+        light: dict[str, Any] = {"alpha": 0.3, "linewidth": 0.6, "label": "unfiltered"}
+        curves = [(chosen, force[chosen], light)]
         try:
             force = filters.low_pass(force, results.dt)
         except InputError:  # sampled too slowly; the report says so
