@@ -31,7 +31,8 @@ endif
 .DEFAULT_GOAL := help
 # The targets share .venv and two cores: one after the other, also under make -j.
 .NOTPARALLEL:
-.PHONY: help setup setup-newest compile update-versions run test test-unit test-verification test-mpi test-regression bench long-runs fuzz lint format clean
+.PHONY: help setup setup-newest compile update-versions run check test test-unit test-verification test-mpi \
+    test-regression bench long-runs fuzz lint types format clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -54,6 +55,9 @@ update-versions: ## write what is installed into .setup/tested, from where make 
 run: setup ## simulate the paper's case and write its report
 	.venv/bin/catenary run ambrosio2012 -o $(RESULT) --force
 	@echo "report: $(CURDIR)/$(RESULT)/report.html"
+
+check: setup lint ## lint, and the unit tests that start no process; under a minute
+	$(PYTEST_SHARED) -q -m "not process" tests/unit
 
 test: setup lint ## lint and all tests, as CI runs them
 	$(PYTEST_SHARED) tests/unit tests/verification tests/regression
@@ -91,6 +95,10 @@ long-runs: setup ## all bodies of a pantograph over 20 s and ten minutes; some s
 lint: setup ## ruff (lint and format) and mypy
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
+	@$(MAKE) --no-print-directory types
+
+# Its cache, .mypy_cache, stays: without it the check takes some 10 s, with it below one.
+types:
 	@mkdir -p build/typing/catenary
 	@for part in $(PARTS); do ln -sfn ../../../$$part build/typing/catenary/$$part; done
 	MYPYPATH=build/typing $(PYTHON) -m mypy $(PARTS:%=-p catenary.%)

@@ -11,6 +11,10 @@ import subprocess
 import sys
 from typing import Any
 
+import pytest
+
+pytestmark = pytest.mark.process
+
 BACKENDS = {"gmsh", "h5py", "matplotlib", "meshio", "mpi4py", "numba", "petsc4py", "scipy", "tqdm"}
 # One process runs all command lines, one after the other, and prints the exit code of each with
 # the packages that are loaded by then.

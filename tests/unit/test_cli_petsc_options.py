@@ -34,6 +34,7 @@ def test_extras_are_assignments_up_to_the_first_dash() -> None:
         split_extras(["a=1", "word", "-ksp_type"])
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("running", [False, True])
 def test_petsc_has_the_options_of_the_command_line(running: bool) -> None:
     # In a process of its own: PETSc starts once in the life of a process.

@@ -7,7 +7,10 @@ from pathlib import Path
 import pytest
 from program import MPIRUN, Done, catenary
 
-pytestmark = pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
+pytestmark = [
+    pytest.mark.process,
+    pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun"),
+]
 
 
 def under_mpirun(*words: str, cwd: Path) -> Done:

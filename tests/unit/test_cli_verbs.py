@@ -94,6 +94,7 @@ def test_the_help_lists_every_verb() -> None:
         assert f"  {verb} " in result.stdout
 
 
+@pytest.mark.process
 def test_importing_the_command_line_loads_no_backend() -> None:
     heavy = ("petsc4py", "mpi4py", "gmsh", "matplotlib", "h5py", "scipy", "numpy", "pydantic")
     script = (
@@ -310,6 +311,7 @@ def test_restart_takes_no_assignments(tmp_path: Path, monkeypatch: pytest.Monkey
     assert "run.h5" in result.stderr
 
 
+@pytest.mark.process
 def test_the_reader_of_a_pipe_may_leave(tmp_path: Path) -> None:
     script = "from catenary.cases.cli.main import main; main()"
     done = subprocess.run(

@@ -74,6 +74,7 @@ def test_the_shell_is_offered_what_fits(typed: str, offered: list[str]) -> None:
     assert completed(typed) == offered
 
 
+@pytest.mark.process
 def test_too_low_a_limit_of_memory_is_one_sentence() -> None:
     """OpenBLAS would try for ever to get memory, and llvmlite end in a traceback."""
     program = "from catenary.cases.cli.main import main; main()"

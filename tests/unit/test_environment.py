@@ -40,6 +40,7 @@ def versions() -> ModuleType:
     return module
 
 
+@pytest.mark.process
 def test_packages_come_from_the_environment_only() -> None:
     show = "import json, sys; print(json.dumps([sys.path, sys.flags.no_user_site]))"
     done = subprocess.run(
@@ -68,6 +69,7 @@ def test_what_is_linked_shares_mpi_or_numpy() -> None:
         assert Path(spec.origin).is_relative_to(SITE.with_name("system-packages"))
 
 
+@pytest.mark.process
 def test_the_program_ignores_other_packages(tmp_path: Path) -> None:
     for name in ("numpy", "mpl_toolkits", "typer", "catenary"):
         (tmp_path / name).mkdir()

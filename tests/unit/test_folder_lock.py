@@ -59,6 +59,7 @@ def test_folders_with_something_in_them_stay(tmp_path: Path) -> None:
     assert names(tmp_path) == ["a"] and names(tmp_path / "a") == ["run.h5"]
 
 
+@pytest.mark.process
 def test_a_living_process_is_respected_and_a_killed_one_is_not(tmp_path: Path) -> None:
     with subprocess.Popen(
         [sys.executable, "-c", HOLD, str(tmp_path)],

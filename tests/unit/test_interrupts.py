@@ -162,6 +162,7 @@ def test_other_programs_get_their_handlers_back() -> None:
         assert not stop()
 
 
+@pytest.mark.process
 def test_libraries_leave_the_handlers_as_they_are(tmp_path: Path) -> None:
     """PETSc and Gmsh set handlers of their own when they start."""
     script = """

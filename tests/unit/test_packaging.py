@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.process
+
 ROOT = Path(__file__).parents[2]
 PARTS = ("meshgen", "solver", "mbs", "postproc", "cases")
 BUILT_FROM = (*PARTS, "pyproject.toml", "setup.py", "LICENSE", "README.md")

@@ -169,6 +169,7 @@ for step in range(10**6):
 """
 
 
+@pytest.mark.process
 def test_a_killed_run_is_readable_up_to_its_last_flush(tmp_path: Path, make_march: Any) -> None:
     path = tmp_path / "run.h5"
     with subprocess.Popen(
@@ -221,6 +222,7 @@ watcher.start""",
 )
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("room", [700_000, 1_000_000, 1_234_567])
 @pytest.mark.parametrize("claim", ["system", "zeros"])
 def test_a_full_disk_ends_the_run_with_a_sentence_and_keeps_the_record(

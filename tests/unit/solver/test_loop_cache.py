@@ -161,6 +161,7 @@ def test_numbas_own_folder_is_left_to_others(monkeypatch: pytest.MonkeyPatch) ->
     assert numba.config.CACHE_DIR == "somewhere"
 
 
+@pytest.mark.process
 @pytest.mark.skipif(
     os.geteuid() != 0 or not shutil.which("setpriv"), reason="another user takes root and setpriv"
 )

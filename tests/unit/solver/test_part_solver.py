@@ -50,6 +50,7 @@ def test_all_factors_give_the_same_answer(option: str | None, hurries: bool) -> 
         pair.vector.destroy()
 
 
+@pytest.mark.process
 def test_a_solver_that_nobody_destroyed_does_not_crash_the_end_of_python() -> None:
     """PETSc is finalised after Python, and cannot free what is written in Python then."""
     code = (
