@@ -72,10 +72,19 @@ def run(
     from catenary.cases.run.describe_arrivals import arrival_warnings
     from catenary.cases.run.runner import run_case
 
-    for text in arrival_warnings(scene):
-        console.warn(text)
-    tell = _teller(out)
-    result = run_case(scene, out, comm, force=force, petsc_options=arguments, tell=tell)
+    def warn() -> None:
+        for text in arrival_warnings(scene):
+            console.warn(text)
+
+    result = run_case(
+        scene,
+        out,
+        comm,
+        force=force,
+        petsc_options=arguments,
+        tell=_teller(out),
+        ready=warn,
+    )
     return _end(result, out, strict)
 
 
@@ -89,6 +98,9 @@ def restart(
     folder: RunFolder,
     extras: PetscOptions = None,
     strict: Strict = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Continue even without room for all results.")
+    ] = False,
     verbose: Verbose = False,
 ) -> int:
     """Collective."""
@@ -113,7 +125,9 @@ def restart(
     comm, scene, arguments = begin(read, verbose, lambda scene: scene)
     from catenary.cases.run.runner import restart_case
 
-    result = restart_case(scene, folder, comm, petsc_options=arguments, tell=_teller(folder))
+    result = restart_case(
+        scene, folder, comm, petsc_options=arguments, tell=_teller(folder), force=force
+    )
     return _end(result, folder, strict)
 
 

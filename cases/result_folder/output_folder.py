@@ -7,6 +7,7 @@ import errno
 import logging
 import os
 import stat
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -119,17 +120,10 @@ def check_size(folder: Path, size: RunSize, force: bool) -> None:
         Unless ``force`` is given.
     """
     room = free_bytes(folder) + _replaced_bytes(folder)
-    takes = (
-        f"{size.n_steps} steps take about {duration(size.seconds)} and {volume(size.n_bytes)} in "
-        f"{folder}, where {volume(room)} are free"
-    )
+    takes = _takes(folder, size, room)
     beyond = size.n_bytes > MOST_BYTES or size.seconds > MOST_SECONDS or size.n_steps > MOST_STEPS
     if not force:
-        if size.n_bytes > room:
-            raise InputError(
-                f"there is no room for the results: {takes}; free some space, name another folder "
-                "with -o, record less, or give --force to run until the disk is full"
-            )
+        _refuse_without_room(takes, size, room, "record less, ")
         if beyond:
             raise InputError(
                 f"the run is very large: {takes}; beyond {volume(MOST_BYTES)}, "
@@ -138,6 +132,62 @@ def check_size(folder: Path, size: RunSize, force: bool) -> None:
             )
     if beyond or size.n_bytes > LARGE or size.seconds > LONG:
         logger.info(takes)
+
+
+def check_room_to_continue(folder: Path, size: RunSize, force: bool) -> None:
+    """Refuse to continue a run without room for the rest of its files. Not collective.
+
+    Parameters
+    ----------
+    size : of the whole run
+
+    Raises
+    ------
+    InputError
+        Unless ``force`` is given.
+    """
+    room = free_bytes(folder) + _own_bytes(folder)
+    if not force:
+        _refuse_without_room(_takes(folder, size, room), size, room, "", other_folder=False)
+
+
+def check_room_of_runs(folder: Path, folders: Iterable[Path], size: RunSize, force: bool) -> None:
+    """Refuse several runs without room for all of them. Not collective.
+
+    Parameters
+    ----------
+    folder : in which all are, the deepest that is there counts
+    folders : of the runs that are still to be made; their old files count as room
+    size : of these runs together
+
+    Raises
+    ------
+    InputError
+        Unless ``force`` is given.
+    """
+    there = next(path for path in (folder, *folder.absolute().parents) if path.is_dir())
+    room = free_bytes(there) + sum(_replaced_bytes(each) for each in folders)
+    if not force:
+        _refuse_without_room(_takes(folder, size, room), size, room, "record less, ")
+
+
+def _takes(folder: Path, size: RunSize, room: float) -> str:
+    return (
+        f"{size.n_steps} steps take about {duration(size.seconds)} and {volume(size.n_bytes)} in "
+        f"{folder}, where {volume(room)} are free"
+    )
+
+
+def _refuse_without_room(
+    takes: str, size: RunSize, room: float, less: str, *, other_folder: bool = True
+) -> None:
+    if size.n_bytes <= room:
+        return
+    elsewhere = "name another folder with -o, " if other_folder else ""
+    raise InputError(
+        f"there is no room for the results: {takes}; free some space, {elsewhere}{less}or give "
+        "--force to run until the disk is full"
+    )
 
 
 def free_bytes(folder: Path) -> float:
@@ -151,12 +201,18 @@ def free_bytes(folder: Path) -> float:
 
 def _replaced_bytes(folder: Path) -> float:
     """Blocks on the disk of the files that a new run removes [bytes]."""
-    total = 0.0
+    return sum(512.0 * one.st_blocks for one in _run_files(folder) if one.st_nlink == 1)
+
+
+def _own_bytes(folder: Path) -> float:
+    """Blocks on the disk of the files that a continued run goes on with [bytes]."""
+    return sum(512.0 * one.st_blocks for one in _run_files(folder))
+
+
+def _run_files(folder: Path) -> Iterator[os.stat_result]:
     for name in (RUN_FILE, *FIELD_FILES):
         with contextlib.suppress(OSError):
-            found = (folder / name).lstat()
-            total += 512.0 * found.st_blocks if found.st_nlink == 1 else 0.0
-    return total
+            yield (folder / name).lstat()
 
 
 def _is_hdf5(path: Path) -> bool:

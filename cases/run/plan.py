@@ -1,54 +1,24 @@
-"""What a scene will simulate and what not, its size, and an estimate of memory and time."""
+"""What a scene will simulate and what not, with its size and what a run of it needs."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from catenary.cases.result_folder.output_folder import RunSize, volume
+from catenary.cases.result_folder.output_folder import volume
 from catenary.cases.run.describe_arrivals import arrival_facts
 from catenary.cases.run.describe_incidents import incident_facts
 from catenary.cases.run.describe_pantographs import kind_lines
-from catenary.cases.run.file_sizes import FileSizes, estimate_files
-from catenary.cases.run.recording import Recording, recording_of
+from catenary.cases.run.file_sizes import FileSizes
+from catenary.cases.run.needs import needs_of, simulated_time
+from catenary.cases.run.recording import extent_of
 from catenary.cases.scene.scene import Scene
-from catenary.mbs.mechanism.pantograph_data import MultibodyData
 from catenary.postproc.report.wording import counted
 from catenary.solver.effects import effect as effects
 from catenary.solver.problem.problem import Numerics, Problem, n_halvings
 
 if TYPE_CHECKING:
     from catenary.meshgen.mesh import LineMesh
-
-# Cost model of the march on one rank, records included: overhead of a step, and time per unknown.
-# Runs of the case ambrosio2012 on 25, 100 and 1000 spans, 4.5e3 to 1.8e5 unknowns, on a two-core
-# machine of 2026 (Debian 12, PETSc 3.18) lie within 40 % of it, and machines differ by a factor of
-# two; the plan calls it an estimate.
-STEP_OVERHEAD = 4.5e-5  # [s]
-STEP_PER_UNKNOWN = 4.8e-9  # [s]
-# The fixed-point scheme repeats the solve; 3 times the time of one_solve was measured.
-# PETSc's TSALPHA2 factors anew in every iteration; 26 times was measured.
-SCHEME_FACTOR = {"one_solve": 1.0, "fixed_point": 3.0, "ts_alpha2": 26.0}
-# A substep of a pantograph with all its bodies: 0.21 to 0.38 ms were measured with the paper's
-# seven, by the way of keeping joints.
-ALL_BODIES_SUBSTEP = 3.0e-4  # [s]
-
-# Time between two flushes of the result file, each of which takes some 5 ms [s], and what may wait
-# for one in memory [B].
-FLUSH_EVERY = 0.5
-FLUSH_MEMORY = 1e8
-# Steps of a flush whose chunks are not too small.
-LEAST_FLUSH = 256
-
-# Resident memory of runs of ambrosio2012 on 25, 300, 1000 and 2000 spans, report included, within
-# 10 %: program and libraries, then per unknown.
-MEMORY_BASE = 3.85e8  # [B]
-MEMORY_PER_UNKNOWN = 2200.0  # [B]
-# What a step adds, as the report takes the history of one pantograph after the other.
-MEMORY_PER_STEP = 40.0  # [B]
-_BYTES = 8
-_PER_PANTOGRAPH = 6  # channels of a pantograph at most
 
 
 class EffectRow(NamedTuple):
@@ -138,12 +108,6 @@ def effect_rows(scene: Scene, problem: Problem) -> tuple[list[EffectRow], list[E
     return on, off
 
 
-def run_size(scene: Scene, mesh: LineMesh) -> RunSize:
-    """What a run of a scene takes, by its plan. Not collective."""
-    plan = make_plan(scene, mesh)
-    return RunSize(plan.files.total, plan.march, plan.n_steps)
-
-
 def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
     """The plan of a scene; makes the mesh if it is not given. Not collective."""
     import numpy as np
@@ -153,16 +117,13 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
 
     problem = scene.to_problem()
     mesh = mesh_of(scene) if mesh is None else mesh
+    extent = extent_of(mesh)
     on, off = effect_rows(scene, problem)
     unknowns = effects.unknowns_per_node(effects.active(problem))
     n_dofs = mesh.n_nodes * len(unknowns)
     train, dt = problem.train, problem.numerics.dt
-    simulated = (train.end - train.start) / train.speed
-    n_steps = max(1, math.floor(simulated / dt + 1e-9))
+    needs = needs_of(scene, problem, extent, n_dofs)
     length = np.diff(mesh.x(mesh.wires[CONTACT_WIRE]))
-    n_droppers, n_arms = mesh.droppers.shape[0], mesh.steady_arms.size
-    recording = recording_of(scene.output, problem, mesh, n_steps)
-    flush_every = scene.output.flush_every_steps or flush_cadence(problem, n_dofs, recording)
     waves = arrival_facts(scene, problem)
     return Plan(
         case=scene.case.name,
@@ -172,9 +133,9 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
         unknowns=unknowns,
         n_nodes=mesh.n_nodes,
         n_dofs=n_dofs,
-        n_steps=n_steps,
-        n_droppers=n_droppers,
-        n_arms=int(n_arms),
+        n_steps=needs.n_steps,
+        n_droppers=extent.dropper_x.size,
+        n_arms=extent.arm_x.size,
         n_pantographs=len(train.placements),
         element_lengths=(float(length.min()), float(length.max())),
         speed=train.speed,
@@ -190,27 +151,12 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
         dt=dt,
         scheme=problem.numerics.scheme,
         halved=_halved(problem.numerics),
-        simulated=simulated,
-        memory=estimate_memory(n_dofs, n_steps),
-        march=estimate_march(n_dofs, n_steps, problem.numerics.scheme, _substeps(problem)),
-        files=estimate_files(scene, problem, recording, n_dofs, flush_every),
-        recorded=recording.sentences(dt),
+        simulated=simulated_time(problem),
+        memory=needs.memory,
+        march=needs.march,
+        files=needs.files,
+        recorded=needs.recording.sentences(dt),
     )
-
-
-def estimate_memory(n_dofs: int, n_steps: int = 0) -> float:
-    """Resident memory of a run on one rank, its report included [B]."""
-    return MEMORY_BASE + MEMORY_PER_UNKNOWN * n_dofs + MEMORY_PER_STEP * n_steps
-
-
-def estimate_march(n_dofs: int, n_steps: int, scheme: str, n_substeps: int = 0) -> float:
-    """Wall time of the time loop on one rank [s].
-
-    ``n_substeps`` are those of a step that pantographs with all their bodies take, all together.
-    """
-    step = STEP_OVERHEAD + STEP_PER_UNKNOWN * n_dofs
-    step *= SCHEME_FACTOR[scheme]
-    return n_steps * (step + ALL_BODIES_SUBSTEP * n_substeps)
 
 
 def _halved(numerics: Numerics) -> str:
@@ -222,30 +168,6 @@ def _halved(numerics: Numerics) -> str:
         f"steps with a contact force wrong by more than {tolerance:g} N, or without a solution, "
         f"are halved, down to {1e3 * shortest:g} ms (not in the estimates)"
     )
-
-
-def _substeps(problem: Problem) -> int:
-    """Substeps in a step of all pantographs whose bodies are all moved."""
-    kinds = [place.data for place in problem.train.placements]
-    ways = [kind.all_bodies for kind in kinds if isinstance(kind, MultibodyData)]
-    return sum(way.substeps for way in ways if way is not None)
-
-
-def flush_cadence(problem: Problem, n_dofs: int, recording: Recording) -> int:
-    """Steps between two flushes: about half a second of wall time, and what fits into memory.
-
-    Not so few that the file is made of small chunks, and whole chunks of them. The same on any
-    number of ranks, so that their files are.
-    """
-    step = estimate_march(n_dofs, 1, problem.numerics.scheme, _substeps(problem))
-    columns = _PER_PANTOGRAPH * len(problem.train.placements)
-    columns += recording.arm_x.size + recording.dropper_x.size
-    wanted = max(round(FLUSH_EVERY / step), LEAST_FLUSH)
-    steps = max(1, min(wanted, int(FLUSH_MEMORY / (_BYTES * columns))))
-    for part in (LEAST_FLUSH * recording.line.every, LEAST_FLUSH, recording.line.every):
-        if steps >= part:
-            return steps - steps % part
-    return steps
 
 
 def plan_text(plan: Plan) -> str:

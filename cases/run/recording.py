@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.record import channels
 from catenary.postproc.record.line_record import GZIP, NONE, LineRecord, says
@@ -24,6 +25,36 @@ THINNED_EVERY, THINNED_WINDOW = 5e-3, (300.0, 200.0)
 FIELD_EVERY = 0.05  # [s]
 # Bytes of a node in a snapshot.
 PER_NODE = 16
+
+
+class Extent(NamedTuple):
+    """What of a line is recorded: positions of arms and droppers [m], nodes and cells of snapshots.
+
+    ``n_cells`` are the elements of the wires and the droppers.
+    """
+
+    arm_x: np.ndarray
+    dropper_x: np.ndarray
+    n_nodes: int
+    n_cells: int
+
+
+def extent_of(mesh: LineMesh) -> Extent:
+    """What of a mesh is recorded. Not collective."""
+    n_cells = sum(len(nodes) - 1 for nodes in mesh.wires.values()) + len(mesh.droppers)
+    arms, droppers = mesh.x(mesh.steady_arms), mesh.x(mesh.droppers[:, 1])
+    return Extent(arms, droppers, mesh.n_nodes, n_cells)
+
+
+def extent_before_meshing(line: Line, n_nodes: int) -> Extent:
+    """The same of a line that is to be meshed, of which only the nodes are counted."""
+    masts = line.support_positions
+    droppers = [
+        start + np.asarray(places, dtype=float)
+        for start, places in zip(masts[:-1], line.dropper_positions, strict=True)
+    ]
+    dropper_x = np.concatenate(droppers)
+    return Extent(masts[1:-1], dropper_x, n_nodes, n_nodes - 2 + dropper_x.size)
 
 
 @dataclass(frozen=True)
@@ -64,7 +95,7 @@ class Recording:
         return [text for name, text in self.sentences(dt).items() if chosen[name]]
 
 
-def recording_of(output: OutputTable, problem: Problem, mesh: LineMesh, n_steps: int) -> Recording:
+def recording_of(output: OutputTable, problem: Problem, extent: Extent, n_steps: int) -> Recording:
     """What a run of a problem records. Not collective.
 
     Parameters
@@ -72,18 +103,14 @@ def recording_of(output: OutputTable, problem: Problem, mesh: LineMesh, n_steps:
     output : the scene's table
     n_steps : steps after step 0
     """
-    arm_x, dropper_x = mesh.x(mesh.steady_arms), mesh.x(mesh.droppers[:, 1])
-    n_cells = sum(len(nodes) - 1 for nodes in mesh.wires.values()) + len(mesh.droppers)
-    field_every, by_size = _field_every(output, problem.numerics.dt, mesh.n_nodes, n_steps)
+    field_every, by_size = _field_every(output, problem.numerics.dt, extent.n_nodes, n_steps)
+    n_columns = extent.arm_x.size + extent.dropper_x.size
     return Recording(
-        _line_record(output, problem, arm_x.size + dropper_x.size, n_steps),
+        _line_record(output, problem, n_columns, n_steps),
         field_every,
         cadence(output.energy_every_s, problem.numerics.dt),
         by_size,
-        arm_x,
-        dropper_x,
-        mesh.n_nodes,
-        n_cells,
+        *extent,
         n_steps,
     )
 

@@ -19,13 +19,24 @@ import numpy as np
 from catenary.cases.process.interrupts import Phase, StopRequest
 from catenary.cases.process.versions import versions
 from catenary.cases.result_folder.folder_lock import held
-from catenary.cases.result_folder.output_folder import RunSize, check_size, prepare
+from catenary.cases.result_folder.output_folder import (
+    RunSize,
+    check_room_to_continue,
+    check_size,
+    prepare,
+)
 from catenary.cases.run.continuing import refuse_other_run, state_to_continue
 from catenary.cases.run.describe_arrivals import arrival_facts
 from catenary.cases.run.describe_incidents import incident_facts
 from catenary.cases.run.describe_pantographs import header_facts
-from catenary.cases.run.plan import effect_rows, flush_cadence, run_size
-from catenary.cases.run.recording import recording_of
+from catenary.cases.run.needs import (
+    flush_cadence,
+    needs_before_meshing,
+    needs_with_mesh,
+    run_size,
+)
+from catenary.cases.run.plan import effect_rows
+from catenary.cases.run.recording import extent_of, recording_of
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.mesh import LineMesh
@@ -109,6 +120,7 @@ def run_case(
     force: bool = False,
     petsc_options: Sequence[str] = (),
     tell: Callable[[str], None] = lambda outcome: None,
+    ready: Callable[[], None] = lambda: None,
     only_summary: bool = False,
     large: bool | None = None,
 ) -> RunOutcome:
@@ -121,6 +133,7 @@ def run_case(
     petsc_options : the options that PETSc was started with, for the record
     tell : called with the outcome on all ranks when the result file is closed, before the report
         is drawn: an MPI launcher that is interrupted leaves its processes a second
+    ready : called on all ranks when folder and size of the run have been judged
     only_summary : of the report write ``summary.json`` alone, which costs no time
     large : whether a run may pass the bounds on its size; as ``force`` if not given
 
@@ -134,7 +147,7 @@ def run_case(
         If files cannot be written.
     """
     allowed = force if large is None else large
-    order = _Order(scene, out_dir, comm, petsc_options, tell, None, only_summary)
+    order = _Order(scene, out_dir, comm, petsc_options, tell, None, only_summary, ready)
     with held(out_dir, comm, f"catenary run {scene.case.name}"):
         on_root(comm, lambda: prepare(out_dir, force))
         return _run(order, lambda size: check_size(out_dir, size, allowed))
@@ -147,21 +160,24 @@ def restart_case(
     *,
     petsc_options: Sequence[str] = (),
     tell: Callable[[str], None] = lambda outcome: None,
+    force: bool = False,
 ) -> RunOutcome:
     """Continue an interrupted or broken run from its last checkpoint. Collective.
 
     ``scene`` must be the one that the run was started with; any number of ranks may continue.
-    ``petsc_options`` and ``tell`` are those of ``run_case``.
+    ``petsc_options`` and ``tell`` are those of ``run_case``; with ``force`` the room on the disk
+    is not looked at.
 
     Raises
     ------
     InputError
-        If there is nothing to continue, or if another process writes into the folder.
+        If there is nothing to continue, if another process writes into the folder, or if there is
+        no room for the rest.
     """
     with held(out_dir, comm, f"catenary restart {out_dir}"):
         state = on_root(comm, lambda: state_to_continue(out_dir / RESULT))
         order = _Order(scene, out_dir, comm, petsc_options, tell, state, False)
-        return _run(order, lambda size: None)
+        return _run(order, lambda size: check_room_to_continue(out_dir, size, force))
 
 
 def static_table(scene: Scene) -> dict[str, np.ndarray]:
@@ -189,6 +205,7 @@ class _Order:
     tell: Callable[[str], None]
     state: dict[str, Any] | None
     only_summary: bool
+    ready: Callable[[], None] = lambda: None
 
     @property
     def resume(self) -> bool:
@@ -204,7 +221,7 @@ class _Order:
 def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
     """All phases of a run whose folder is ready. Collective.
 
-    ``judge`` sees the size of the run as soon as the mesh is there, on rank 0.
+    ``judge`` sees the size of the run on rank 0 before the mesh is made, or once it is read.
     """
     scene, comm = order.scene, order.comm
     phases = Phases(Progress(comm))
@@ -212,6 +229,8 @@ def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
     with ExitStack() as stack:
         with Phase(comm, "the line was read", left) as phase:
             problem = scene.to_problem()
+            on_root(comm, phase.alone(lambda: _judge_before_meshing(scene, judge)))
+            order.ready()
             at_rest = _at_rest(scene, problem, comm, phases, phase, judge)
             header = _header(order, problem, at_rest) if comm.rank == 0 else None
             if order.resume:
@@ -238,6 +257,12 @@ def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
     return result
 
 
+def _judge_before_meshing(scene: Scene, judge: Callable[[RunSize], None]) -> None:
+    needs = needs_before_meshing(scene)
+    if needs is not None:
+        judge(run_size(needs))
+
+
 def _at_rest(
     scene: Scene,
     problem: Problem,
@@ -250,7 +275,8 @@ def _at_rest(
 
     def make_mesh() -> LineMesh:
         mesh = mesh_of(scene)
-        judge(run_size(scene, mesh))
+        if scene.mesh_file() is not None:
+            judge(run_size(needs_with_mesh(scene, mesh)))
         return mesh
 
     def rest() -> tuple[Equilibrium, np.ndarray, Elasticity]:
@@ -282,7 +308,7 @@ def _observers(
     those of the whole run, ``header`` is needed on rank 0.
     """
     comm, dt, output = order.comm, problem.numerics.dt, order.scene.output
-    recording = recording_of(output, problem, at_rest.mesh, n_steps)
+    recording = recording_of(output, problem, extent_of(at_rest.mesh), n_steps)
     for sentence in recording.told(dt):
         logger.info(sentence)
     flush_every = output.flush_every_steps or flush_cadence(

@@ -32,7 +32,7 @@ class Size(NamedTuple):
 
     def sentence(self) -> str:
         """What it is and what it takes, in one sentence."""
-        from catenary.cases.run.plan import estimate_memory
+        from catenary.cases.run.needs import estimate_memory
 
         memory = estimate_memory(self.unknowns)
         return (

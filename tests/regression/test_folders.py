@@ -58,3 +58,17 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
     (sentence,) = done.stderr.splitlines()
     assert f"{tmp_path / 'file'} is no folder" in sentence
     assert content(tmp_path) == {"file": b"mine"}
+
+
+def test_a_refused_folder_is_all_that_is_told(tmp_path: Path) -> None:
+    """Warnings about a run that is not made would hide the refusal."""
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "run.h5").write_bytes(b"mine")
+    refused = catenary(*short_run(out), cwd=tmp_path)
+    assert refused.code == 2
+    (sentence,) = refused.stderr.splitlines()
+    assert "--force" in sentence
+    made = catenary(*short_run(out), "--force", cwd=tmp_path)
+    assert made.code == 0, made.stderr
+    assert "WARNING" in made.stderr

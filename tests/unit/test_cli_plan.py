@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.cases.run.plan import estimate_march, estimate_memory, make_plan, plan_text
+from catenary.cases.run.needs import estimate_march, estimate_memory
+from catenary.cases.run.plan import make_plan, plan_text
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.scene import load_scene
 

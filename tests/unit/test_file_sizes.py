@@ -9,8 +9,16 @@ import pytest
 import typer
 from mpi4py import MPI
 
-from catenary.cases.run.plan import estimate_memory, make_plan, plan_text
+from catenary.cases.run.needs import (
+    Kept,
+    estimate_memory,
+    needs_before_meshing,
+    needs_with_mesh,
+    total_size,
+)
+from catenary.cases.run.plan import make_plan, plan_text
 from catenary.cases.run.runner import run_case
+from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.scene import Scene, load_scene
 from catenary.cases.terminal import console
 from catenary.postproc.read.results import Results
@@ -140,3 +148,51 @@ def test_too_little_memory_ends_in_a_sentence(capsys: pytest.CaptureFixture[str]
     assert "not enough memory" in capsys.readouterr().err
     with pytest.raises(RunBroken, match="not enough memory"):
         on_root(MPI.COMM_SELF, greedy)
+
+
+@pytest.mark.parametrize("case", ["ac_simple", "ambrosio2012", "en50318_2002"])
+@pytest.mark.parametrize("more", [(), ("mesh.elements_per_gap=3", "mesh.support_refinement=2")])
+def test_what_a_run_needs_is_known_before_it_is_meshed(case: str, more: tuple[str, ...]) -> None:
+    scene = scene_of(*more, case=case)
+    before = needs_before_meshing(scene)
+    meshed = needs_with_mesh(scene, mesh_of(scene))
+    assert before is not None
+    assert before.n_steps == meshed.n_steps > 1000
+    assert (before.memory, before.march, before.files) == (
+        meshed.memory,
+        meshed.march,
+        meshed.files,
+    )
+    assert before.recording.n_cells == meshed.recording.n_cells
+    assert np.allclose(before.recording.dropper_x, meshed.recording.dropper_x)
+    assert np.allclose(before.recording.arm_x, meshed.recording.arm_x)
+
+
+def test_the_size_of_a_large_run_is_told_before_the_mesh_is_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A mesh of a thousand spans takes seconds."""
+
+    def no_mesh(scene: Scene) -> None:
+        raise AssertionError("meshed")
+
+    monkeypatch.setattr("catenary.cases.run.runner.mesh_of", no_mesh)
+    with pytest.raises(InputError, match="the run is very large"):
+        run_case(scene_of("numerics.dt_s=1e-6"), tmp_path, MPI.COMM_SELF)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_several_runs_take_what_stays_of_them_and_the_largest_of_the_rest() -> None:
+    scene = scene_of(*SHORT)
+    one = needs_before_meshing(scene)
+    assert one is not None
+    kept, reported, passing = (
+        Kept(scene, True, False),
+        Kept(scene, True, True),
+        Kept(scene, False, False),
+    )
+    total = total_size([kept, reported, passing, passing])
+    files = one.files
+    assert total.n_bytes == 3 * files.result + 4 * files.film + files.report
+    assert total.n_steps == 4 * one.n_steps
+    assert total.seconds == pytest.approx(4 * one.march)

@@ -16,6 +16,8 @@ from catenary.cases.result_folder.output_folder import (
     MOST_SECONDS,
     MOST_STEPS,
     RunSize,
+    check_room_of_runs,
+    check_room_to_continue,
     check_size,
     prepare,
     refuse_earlier,
@@ -156,3 +158,27 @@ def test_needed_and_free_bytes_are_told(tmp_path: Path, monkeypatch: pytest.Monk
     (tmp_path / "kept.h5").hardlink_to(tmp_path / "run.h5")
     with pytest.raises(InputError, match="there is no room"):
         check_size(tmp_path, SMALL, force=False)
+
+
+def test_the_files_of_a_run_that_is_continued_are_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It goes on in them, whatever other names they have."""
+    monkeypatch.setattr(output_folder, "free_bytes", lambda folder: 0.5e6)
+    with pytest.raises(InputError, match=r"0\.5 MB are free; free some space, or give --force"):
+        check_room_to_continue(tmp_path, SMALL, force=False)
+    check_room_to_continue(tmp_path, SMALL, force=True)
+    (tmp_path / "run.h5").write_bytes(bytes(1_000_000))
+    (tmp_path / "kept.h5").hardlink_to(tmp_path / "run.h5")
+    check_room_to_continue(tmp_path, SMALL, force=False)
+
+
+def test_several_runs_need_room_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(output_folder, "free_bytes", lambda folder: 0.5e6)
+    out, folders = tmp_path / "to be made", [tmp_path / "one", tmp_path / "other"]
+    with pytest.raises(InputError, match=r"about 10 s and 1\.0 MB in .*to be made, where 0\.5 MB"):
+        check_room_of_runs(out, folders, SMALL, force=False)
+    check_room_of_runs(out, folders, SMALL, force=True)
+    folders[0].mkdir()
+    (folders[0] / "run.h5").write_bytes(bytes(1_000_000))
+    check_room_of_runs(out, folders, SMALL, force=False)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from catenary.cases.run.plan import estimate_march, make_plan, plan_text
+from catenary.cases.run.needs import estimate_march
+from catenary.cases.run.plan import make_plan, plan_text
 from catenary.cases.scene.error_sentences import Origin
 from catenary.cases.scene.scene import Scene, load_scene, scene_from
 from catenary.mbs.build import has_joints

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ from measuring import COMM
 from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
+from catenary.cases.result_folder import output_folder
+from catenary.cases.run.needs import needs_before_meshing
 from catenary.cases.run.runner import run_case
 from catenary.cases.studies.sweep.axis_words import STATISTICS_IN_WORDS, key_in_words
 from catenary.cases.studies.sweep.done_before import read_record, read_summary
@@ -360,3 +363,21 @@ def test_axes_are_in_the_fields_words(key: str, words: str) -> None:
 def test_every_statistic_has_words_with_a_unit() -> None:
     assert set(STATISTICS_IN_WORDS) == set(STATISTICS)
     assert all(words.endswith("]") and "_" not in words for words in STATISTICS_IN_WORDS.values())
+
+
+def test_a_sweep_without_room_for_all_its_runs_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each alone has room."""
+    jobs = tiny()
+    sizes = [needs_before_meshing(job.scene) for job in jobs]
+    (one, other) = (size.files.result + size.files.film for size in sizes if size is not None)
+    room = [0.9 * (one + other)]
+    monkeypatch.setattr(output_folder, "free_bytes", lambda folder: room[0])
+    with pytest.raises(InputError, match="there is no room for the results"):
+        run_jobs(jobs, tmp_path / "out", COMM)
+    assert not list(tmp_path.rglob("run.h5"))
+    # Of runs whose result files do not stay only one at a time takes room.
+    passing = [replace(job, keep_results=False) for job in jobs]
+    room[0] = 1.5 * max(one, other) + 2e6  # and a report, by which a run alone is judged
+    assert [end.outcome for end in run_jobs(passing, tmp_path / "out", COMM)] == ["done", "done"]

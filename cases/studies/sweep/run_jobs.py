@@ -13,7 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from catenary.cases.process.interrupts import Interrupted
-from catenary.cases.result_folder.output_folder import refuse_earlier, refuse_impossible
+from catenary.cases.result_folder.output_folder import (
+    check_room_of_runs,
+    refuse_earlier,
+    refuse_impossible,
+)
+from catenary.cases.run.needs import Kept, total_size
 from catenary.cases.run.runner import RESULT, run_case
 from catenary.cases.studies.sweep.done_before import read_record, read_summary, record_text
 from catenary.cases.studies.sweep.jobs import Ended, Job
@@ -54,13 +59,15 @@ def run_jobs(
     ------
     InputError
         If ``out_dir`` cannot be written to, or if it or a job's folder holds other results and
-        ``force`` is not given; nothing is run then.
+        ``force`` is not given, or if there is no room for all runs; nothing is run then.
     RunBroken
         If a record of what is done cannot be written.
     """
     earlier = on_root(comm, lambda: _earlier(jobs, out_dir, force, measure is not None))
+    left = [job for job, found in zip(jobs, earlier, strict=True) if found is None]
+    on_root(comm, lambda: _check_room(left, out_dir, force))
     ended: list[Ended] = []
-    begin, n_left = time.perf_counter(), sum(found is None for found in earlier)
+    begin, n_left = time.perf_counter(), len(left)
     n_run = 0
     for number, (job, found) in enumerate(zip(jobs, earlier, strict=True), start=1):
         place = f"[{number}/{len(jobs)}] {job.variant.name}"
@@ -75,8 +82,8 @@ def run_jobs(
             break
         n_run += 1
         spent = time.perf_counter() - begin
-        left = spent / n_run * (n_left - n_run)
-        tell(f"    {_figures(one)}; {spent:.0f} s gone, about {left:.0f} s left")
+        ahead = spent / n_run * (n_left - n_run)
+        tell(f"    {_figures(one)}; {spent:.0f} s gone, about {ahead:.0f} s left")
     return ended
 
 
@@ -138,6 +145,13 @@ def _earlier(jobs: Sequence[Job], out_dir: Path, force: bool, measured: bool) ->
     if force:
         return [None] * len(jobs)
     return [_found(job, out_dir / job.variant.name, measured) for job in jobs]
+
+
+def _check_room(jobs: Sequence[Job], out_dir: Path, force: bool) -> None:
+    """Refuse jobs whose files have no room together."""
+    size = total_size(Kept(job.scene, job.keep_results, job.full_report) for job in jobs)
+    folders = [out_dir / job.variant.name for job in jobs]
+    check_room_of_runs(out_dir, folders, size, force)
 
 
 def _found(job: Job, folder: Path, measured: bool) -> Ended | None:

@@ -1,0 +1,194 @@
+"""What a run needs, estimated before anything is made: time, memory and room for its files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from catenary.cases.result_folder.output_folder import RunSize
+from catenary.cases.run.file_sizes import FileSizes, estimate_files
+from catenary.cases.run.recording import (
+    Extent,
+    Recording,
+    extent_before_meshing,
+    extent_of,
+    recording_of,
+)
+from catenary.cases.scene.mesh_size import size_of
+from catenary.cases.scene.scene import Scene
+from catenary.mbs.lumped_data import LumpedData
+from catenary.meshgen.mesh import LineMesh
+from catenary.solver.effects import effect as effects
+from catenary.solver.problem.problem import Problem
+
+# Cost model of the march on one rank, records included: overhead of a step, and time per unknown.
+# Runs of the case ambrosio2012 on 25, 100 and 1000 spans, 4.5e3 to 1.8e5 unknowns, on a two-core
+# machine of 2026 (Debian 12, PETSc 3.18) lie within 40 % of it, and machines differ by a factor of
+# two; the plan calls it an estimate.
+STEP_OVERHEAD = 4.5e-5  # [s]
+STEP_PER_UNKNOWN = 4.8e-9  # [s]
+# The fixed-point scheme repeats the solve; 3 times the time of one_solve was measured.
+# PETSc's TSALPHA2 factors anew in every iteration; 26 times was measured.
+SCHEME_FACTOR = {"one_solve": 1.0, "fixed_point": 3.0, "ts_alpha2": 26.0}
+# A substep of a pantograph with all its bodies: 0.21 to 0.38 ms were measured with the paper's
+# seven, by the way of keeping joints.
+ALL_BODIES_SUBSTEP = 3.0e-4  # [s]
+
+# Time between two flushes of the result file, each of which takes some 5 ms [s], and what may wait
+# for one in memory [B].
+FLUSH_EVERY = 0.5
+FLUSH_MEMORY = 1e8
+# Steps of a flush whose chunks are not too small.
+LEAST_FLUSH = 256
+
+# Resident memory of runs of ambrosio2012 on 25, 300, 1000 and 2000 spans, report included, within
+# 10 %: program and libraries, then per unknown.
+MEMORY_BASE = 3.85e8  # [B]
+MEMORY_PER_UNKNOWN = 2200.0  # [B]
+# What a step adds, as the report takes the history of one pantograph after the other.
+MEMORY_PER_STEP = 40.0  # [B]
+_BYTES = 8
+_PER_PANTOGRAPH = 6  # channels of a pantograph at most
+
+
+@dataclass(frozen=True)
+class Needs:
+    """What a run needs.
+
+    Attributes
+    ----------
+    n_steps : number of steps
+    memory : resident memory on one rank [B]
+    march : wall time of the time loop on one rank [s]
+    files : sizes of the files
+    recording : what is recorded
+    """
+
+    n_steps: int
+    memory: float
+    march: float
+    files: FileSizes
+    recording: Recording
+
+
+class Kept(NamedTuple):
+    """A run of several, and what of it stays on the disk beside summary and snapshots."""
+
+    scene: Scene
+    result: bool
+    report: bool
+
+
+def needs_of(scene: Scene, problem: Problem, extent: Extent, n_dofs: int) -> Needs:
+    """What a run of a scene needs. Not collective.
+
+    Parameters
+    ----------
+    problem : of the scene
+    extent : of its mesh
+    n_dofs : unknowns of the line
+    """
+    scheme = problem.numerics.scheme
+    n_steps = max(1, math.floor(simulated_time(problem) / problem.numerics.dt + 1e-9))
+    recording = recording_of(scene.output, problem, extent, n_steps)
+    flush_every = scene.output.flush_every_steps or flush_cadence(problem, n_dofs, recording)
+    return Needs(
+        n_steps=n_steps,
+        memory=estimate_memory(n_dofs, n_steps),
+        march=estimate_march(n_dofs, n_steps, scheme, _substeps(problem)),
+        files=estimate_files(scene, problem, recording, n_dofs, flush_every),
+        recording=recording,
+    )
+
+
+def simulated_time(problem: Problem) -> float:
+    """From the start of a run to its end [s]."""
+    train = problem.train
+    return (train.end - train.start) / train.speed
+
+
+def needs_before_meshing(scene: Scene) -> Needs | None:
+    """What a run needs, known from its scene alone; None if that brings its own mesh.
+
+    Not collective.
+    """
+    size = size_of(scene)
+    if size is None:
+        return None
+    problem = scene.to_problem()
+    extent = extent_before_meshing(problem.line, size.nodes)
+    return needs_of(scene, problem, extent, size.unknowns)
+
+
+def needs_with_mesh(scene: Scene, mesh: LineMesh) -> Needs:
+    """What a run on a mesh needs. Not collective."""
+    problem = scene.to_problem()
+    n_unknowns = len(effects.unknowns_per_node(effects.active(problem)))
+    return needs_of(scene, problem, extent_of(mesh), n_unknowns * mesh.n_nodes)
+
+
+def run_size(needs: Needs) -> RunSize:
+    """Size of one run with its report."""
+    return RunSize(needs.files.total, needs.march, needs.n_steps)
+
+
+def total_size(runs: Iterable[Kept]) -> RunSize:
+    """Size of several runs, one after the other. Not collective.
+
+    Result files that do not stay take the room of the largest one. Runs whose scenes bring their
+    own mesh, which is not read here, are not counted.
+    """
+    left = largest = seconds = 0.0
+    n_steps = 0
+    for run in runs:
+        needs = needs_before_meshing(run.scene)
+        if needs is None:
+            continue
+        files = needs.files
+        left += files.film + (files.report if run.report else 0.0)
+        left += files.result if run.result else 0.0
+        largest = max(largest, 0.0 if run.result else files.result)
+        seconds += needs.march
+        n_steps += needs.n_steps
+    return RunSize(left + largest, seconds, n_steps)
+
+
+def estimate_memory(n_dofs: int, n_steps: int = 0) -> float:
+    """Resident memory of a run on one rank, its report included [B]."""
+    return MEMORY_BASE + MEMORY_PER_UNKNOWN * n_dofs + MEMORY_PER_STEP * n_steps
+
+
+def estimate_march(n_dofs: int, n_steps: int, scheme: str, n_substeps: int = 0) -> float:
+    """Wall time of the time loop on one rank [s].
+
+    ``n_substeps`` are those of a step that pantographs with all their bodies take, all together.
+    """
+    step = STEP_OVERHEAD + STEP_PER_UNKNOWN * n_dofs
+    step *= SCHEME_FACTOR[scheme]
+    return n_steps * (step + ALL_BODIES_SUBSTEP * n_substeps)
+
+
+def _substeps(problem: Problem) -> int:
+    """Substeps in a step of all pantographs whose bodies are all moved."""
+    kinds = [place.data for place in problem.train.placements]
+    ways = [kind.all_bodies for kind in kinds if not isinstance(kind, LumpedData)]
+    return sum(way.substeps for way in ways if way is not None)
+
+
+def flush_cadence(problem: Problem, n_dofs: int, recording: Recording) -> int:
+    """Steps between two flushes: about half a second of wall time, and what fits into memory.
+
+    Not so few that the file is made of small chunks, and whole chunks of them. The same on any
+    number of ranks, so that their files are.
+    """
+    step = estimate_march(n_dofs, 1, problem.numerics.scheme, _substeps(problem))
+    columns = _PER_PANTOGRAPH * len(problem.train.placements)
+    columns += recording.arm_x.size + recording.dropper_x.size
+    wanted = max(round(FLUSH_EVERY / step), LEAST_FLUSH)
+    steps = max(1, min(wanted, int(FLUSH_MEMORY / (_BYTES * columns))))
+    for part in (LEAST_FLUSH * recording.line.every, LEAST_FLUSH, recording.line.every):
+        if steps >= part:
+            return steps - steps % part
+    return steps
