@@ -15,11 +15,11 @@ from typing import Any
 from numba import typeof
 
 
-def bound(kernel: Any, *arguments: Any, later: tuple[float, ...] = ()) -> Callable[..., Any]:
+def bound(kernel: Any, *arguments: Any, later: tuple[Any, ...] = ()) -> Callable[..., Any]:
     """A compiled ``kernel`` as a function of what follows these ``arguments``.
 
-    Arrays are kept by reference; ``later`` are examples of what follows: numbers, which are
-    converted as need be.
+    Arrays are kept by reference; ``later`` are examples of what follows: arrays, or
+    numbers, which are converted as need be.
     """
     if not hasattr(kernel, "overloads"):
         return partial(kernel, *arguments)  # Numba was told to compile nothing

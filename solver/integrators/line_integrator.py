@@ -17,9 +17,9 @@ from catenary.solver.base import aligned_arrays, flush_to_zero
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.contact import contact_kernels
 from catenary.solver.contact_problem import complementarity_kernels
-from catenary.solver.integrators import state_kernels, two_pass_step
+from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_state import Motion
-from catenary.solver.linear import station_factors, station_products, unique_rows
+from catenary.solver.linear import unique_rows
 from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.step_operators import LineOperators, Loads
 from catenary.solver.linear.unit_responses import Windows
@@ -54,9 +54,6 @@ class LineMotion(ABC):
         contact_kernels.warm_up()
         complementarity_kernels.warm_up()
         unique_rows.warm_up()
-        station_products.warm_up()
-        station_factors.warm_up()
-        two_pass_step.warm_up()
         flush_to_zero.warm_up()
         self._comm = comm
         self.ownership = ownership

@@ -13,18 +13,18 @@ import numpy as np
 from catenary.solver.base.bound import bound
 from catenary.solver.integrators.line_state import MotionAhead, Steps
 from catenary.solver.integrators.state_kernels import compiled, in_line, tension_of
-from catenary.solver.linear.lanes import add_scaled, load, store, zero
+from catenary.solver.linear.lanes import add_scaled, load, pitch, store, zero
 from catenary.solver.linear.station_factors import (
     StationFactors,
     eliminate,
     substitute,
     substitute_outside,
 )
-from catenary.solver.linear.station_products import BLOCK, StationProduct, multiply_rows
+from catenary.solver.linear.station_products import StationProduct, multiply_rows
 
-# Stations of a stretch: large enough for memory to be read ahead, 64 kB of each array, of which a
+# Unknowns of a stretch: large enough for memory to be read ahead, 64 kB of each array, of which a
 # cache next to a processor, of 1 MB, holds the six that both ends need.
-_STRETCH = 2048
+_STRETCH = 8192
 
 
 class StationPasses:
@@ -41,7 +41,9 @@ class StationPasses:
     factors : of the step operator
     read : what ``product`` reads; the rank's own part is x of the motion, and what others have of
         it is there before a step
-    answer : (4 n,) of all that is solved for; the rank's own part is the acceleration
+    velocity : the same of y of the motion, which a product with C reads
+    loads : of all that is solved for [N], or none, added in the pass forth; kept by reference
+    answer : of all that is solved for; the rank's own part is the acceleration
     motion : of the rank's own stations
     steps : those that the motion is kept for
     """
@@ -51,22 +53,26 @@ class StationPasses:
         product: StationProduct,
         factors: StationFactors,
         read: np.ndarray,
+        velocity: np.ndarray,
+        loads: np.ndarray,
         answer: np.ndarray,
         motion: MotionAhead,
         steps: Steps,
     ) -> None:
         low, high = factors.low, factors.high
-        factored = factors.kinds, factors.blocks, low, high
-        multiplied = product.kinds, product.blocks, product.first, read
+        layout = factors.layout
+        factored = layout, factors.kinds, factors.blocks, low, high
+        multiplied = layout, product.kinds, product.blocks, product.first, read, velocity
         by_position, by_velocity = map(float, motion.gains)
         changes = steps.dt, by_position, by_velocity, steps.damping_share
-        self._own = low, high
-        self._parts = multiplied, factored, answer, motion.read, changes
+        self._stretch = max(1, _STRETCH // layout.pitch)
+        self._place = low, high, self._stretch, layout.pitch
+        self._parts = multiplied, factored, loads, answer, motion.read, changes
         self.look_at(np.zeros((0, 2), np.int64), np.zeros((0, 4)), np.zeros(0))
 
     def look_at(self, ends: np.ndarray, laws: np.ndarray, tension: np.ndarray) -> None:
         """Fill ``tension`` on the way back, as ``LineMotion.look_at``."""
-        droppers = ends, laws, tension, pulled(*self._own, ends)
+        droppers = ends, laws, tension, pulled(*self._place, ends), self._stretch
         self.kernel, self.arguments = forth_and_back, (*self._parts, droppers)
         self._step = bound(self.kernel, *self.arguments)
 
@@ -76,75 +82,74 @@ class StationPasses:
 
 
 # Kernels take what belongs together as tuples, named as in ``StationPasses``.
-_BLOCK = np.uint64(BLOCK)
 
 
 @in_line
-def go_on(station, solution, motion, changes):
+def go_on(layout, station, solution, motion, changes):
     """Take the rank's own station from one prediction to the next: ``kernels.correct`` and
     ``predict`` at once. What was solved for is its acceleration but for damping on mass."""
     x, y, z, _ = motion
     dt, by_position, by_velocity, damping_share = changes
-    at = _BLOCK * np.uint64(station)
-    v = load(y, at)
+    at = pitch(layout) * np.uint64(station)
+    v = load(layout, y, at)
     a = add_scaled(solution, -damping_share, v)
-    store(z, at, a)
-    store(x, at, add_scaled(add_scaled(load(x, at), -dt, v), by_position, a))
-    store(y, at, add_scaled(v, by_velocity, a))
+    store(layout, z, at, a)
+    ahead = add_scaled(add_scaled(load(layout, x, at), -dt, v), by_position, a)
+    store(layout, x, at, ahead)
+    store(layout, y, at, add_scaled(v, by_velocity, a))
 
 
 @in_line
 def eliminate_both(factored, begin, end, left, right, answer):
     """Eliminate own stations from ``begin`` to ``end``, counted from both ends."""
-    kinds, blocks, low, high = factored
+    _, _, _, low, high = factored
     for k in range(begin, end):
-        left = eliminate(kinds, blocks, answer, low + k, left, answer)
-        right = eliminate(kinds, blocks, answer, high - 1 - k, right, answer)
+        left = eliminate(factored, answer, low + k, left, answer)
+        right = eliminate(factored, answer, high - 1 - k, right, answer)
     return left, right
 
 
 @compiled
-def forth(multiplied, factored, answer):
+def forth(multiplied, factored, loads, answer, stretch):
     """Leave in ``answer`` what elimination leaves of the right-hand side; see ``StationPasses``."""
-    product_kinds, product_blocks, first, read = multiplied
-    kinds, blocks, low, high = factored
+    layout, kinds, _, low, high = factored
     middle, pairs = (low + high) // 2, (high - low - 1) // 2
-    multiply_rows(product_kinds, product_blocks, first, read, 0, low, answer)
-    multiply_rows(product_kinds, product_blocks, first, read, high, kinds.size, answer)
-    left, right = zero(), zero()
+    multiply_rows(multiplied, loads, 0, low, answer)
+    multiply_rows(multiplied, loads, high, kinds.size, answer)
+    left, right = zero(layout), zero(layout)
     for i in range(low):
-        left = eliminate(kinds, blocks, answer, i, left, answer)
+        left = eliminate(factored, answer, i, left, answer)
     for j in range(kinds.size - 1, high - 1, -1):
-        right = eliminate(kinds, blocks, answer, j, right, answer)
-    for start in range(0, pairs, _STRETCH):
-        stop = min(start + _STRETCH, pairs)
-        multiply_rows(product_kinds, product_blocks, first, read, low + start, low + stop, answer)
-        multiply_rows(product_kinds, product_blocks, first, read, high - stop, high - start, answer)
+        right = eliminate(factored, answer, j, right, answer)
+    for start in range(0, pairs, stretch):
+        stop = min(start + stretch, pairs)
+        multiply_rows(multiplied, loads, low + start, low + stop, answer)
+        multiply_rows(multiplied, loads, high - stop, high - start, answer)
         left, right = eliminate_both(factored, start, stop, left, right, answer)
-    multiply_rows(product_kinds, product_blocks, first, read, low + pairs, high - pairs, answer)
+    multiply_rows(multiplied, loads, low + pairs, high - pairs, answer)
     # One more towards the start of the line, if there is an even number of them.
     for i in range(low + pairs, middle + 1):
-        left = eliminate(kinds, blocks, answer, i, left, answer)
-    substitute(kinds, blocks, middle, right, answer)
+        left = eliminate(factored, answer, i, left, answer)
+    substitute(factored, middle, right, answer)
 
 
 @compiled
-def pulled(low, high, ends):
+def pulled(low, high, stretch, width, ends):
     """Droppers that the pass back has left behind with each stretch, (n_stretches + 1, 2).
 
     They are those from the first of both numbers to the second, and have both ``ends`` among what
-    is known by then. Both wires' unknowns of a place stand together, so that few wait for the next.
+    is known by then. ``width`` unknowns of a station stand together, so that few wait for the next.
     """
     n, own, pairs = ends.shape[0], high - low, (high - low - 1) // 2
     middle = own // 2
-    ranges = np.empty((1 + (pairs + _STRETCH - 1) // _STRETCH + 1, 2), dtype=np.int64)
-    first = last = np.searchsorted(ends[:, 0], BLOCK * middle)
+    ranges = np.empty((1 + (pairs + stretch - 1) // stretch + 1, 2), dtype=np.int64)
+    first = last = np.searchsorted(ends[:, 0], width * middle)
     ranges[0] = first
     for number in range(1, ranges.shape[0]):
-        reach = min(number * _STRETCH, pairs)
-        begin, end = BLOCK * (middle - reach), BLOCK * (middle + reach + 1)
+        reach = min(number * stretch, pairs)
+        begin, end = width * (middle - reach), width * (middle + reach + 1)
         if number == ranges.shape[0] - 1:
-            begin, end = 0, BLOCK * own
+            begin, end = 0, width * own
         while first > 0 and begin <= ends[first - 1].min() and ends[first - 1].max() < end:
             first -= 1
         while last < n and begin <= ends[last].min() and ends[last].max() < end:
@@ -156,7 +161,7 @@ def pulled(low, high, ends):
 @in_line
 def pull(number, motion, droppers):
     """Find the tension of droppers that a stretch of the pass back has left behind."""
-    ends, laws, tension, ranges = droppers
+    ends, laws, tension, ranges, _ = droppers
     before, now = ranges[number - 1], ranges[number]
     for dropper in range(now[0], before[0]):
         tension[dropper] = tension_of(dropper, motion, ends, laws)
@@ -168,40 +173,29 @@ def pull(number, motion, droppers):
 def back(factored, motion, answer, changes, droppers):
     """Fill ``answer`` with the solution, take the rank's own motion on, and find the tension of
     its droppers, which come with their ranges of ``pulled``; after ``forth``."""
-    kinds, blocks, low, high = factored
+    layout, _, _, low, high = factored
+    stretch = droppers[4]
     middle, pairs = (low + high) // 2, (high - low - 1) // 2
-    x = y = load(answer, _BLOCK * np.uint64(middle))
-    go_on(middle - low, x, motion, changes)
+    x = y = load(layout, answer, pitch(layout) * np.uint64(middle))
+    go_on(layout, middle - low, x, motion, changes)
     number = 1
-    for start in range(1, pairs + 1, _STRETCH):
-        for k in range(start, min(start + _STRETCH, pairs + 1)):
-            x = substitute(kinds, blocks, middle - k, x, answer)
-            y = substitute(kinds, blocks, middle + k, y, answer)
-            go_on(middle - k - low, x, motion, changes)
-            go_on(middle + k - low, y, motion, changes)
+    for start in range(1, pairs + 1, stretch):
+        for k in range(start, min(start + stretch, pairs + 1)):
+            x = substitute(factored, middle - k, x, answer)
+            y = substitute(factored, middle + k, y, answer)
+            go_on(layout, middle - k - low, x, motion, changes)
+            go_on(layout, middle + k - low, y, motion, changes)
         pull(number, motion, droppers)
         number += 1
     for i in range(middle - pairs - 1, low - 1, -1):
-        x = substitute(kinds, blocks, i, x, answer)
-        go_on(i - low, x, motion, changes)
+        x = substitute(factored, i, x, answer)
+        go_on(layout, i - low, x, motion, changes)
     pull(number, motion, droppers)
-    substitute_outside(kinds, blocks, low, high, x, y, answer)
+    substitute_outside(factored, low, high, x, y, answer)
 
 
 @compiled
-def forth_and_back(multiplied, factored, answer, motion, changes, droppers):
+def forth_and_back(multiplied, factored, loads, answer, motion, changes, droppers):
     """Both passes."""
-    forth(multiplied, factored, answer)
+    forth(multiplied, factored, loads, answer, droppers[4])
     back(factored, motion, answer, changes, droppers)
-
-
-def warm_up() -> None:
-    """Compile the kernels, or load them from Numba's cache, before the clock of a march starts."""
-    kinds, station = np.zeros(1, dtype=np.int32), np.zeros(BLOCK)
-    product = StationProduct(kinds, np.zeros(2 * BLOCK**2), 1)
-    factors = StationFactors(kinds, np.zeros(3 * BLOCK**2), 0, 1)
-    read, steps = np.zeros(3 * BLOCK), Steps(*[0.0] * len(Steps._fields))
-    own = read[BLOCK : 2 * BLOCK]
-    motion = MotionAhead(own, station.copy(), station, station.copy(), steps)
-    passes = StationPasses(product, factors, read, station, motion, steps)
-    passes.step()

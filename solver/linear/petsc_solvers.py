@@ -17,6 +17,7 @@ from scipy import sparse
 
 from catenary.solver.base.errors import InputError
 from catenary.solver.base.petsc import PETSc
+from catenary.solver.linear.lanes import Layout
 from catenary.solver.linear.station_factors import StationFactors, station_factors
 from catenary.solver.model.matrices import as_petsc
 from catenary.solver.model.partition import Ownership
@@ -66,6 +67,7 @@ class PartSolver:
     own : the rank's own among them, in blocks
     in_stations : whether its blocks are stations
     is_whole : whether it is the whole line, which decides the prefix of its options
+    layout : of its stations, None if our own factors cannot be used
 
     Attributes
     ----------
@@ -74,7 +76,12 @@ class PartSolver:
     """
 
     def __init__(
-        self, part: sparse.bsr_matrix, own: slice, in_stations: bool, is_whole: bool
+        self,
+        part: sparse.bsr_matrix,
+        own: slice,
+        in_stations: bool,
+        is_whole: bool,
+        layout: Layout | None = None,
     ) -> None:
         prefix = PREFIX if is_whole else PART_PREFIX
         self.matrix = as_petsc(part, PETSc.COMM_SELF)
@@ -86,8 +93,8 @@ class PartSolver:
         self._ksp.setOperators(self.matrix)
         _choose_direct(self._ksp, in_stations)
         self.factors: StationFactors | None = None
-        if in_stations and not _is_given(f"{prefix}pc_"):
-            self.factors = station_factors(part, own.start, own.stop)
+        if layout is not None and not _is_given(f"{prefix}pc_"):
+            self.factors = station_factors(part, layout, own.start, own.stop)
         if self.factors is not None:
             self._ksp.getPC().setType(PETSc.PC.Type.PYTHON)
             self._ksp.getPC().setPythonContext(self.factors)

@@ -11,11 +11,11 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from catenary.solver.base.bound import bound
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.integrators.state_kernels import compiled, in_line
 from catenary.solver.linear import station_products
-from catenary.solver.linear.lanes import add_product, by_diagonals, load, store, zero
-from catenary.solver.linear.station_products import BLOCK
+from catenary.solver.linear.lanes import Layout, add_product, block_size, load, pitch, store, zero
 
 
 class StationFactors:
@@ -23,21 +23,27 @@ class StationFactors:
 
     Attributes
     ----------
+    layout : Layout
     kinds : (n,) kind of each station
-    blocks : (48 n_kinds,) of each kind S^-1, -S^-1 times its block towards the end of the line that
-        elimination starts from, and -S^-1 times that towards the middle, as ``fours.add_product``
-        reads them; S is its diagonal block after elimination
+    blocks : of each kind S^-1, -S^-1 times its block towards the end of the line that
+        elimination starts from, and -S^-1 times that towards the middle, packed by the layout; S
+        is its diagonal block after elimination
     low, high : range of stations in whose middle elimination ends
     n_stations, n_kinds : in the matrix, and how many have different factors
     """
 
-    def __init__(self, kinds: np.ndarray, blocks: np.ndarray, low: int, high: int) -> None:
-        self.kinds, self.blocks, self.low, self.high = kinds, blocks, low, high
-        self.n_stations, self.n_kinds = kinds.size, blocks.size // (3 * BLOCK**2)
+    def __init__(
+        self, layout: Layout, kinds: np.ndarray, blocks: np.ndarray, low: int, high: int
+    ) -> None:
+        self.layout, self.kinds, self.blocks = layout, kinds, blocks
+        self.low, self.high = low, high
+        self.n_stations, self.n_kinds = kinds.size, blocks.size // (3 * layout.partners.size)
+        factored, vectors = (layout, kinds, blocks, low, high), (np.zeros(0), np.zeros(0))
+        self._solve = bound(solve, factored, later=vectors)
 
     def solve(self, right: np.ndarray, answer: np.ndarray) -> None:
-        """Make ``answer`` that to ``right``, both (4 n,), perhaps the same array."""
-        solve(self.kinds, self.blocks, self.low, self.high, right, answer)
+        """Make ``answer`` that to ``right``, both (n pitch,), perhaps the same array."""
+        self._solve(right, answer)
 
     def apply(self, pc: PETSc.PC, right: PETSc.Vec, answer: PETSc.Vec) -> None:
         """Called by PETSc."""
@@ -52,29 +58,28 @@ class StationFactors:
 
 
 def station_factors(
-    matrix: sparse.bsr_matrix, low: int = 0, high: int | None = None
+    matrix: sparse.bsr_matrix, layout: Layout, low: int = 0, high: int | None = None
 ) -> StationFactors | None:
     """Factors of a positive definite matrix in sorted blocks, eliminated towards the middle of the
     stations from ``low`` to ``high``, all by default.
 
-    None if it is not block tridiagonal by stations, or hardly repeats, so that PETSc's factors are
-    faster, being smaller. A matrix that is not positive definite gives wrong answers or none that
-    are numbers.
+    None if it is not block tridiagonal by stations. A matrix that is not positive definite gives
+    wrong answers or NaN.
     """
     blocks = station_products.neighbours(matrix)
     if blocks is None:
         return None
     n = blocks.shape[1]
     high = n if high is None else high
-    factors = np.zeros((n, 3, BLOCK, BLOCK))
+    factors = np.zeros((n, 3, layout.pitch, layout.pitch))
     factorise(blocks, (low + high) // 2, factors)
-    kinds = station_products.by_kinds(by_diagonals(factors).reshape(n, -1))
-    return None if kinds is None else StationFactors(*kinds, low, high)
+    kinds, numbers = station_products.by_kinds(layout.packed(factors).reshape(n, -1))
+    return StationFactors(layout, kinds, numbers, low, high)
 
 
 @compiled
 def factorise(blocks, middle, factors):
-    """Fill ``factors`` (n, 3, 4, 4), by rows, of ``blocks`` (3, n, 4, 4); see ``StationFactors``
+    """Fill ``factors`` (n, 3, b, b), by rows, of ``blocks`` (3, n, b, b); see ``StationFactors``
     and ``station_blocks.neighbours``."""
     to_start, own, to_end = blocks[0], blocks[1], blocks[2]
     n = own.shape[0]
@@ -98,7 +103,7 @@ def factorise(blocks, middle, factors):
 
 @compiled
 def put_factors(pivot, outward, inward, factors):
-    """Factors (3, 4, 4) of a station from its pivot S and its blocks to both sides."""
+    """Factors (3, b, b) of a station from its pivot S and its blocks to both sides."""
     inverse = factors[0]
     inverse[:] = np.eye(pivot.shape[0])
     # A positive definite block needs no exchange of rows.
@@ -115,64 +120,60 @@ def put_factors(pivot, outward, inward, factors):
     factors[2] = -(inverse @ inward)
 
 
-# Indices are unsigned, so that none is asked whether it counts from the end.
-_SIZE, _BLOCK = np.uint64(3 * BLOCK**2), np.uint64(BLOCK)
-_OUTWARD, _INWARD = np.uint64(BLOCK**2), np.uint64(2 * BLOCK**2)
-
-
 @in_line
-def eliminate(kinds, blocks, right, station, outward, answer):
+def eliminate(factored, right, station, outward, answer):
     """Leave in ``answer`` what is left of a station's unknowns after those ``outward`` of it."""
-    at, here = _SIZE * np.uint64(kinds[station]), _BLOCK * np.uint64(station)
-    own = add_product(zero(), blocks, at, load(right, here))
-    own = add_product(own, blocks, at + _OUTWARD, outward)
-    store(answer, here, own)
+    layout, kinds, blocks, _, _ = factored
+    # Indices are unsigned, which spares a check for negative ones.
+    size, here = block_size(layout), pitch(layout) * np.uint64(station)
+    at = np.uint64(3) * size * np.uint64(kinds[station])
+    own = add_product(layout, zero(layout), blocks, at, load(layout, right, here))
+    own = add_product(layout, own, blocks, at + size, outward)
+    store(layout, answer, here, own)
     return own
 
 
 @in_line
-def substitute(kinds, blocks, station, inward, answer):
+def substitute(factored, station, inward, answer):
     """Unknowns of a station from what ``answer`` holds of them and those ``inward`` of it."""
-    at, here = _SIZE * np.uint64(kinds[station]) + _INWARD, _BLOCK * np.uint64(station)
-    own = add_product(load(answer, here), blocks, at, inward)
-    store(answer, here, own)
+    layout, kinds, blocks, _, _ = factored
+    size, here = block_size(layout), pitch(layout) * np.uint64(station)
+    at = np.uint64(3) * size * np.uint64(kinds[station]) + np.uint64(2) * size
+    own = add_product(layout, load(layout, answer, here), blocks, at, inward)
+    store(layout, answer, here, own)
     return own
 
 
 @compiled
-def solve(kinds, blocks, low, high, right, answer):
-    """Fill ``answer`` from ``right``; see ``StationFactors``."""
+def solve(factored, right, answer):
+    """Fill ``answer`` from ``right``; ``factored`` are layout, kinds, blocks, low and high of
+    ``StationFactors``."""
+    layout, kinds, _, low, high = factored
     middle, pairs = (low + high) // 2, (high - low - 1) // 2
-    x, y = zero(), zero()
+    x, y = zero(layout), zero(layout)
     for i in range(low):
-        x = eliminate(kinds, blocks, right, i, x, answer)
+        x = eliminate(factored, right, i, x, answer)
     for j in range(kinds.size - 1, high - 1, -1):
-        y = eliminate(kinds, blocks, right, j, y, answer)
+        y = eliminate(factored, right, j, y, answer)
     for k in range(pairs):
-        x = eliminate(kinds, blocks, right, low + k, x, answer)
-        y = eliminate(kinds, blocks, right, high - 1 - k, y, answer)
+        x = eliminate(factored, right, low + k, x, answer)
+        y = eliminate(factored, right, high - 1 - k, y, answer)
     # One more towards the start of the line, if there is an even number of them.
     for i in range(low + pairs, middle + 1):
-        x = eliminate(kinds, blocks, right, i, x, answer)
-    x = y = substitute(kinds, blocks, middle, y, answer)
+        x = eliminate(factored, right, i, x, answer)
+    x = y = substitute(factored, middle, y, answer)
     for k in range(1, pairs + 1):
-        x = substitute(kinds, blocks, middle - k, x, answer)
-        y = substitute(kinds, blocks, middle + k, y, answer)
-    substitute_outside(kinds, blocks, middle - pairs, high, x, y, answer)
+        x = substitute(factored, middle - k, x, answer)
+        y = substitute(factored, middle + k, y, answer)
+    substitute_outside(factored, middle - pairs, high, x, y, answer)
 
 
 @in_line
-def substitute_outside(kinds, blocks, low, high, x, y, answer):
+def substitute_outside(factored, low, high, x, y, answer):
     """Unknowns of stations before ``low`` and from ``high`` on, from those beside these, x and
     y."""
+    _, kinds, _, _, _ = factored
     for i in range(low - 1, -1, -1):
-        x = substitute(kinds, blocks, i, x, answer)
+        x = substitute(factored, i, x, answer)
     for j in range(high, kinds.size):
-        y = substitute(kinds, blocks, j, y, answer)
-
-
-def warm_up() -> None:
-    """Compile the kernels, or load them from Numba's cache, before the clock of a march starts."""
-    factorise(np.ones((3, 1, BLOCK, BLOCK)), 0, np.zeros((1, 3, BLOCK, BLOCK)))
-    kinds, blocks, station = np.zeros(1, dtype=np.int32), np.zeros(3 * BLOCK**2), np.zeros(BLOCK)
-    solve(kinds, blocks, 0, 1, station, station)
+        y = substitute(factored, j, y, answer)

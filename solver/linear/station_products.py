@@ -1,8 +1,9 @@
-"""Matrices in blocks of stations: block tridiagonal along the track, each kind of station once.
+"""Matrices in blocks of stations: block tridiagonal along the track, each unique one stored once.
 
-A station is a node of each of two wires at one place: four unknowns. Spans are alike, so that a
-line has few kinds of stations, however long it is. Numbers of each kind then stay in the caches,
-where a stored matrix leaves them on a long line, and products and solves wait for memory.
+A station is a cross-section of the line: the unknowns of a node of each wire at one place. Spans
+are alike, so that a line has few unique stations, however long it is. Their numbers then stay in
+the caches, where a stored matrix leaves them on a long line, and products and solves wait for
+memory. Where no two spans are alike, blocks are read one after the other, as memory likes it best.
 """
 
 from __future__ import annotations
@@ -11,110 +12,184 @@ import numpy as np
 from scipy import sparse
 
 from catenary.solver.base import aligned_arrays
+from catenary.solver.base.bound import bound
 from catenary.solver.integrators.state_kernels import compiled, in_line
-from catenary.solver.linear.lanes import add_pairs, add_product, by_diagonals, load, store, zero
+from catenary.solver.linear.lanes import (
+    WIDEST,
+    Layout,
+    add,
+    add_product,
+    add_product_beside,
+    beside_size,
+    block_size,
+    is_damped,
+    load,
+    pitch,
+    store,
+    zero,
+)
 from catenary.solver.linear.unique_rows import kinds_of
-
-# Unknowns of a station that the kernels are written for.
-BLOCK = 4
-# Kinds of stations whose blocks stay in the caches next to a processor, 1.5 MB.
-MOST_KINDS = 4096
 
 
 def neighbours(matrix: sparse.bsr_matrix, first: int = 0) -> np.ndarray | None:
     """Blocks of each row towards the start of the line, on the diagonal and towards the end.
 
-    Row i has its diagonal block in column ``first`` + i. Shape (3, n, 4, 4); None if the matrix
-    has others, or blocks of another size.
+    Row i has its diagonal block in column ``first`` + i. Shape (3, n, b, b) with the matrix's size
+    of blocks; None if the matrix has blocks further away.
     """
-    n = matrix.indptr.size - 1
-    if matrix.blocksize != (BLOCK, BLOCK) or n == 0:
+    n, (size, _) = matrix.indptr.size - 1, matrix.blocksize
+    if n == 0:
         return None
     row = np.repeat(np.arange(n), np.diff(matrix.indptr))
     step = matrix.indices - row - first
     if np.abs(step).max(initial=0) > 1:
         return None
-    blocks = np.zeros((3, n, BLOCK, BLOCK))
+    blocks = np.zeros((3, n, size, size))
     blocks[step + 1, row] = matrix.data
     return blocks
 
 
-def by_kinds(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Kind (n,) of each station of whose ``numbers`` (n, m), and those of the kinds in a row.
+def layout_of(
+    operator: np.ndarray, stiffness: np.ndarray, damping: np.ndarray | None = None
+) -> Layout | None:
+    """Layout of a line by its blocks of A, K, and C if that is not proportional.
 
-    None if there are too many kinds.
+    All are those of ``neighbours``. None if a plane is wider than kernels are.
     """
+    products = [stiffness] if damping is None else [stiffness, damping]
+    joined = (operator != 0).any(axis=(0, 1))
+    beside = np.zeros_like(joined)
+    for blocks in products:
+        joined |= (blocks != 0).any(axis=(0, 1))
+        beside |= (blocks[0::2] != 0).any(axis=(0, 1))
+    widths = _planes(joined)
+    if max(widths) > WIDEST:
+        return None
+    rows, columns = np.nonzero(beside)
+    paired = all(width % 2 == 0 for width in widths) and bool((rows // 2 == columns // 2).all())
+    return Layout(widths, paired, damping is not None)
+
+
+def _planes(joined: np.ndarray) -> tuple[int, ...]:
+    """Widths of the runs of unknowns that ``joined`` (b, b) does not join."""
+    size = joined.shape[0]
+    reach = np.where(joined | joined.T, np.arange(size), 0).max(axis=1, initial=0)
+    ends = np.flatnonzero(np.maximum.accumulate(np.maximum(reach, np.arange(size))) == range(size))
+    return tuple(int(width) for width in np.diff(ends, prepend=-1))
+
+
+def by_kinds(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Kind (n,) of each station of whose ``numbers`` (n, m), and those of the kinds in a row."""
     first, kinds = kinds_of(numbers)
-    return None if first.size > MOST_KINDS else (kinds, aligned_arrays.copy(numbers[first]))
+    return kinds, aligned_arrays.copy(numbers[first])
 
 
 class StationProduct:
-    """Products with rows of a matrix.
+    """Products with rows of K, and C if the layout is damped. Not collective.
 
     Attributes
     ----------
+    layout : Layout
     kinds : (n,) of its rows
-    blocks : (32 n_kinds,) of each kind its diagonal block, then what joins it to the stations
-        before and after it, wire by wire; all as products read them, see ``fours``
+    blocks : of each kind the diagonal block of K, then what joins it to the stations before and
+        after it; the same of -C; all as products read them, see ``Layout``
     first : station in the factor of the first row; the factor has one before and one after all
         rows, which is zero where the line ends
+    n_kinds : how many rows are different
     """
 
-    def __init__(self, kinds: np.ndarray, blocks: np.ndarray, first: int) -> None:
-        self.kinds, self.blocks, self.first = kinds, blocks, first
+    def __init__(self, layout: Layout, kinds: np.ndarray, blocks: np.ndarray, first: int) -> None:
+        self.layout, self.kinds, self.blocks, self.first = layout, kinds, blocks, first
+        size = layout.partners.size + 2 * layout.partners_beside.size
+        self.n_kinds = blocks.size // (size * (1 + layout.damped))
+        vectors = np.zeros(0), np.zeros(0), np.zeros(0)
+        self._multiply = bound(multiply, layout, kinds, blocks, first, later=vectors)
 
-    def multiply(self, factor: np.ndarray, result: np.ndarray) -> None:
-        """Make ``result`` the product with ``factor``. Not collective."""
-        multiply(self.kinds, self.blocks, self.first, factor, result)
+    def multiply(
+        self, factor: np.ndarray, result: np.ndarray, velocity: np.ndarray | None = None
+    ) -> None:
+        """Make ``result`` K ``factor``, less C ``velocity`` if the layout is damped."""
+        self._multiply(factor, factor if velocity is None else velocity, result)
 
 
-def station_product(matrix: sparse.bsr_matrix, first: int) -> StationProduct | None:
+def station_product(
+    matrix: sparse.bsr_matrix,
+    first: int,
+    layout: Layout,
+    damping: sparse.bsr_matrix | None = None,
+) -> StationProduct | None:
     """Products with a matrix in sorted blocks, whose first row is that of column ``first``.
 
-    The factor has a station more at both ends than the matrix has columns. None if a station is
-    not joined to its neighbours by each wire for itself, or if the matrix hardly repeats.
+    The factor has a station more at both ends than the matrix has columns. None if the matrix joins
+    what the layout does not.
     """
-    blocks = neighbours(matrix, first)
-    if blocks is None or blocks[0::2, :, :2, 2:].any() or blocks[0::2, :, 2:, :2].any():
-        return None
-    before, own, after = by_diagonals(blocks)
-    numbers = [own, before[:, : 2 * BLOCK], after[:, : 2 * BLOCK]]
-    kinds = by_kinds(np.concatenate(numbers, axis=1))
-    return None if kinds is None else StationProduct(*kinds, first + 1)
-
-
-# Indices are unsigned, so that none is asked whether it counts from the end.
-_BLOCK, _SIZE = np.uint64(BLOCK), np.uint64(2 * BLOCK**2)
-_BEFORE, _AFTER = np.uint64(BLOCK**2), np.uint64(BLOCK**2 + 2 * BLOCK)
-
-
-@in_line
-def multiply_row(kinds, blocks, row, before, here, after):
-    """A row of a product with what the factor holds there and beside it; see ``StationProduct``."""
-    at = _SIZE * np.uint64(kinds[row])
-    total = add_product(zero(), blocks, at, here)
-    total = add_pairs(total, blocks, at + _BEFORE, before)
-    return add_pairs(total, blocks, at + _AFTER, after)
+    parts = []
+    for rows, sign in ((matrix, 1.0), (damping, -1.0)):
+        if rows is None:
+            continue
+        blocks = neighbours(rows, first)
+        if blocks is None:
+            return None
+        for block, beside in ((blocks[1], False), (blocks[0], True), (blocks[2], True)):
+            packed = layout.packed(block, beside)
+            if np.count_nonzero(packed) != np.count_nonzero(block):
+                return None
+            parts.append(sign * packed)
+    return StationProduct(layout, *by_kinds(np.concatenate(parts, axis=1)), first + 1)
 
 
 @in_line
-def multiply_rows(kinds, blocks, first, factor, begin, end, result):
-    """Rows from ``begin`` to ``end`` of a product; see ``StationProduct``."""
-    at = _BLOCK * np.uint64(first + begin)
-    before, here = load(factor, at - _BLOCK), load(factor, at)
+def multiply_row(layout, kinds, blocks, row, factors, velocities):
+    """A row of a product with what ``factors`` and ``velocities`` hold before, at and after the
+    station; see ``StationProduct``."""
+    size, beside = block_size(layout), beside_size(layout)
+    before, here, after = factors
+    if is_damped(layout):
+        at = np.uint64(2) * (size + np.uint64(2) * beside) * np.uint64(kinds[row])
+    else:
+        at = (size + np.uint64(2) * beside) * np.uint64(kinds[row])
+    total = add_product(layout, zero(layout), blocks, at, here)
+    total = add_product_beside(layout, total, blocks, at + size, before)
+    total = add_product_beside(layout, total, blocks, at + size + beside, after)
+    if is_damped(layout):
+        before, here, after = velocities
+        at += size + np.uint64(2) * beside
+        total = add_product(layout, total, blocks, at, here)
+        total = add_product_beside(layout, total, blocks, at + size, before)
+        total = add_product_beside(layout, total, blocks, at + size + beside, after)
+    return total
+
+
+@in_line
+def multiply_rows(multiplied, loads, begin, end, result):
+    """Rows from ``begin`` to ``end`` of a product, and of ``loads`` if there are any.
+
+    ``multiplied`` holds layout, kinds, blocks and first of ``StationProduct`` and both factors.
+    """
+    layout, kinds, blocks, first, factor, velocity = multiplied
+    width = pitch(layout)
+    # Indices are unsigned, which spares a check for negative ones.
+    at = width * np.uint64(first + begin)
+    before, here = load(layout, factor, at - width), load(layout, factor, at)
+    v_before = v_here = v_after = before
+    if is_damped(layout):
+        v_before, v_here = load(layout, velocity, at - width), load(layout, velocity, at)
     for i in range(begin, end):
-        after = load(factor, _BLOCK * np.uint64(first + i + 1))
-        store(result, _BLOCK * np.uint64(i), multiply_row(kinds, blocks, i, before, here, after))
+        at = width * np.uint64(first + i + 1)
+        after = load(layout, factor, at)
+        if is_damped(layout):
+            v_after = load(layout, velocity, at)
+        factors, velocities = (before, here, after), (v_before, v_here, v_after)
+        row = multiply_row(layout, kinds, blocks, i, factors, velocities)
+        if loads.size > 0:
+            row = add(row, load(layout, loads, width * np.uint64(i)))
+        store(layout, result, width * np.uint64(i), row)
         before, here = here, after
+        v_before, v_here = v_here, v_after
 
 
 @compiled
-def multiply(kinds, blocks, first, factor, result):
-    """``result`` = matrix times ``factor``; see ``StationProduct``."""
-    multiply_rows(kinds, blocks, first, factor, 0, kinds.size, result)
-
-
-def warm_up() -> None:
-    """Compile the kernel, or load it from Numba's cache, before the clock of a march starts."""
-    kinds, blocks = np.zeros(1, dtype=np.int32), np.zeros(2 * BLOCK**2)
-    multiply(kinds, blocks, 1, np.zeros(3 * BLOCK), np.zeros(BLOCK))
+def multiply(layout, kinds, blocks, first, factor, velocity, result):
+    """``result`` = K ``factor``, less C ``velocity``; see ``StationProduct``."""
+    multiplied = layout, kinds, blocks, first, factor, velocity
+    multiply_rows(multiplied, blocks[:0], 0, kinds.size, result)

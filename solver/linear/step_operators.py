@@ -21,6 +21,7 @@ from catenary.solver.base.petsc_events import event
 from catenary.solver.integrators.line_state import MotionAhead, Steps
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.linear.halo import Halo, Subdomain
+from catenary.solver.linear.lanes import Layout
 from catenary.solver.linear.petsc_solvers import (
     DIRECT,
     PREFIX,
@@ -30,7 +31,12 @@ from catenary.solver.linear.petsc_solvers import (
     wants_distributed_solver,
     wants_view,
 )
-from catenary.solver.linear.station_products import StationProduct, station_product
+from catenary.solver.linear.station_products import (
+    StationProduct,
+    layout_of,
+    neighbours,
+    station_product,
+)
 from catenary.solver.linear.unique_rows import RepeatedRows, repeated_rows
 from catenary.solver.linear.unit_responses import Windows
 from catenary.solver.model.matrices import as_petsc, columns_of, part_of, station_block
@@ -68,6 +74,7 @@ class LineOperators:
     # None on a rank that owns nothing.
     _solver: PartSolver | SchwarzSolver | None = None
     _is_direct = True
+    _layout: Layout | None = None
 
     def __init__(
         self,
@@ -127,7 +134,10 @@ class LineOperators:
         if solver.factors is None or not self._is_direct:
             return None
         padded, answer = self._read_padded, self._solution.array
-        return StationPasses(stiffness, solver.factors, padded, answer, motion, steps)
+        loads = np.zeros(0)
+        return StationPasses(
+            stiffness, solver.factors, padded, padded, loads, answer, motion, steps
+        )
 
     def exchange(self) -> None:
         """Bring ``factor`` up to date where it is others'. Collective."""
@@ -236,7 +246,9 @@ class LineOperators:
             part = part_of(self._model, rows, rows, self._coefficients, 1.0, self._block)
             owned = self.domain.owned
             own = slice(owned.start // self._block, owned.stop // self._block)
-            solver = PartSolver(part, own, self._in_stations, self._comm.size == 1)
+            self._layout = self._find_layout(part)
+            whole = self._comm.size == 1
+            solver = PartSolver(part, own, self._in_stations, whole, self._layout)
             self._solver, is_direct = solver, solver.is_direct
         self._is_direct = bool(self._comm.allreduce(int(is_direct), op=MPI.MIN))
 
@@ -323,12 +335,22 @@ class LineOperators:
         """
         if name not in self._by_kinds:
             domain, product = self.domain, None
-            if self._in_stations and domain.size:
+            if self._layout is not None and domain.size:
                 first = (domain.low - domain.read_low) // self._block
-                product = station_product(self._rows_of(name, self._block), first)
+                product = station_product(self._rows_of(name, self._block), first, self._layout)
             rows = product or repeated_rows(self._rows_of(name, self._model.block_size))
             self._by_kinds[name] = rows
         return self._by_kinds[name]
+
+    def _find_layout(self, part: sparse.bsr_matrix) -> Layout | None:
+        """How unknowns of a station stand in lanes; None if they cannot, or nodes do not pair."""
+        domain = self.domain
+        first = (domain.low - domain.read_low) // self._block
+        operator = neighbours(part) if self._in_stations else None
+        stiffness = neighbours(self._rows_of("stiffness", self._block), first)
+        if operator is None or stiffness is None:
+            return None
+        return layout_of(operator, stiffness)
 
     def _rows_of(self, name: str, block: int) -> sparse.bsr_matrix:
         domain = self.domain

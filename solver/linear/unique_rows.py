@@ -66,8 +66,13 @@ def repeated_rows(matrix: sparse.bsr_matrix) -> RepeatedRows | None:
 
 
 def kinds_of(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where each kind of ``rows`` (n, k) is met first, and the kind of each row (n,)."""
+    """Where each kind of ``rows`` (n, k) is met first, and the kind of each row (n,).
+
+    Kinds are numbered as they are met, so that rows read theirs from memory mostly in order.
+    """
     _, first, kinds = np.unique(_digests(rows), return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    first, kinds = first[order], np.argsort(order)[kinds]
     if not (rows == rows[first][kinds]).all():
         # Two different rows of one digest, as good as impossible, or what is no number.
         return np.arange(rows.shape[0]), np.arange(rows.shape[0], dtype=np.int32)

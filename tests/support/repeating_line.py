@@ -5,20 +5,28 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from catenary.solver.linear.lanes import Layout
+from catenary.solver.linear.station_products import layout_of, neighbours
+
 
 def line(
-    n_stations: int, period: int = 7, size: int = 4, joined: bool = False
+    n_stations: int, period: int = 7, widths: tuple[int, ...] = (4,), joined: bool = False
 ) -> sparse.bsr_matrix:
     """A positive definite block tridiagonal matrix that repeats but at its ends.
 
-    Stations are joined by each wire for itself, unless wires are ``joined`` between them.
+    Stations have planes of ``widths`` unknowns, and are joined by pairs of unknowns, unless all of
+    a plane is ``joined`` between them.
     """
     rng = np.random.default_rng(7)
-    own = rng.standard_normal((period, size, size))
+    size = sum(widths)
+    plane = np.repeat(np.arange(len(widths)), widths)
+    together = plane[:, None] == plane
+    own = rng.standard_normal((period, size, size)) * together
     own = own @ own.transpose(0, 2, 1) + 8.0 * size * np.eye(size)
-    beside = rng.standard_normal((period, size, size))
-    if size == 4 and not joined:
-        beside *= np.kron(np.eye(2), np.ones((2, 2)))
+    beside = rng.standard_normal((period, size, size)) * together
+    if not joined:
+        pair = np.arange(size) // 2
+        beside *= pair[:, None] == pair
     data, indices, indptr = [], [], [0]
     for i in range(n_stations):
         if i > 0:
@@ -32,3 +40,12 @@ def line(
         indptr.append(len(indices))
     shape = (size * n_stations, size * n_stations)
     return sparse.bsr_matrix((np.array(data), indices, indptr), shape=shape)
+
+
+def layout(matrix: sparse.bsr_matrix, damping: sparse.bsr_matrix | None = None) -> Layout:
+    """Layout for products with a matrix, and with another for velocities, and for its factors."""
+    blocks = neighbours(matrix)
+    assert blocks is not None
+    found = layout_of(blocks, blocks, None if damping is None else neighbours(damping))
+    assert found is not None
+    return found

@@ -10,6 +10,7 @@ import pytest
 from petsc4py import PETSc
 from scipy import sparse
 
+from catenary.solver.linear.lanes import Layout
 from catenary.solver.linear.petsc_solvers import PartSolver, Wrapped
 
 N_STATIONS = 12
@@ -37,7 +38,7 @@ def test_all_factors_give_the_same_answer(option: str | None, hurries: bool) -> 
     if option is not None:
         options["march_pc_type"] = option
     try:
-        solver = PartSolver(matrix, slice(0, N_STATIONS), in_stations=True, is_whole=True)
+        solver = PartSolver(matrix, slice(0, N_STATIONS), True, True, Layout((4,)))
     finally:
         options.delValue("march_pc_type")
     if hurries:
@@ -55,8 +56,10 @@ def test_a_solver_that_nobody_destroyed_does_not_crash_the_end_of_python() -> No
     """PETSc is finalised after Python, and cannot free what is written in Python then."""
     code = (
         "import numpy as np; from scipy import sparse; "
+        "from catenary.solver.linear.lanes import Layout; "
         "from catenary.solver.linear.petsc_solvers import PartSolver; "
-        "kept = PartSolver(sparse.identity(8).tobsr((4, 4)), slice(0, 2), True, True); "
+        "whole = sparse.identity(8).tobsr((4, 4)); "
+        "kept = PartSolver(whole, slice(0, 2), True, True, Layout((4,))); "
         "kept.itself = kept"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)

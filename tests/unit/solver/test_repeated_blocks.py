@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from repeating_line import line
+from repeating_line import layout, line
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
+from catenary.solver.linear.lanes import WIDEST, Layout
 from catenary.solver.linear.station_factors import station_factors
-from catenary.solver.linear.station_products import MOST_KINDS, station_product
+from catenary.solver.linear.station_products import layout_of, neighbours, station_product
 from catenary.solver.linear.unique_rows import repeated_rows
 
 RNG = np.random.default_rng(7)
 # Sums of a dozen products of numbers of order one; solves lose a few digits to the condition, 1e2.
 ROUND_OFF = 1e-14
+WIDTHS = [(2,), (3,), (4,), (6,), (8,), (10,), (12,), (16,), (4, 4), (6, 4), (4, 2, 2), (12, 2)]
 LENGTHS = [1, 2, 3, 4, 5, 40, 301]
 
 
@@ -29,45 +31,81 @@ def test_factors_solve_parts_of_lines(n_own: int, ends: tuple[int, int]) -> None
     compare_factors(ends[0] + n_own + ends[1], ends[0], ends[0] + n_own)
 
 
-def compare_factors(n_stations: int, low: int, high: int) -> None:
-    matrix = line(n_stations, joined=True)
-    factors = station_factors(matrix, low, high)
+@pytest.mark.parametrize("joined", [False, True])
+@pytest.mark.parametrize("widths", WIDTHS)
+def test_factors_and_products_of_any_width(widths: tuple[int, ...], joined: bool) -> None:
+    compare_factors(40, 5, 33, widths, joined)
+    matrix = line(40, widths=widths, joined=joined)
+    lanes = layout(matrix)
+    assert lanes.widths == widths
+    in_pairs = all(width % 2 == 0 for width in widths)
+    assert lanes.paired is (in_pairs and (not joined or max(widths) == 2))
+    compare_product(matrix, 0, lanes)
+
+
+def compare_factors(
+    n_stations: int, low: int, high: int, widths: tuple[int, ...] = (4,), joined: bool = True
+) -> None:
+    matrix = line(n_stations, widths=widths, joined=joined)
+    factors = station_factors(matrix, layout(matrix), low, high)
     assert factors is not None
-    right, answer = RNG.standard_normal(4 * n_stations), np.zeros(4 * n_stations)
+    right, answer = RNG.standard_normal(matrix.shape[0]), np.zeros(matrix.shape[0])
     factors.solve(right, answer)
     expected = spsolve(matrix.tocsc(), right)
     assert np.abs(answer - expected).max() < ROUND_OFF * np.abs(expected).max()
 
 
+def compare_product(matrix: sparse.bsr_matrix, first: int, lanes: Layout) -> None:
+    product = station_product(matrix, first, lanes)
+    assert product is not None
+    factor, result = RNG.standard_normal(matrix.shape[1]), np.zeros(matrix.shape[0])
+    product.multiply(np.pad(factor, lanes.pitch), result)
+    assert np.abs(result - matrix @ factor).max() < ROUND_OFF * np.abs(factor).max() * 1e3
+
+
 def test_factors_of_a_long_line_are_of_as_many_kinds_as_those_of_a_short_one() -> None:
-    short, long = station_factors(line(150)), station_factors(line(1500))
+    short, long = (station_factors(line(n), layout(line(n))) for n in (150, 1500))
     assert short is not None and long is not None
     # The two lines differ; both forget their ends within some ten stations.
     assert abs(long.n_kinds - short.n_kinds) < 30
     assert long.n_stations == 1500 and long.n_kinds < 150
 
 
-def test_a_line_that_does_not_repeat_is_left_to_petsc() -> None:
-    n = MOST_KINDS + 1
+def test_a_line_of_which_no_two_stations_are_alike_keeps_them_in_their_order() -> None:
+    n = 5000
     own = np.einsum("i,jk->ijk", 10.0 + np.arange(n), np.eye(4))
-    indices, indptr = np.arange(n), np.arange(n + 1)
-    alone = sparse.bsr_matrix((own, indices, indptr))
-    assert station_factors(alone) is None
-    assert station_product(alone, 0) is None
+    alone = sparse.bsr_matrix((own, np.arange(n), np.arange(n + 1)))
+    lanes = layout(alone)
+    product, factors = station_product(alone, 0, lanes), station_factors(alone, lanes)
+    assert product is not None and factors is not None
+    for kinds in (product.kinds, factors.kinds):
+        assert np.array_equal(kinds, np.arange(n))
+    compare_product(alone, 0, lanes)
 
 
-def test_blocks_of_another_size_or_place_are_left_to_petsc() -> None:
-    assert station_factors(line(10, size=2)) is None
+def test_what_joins_stations_further_apart_is_left_to_petsc() -> None:
     far = line(10).tolil()
     far[0, 39] = far[39, 0] = 0.1
-    assert station_factors(far.tobsr((4, 4))) is None
-    assert station_product(far.tobsr((4, 4)), 0) is None
+    assert station_factors(far.tobsr((4, 4)), layout(line(10))) is None
+    assert station_product(far.tobsr((4, 4)), 0, layout(line(10))) is None
+
+
+def test_planes_are_what_no_matrix_joins() -> None:
+    apart = neighbours(line(10, widths=(4, 2)))
+    assert apart is not None
+    assert layout_of(apart, apart).widths == (4, 2)
+    for place in ((1, 3, 5, 1), (0, 3, 1, 5)):
+        joined = apart.copy()
+        joined[place] = 0.1
+        assert layout_of(joined, apart).widths == layout_of(apart, joined).widths == (6,)
+        assert layout_of(apart, apart, joined).widths == (6,)
+    assert layout_of(*[np.ones((3, 2, WIDEST + 1, WIDEST + 1))] * 2) is None
 
 
 def test_what_is_not_positive_definite_gives_no_number_and_no_error() -> None:
     matrix = line(5)
     matrix.data[:] = 0.0
-    factors, answer = station_factors(matrix), np.zeros(20)
+    factors, answer = station_factors(matrix, Layout((4,))), np.zeros(20)
     assert factors is not None
     factors.solve(np.ones(20), answer)
     assert not np.isfinite(answer).all()
@@ -78,23 +116,20 @@ def test_products_with_part_of_a_line(low: int, high: int) -> None:
     whole = line(90).tocsr()
     read_low, read_high = max(low - 1, 0), min(high + 1, 90)
     rows = whole[4 * low : 4 * high, 4 * read_low : 4 * read_high].tobsr((4, 4))
-    product = station_product(rows, low - read_low)
-    assert product is not None
-    factor, result = RNG.standard_normal(rows.shape[1]), np.zeros(rows.shape[0])
-    product.multiply(np.pad(factor, 4), result)
-    assert np.abs(result - rows @ factor).max() < ROUND_OFF * np.abs(factor).max() * 100.0
+    compare_product(rows, low - read_low, layout(line(90)))
 
 
-def test_wires_joined_between_stations_are_left_to_other_products() -> None:
-    assert station_product(line(10, joined=True), 0) is None
+def test_a_product_that_joins_more_than_its_layout_is_refused() -> None:
+    assert station_product(line(10, joined=True), 0, layout(line(10))) is None
+    assert station_product(line(10), 0, Layout((2, 2))) is None
 
 
 def test_a_product_by_rows_where_stations_do_not_pair() -> None:
-    matrix = line(400, size=2)
+    matrix = line(400, widths=(2,))
     # The first and the last row have a neighbour on one side only, so that they take in more.
     product = repeated_rows(matrix)
     assert product is not None
     factor, result = RNG.standard_normal(800), np.zeros(800)
     product.multiply(factor, result)
     assert np.abs(result - matrix @ factor).max() < ROUND_OFF * np.abs(factor).max() * 100.0
-    assert repeated_rows(line(20, size=2)) is None
+    assert repeated_rows(line(20, widths=(2,))) is None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from repeating_line import line
+from repeating_line import layout, line
 
 from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_state import Motion, MotionAhead, Steps
@@ -23,34 +23,50 @@ ROUND_OFF = 1e-13
 @pytest.mark.parametrize("before", [0, 1, 30])
 @pytest.mark.parametrize("after", [0, 2, 25])
 def test_passes_take_the_steps_of_their_parts(n_own: int, before: int, after: int) -> None:
-    """A rank's own stations with some of its neighbours', which it is told of."""
-    n = before + n_own + after
-    low, high = before, before + n_own
-    product = station_product(line(n), 0)
-    factors = station_factors(line(n), low, high)
-    assert product is not None and factors is not None
-    displacement, velocity = RNG.standard_normal((2, 4 * n_own))
-    answer = RNG.standard_normal(4 * n)
-    others = np.pad(RNG.standard_normal(4 * n), 4)
-    own = slice(4 * low, 4 * high)
+    compare(n_own, before, after)
 
-    read, force, solution = others.copy(), np.zeros(4 * n), answer.copy()
+
+@pytest.mark.parametrize("loaded", [False, True])
+@pytest.mark.parametrize("widths", [(2,), (6,), (8,), (10,), (12,), (16,), (4, 4), (6, 4)])
+def test_passes_over_stations_of_any_width(widths: tuple[int, ...], loaded: bool) -> None:
+    compare(90, 4, 7, widths, loaded)
+
+
+def compare(
+    n_own: int, before: int, after: int, widths: tuple[int, ...] = (4,), loaded: bool = False
+) -> None:
+    """A rank's own stations with some of its neighbours', which it is told of."""
+    n, b = before + n_own + after, sum(widths)
+    low, high = before, before + n_own
+    matrix = line(n, widths=widths)
+    product = station_product(matrix, 0, layout(matrix))
+    factors = station_factors(matrix, layout(matrix), low, high)
+    assert product is not None and factors is not None
+    displacement, velocity = RNG.standard_normal((2, b * n_own))
+    answer = RNG.standard_normal(b * n)
+    loads = RNG.standard_normal(b * n if loaded else 0)
+    others = np.pad(RNG.standard_normal(b * n), b)
+    own = slice(b * low, b * high)
+
+    read, force, solution = others.copy(), np.zeros(b * n), answer.copy()
     expected = displacement.copy(), velocity.copy(), solution[own]
-    state_kernels.predict(*expected, read[4:-4][own], *STEPS[:4])
+    state_kernels.predict(*expected, read[b:-b][own], *STEPS[:4])
     product.multiply(read, force)
+    if loaded:
+        force += loads
     factors.solve(force, solution)
     state_kernels.correct(*expected, *STEPS[4:])
 
     # Droppers at every third station, whose ends may be at different ones.
     upper = np.arange(0, n_own, 3)
     lower = np.minimum(upper + RNG.integers(0, 2, upper.size), n_own - 1)
-    ends = 4 * np.column_stack([upper, lower]) + [2, 0]
+    ends = b * np.column_stack([upper, lower]) + [b // 2, 0]
     tension, pulls = np.full((2, upper.size), np.nan)
 
-    read, shown = others.copy(), np.zeros(4 * n_own)
-    motion = MotionAhead(read[4:-4][own], np.zeros(4 * n_own), answer[own], shown, STEPS)
+    read, shown = others.copy(), np.zeros(b * n_own)
+    motion = MotionAhead(read[b:-b][own], np.zeros(b * n_own), answer[own], shown, STEPS)
     motion.put(displacement, velocity, answer[own].copy())
-    passes = StationPasses(product, factors, read, answer, motion, STEPS)
+    passes = StationPasses(product, factors, read, read, loads, answer, motion, STEPS)
     passes.look_at(ends, LAWS[: len(ends)], tension)
     passes.step()
     found = motion.displacement, motion.velocity, answer[own], tension
@@ -61,7 +77,9 @@ def test_passes_take_the_steps_of_their_parts(n_own: int, before: int, after: in
 
 
 def test_a_compiled_loop_takes_the_same_steps_with_kernel_and_arguments() -> None:
-    product, factors = station_product(line(20), 0), station_factors(line(20))
+    matrix = line(20)
+    product = station_product(matrix, 0, layout(matrix))
+    factors = station_factors(matrix, layout(matrix))
     assert product is not None and factors is not None
     states = []
     for by_kernel in (False, True):
@@ -69,7 +87,7 @@ def test_a_compiled_loop_takes_the_same_steps_with_kernel_and_arguments() -> Non
         read, answer, shown = np.zeros(88), np.zeros(80), np.zeros(80)
         motion = MotionAhead(read[4:-4], np.zeros(80), answer, shown, STEPS)
         motion.put(start, 2.0 * start, 3.0 * start)
-        passes = StationPasses(product, factors, read, answer, motion, STEPS)
+        passes = StationPasses(product, factors, read, read, np.zeros(0), answer, motion, STEPS)
         for _ in range(3):
             if by_kernel:
                 passes.kernel(*passes.arguments)
