@@ -50,6 +50,7 @@ class Plan:
     warnings : sentences about them, empty if the line is long enough
     dt, simulated : time step and simulated time [s]
     halved : what is said of steps that adapt, empty if none do
+    slack : what a slack dropper does, in words; empty if no dropper slackens
     memory : estimate of the resident memory on one rank [B]
     march : estimate of the wall time of the time loop on one rank [s]
     files : sizes of the files
@@ -81,6 +82,7 @@ class Plan:
     dt: float
     scheme: str
     halved: str
+    slack: str
     simulated: float
     memory: float
     march: float
@@ -151,6 +153,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
         dt=dt,
         scheme=problem.numerics.scheme,
         halved=_halved(problem.numerics),
+        slack=_slack(problem),
         simulated=simulated_time(problem),
         memory=needs.memory,
         march=needs.march,
@@ -168,6 +171,19 @@ def _halved(numerics: Numerics) -> str:
         f"steps with a contact force wrong by more than {tolerance:g} N, or without a solution, "
         f"are halved, down to {1e3 * shortest:g} ms (not in the estimates)"
     )
+
+
+def _slack(problem: Problem) -> str:
+    """The law of a slack dropper, with the key that chooses it; empty if none slackens."""
+    if "dropper_slackening" not in problem.effects:
+        return ""
+    keeps = "residual_dropper_stiffness" in problem.effects and problem.residual_stiffness_ratio > 0
+    share = f"{100.0 * problem.residual_stiffness_ratio:g} %"
+    if problem.slack_dampers_act:
+        spring = f"keeps {share} of its force" if keeps else "is released"
+        return f"spring {spring}, damper goes on acting (line.dropper.slack_damping = kept)"
+    both = f"keep {share} of their force" if keeps else "are released"
+    return f"spring and damper {both} (line.dropper.slack_damping = released)"
 
 
 def plan_text(plan: Plan) -> str:
@@ -202,6 +218,7 @@ def plan_text(plan: Plan) -> str:
             f"{plan.simulated:.2f} s in {counted(plan.n_steps, 'step')} of {1e3 * plan.dt:g} ms, "
             f"scheme {plan.scheme}",
         ),
+        *([("slack", f"of a slack dropper, {plan.slack}")] if plan.slack else []),
         *([("adapted", plan.halved)] if plan.halved else []),
         ("memory", f"about {plan.memory / 1e6:.0f} MB on one rank (estimate)"),
         (

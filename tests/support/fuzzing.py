@@ -6,7 +6,7 @@ import random
 from dataclasses import dataclass
 
 from fuzzing_broken import INCIDENTS, a_way
-from fuzzing_more import as_assignments, mechanism, put_more
+from fuzzing_more import SLACK_DAMPINGS, as_assignments, mechanism, put_more
 
 BASE = "en50318_2002"
 N_STEPS = 200
@@ -110,6 +110,7 @@ def sound_scene(
     if rear > 0.6 * way:
         behind = []
     words["train.pantographs"] = f"[{','.join(names if behind else names[:1])}]"
+    words["line.dropper.slack_damping"] = rng.choice(SLACK_DAMPINGS)
     if wide is not None:
         room = min(start - (rear if behind else 0.0), length - way - start)
         put_more(wide, words, span, room, n_steps)

@@ -15,6 +15,8 @@ Words = dict[str, object]
 _NOW_AND_THEN = 0.2
 # Droppers in each span of the case with a mechanism.
 _DROPPERS_OF_MECHANISM = 8
+# Whether the damper of a slack dropper is released with its spring, or goes on acting.
+SLACK_DAMPINGS = ("'released'", "'kept'")
 _IMPACTS = ("lankarani_nikravesh", "hunt_crossley", "flores", "gonthier")
 
 
@@ -270,6 +272,7 @@ def mechanism(rng: random.Random, n_steps: int) -> tuple[str, ...]:
     put_numerics(rng, words, with_second_opinion=False)
     if rng.random() < 2 * _NOW_AND_THEN:
         put_incidents(rng, words, n_steps, [_DROPPERS_OF_MECHANISM] * n_spans, 1, deepest_m=0.3)
+    words["line.dropper.slack_damping"] = rng.choice(SLACK_DAMPINGS)
     return as_assignments(words)
 
 

@@ -69,3 +69,19 @@ def test_steps_that_adapt_are_told_with_their_shortest() -> None:
     told = plan_text(make_plan(load_scene("en50318_2002", adapted)))
     assert "wrong by more than 2 N" in told and "down to 0.25 ms" in told
     assert "adapted" not in plan_text(make_plan(load_scene("en50318_2002", [])))
+
+
+def test_the_law_of_a_slack_dropper_is_told() -> None:
+    residual = ["effects.residual_dropper_stiffness=true"]
+    residual += ["line.dropper.residual_stiffness_ratio=0.01"]
+    for words, told in (
+        ([], "spring and damper are released (line.dropper.slack_damping = released)"),
+        (residual, "spring and damper keep 1 % of their force"),
+        (["line.dropper.slack_damping=kept"], "spring is released, damper goes on acting"),
+        ([*residual, "line.dropper.slack_damping=kept"], "spring keeps 1 % of its force, damper"),
+    ):
+        assert f"of a slack dropper, {told}" in plan_text(
+            make_plan(load_scene("en50318_2002", words))
+        )
+    linear = make_plan(load_scene("en50318_2002", ["effects.dropper_slackening=false"]))
+    assert "of a slack dropper" not in plan_text(linear)

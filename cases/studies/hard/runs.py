@@ -1,19 +1,20 @@
 """Runs of hard cases, watched: histories, and the energy that the line gains beyond its input.
 
-The work of the contact forces is summed as average acceleration does it: with forces f at places x
-and the line's displacement u, a step does the work (f_n N(x_n) + f_n+1 N(x_n+1)) (u_n+1 - u_n) / 2.
-With beta = 1/4 and gamma = 1/2 kinetic plus elastic energy then changes by that work less what
-damping takes, exactly, as long as no dropper switches.
+Newmark's method has an energy balance of its own (S. Krenk, Comput. Methods Appl. Mech. Engrg. 195
+(2006) 6110-6124), in which numerical damping only takes: see `LineBalance`. Contact forces are
+loads in it, whose work is summed with the method's weights. So contact that is lost or regained
+makes no energy, however the force jumps, and what rises was made by droppers that switch, at most
+`Watched.one_switch` each.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_matrix
+from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import spsolve
 
 from catenary.cases.run.scene_mesh import mesh_of
@@ -26,6 +27,7 @@ from catenary.solver.model.model import Model, build, iterate_entries
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import in_steps
 from catenary.solver.problem.problem import Problem
+from catenary.solver.schemes.make_scheme import kept_ratio
 from catenary.solver.statics.equilibrium import (
     Elasticity,
     Equilibrium,
@@ -52,6 +54,9 @@ class Watched:
     taut : (n, n_droppers) whether a dropper carries anything; only on one rank
     energy : (n,) of the line [J]; work : (n,) of the contact forces on it since the start [J];
         both empty unless asked for
+    damping_terms : (n,) what numerical damping adds to the energy in the balance [J], see
+        `LineBalance`; empty like these
+    one_switch : the most that one dropper may have made in one switch [J], see `LineBalance`
     counters : of the scheme
     kept : by step, dropper forces [N] and the line's displacement as incidents found them
     """
@@ -65,18 +70,26 @@ class Watched:
     taut: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
     energy: np.ndarray = field(default_factory=lambda: np.zeros(0))
     work: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    damping_terms: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    one_switch: float = 0.0
     counters: dict[str, int] = field(default_factory=dict)
     kept: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
     def energy_gain(self) -> float:
         """The most that energy less work rises above its least value before, of the largest energy.
 
-        Damping lets it fall; what rises was given by nothing. After incidents the energy, which
-        counts from the first rest, may be negative.
+        Damping only lowers it; any rise is spurious. After incidents the energy, which counts from
+        the first rest, may be negative.
         """
         balance = self.energy - self.work
+        if self.damping_terms.size:
+            balance = balance + self.damping_terms
         rise = (balance - np.minimum.accumulate(balance)).max()
-        return float(rise / max(np.abs(self.energy).max(), np.abs(self.work).max(), 1e-300))
+        return float(rise / self.energy_scale())
+
+    def energy_scale(self) -> float:
+        """The largest energy or work of the run [J]."""
+        return float(max(np.abs(self.energy).max(), np.abs(self.work).max(), 1e-300))
 
     @property
     def all_finite(self) -> bool:
@@ -89,14 +102,88 @@ class Watched:
         return np.asarray((self.taut[1:] != self.taut[:-1]).sum(axis=1))
 
 
+class LineBalance:
+    """Newmark's energy balance of the line, and what one switch of a dropper adds to it.
+
+    With step h, d = beta - gamma / 2 and the line's M, C and K, each step changes
+
+        v.Mv / 2 + u.Ku / 2 + h^2 d a.Ma / 2 + h (gamma - 1/2) (v.Cv + h^2 d a.Ca) / 2
+
+    by the work (u_n+1 - u_n) . ((1 - gamma) f_n + gamma f_n+1) of the loads f, less
+
+        (gamma - 1/2) (Du.K Du + h^2 d Da.M Da) + h w.C w + h^3 d ((gamma - 1/2)^2 - d / 4) Da.C Da
+
+    where D is the change in the step and w = (v_n + v_n+1) / 2 + h d Da / 2. None of it is negative
+    if gamma >= 1/2 and 0 <= d <= 4 (gamma - 1/2)^2. The terms beyond the energy are
+    `damping_terms`; average acceleration has none. A slack dropper has no part in C.
+
+    **A dropper that slackens** from its tension k a to a gap b, a + b being its change of length
+    in the step, stored k a^2 / 2 and does the work (1 - gamma) k a (a + b). With a + b = h e' that
+    makes at most (1 - gamma)^2 k (h e')^2 / 2; one that tightens makes nothing.
+
+    Integrators other than Newmark's are balanced like average acceleration. After incidents the
+    terms are those of the line as it was.
+    """
+
+    def __init__(self, model: Model, problem: Problem) -> None:
+        numerics = problem.numerics
+        newmark = numerics.integrator == "newmark"
+        dt, gamma = numerics.dt, numerics.gamma if newmark else 0.5
+        excess = numerics.beta - 0.5 * gamma if newmark else 0.0
+        self.weights = 1.0 - gamma, gamma
+        self._terms: list[tuple[str, csr_matrix]] = []
+        if gamma != 0.5 or excess != 0.0:
+            damping = _matrix(model, damping=0.5 * dt * (gamma - 0.5))
+            of_acceleration = _matrix(model, mass=0.5) + damping
+            self._terms = [
+                ("velocity", damping),
+                ("acceleration", dt**2 * excess * of_acceleration),
+            ]
+        self._ends = model.dofs(model.mesh.droppers)
+        slackens = "dropper_slackening" in problem.effects
+        kept = kept_ratio(problem, model) if slackens else 1.0
+        released = (1.0 - kept) * model.released_damping
+        of_velocity = 0.5 * dt * (gamma - 0.5) * released
+        self._slack = [
+            ("velocity", of_velocity),
+            ("acceleration", dt**2 * excess * of_velocity),
+        ]
+        self._share = 0.5 * model.dropper_stiffness * ((1.0 - gamma) * dt) ** 2
+
+    def damping_terms(self, state: Mapping[str, np.ndarray], taut: np.ndarray) -> float:
+        """What numerical damping adds to the energy of a state with droppers ``taut`` (n,) [J]."""
+        found = 0.0
+        for of, matrix in self._terms:
+            found += float(state[of] @ (matrix @ state[of]))
+        for of, factors in self._slack:
+            found -= float(factors[~taut] @ self._between(state[of])[~taut] ** 2)
+        return found
+
+    def one_switch(self, state: Mapping[str, np.ndarray], switched: np.ndarray) -> float:
+        """The most that one of the droppers ``switched`` (n,) makes at the state's rates [J]."""
+        rate = self._between(state["velocity"])
+        return float((self._share * rate**2)[switched].max(initial=0.0))
+
+    def _between(self, values: np.ndarray) -> np.ndarray:
+        """Upper less lower end of each dropper, (n,)."""
+        upper, lower = self._ends.T
+        return np.asarray(values[upper] - values[lower])
+
+
 class Watcher:
-    """Observer that keeps what `Watched` holds; ``wire`` is needed for the work.
+    """Observer that keeps what `Watched` holds; wire and balance are needed for the work.
 
     With the work, dropper forces and displacements are kept after the steps ``keep``.
     """
 
-    def __init__(self, wire: ContactWire | None = None, keep: Collection[int] = ()) -> None:
+    def __init__(
+        self,
+        wire: ContactWire | None = None,
+        keep: Collection[int] = (),
+        balance: LineBalance | None = None,
+    ) -> None:
         self._wire = wire
+        self._balance = balance
         self._keep = keep
         self._kept: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         self._rows: dict[str, list[Any]] = {
@@ -104,6 +191,8 @@ class Watcher:
         }
         self._energy: list[float] = []
         self._work: list[float] = []
+        self._terms: list[float] = []
+        self._one_switch = 0.0
         self._before = np.zeros(0)
         self._pushed: list[tuple[np.ndarray, np.ndarray]] = []
 
@@ -121,9 +210,9 @@ class Watcher:
             ("taut", view.dropper_force > 0.0),
         ):
             self._rows[name].append(value)
-        if self._wire is not None:
+        if self._wire is not None and self._balance is not None:
             self._energy.append(sum(view.energies()))
-            self._add_work(view, self._wire)
+            self._add_work(view, self._wire, self._balance)
 
     def finish(self, outcome: str) -> None:
         """Nothing is left to do."""
@@ -137,11 +226,13 @@ class Watcher:
             **rows,
             energy=energies[0],
             work=energies[1],
+            damping_terms=np.array(self._terms),
+            one_switch=self._one_switch,
             counters=counters,
             kept=self._kept,
         )
 
-    def _add_work(self, view: StepView, wire: ContactWire) -> None:
+    def _add_work(self, view: StepView, wire: ContactWire, balance: LineBalance) -> None:
         state = view.checkpoint()
         assert state is not None  # the work is only asked for on one rank
         displacement = state["displacement"]
@@ -151,9 +242,14 @@ class Watcher:
         pushed = [(dofs.ravel(), (view.contact_force[:, None] * touches["whole_value"]).ravel())]
         done = self._work[-1] if self._work else 0.0
         if self._before.size:
-            for where, values in (*self._pushed, *pushed):
-                done += 0.5 * float(values @ (displacement[where] - self._before[where]))
+            for weight, (where, values) in zip(
+                balance.weights, (*self._pushed, *pushed), strict=True
+            ):
+                done += weight * float(values @ (displacement[where] - self._before[where]))
+            taut, before = self._rows["taut"][-1], self._rows["taut"][-2]
+            self._one_switch = max(self._one_switch, balance.one_switch(state, taut != before))
         self._work.append(done)
+        self._terms.append(balance.damping_terms(state, self._rows["taut"][-1]))
         if view.step in self._keep:
             self._kept[view.step] = view.dropper_force.copy(), displacement.copy()
         self._before, self._pushed = displacement.copy(), pushed
@@ -201,8 +297,9 @@ def run(rest: AtRest, comm: Any, with_work: bool = False) -> Watched:
     """March to the end, or to where it breaks. Collective; ``with_work`` on one rank only."""
     wire = ContactWire(rest.model, rest.form, distribute(rest.model, 1, 0)) if with_work else None
     problem = rest.problem
+    balance = LineBalance(rest.model, problem) if with_work else None
     keep = [happened.step for happened in in_steps(problem.incidents, problem.numerics.dt)]
-    watcher = Watcher(wire, keep)
+    watcher = Watcher(wire, keep, balance)
     with March(comm, rest.problem, rest.model, rest.form, rest.lift) as march:
         ended = march.run([watcher])
     return watcher.watched(ended.outcome, ended.counters)
@@ -240,7 +337,12 @@ def run_free(rest: AtRest, comm: Any, n_steps: int) -> Watched:
 def _mass_matrix(model: Model) -> csc_matrix:
     """M with ones at the unknowns that are held, which then have no acceleration."""
     n, held = model.n_dofs, model.constrained
-    parts = list(iterate_entries(model, 0, n, 1.0, 0.0, 0.0))
+    ones = csc_matrix((np.ones(held.size), (held, held)), shape=(n, n))
+    return csc_matrix(_matrix(model, mass=1.0) + ones)
+
+
+def _matrix(model: Model, mass: float = 0.0, damping: float = 0.0) -> csr_matrix:
+    """``mass`` M + ``damping`` C without rows and columns of unknowns that are held."""
+    parts = list(iterate_entries(model, 0, model.n_dofs, mass, 0.0, damping))
     rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
-    rows, columns = np.concatenate([rows, held]), np.concatenate([columns, held])
-    return csc_matrix((np.concatenate([values, np.ones(held.size)]), (rows, columns)), shape=(n, n))
+    return csr_matrix((values, (rows, columns)), shape=(model.n_dofs, model.n_dofs))
