@@ -5,13 +5,15 @@ Source: EN 50318, annex (two masses); the benchmark of ten codes of 2015 (three 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy import linalg
 
 from catenary.mbs.head import head_kernels
+from catenary.mbs.head.head_records import LUMPED
 from catenary.mbs.head.newmark_head import SteppedHead, raised
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.interface import HeadState
@@ -75,18 +77,22 @@ class LumpedPantograph(SteppedHead):
         _, ahead, faster, by_place, by_speed = self._newmark
         predict_position = np.hstack([one, dt * one, ahead * one])
         predict_velocity = np.hstack([none, one, faster * one])
-        inverse = linalg.inv(
-            np.diag(self._masses) + by_speed * self._damping + by_place * self._stiffness
+        inverse = np.ascontiguousarray(
+            linalg.inv(
+                np.diag(self._masses) + by_speed * self._damping + by_place * self._stiffness
+            )
         )
         free = -inverse @ (self._stiffness @ predict_position + self._damping @ predict_velocity)
         step = np.vstack(
             [predict_position + by_place * free, predict_velocity + by_speed * free, free]
         )
         unit = np.vstack([by_place * inverse, by_speed * inverse, inverse])
+        by_drive = np.ascontiguousarray(unit[:, self._carrier])
+        self._of_step = {"step": step, "by_drive": by_drive, "inverse": inverse}
         self._step = bound(
             head_kernels.linear_step,
             step,
-            np.ascontiguousarray(unit[:, self._carrier]),
+            by_drive,
             inverse,
             float(by_place),
             float(by_speed),
@@ -111,6 +117,15 @@ class LumpedPantograph(SteppedHead):
         self._aim(time)
         self._step(self._drive(time))
         return self._head
+
+    def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
+        """Fill in the force on the last mass, and where the wire crosses; see `SteppedHead`."""
+        drives[:, 0] = [self._drive(time) for time in times]
+        self._fill_lateral(times, drives)
+
+    def record(self) -> dict[str, Any]:
+        """The pantograph as `head_records.fill_head` takes it."""
+        return {**super().record(), **self._of_step, "model": LUMPED}
 
     def energy(self) -> float:
         """Kinetic energy, and elastic energy of all springs, the base spring included [J]."""

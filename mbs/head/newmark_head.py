@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from catenary.mbs.head import head_kernels
+from catenary.mbs.head.head_records import N_DRIVE
 from catenary.mbs.head.strips import HeadParts
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.interface import HeadState
@@ -74,6 +77,38 @@ class SteppedHead(ABC):
     @abstractmethod
     def _acceleration(self, time: float) -> np.ndarray:
         """Accelerations (n,) of the present state without contact."""
+
+    @abstractmethod
+    def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
+        """Fill in what steps to ``times`` [s] depend on besides the state, a row each.
+
+        ``drives`` (len(times), `head_records.drive_width`) is what ``record`` of a head is stepped
+        with.
+        """
+
+    def record(self) -> dict[str, Any]:
+        """The head as `head_records.fill_head` takes it; arrays are the head's own."""
+        return {
+            "n": self._n,
+            "s": len(self.strip_offsets),
+            "roll": -1 if self._lateral is None else self._roll,
+            "newmark": self._newmark,
+            "touch": self._touch,
+            "state": self._state,
+            "free": self._free,
+            "by_force": self._by_force,
+            "out": self._out,
+        }
+
+    def _fill_lateral(self, times: Sequence[float], drives: np.ndarray) -> None:
+        """Fill in where the wire crosses the strips, if the head rolls."""
+        if self._lateral is None:
+            return
+        s = len(self.strip_offsets)
+        for row, time in zip(drives, times, strict=True):
+            self._lateral.move_to(time)
+            row[N_DRIVE : N_DRIVE + s] = self._lateral.place
+            row[N_DRIVE + s : N_DRIVE + 2 * s] = self._lateral.rate
 
     def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Heights and velocities (s,) of the strips by Newmark's predictor (paper eq. 2.5)."""

@@ -14,13 +14,15 @@ not carried along the track, and links between two balls do not spin.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from catenary.mbs.head import head_kernels
+from catenary.mbs.head.head_records import N_DRIVE, REDUCED
 from catenary.mbs.head.newmark_head import SteppedHead, raised
 from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning, head_parts
 from catenary.mbs.head.wire_crossing import LateralPath
@@ -122,6 +124,29 @@ class RaisingPantograph(SteppedHead):
         if height < self._lowest or height > self._highest:
             raise self._data.frame.left(height, time)
         return self._head
+
+    def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
+        """Fill in lift and base, and where the wire crosses; see `SteppedHead`."""
+        drives[:, :N_DRIVE] = self._drive
+        drives[:, 0] = [self._part(time) for time in times]
+        if self._base is not None:
+            drives[:, 3:N_DRIVE] = [self._base.vertical(time) for time in times]
+        self._fill_lateral(times, drives)
+
+    def record(self) -> dict[str, Any]:
+        """The pantograph as `head_records.fill_head` takes it."""
+        return {
+            **super().record(),
+            "model": REDUCED,
+            "lowest": self._lowest,
+            "highest": self._highest,
+            "n_breaks": self._breaks.size,
+            "masses": self._masses,
+            "stiffness": self._stiffness,
+            "damping": self._damping,
+            "breaks": self._breaks,
+            "coefficients": self._coefficients,
+        }
 
     def energy(self) -> float:
         """Kinetic energy in the line's frame, and elastic energy of the head's springs beyond its

@@ -30,7 +30,7 @@ from catenary.postproc.files.disk import (
 )
 from catenary.postproc.files.own_files import part_of
 from catenary.postproc.read.guard import survives
-from catenary.postproc.record.column_gather import ColumnGather
+from catenary.postproc.record.column_gather import ColumnGather, next_flush
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.base.parallel import on_root
 from catenary.solver.time_loop.observers import Stage, StepView
@@ -107,6 +107,14 @@ class FieldRecorder:
         self._gather = ColumnGather(self._comm, stage.owned_nodes, self._n_nodes, self._capacity)
         self._uplift = np.zeros((self._capacity, self._gather.n_owned))
         self._guarded(lambda: self._open(stage), stage.start_time)
+
+    def next_state(self, step: int) -> int:
+        """The step of the next snapshot, or flush."""
+        snapshot = step - step % self._every + self._every
+        return min(snapshot, next_flush(step, self._flush_every))
+
+    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
+        """Pass over steps between two snapshots."""
 
     def observe(self, view: StepView) -> None:
         """Keep a snapshot if one is due; collective when the buffer is to be written."""

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
 
+import numpy as np
 from tqdm import tqdm
 
 from catenary.postproc.files.result_file import DONE
@@ -91,6 +92,13 @@ class Progress:
                 bar_format="{desc} {percentage:3.0f}% |{bar}| {n:.2f}/{total:.2f} s simulated"
                 "{postfix}, left {remaining}",
             )
+
+    def next_state(self, step: int) -> int:
+        """The step of the next look at the clock."""
+        return max(step + 1, self._next_look)
+
+    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
+        """Pass over steps."""
 
     def observe(self, view: StepView) -> None:
         """Look at the clock now and then: most steps are passed over."""

@@ -16,6 +16,7 @@ import numpy as np
 from catenary.postproc.files.disk import Elsewhere, NoRoom, broken_write
 from catenary.postproc.files.result_file import DONE, INTERRUPTED, LineBlock, ResultFile
 from catenary.postproc.record import channels
+from catenary.postproc.record.column_gather import next_flush
 from catenary.postproc.record.header import Header
 from catenary.postproc.record.line_record import LineRecord
 from catenary.postproc.record.line_rows import LineGather, LineRows
@@ -126,6 +127,25 @@ class Recorder:
         # midst of writing one spoils no checksum of earlier rows.
         if (view.step + 1) % self._flush_every == 0 or not self._flushed_once:
             self._flush(view)
+
+    def next_state(self, step: int) -> int:
+        """The step of the next flush or record of the energies."""
+        if not self._flushed_once:
+            return step + 1
+        following = next_flush(step, self._flush_every)
+        if self._energy_every:
+            following = min(following, step - step % self._energy_every + self._energy_every)
+        return following
+
+    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
+        """Copy steps between two states into the buffers."""
+        begin = self._rows
+        if begin == 0:
+            self._first_step = first_step
+        end = self._rows = begin + times.size
+        self._time[begin:end] = times
+        self._kept[begin:end] = rows
+        self._last_time = float(times[-1])
 
     def finish(self, outcome: str) -> None:
         """Write what is left and the outcome. Collective.

@@ -22,6 +22,7 @@ NAMES = {
     "ContactReply": "forces to all ranks, where there are others",
     "LineSuperpose": "answers to the forces",
     "PantoAdvance": "pantographs' steps, on rank 0",
+    "Steps": "whole steps in one compiled loop, where none of the others is looked at",
     "Show": "observers: recorder, fields, progress",
 }
 

@@ -85,6 +85,11 @@ class Droppers:
 class Interaction:
     """Contacts and droppers of one rank. Collective to make.
 
+    Attributes
+    ----------
+    placing : arguments of ``contact_kernels.place``
+    superposing, compensating : of ``superpose`` and ``compensate`` after the forces
+
     Parameters
     ----------
     range_of_run : stretch of the contact wire that pan heads will touch [m]
@@ -125,21 +130,14 @@ class Interaction:
         self._touches = np.zeros(n, dtype=TOUCH)
         self._answers = np.zeros((n, n_local))
         self._slope_answers = np.zeros((n, n_local if uses_rate else 0))
-        self._place = bound(
-            contact_kernels.place,
-            contact_place,
-            self.wire.nodes,
-            node_columns,
-            self._touches,
-            self._answers,
-            self._slope_answers,
-        )
+        touched = self._touches, self._answers, self._slope_answers
+        self.placing = contact_place, self.wire.nodes, node_columns, *touched
+        self._place = bound(contact_kernels.place, *self.placing)
         motion = line.motion.read, line.motion.gains
         self._force = np.zeros(n)
-        self._superpose = bound(
-            contact_kernels.superpose, self._force, self._answers, self._touches, *motion
-        )
-        self._compensated = (*dropper_columns.packed(), *motion)
+        self.superposing = self._answers, self._touches, *motion
+        self._superpose = bound(contact_kernels.superpose, self._force, *self.superposing)
+        self.compensating = (*dropper_columns.packed(), *motion)
 
     def place(self) -> None:
         """Look where the contacts are now, and work out the line's answer to a unit force at
@@ -165,9 +163,12 @@ class Interaction:
         included if their tension may fall below the response's margin under contact forces up to
         its limits.
         """
+        return bound(contact_kernels.respond, *self.responding(response))
+
+    def responding(self, response: LineResponse) -> tuple[Any, ...]:
+        """Arguments of ``contact_kernels.respond``."""
         line, droppers = self.line, self.droppers
-        return bound(
-            contact_kernels.respond,
+        return (
             line.motion.read,
             self._touches,
             self._speed,
@@ -192,7 +193,7 @@ class Interaction:
         self._force[:] = contact_force
         self._superpose()
         if droppers.size:
-            contact_kernels.compensate(droppers, compensation, *self._compensated)
+            contact_kernels.compensate(droppers, compensation, *self.compensating)
 
     def loads(
         self, contact_force: np.ndarray, compensation: np.ndarray

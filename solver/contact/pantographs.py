@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from scipy import integrate
 
 from catenary.mbs.build import Operation, has_joints, make_pantograph
+from catenary.mbs.head.head_records import HEAD, fill_head
+from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.head.roll import roll_of
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.interface import Pantograph
@@ -48,7 +50,11 @@ class Pantographs:
     joints_in_loop : whether a pantograph has joints that may open, all ranks
     constraint_violation : (n,) largest open joint after the latest step [m], NaN for pantographs
         without joints in the loop, rank 0 only
-    told : ``position`` and all these of the latest step one after another
+    told : ``position`` and all these of the latest step one after another; ``of_step`` is its part
+        that a step fills after its forces are known
+    speed : of the train [m/s]
+    moving : start and places of contacts and pantographs, see ``kernels.shift``
+    ends : (n + 1,) number of the first contact of each pantograph, and of all
 
     Raises
     ------
@@ -66,12 +72,12 @@ class Pantographs:
         train = problem.train
         self._wire = wire
         self._start = np.array([train.start - p.behind for p in train.placements])
-        self._speed = train.speed
+        self.speed = train.speed
         offsets = [placement.data.strip_offsets for placement in train.placements]
         counts = [len(own) for own in offsets]
         ends = np.cumsum([0, *counts])
         self._strips = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
-        self._ends = ends.astype(np.int64)
+        self.ends = ends.astype(np.int64)
         contact_start = np.repeat(self._start, counts) + np.concatenate(offsets)
         # Places of contacts and of pantographs move together, in one sum.
         self.n_contacts = contact_start.size
@@ -79,7 +85,8 @@ class Pantographs:
         sizes = (self.n, 3 * self.n, self.n_contacts, self.n)
         places_and_told = np.zeros(self.n_contacts + sum(sizes))
         self._all_places = places_and_told[: self._all_start.size]
-        self._move = bound(state_kernels.shift, self._all_start, self._all_places, later=(0.0,))
+        self.moving = self._all_start, self._all_places
+        self._move = bound(state_kernels.shift, *self.moving, later=(0.0,))
         self.contact_place = places_and_told[: self.n_contacts]
         self.told = places_and_told[self.n_contacts :]
         self.position, forces, self.strip_force, self.constraint_violation = np.split(
@@ -87,8 +94,7 @@ class Pantographs:
         )
         self._all_places[:] = self._all_start
         self.contact_force, self.head_height, self.wire_height = forces.reshape(3, self.n)
-        # Those of them that a step fills after its forces are known.
-        self._of_step = self.told[self.n : 4 * self.n + self.n_contacts]
+        self.of_step = self.told[self.n : 4 * self.n + self.n_contacts]
         self.wire_height[:] = wire.rest_height(self._start)
         self.head_height[:] = self.wire_height - train.start_below
         self._heads = Heads(self.n_contacts)
@@ -109,7 +115,7 @@ class Pantographs:
 
     def move_to(self, time: float) -> None:
         """Move pantographs and contacts to where they are at ``time`` [s]."""
-        self._move(self._speed * time)
+        self._move(self.speed * time)
 
     def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Heights and velocities (n_contacts,) at ``time`` from the motion alone. Rank 0 only."""
@@ -140,8 +146,26 @@ class Pantographs:
         if self.joints_in_loop:
             self.look_at_joints()
         complementarity_kernels.tell(
-            contact_force, reported, self._heads.numbers, depth, self._ends, self._of_step
+            contact_force, reported, self._heads.numbers, depth, self.ends, self.of_step
         )
+
+    def records(self) -> np.ndarray | None:
+        """The heads as a compiled loop steps them, None if it cannot step one of them."""
+        records = np.zeros(self.n, dtype=HEAD)
+        for record, model, strips in zip(records, self.models, self._strips, strict=True):
+            if not isinstance(model, SteppedHead):
+                return None
+            fill_head(record, {**model.record(), "first": strips.start})
+        return records
+
+    def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
+        """Fill in what heads of ``records`` depend on in steps to ``times`` [s].
+
+        ``drives`` (len(times), n, `head_records.drive_width`).
+        """
+        for number, model in enumerate(self.models):
+            assert isinstance(model, SteppedHead)
+            model.fill_drives(times, drives[:, number])
 
     def look_at_joints(self) -> None:
         """Note by how much joints are open now. Does nothing where there are no models."""
@@ -160,7 +184,7 @@ class Pantographs:
         """Make and place all models. Rank 0 only."""
         velocity = np.zeros(self.n)
         if isinstance(problem.contact, KinematicLaw):
-            velocity = self._speed * self._wire.rest_slope(self._start)
+            velocity = self.speed * self._wire.rest_slope(self._start)
         for number, placement in enumerate(problem.train.placements):
             model = self._make(problem, placement, nominal_height(placement))
             model.place(float(self.head_height[number]), float(velocity[number]))

@@ -20,7 +20,7 @@ found: Newton's method, which for a convex spring comes from one side and cannot
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -251,9 +251,15 @@ class InnerProblem:
     def _bind(self, heads: Heads, line: LineResponse) -> None:
         """Let the compiled loop work on these answers, mostly those of the step before."""
         self._bound_to = heads.numbers, line.rows
-        self._solve = bound(
-            complementarity_kernels.solve,
-            heads.numbers,
+        self._solve = bound(complementarity_kernels.solve, *self.solving(heads.numbers, line))
+
+    def solving(self, heads: np.ndarray, line: LineResponse) -> tuple[Any, ...]:
+        """Arguments of ``inner_kernels.solve``; some are others when more droppers need room.
+
+        ``heads`` (2 n + 2 n^2,) are the numbers of a ``HeadState``.
+        """
+        return (
+            heads,
             line.summed,
             line.rows,
             line.limits,

@@ -66,12 +66,18 @@ class _RemembersLaw:
 
 
 class Implicit(_RemembersLaw):
-    """Linearly implicit through both compliances, stable for every stiffness and mass."""
+    """Linearly implicit through both compliances, stable for every stiffness and mass.
+
+    Attributes
+    ----------
+    inner : InnerProblem
+    """
 
     extrapolates = False
 
     def __init__(self, inner: InnerProblem) -> None:
         self.law = inner.law
+        self.inner = inner
         self.solve = inner.solve
 
 

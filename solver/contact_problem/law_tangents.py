@@ -64,6 +64,14 @@ class LawInSteps(Protocol):
     def reported(self, force: np.ndarray) -> np.ndarray:
         """What of the forces (n,) of the latest step is to be recorded [N]."""
 
+    def in_loop(self) -> tuple[float, float, np.ndarray, np.ndarray] | None:
+        """What ``accept`` and ``reported`` are in a compiled loop, None if they are not.
+
+        The weight of the new force in what is reported, 0 where that is the force itself; the time
+        [s] from which on the law does not pull; the latest forces, and what is reported, (n,) each
+        [N].
+        """
+
     def state(self) -> np.ndarray:
         """All that is remembered, as one array."""
 
@@ -100,6 +108,10 @@ class _Tangents:
     def reported(self, force: np.ndarray) -> np.ndarray:
         """The forces themselves."""
         return force
+
+    def in_loop(self) -> tuple[float, float, np.ndarray, np.ndarray] | None:
+        """Forces count as they are."""
+        return 0.0, 0.0, np.zeros(0), np.zeros(self.n)
 
     def state(self) -> np.ndarray:
         """Nothing."""
@@ -163,6 +175,9 @@ class HertzInSteps(_Tangents):
         free = depth <= 0.0
         self._speed[free] = np.maximum(rate[free], self._law.least_speed)
 
+    def in_loop(self) -> None:
+        """A law that is not linear is linearised again and again, which no loop does."""
+
     def state(self) -> np.ndarray:
         """Speeds of impact of those that touch, or of the next impact."""
         return self._speed.copy()
@@ -190,7 +205,7 @@ class KinematicInSteps(_Tangents):
 
     def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
         """End the run where head and wire would have to pull at each other."""
-        self._mean = self._gamma * force + (1.0 - self._gamma) * self._force
+        self._mean[:] = self._gamma * force + (1.0 - self._gamma) * self._force
         self._force[:] = force
         if time > self._from_time and (self._mean < 0.0).any():
             number = int(np.argmin(self._mean)) + 1
@@ -203,6 +218,10 @@ class KinematicInSteps(_Tangents):
     def reported(self, force: np.ndarray) -> np.ndarray:
         """The mean over the step."""
         return self._mean
+
+    def in_loop(self) -> tuple[float, float, np.ndarray, np.ndarray]:
+        """What of the forces is reported, and from when on none may pull."""
+        return self._gamma, self._from_time, self._force, self._mean
 
     def state(self) -> np.ndarray:
         """The latest force itself."""

@@ -19,6 +19,7 @@ from catenary.solver.contact import contact_kernels
 from catenary.solver.contact_problem import complementarity_kernels
 from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_state import Motion
+from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.linear import unique_rows
 from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.step_operators import LineOperators, Loads
@@ -80,6 +81,12 @@ class LineMotion(ABC):
         self.look_at(np.zeros((0, 2), np.int64), np.zeros((0, 4)), np.zeros(0))
         # PETSc's time loop wants the solution as a vector; it wraps our array.
         self.solution = PETSc.Vec().createWithArray(self.displacement, size=(n, None), comm=comm)
+
+    @property
+    def passes(self) -> StationPasses | None:
+        """What takes free steps without loads in compiled code, None if these are taken in
+        parts."""
+        return None
 
     @property
     def displacement(self) -> np.ndarray:

@@ -53,6 +53,11 @@ class NewmarkLine(LineMotion):
             motion.put(self.displacement, self.velocity, self.acceleration)
             self.motion = motion
 
+    @property
+    def passes(self) -> StationPasses | None:
+        """What takes free steps without loads, if they are taken in two passes."""
+        return self._passes
+
     def predict(self) -> None:
         """Turn displacement and velocity into their predictions of eq. (2.5)."""
         state_kernels.predict(

@@ -244,6 +244,11 @@ def wants_solution() -> bool:
     return _is_given(f"{PREFIX}ts_monitor_", f"{PREFIX}ts_save_trajectory")
 
 
+def wants_single_steps() -> bool:
+    """Whether PETSc's options ask to drive, see or time steps one by one."""
+    return _is_given(f"{PREFIX}ts_", "log_")
+
+
 def _destroy(*objects: PETSc.Object) -> None:
     for held in objects:
         held.destroy()

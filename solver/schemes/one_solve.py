@@ -57,6 +57,14 @@ class OneSolve:
         self._events = {name: event(name) for name in NAMES}
 
     def step(self, time: float, stop: bool) -> bool:
+        self.begin(time)
+        return self.finish(time, stop)
+
+    def begin(self, time: float) -> None:
+        """Take the line to the end of the step at ``time`` [s] without contacts and slack droppers.
+
+        Collective, as ``finish``.
+        """
         line, interaction, events = self.interaction.line, self.interaction, self._events
         events["LineColumns"].begin()
         self.pantographs.move_to(time)
@@ -72,8 +80,12 @@ class OneSolve:
             interaction.droppers.tension()
         else:
             line.free_step(self.loads(time))
-        # From here on the line holds the end of the step without contacts and slack droppers.
         events["LineFree"].end()
+
+    def finish(self, time: float, stop: bool) -> bool:
+        """Find the forces of a step that has begun and take line and pantographs to its end; as
+        ``step``."""
+        interaction, events = self.interaction, self._events
         reply = self._solve_inner(time, stop)
         if self.judge is not None:
             self.judge.hear(reply.level)
@@ -106,6 +118,11 @@ class OneSolve:
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
         self.coupling.restore(state)
+
+    @property
+    def share(self) -> LineResponse:
+        """This rank's share of the inner problem, another one when it needs more room."""
+        return self._exchange.share
 
     @property
     def traffic(self) -> tuple[int, int]:

@@ -1,7 +1,8 @@
 """The march: PETSc's TS drives our stepper, and observers are shown every state.
 
 The Newmark family runs as a TS of type ``python``: PETSc owns the time loop, its options (prefix
-``march_``), its monitors and its events; the stepper advances line and pantographs by one step.
+``march_``), its monitors and its events; the stepper advances line and pantographs, by one step or,
+where nobody looks at each, by a block of them.
 
 Incidents cut a march into parts, each with a TS, matrices and columns of its own: a step of any
 part costs what it costs without incidents. What happens at the end of a step is shown before.
@@ -23,10 +24,14 @@ from mpi4py import MPI
 from catenary.solver.base.errors import CatenaryError, InputError, RunBroken
 from catenary.solver.base.flush_to_zero import taken_for_zero
 from catenary.solver.base.petsc import PETSc
-from catenary.solver.base.petsc_events import event
 from catenary.solver.contact.contact_wire import ContactWire
 from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
-from catenary.solver.linear.petsc_solvers import PREFIX, refused_options, wants_solution
+from catenary.solver.linear.petsc_solvers import (
+    PREFIX,
+    refused_options,
+    wants_single_steps,
+    wants_solution,
+)
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import DropperBreak, Happened, in_steps
@@ -41,7 +46,9 @@ from catenary.solver.statics.after_incidents import (
     unchanged,
 )
 from catenary.solver.statics.equilibrium import Elasticity, Equilibrium
-from catenary.solver.time_loop.observers import Observer, Stage
+from catenary.solver.time_loop.audience import Audience
+from catenary.solver.time_loop.compiled_steps import compiled_steps
+from catenary.solver.time_loop.observers import Observer
 from catenary.solver.time_loop.step_views import Showing
 from catenary.solver.time_loop.ts_stepper import Stepper
 
@@ -99,7 +106,6 @@ class March:
         self._wire = ContactWire(model, form, self.ownership)
         self._pantographs = Pantographs(comm, problem, self._wire, self._nominal_height)
         self._set_ups = SetUp(comm, form, self.ownership, self._nominal_height)
-        self._show_event = event("Show")
         self._set_up(unchanged(model))
         self._first_step = 0
         self._ahead = self._happening()
@@ -220,16 +226,18 @@ class March:
         since = first
         ahead = [happened for happened in self._ahead if happened.step < self.n_steps]
         ends = [*(happened.step for happened in ahead), self.n_steps]
-        show = self._shown_to_petsc(self._shown_to(observers))
-        ts = self._make_ts(show, stop_requested, first, ends[0])
+        # PETSc's monitors of the solution look at each.
+        fill = self._line_fills_solution if wants_solution() else None
+        audience = Audience(observers, fill)
+        ts = self._make_ts(audience, stop_requested, first, ends[0])
         try:
-            self._start(observers, self._showing.stage(dt, first * dt, self.n_steps))
+            audience.start(self._showing.stage(dt, first * dt, self.n_steps))
         except RunBroken:
             ts.destroy()
             raise
         begin = clock.perf_counter()
         try:
-            show(first, first * dt)
+            audience.show(lambda: self._showing.view(first, first * dt))
         except RunBroken as error:
             self._stepper.broken = str(error)
         else:
@@ -244,7 +252,7 @@ class March:
                 self._stepper.broken = str(error)
                 break
             since = happened.step
-            ts = self._make_ts(show, stop_requested, since, end)
+            ts = self._make_ts(audience, stop_requested, since, end)
             self._advance(ts)
         wall = clock.perf_counter() - begin
         if self._stepper.broken:
@@ -258,7 +266,7 @@ class March:
         elif self._stepper.stopped or self._stepper.step_number < self.n_steps:
             # The latter if PETSc was told to end early, for instance by -march_ts_max_steps.
             outcome = "interrupted"
-        outcome = _finish(observers, outcome)
+        outcome = audience.finish(outcome)
         n_steps = self._stepper.step_number - first
         return Outcome(
             outcome,
@@ -301,52 +309,24 @@ class March:
         self._comm.Allreduce(MPI.IN_PLACE, sent, op=MPI.MAX)
         return float(sent[0]), float(sent[1])
 
-    @staticmethod
-    def _start(observers: Sequence[Observer], stage: Stage) -> None:
-        for number, observer in enumerate(observers):
-            try:
-                observer.start(stage)
-            except RunBroken as error:
-                _finish(observers[:number], str(error))
-                raise
-
-    def _shown_to(self, observers: Sequence[Observer]) -> Callable[[int, float], None]:
-        """How observers are shown a state: by number and time of its step."""
-        if not observers:
-            return lambda step, time: None
-
-        def show(step: int, time: float) -> None:
-            self._show_event.begin()
-            try:
-                view = self._showing.view(step, time)
-                for observer in observers:
-                    observer.observe(view)
-            finally:
-                self._show_event.end()
-
-        return show
-
-    def _shown_to_petsc(self, show: Callable[[int, float], None]) -> Callable[[int, float], None]:
-        """The same, followed by PETSc's monitors of the solution if there are any."""
-        if not wants_solution():
-            return show
-
-        def show_both(step: int, time: float) -> None:
-            show(step, time)
-            self._line.fill_solution()
-
-        return show_both
+    def _line_fills_solution(self) -> None:
+        self._line.fill_solution()
 
     def _make_ts(
         self,
-        show: Callable[[int, float], None],
+        audience: Audience,
         stop_requested: Callable[[], bool],
         first: int,
         end: int,
     ) -> PETSc.TS:
         """The time loop from step ``first``, shown already, to step ``end``. Collective."""
         dt = self._problem.numerics.dt
-        self._stepper = Stepper(self._scheme, first, dt, stop_requested, show)
+        blocks = None
+        if not wants_single_steps():
+            blocks = compiled_steps(self._scheme, self._showing, dt, audience.looks)
+        self._stepper = Stepper(
+            self._scheme, self._showing, audience, stop_requested, dt, (first, end), blocks
+        )
         ts = PETSc.TS().create(self._comm)
         ts.setOptionsPrefix(PREFIX)
         ts.setProblemType(PETSc.TS.ProblemType.NONLINEAR)
@@ -387,17 +367,3 @@ class March:
         if found:
             ts.destroy()
             raise InputError(f"the PETSc option -{PREFIX}ts{found}")
-
-
-def _finish(observers: Sequence[Observer], outcome: str) -> str:
-    """Tell observers how the march ended; return how it ended after that.
-
-    An observer that breaks now changes a good end to its sentence for those that follow.
-    """
-    for observer in observers:
-        try:
-            observer.finish(outcome)
-        except RunBroken as error:
-            if outcome in ("done", "interrupted"):
-                outcome = str(error)
-    return outcome

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -125,3 +125,27 @@ class Observer(Protocol):
 
     def finish(self, outcome: str) -> None:
         """After the last step: "done", "interrupted" or the sentence of what broke."""
+
+
+@runtime_checkable
+class BlockObserver(Observer, Protocol):
+    """An observer to whom the rows of many steps may be shown at once, which costs little a step.
+
+    Steps are shown to it in order: by ``observe_rows``, or by ``observe``.
+    """
+
+    def next_state(self, step: int) -> int:
+        """The next step after ``step`` that ``observe`` has to show, as it needs more than the row.
+
+        Asked when all steps up to ``step`` are shown.
+        """
+
+    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
+        """After steps before the next state, of which only the rows are left. Not collective.
+
+        Parameters
+        ----------
+        first_step : number of the step of the first row
+        times : (k,) [s]
+        rows : (k, n), ``StepView.row`` of each; overwritten by what is shown next
+        """

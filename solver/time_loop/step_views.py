@@ -30,6 +30,10 @@ class Showing:
     comm : mpi4py communicator
     line, form : the line as it is now, and its first rest, from which displacements count
     kept_ratio : share of its stiffness that a slack dropper keeps
+
+    Attributes
+    ----------
+    showing : arguments of ``kernels.show`` before what it fills
     """
 
     def __init__(
@@ -79,16 +83,15 @@ class Showing:
             constraint_violation=pantographs.constraint_violation,
         )
 
-        self._show = bound(
-            state_kernels.show,
+        self.showing = (
             self._line.motion.read,
             self._arm_rows,
             interaction.droppers.shown_ends,
             interaction.droppers.shown_laws,
             self._pushed_share,
-            self._view.arm_uplift,
-            self._view.dropper_force,
         )
+        view = self._view
+        self._show = bound(state_kernels.show, *self.showing, view.arm_uplift, view.dropper_force)
 
     def stage(self, dt: float, start_time: float, n_steps: int) -> Stage:
         """What stays the same for the whole run."""
@@ -117,6 +120,18 @@ class Showing:
         view.row[: told.size] = told
         self._show()
         return view
+
+    def view_of(self, step: int, time: float, row: np.ndarray) -> StepView:
+        """The state after a step that a compiled loop has shown as ``row`` of a view."""
+        view = self._view
+        view.step, view.time = step, time
+        view.row[:] = row
+        return view
+
+    @property
+    def width(self) -> int:
+        """Numbers of a row of a view."""
+        return int(self._view.row.size)
 
     def restore(self, checkpoint: dict[str, Any]) -> None:
         """Continue from a checkpoint, which all ranks pass. Collective.

@@ -1,24 +1,35 @@
-"""One step at a time, as PETSc's TS of type ``python`` asks for it."""
+"""Steps as PETSc's TS of type ``python`` asks for them: one at a time, or a block of them."""
 
 from __future__ import annotations
 
+import time as clock
 from collections.abc import Callable
 
 from catenary.solver.base.errors import NotConverged, RunBroken
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.schemes.scheme import Scheme
+from catenary.solver.time_loop.audience import Audience
+from catenary.solver.time_loop.compiled_steps import CompiledSteps
+from catenary.solver.time_loop.step_views import Showing
+
+# Wall time of a block [s], after which a wish to stop is seen, and steps of the first one.
+_BLOCK_TIME, _FIRST_BLOCK = 0.05, 16
+# So many times more steps may the next one have.
+_GROWTH = 4
 
 
 class Stepper:
     """Context of a TS of type ``python`` that advances a scheme and shows each step.
 
     A step that breaks is told with its time and place, whatever broke in it, and counted if its
-    equations were not solved.
+    equations were not solved. For PETSc a block is a step, but for the number of the step.
 
     Parameters
     ----------
-    show : called with number and time [s] of each good step; raises RunBroken, on all ranks, if
-        nobody can watch any longer
+    audience : is shown each good step; it raises RunBroken, on all ranks, if nobody can watch any
+        longer
+    steps : number of the first step, which is shown already, and of the last one
+    blocks : takes steps of the scheme many at once, None to take each for itself
 
     Attributes
     ----------
@@ -30,39 +41,36 @@ class Stepper:
     def __init__(
         self,
         scheme: Scheme,
-        first_step: int,
-        dt: float,
+        showing: Showing,
+        audience: Audience,
         stop_requested: Callable[[], bool],
-        show: Callable[[int, float], None],
+        dt: float,
+        steps: tuple[int, int],
+        blocks: CompiledSteps | None,
     ) -> None:
         self._scheme = scheme
-        self._dt = dt
+        self._showing = showing
+        self._audience = audience
         self._stop_requested = stop_requested
-        self._show = show
-        self.step_number = first_step
+        self._dt = dt
+        self.step_number, self._end = steps
+        self._blocks = blocks
+        self._most = _FIRST_BLOCK
         self.stopped = False
         self.broken = ""
 
     def step(self, ts: PETSc.TS) -> None:
         """Called by PETSc; errors may not pass through it, so they are kept for the march."""
-        # Times are multiples of dt, not sums, so that a long run does not drift.
-        time = (self.step_number + 1) * self._dt
+        goes_on, stop = True, self._stop_requested()
         try:
-            goes_on = self._scheme.step(time, self._stop_requested())
-        except RunBroken as error:
-            scheme = self._scheme
-            scheme.counters.unconverged_steps += isinstance(error, NotConverged)
-            place = float(scheme.pantographs.position[0])
-            step = f"the step to t = {time:.4f} s with the train at {place:.1f} m"
-            self._give_up(ts, f"{step}: {error}")
-            return
-        self.step_number += 1
-        try:
-            self._show(self.step_number, time)
+            if self._blocks is None or stop:
+                goes_on = self._step(stop)
+            else:
+                self._take(self._blocks, ts)
         except RunBroken as error:
             self._give_up(ts, str(error))
             return
-        ts.setTime(time)
+        ts.setTime(self.step_number * self._dt)
         if not goes_on:
             self.stopped = True
             ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
@@ -71,14 +79,57 @@ class Stepper:
         """Whether nothing broke or stopped before the end of this step."""
         return not (self.broken or self.stopped) and self.step_number == step
 
-    def _give_up(self, ts: PETSc.TS, why: str) -> None:
-        """End the time loop because of an error that the march reports."""
-        self.broken = why
-        # Not a reason of failure, for which PETSc would raise an error of its own.
-        ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
-
     def view(self, ts: PETSc.TS, viewer: PETSc.Viewer) -> None:
         """Name the scheme in -march_ts_view."""
         viewer.printfASCII(
             f"  step of the line and its train by scheme {type(self._scheme).__name__}\n"
         )
+
+    def _step(self, stop: bool) -> bool:
+        """Take one step and show it; False if the scheme wants no further one."""
+        number = self.step_number + 1
+        # Times are multiples of dt, not sums, so that a long run does not drift.
+        time = number * self._dt
+        try:
+            goes_on = self._scheme.step(time, stop)
+        except RunBroken as error:
+            raise self._told(error) from error
+        self.step_number = number
+        self._audience.show(lambda: self._showing.view(number, time))
+        return goes_on
+
+    def _take(self, blocks: CompiledSteps, ts: PETSc.TS) -> None:
+        """Take as many steps as nobody looks between, and show them."""
+        first = self.step_number
+        until = min(self._end, self._audience.next_state(first))
+        n_steps = min(until - first, blocks.most, self._most)
+        begin, broken = clock.perf_counter(), None
+        try:
+            blocks.take(first, n_steps)
+        except RunBroken as error:
+            broken = error
+        spent = clock.perf_counter() - begin
+        allowed = int(_BLOCK_TIME * n_steps / max(spent, 1e-9))
+        self._most = max(1, min(_GROWTH * self._most, allowed))
+        taken = blocks.taken
+        self.step_number = first + taken
+        # A state can be looked at after the last step only, if that is not amid the next one.
+        passed = taken if broken is not None else taken - 1
+        self._audience.show_rows(first + 1, blocks.times[:passed], blocks.rows[:passed])
+        if broken is not None:
+            raise self._told(broken) from broken
+        self._audience.show(lambda: blocks.last_view(self.step_number))
+        ts.setStepNumber(self.step_number - 1)  # PETSc adds one
+
+    def _told(self, error: RunBroken) -> RunBroken:
+        """The error of the next step with its time and place."""
+        scheme = self._scheme
+        scheme.counters.unconverged_steps += isinstance(error, NotConverged)
+        time, place = (self.step_number + 1) * self._dt, float(scheme.pantographs.position[0])
+        return RunBroken(f"the step to t = {time:.4f} s with the train at {place:.1f} m: {error}")
+
+    def _give_up(self, ts: PETSc.TS, why: str) -> None:
+        """End the time loop because of an error that the march reports."""
+        self.broken = why
+        # Not a reason of failure, for which PETSc would raise an error of its own.
+        ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)

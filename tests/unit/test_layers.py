@@ -23,6 +23,7 @@ LEAVES = {
     "catenary.solver.base.bound",
     "catenary.solver.base.compiled",
     "catenary.solver.base.loop_cache",
+    "catenary.solver.base.pointers",
     "catenary.solver.base.errors",
     "catenary.solver.base.python_signals",
     "catenary.solver.base.parallel",

@@ -1,0 +1,156 @@
+"""Many steps of the scheme ``one_solve`` in one call, on one rank, as far as a loop can take them.
+
+A step whose forces the loop does not find, because an active set cycles, a bound was too small, or
+something is no number, is finished by the scheme itself, from where the loop has left it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from catenary.mbs.head.head_records import drive_width
+from catenary.solver.base.bound import bound
+from catenary.solver.base.petsc_events import event
+from catenary.solver.base.pointers import address_of_function
+from catenary.solver.contact_problem.coupling import Implicit
+from catenary.solver.schemes.one_solve import OneSolve
+from catenary.solver.schemes.scheme import Scheme
+from catenary.solver.time_loop import step_kernels
+from catenary.solver.time_loop.observers import StepView
+from catenary.solver.time_loop.step_kernels import ROUNDS, SLACK, Steps
+from catenary.solver.time_loop.step_views import Showing
+
+# What rows of a block may take, so that it stays in the caches [B], and the most of them.
+_BLOCK_BYTES, _MOST_ROWS = 2**19, 512
+
+
+class CompiledSteps:
+    """Takes steps of a scheme and keeps the rows that observers are shown. One rank only.
+
+    Attributes
+    ----------
+    most : steps of the largest block
+    times : (most,) of the steps of the latest block [s]
+    rows : (most, width) what each of them shows; empty if nobody looks
+    taken : steps of the latest block that were taken, fewer than asked for if one broke
+
+    Parameters
+    ----------
+    dt : time step [s]
+    shows : whether rows are wanted
+    """
+
+    def __init__(self, scheme: OneSolve, showing: Showing, dt: float, shows: bool) -> None:
+        self._scheme, self._showing, self._dt, self._shows = scheme, showing, dt, shows
+        width = showing.width
+        self.most = max(1, min(_MOST_ROWS, _BLOCK_BYTES // (8 * width)))
+        self.rows = np.zeros((self.most if shows else 0, width))
+        self.times = np.zeros(self.most)
+        self.taken = 0
+        pantographs, interaction = scheme.pantographs, scheme.interaction
+        n = pantographs.n_contacts
+        records, passes = pantographs.records(), interaction.line.passes
+        law = scheme.coupling.law.in_loop()
+        assert records is not None and passes is not None and law is not None
+        self._free = address_of_function(passes.kernel, passes.arguments), passes.arguments
+        self._records, self._law = records, law
+        self._heads = np.zeros(2 * n * (1 + n))
+        self._drives = np.zeros((self.most, pantographs.n, drive_width(max(pantographs.n_strips))))
+        self._counts = np.zeros(2, dtype=np.int64)
+        self._bound_to: tuple[Any, ...] = ()
+        self._event = event("Steps")
+        self._loop()  # compiled, or loaded, before the clock of a march starts
+
+    def take(self, step: int, n_steps: int) -> None:
+        """Take ``n_steps`` <= ``most`` steps after the one of number ``step``.
+
+        Raises
+        ------
+        RunBroken
+            As ``OneSolve.step``; ``taken`` steps are then taken and shown.
+        """
+        scheme, self.taken = self._scheme, 0
+        times = self.times[:n_steps]
+        np.multiply(np.arange(step + 1, step + 1 + n_steps), self._dt, out=times)
+        scheme.pantographs.fill_drives(times.tolist(), self._drives[:n_steps])
+        while self.taken < n_steps:
+            if self._take_on(n_steps):
+                time = float(times[self.taken])
+                scheme.finish(time, stop=False)
+                if self._shows:
+                    number = step + self.taken + 1
+                    self.rows[self.taken] = self._showing.view(number, time).row
+                self.taken += 1
+
+    def last_view(self, step: int) -> StepView:
+        """The state after the latest block, ``step`` being the number of its last step."""
+        last = self.taken - 1
+        return self._showing.view_of(step, float(self.times[last]), self.rows[last])
+
+    def _take_on(self, n_steps: int) -> bool:
+        """Go on with a block as far as the loop can; whether the scheme has to finish a step."""
+        self._event.begin()
+        first, counts, counters = self.taken, self._counts, self._scheme.counters
+        counts[:] = 0
+        done, begun = self._loop()(first, n_steps)
+        counters.steps += done
+        counters.solves += done
+        counters.rounds += int(counts[ROUNDS])
+        counters.slack_dropper_steps += int(counts[SLACK])
+        self.taken += done
+        self._event.end()
+        return bool(begun)
+
+    def _loop(self) -> Callable[[int, int], tuple[int, bool]]:
+        """The compiled loop, on the arrays that the scheme has now."""
+        scheme = self._scheme
+        coupling, pantographs, interaction = scheme.coupling, scheme.pantographs, scheme.interaction
+        assert isinstance(coupling, Implicit)
+        solving = coupling.inner.solving(self._heads, scheme.share)
+        # Arrays that a step may exchange for larger ones.
+        now = solving[2], solving[9]
+        if len(self._bound_to) == 2 and all(
+            a is b for a, b in zip(now, self._bound_to, strict=True)
+        ):
+            return self._bound
+        self._bound_to = now
+        steps = Steps(
+            speed=float(pantographs.speed),
+            moving=pantographs.moving,
+            placing=interaction.placing,
+            free=self._free,
+            records=self._records,
+            heads=self._heads,
+            responding=interaction.responding(scheme.share),
+            solving=solving,
+            law=self._law,
+            superposing=interaction.superposing,
+            compensating=interaction.compensating,
+            pushed=np.zeros(solving[9].shape[0], dtype=np.int64),
+            ends=pantographs.ends,
+            of_step=pantographs.of_step,
+            told=pantographs.told,
+            showing=self._showing.showing,
+        )
+        arguments = steps, self.times, self._drives, self.rows, self._counts, self._shows
+        self._bound = bound(step_kernels.take, *arguments, later=(0, 0))
+        return self._bound
+
+
+def compiled_steps(
+    scheme: Scheme, showing: Showing, dt: float, shows: bool
+) -> CompiledSteps | None:
+    """What takes steps of a scheme in one loop, None if there is no such loop. Not collective."""
+    if not isinstance(scheme, OneSolve) or scheme.comm.size > 1 or scheme.judge is not None:
+        return None
+    line = scheme.interaction.line
+    if not isinstance(scheme.coupling, Implicit) or line.passes is None:
+        return None
+    if not hasattr(step_kernels.take, "overloads"):
+        return None  # Numba was told to compile nothing
+    if scheme.coupling.law.in_loop() is None or scheme.pantographs.records() is None:
+        return None
+    return CompiledSteps(scheme, showing, dt, shows)

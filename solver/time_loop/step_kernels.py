@@ -1,0 +1,147 @@
+"""Steps of the scheme ``one_solve`` on one rank as one compiled loop, and what it is called with.
+
+It calls the kernels that a step from Python calls, with the same arguments: what is said of these
+there holds here. Not collective.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from catenary.mbs.head import head_records
+from catenary.solver.base.compiled import compiled
+from catenary.solver.base.pointers import call
+from catenary.solver.contact import contact_kernels
+from catenary.solver.contact_problem import complementarity_kernels
+from catenary.solver.contact_problem.complementarity_kernels import NUMBER
+from catenary.solver.integrators import state_kernels
+
+# Numbers of ``counts``, named as in `schemes.Counters`.
+ROUNDS, SLACK = 0, 1
+
+
+class Steps(NamedTuple):
+    """What steps are made of.
+
+    Attributes
+    ----------
+    speed : of the train [m/s]
+    moving : start and places of contacts and pantographs, see ``kernels.shift``
+    placing, responding, solving : arguments of ``place``, ``respond`` and ``solve``
+    superposing, compensating : of ``superpose`` and ``compensate`` after the forces
+    showing : of ``kernels.show`` before what it fills
+    free : address and arguments of the line's free step, see ``pointers.call``
+    records : of all heads, ``head_records.HEAD``
+    heads : (2 n + 2 n^2,) all strips as functions of the forces, see ``HeadState``
+    law : numbers of the contact law, see ``report``
+    ends : of the contacts of each pantograph, see ``inner_kernels.tell``
+    pushed : (m,) int, room for the numbers of slack droppers
+    told : what the pantographs tell, of which ``of_step`` is filled by a step
+    """
+
+    speed: float
+    moving: tuple[Any, ...]
+    placing: tuple[Any, ...]
+    free: tuple[int, tuple[Any, ...]]
+    records: np.ndarray
+    heads: np.ndarray
+    responding: tuple[Any, ...]
+    solving: tuple[Any, ...]
+    law: tuple[Any, ...]
+    superposing: tuple[Any, ...]
+    compensating: tuple[Any, ...]
+    pushed: np.ndarray
+    ends: np.ndarray
+    of_step: np.ndarray
+    told: np.ndarray
+    showing: tuple[Any, ...]
+
+
+@compiled
+def report(time, force, law):
+    """Whether the contact law holds for ``force`` (n,) at ``time`` [s]; if so it is remembered.
+
+    A law that remembers forces has ``gamma`` > 0 and counts their mean over the step, as
+    `KinematicInSteps` says.
+    """
+    gamma, from_time, before, reported = law
+    if gamma == 0.0:
+        for i in range(force.size):
+            reported[i] = force[i]
+        return True
+    for i in range(force.size):
+        if time > from_time and gamma * force[i] + (1.0 - gamma) * before[i] < 0.0:
+            return False
+    for i in range(force.size):
+        reported[i] = gamma * force[i] + (1.0 - gamma) * before[i]
+        before[i] = force[i]
+    return True
+
+
+@compiled
+def find_forces(time, steps, response, counts):
+    """Contact forces and compensations into the arrays of ``steps.solving``.
+
+    Returns the number of droppers with a compensation, -1 if that is left to others.
+    """
+    summed, rows, room = response
+    solution = steps.solving[11]
+    n = steps.ends[-1]
+    if summed[2] or summed[3] or n + int(summed[0]) > room:
+        return -1
+    rounds, size, finite, complete = complementarity_kernels.solve(*steps.solving)
+    if rounds <= 0 or not finite or not complete:
+        return -1
+    if not report(time, solution[:n], steps.law):
+        return -1
+    counts[ROUNDS] += rounds
+    for k in range(size - n):
+        steps.pushed[k] = int(rows[k, NUMBER])
+        counts[SLACK] += solution[n + k] != 0.0
+    return size - n
+
+
+@compiled
+def take(steps, times, drives, rows, counts, shows, first, n_steps):
+    """Take the steps from ``first`` on of ``n_steps`` to ``times`` [s], with ``drives`` of heads.
+
+    If ``shows``, ``rows`` take what each shows. Returns how many were taken, and whether the next
+    one is begun: up to its free step, as its forces are left to others.
+    """
+    n = steps.ends[-1]
+    start, places = steps.moving
+    address, arguments = steps.free
+    summed, table = steps.responding[13], steps.responding[14]
+    response = summed, table, steps.solving[9].shape[0]
+    solution, depth = steps.solving[11], steps.solving[12][0]
+    n_told = steps.told.size
+    motion, arms, ends, laws, kept = steps.showing
+    for i in range(first, n_steps):
+        time = times[i]
+        state_kernels.shift(start, places, steps.speed * time)
+        contact_kernels.place(*steps.placing)
+        call(address, arguments)
+        within = True
+        for h in range(steps.records.size):
+            within &= head_records.predict(steps.records[h], drives[i, h], steps.heads, n)
+        contact_kernels.respond(*steps.responding)
+        n_slack = find_forces(time, steps, response, counts) if within else -1
+        if n_slack < 0:
+            return i - first, True
+        force = solution[:n]
+        contact_kernels.superpose(force, *steps.superposing)
+        if n_slack:
+            slack = solution[n : n + n_slack]
+            contact_kernels.compensate(steps.pushed[:n_slack], slack, *steps.compensating)
+        for h in range(steps.records.size):
+            head_records.move(steps.records[h], force)
+        reported = steps.law[3]
+        complementarity_kernels.tell(force, reported, steps.heads, depth, steps.ends, steps.of_step)
+        if shows:
+            row = rows[i]
+            row[:n_told] = steps.told
+            uplift = row[n_told : n_told + arms.size]
+            state_kernels.show(motion, arms, ends, laws, kept, uplift, row[n_told + arms.size :])
+    return n_steps - first, False
