@@ -60,7 +60,8 @@ class CompiledSteps:
         self._heads = np.zeros(2 * n * (1 + n))
         self._drives = np.zeros((self.most, pantographs.n, drive_width(max(pantographs.n_strips))))
         self._counts = np.zeros(2, dtype=np.int64)
-        self._bound_to: tuple[Any, ...] = ()
+        self._bound_to = (0, 0)
+        self._bound: Callable[[int, int], tuple[int, bool]]
         self._event = event("Steps")
         self._loop()  # compiled, or loaded, before the clock of a march starts
 
@@ -106,17 +107,20 @@ class CompiledSteps:
 
     def _loop(self) -> Callable[[int, int], tuple[int, bool]]:
         """The compiled loop, on the arrays that the scheme has now."""
-        scheme = self._scheme
-        coupling, pantographs, interaction = scheme.coupling, scheme.pantographs, scheme.interaction
+        coupling = self._scheme.coupling
         assert isinstance(coupling, Implicit)
-        solving = coupling.inner.solving(self._heads, scheme.share)
-        # Arrays that a step may exchange for larger ones.
-        now = solving[2], solving[9]
-        if len(self._bound_to) == 2 and all(
-            a is b for a, b in zip(now, self._bound_to, strict=True)
-        ):
-            return self._bound
-        self._bound_to = now
+        solving = coupling.inner.solving(self._heads, self._scheme.share)
+        # A step may exchange these arrays for larger ones.
+        now = id(solving[2]), id(solving[9])
+        if now != self._bound_to:
+            self._bound_to, self._arguments = now, self._steps(solving)
+            self._bound = bound(step_kernels.take, *self._arguments, later=(0, 0))
+        return self._bound
+
+    def _steps(self, solving: tuple[Any, ...]) -> tuple[Any, ...]:
+        """Arguments of the loop but its last two."""
+        scheme = self._scheme
+        pantographs, interaction = scheme.pantographs, scheme.interaction
         steps = Steps(
             speed=float(pantographs.speed),
             moving=pantographs.moving,
@@ -135,9 +139,7 @@ class CompiledSteps:
             told=pantographs.told,
             showing=self._showing.showing,
         )
-        arguments = steps, self.times, self._drives, self.rows, self._counts, self._shows
-        self._bound = bound(step_kernels.take, *arguments, later=(0, 0))
-        return self._bound
+        return steps, self.times, self._drives, self.rows, self._counts, self._shows
 
 
 def compiled_steps(

@@ -1,0 +1,250 @@
+"""Steps in one compiled loop against the same steps from Python, and against each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import paper_pantograph as paper
+import pytest
+from measuring import start_march
+from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
+
+from catenary.mbs.head.strips import Strips, Suspension, Turning
+from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.vehicle.irregularity import Irregularity
+from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
+from catenary.meshgen.mesh import LineMesh
+from catenary.solver.base.errors import RunBroken
+from catenary.solver.contact_problem import complementarity
+from catenary.solver.problem.contact_laws import KinematicLaw, LinearLaw
+from catenary.solver.problem.problem import Placement, Problem
+from catenary.solver.schemes.one_solve import OneSolve
+from catenary.solver.time_loop import march as time_loop
+from catenary.solver.time_loop.march import Outcome
+from catenary.solver.time_loop.observers import Stage, StepView
+
+LINE = replace(ac_simple_line(4), stagger=(0.2, -0.2, 0.2, -0.2, 0.2))
+TWO = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0))
+PAIR = Strips(2, 0.56, 1.6, Suspension(1.0, 8000.0, 10.0))
+ROLLING = replace(TWO, strips=PAIR, roll=Turning(2.0, 600.0, 4.0))
+TRACK = (Irregularity("fra_6", 3.0, 100.0, 1), Harmonic(0.01, 1.3))
+# What runs alternately by the loop and from Python: pantographs, contact, effects.
+LINEAR = LinearLaw(5e4, 100.0)
+SCENES: dict[str, tuple[tuple[Any, ...], Any, set[str]]] = {
+    "one": ((TWO,), LinearLaw(5e4, 0.0), set()),
+    "light": ((LumpedData((1.0, 15.0), (4200.0, 50.0), (10.0, 90.0)),), LinearLaw(1e6, 0.0), set()),
+    "seven bodies": ((paper.data(),), LINEAR, {"contact_damping"}),
+    "two kinds": ((TWO, paper.data()), LINEAR, {"contact_damping"}),
+    "two strips that roll, on a track": (
+        (ROLLING, replace(paper.data(), strips=PAIR)),
+        LINEAR,
+        {"contact_damping", "head_roll", "vehicle_motion"},
+    ),
+    "kinematic": ((TWO,), KinematicLaw(), set()),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def mesh() -> LineMesh:
+    return mesh_of(LINE, 3)
+
+
+def problem(scene: str, n_steps: int = 200, raise_time: float = 0.15) -> Problem:
+    pantographs, law, effects = SCENES[scene]
+    start, speed, dt = 90.0, 75.0, 1e-3
+    placements = tuple(
+        Placement(data, 160.0, 40.0 * number, 5.0) for number, data in enumerate(pantographs)
+    )
+    usual = train(speed, start, start + n_steps * dt * speed, raise_time=raise_time)
+    usual = replace(usual, placements=placements, vehicle=VehicleMotion(TRACK, TRACK))
+    return problem_of(
+        LINE, WHOLE | effects, contact=law, train=usual, numerics=numerics(dt), evaluation=(95, 100)
+    )
+
+
+class Rows:
+    """Keeps the rows of all steps, in blocks that end every ``every`` steps."""
+
+    def __init__(self, every: int = 64) -> None:
+        self.every, self.rows, self.blocks = every, [], []
+        self.state: Any = None
+
+    def start(self, stage: Stage) -> None:
+        self.stage = stage
+
+    def next_state(self, step: int) -> int:
+        return step - step % self.every + self.every
+
+    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
+        assert first_step == len(self.rows)
+        assert np.array_equal(times, np.arange(first_step, first_step + len(rows)) * self.stage.dt)
+        self.rows += [row.copy() for row in rows]
+        self.blocks.append(len(rows))
+
+    def observe(self, view: StepView) -> None:
+        assert view.step == len(self.rows)
+        self.rows.append(view.row.copy())
+        self.state = view.checkpoint()
+
+    def finish(self, outcome: str) -> None:
+        self.outcome = outcome
+
+
+def run(
+    scene: Problem, mesh: LineMesh, rows: Rows, stop: Callable[[], bool] = lambda: False
+) -> Outcome:
+    march, _ = start_march(scene, mesh)
+    with march:
+        return march.run([rows], stop)
+
+
+@pytest.fixture
+def from_python(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[Rows, Outcome]]:
+    """Runs a scene step by step."""
+
+    def run_so(scene: Problem, mesh: LineMesh) -> tuple[Rows, Outcome]:
+        rows = Rows(1)
+        with monkeypatch.context() as patch:
+            patch.setattr(time_loop, "compiled_steps", lambda *arguments: None)
+            return rows, run(scene, mesh, rows)
+
+    return run_so
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_loop_gives_the_bits_of_steps_from_python(
+    scene: str, mesh: LineMesh, from_python: Any
+) -> None:
+    # A kinematic contact may pull while pantographs are raised.
+    raise_time = 0.3 if scene == "kinematic" else 0.15
+    asked = problem(scene, raise_time=raise_time)
+    expected, outcome = from_python(asked, mesh)
+    rows = Rows()
+    found = run(asked, mesh, rows)
+    assert found.outcome == outcome.outcome == "done"
+    assert np.array_equal(rows.rows, expected.rows, equal_nan=True)
+    assert max(rows.blocks) > 30
+    assert found.counters == outcome.counters
+    assert rows.state.keys() == expected.state.keys()
+    for name, values in rows.state.items():
+        assert np.array_equal(values, expected.state[name], equal_nan=True), name
+
+
+@pytest.mark.parametrize("fault", ["cycles", "room", "bound"])
+def test_the_scheme_finishes_the_steps_that_the_loop_leaves(
+    fault: str, mesh: LineMesh, from_python: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Sets that are given up at once, room for rows of two droppers, and too small bounds."""
+    scene = replace(problem("two kinds"), contact=LinearLaw(5e4, 0.0))
+    scene = replace(scene, train=replace(scene.train, placements=tuple(
+        replace(placement, static_force=400.0) for placement in scene.train.placements
+    )))  # fmt: skip
+    usual = from_python(scene, mesh)[0].rows
+    if fault == "cycles":
+        monkeypatch.setattr(complementarity, "_MAX_ROUNDS", 0)
+    elif fault == "room":
+        monkeypatch.setattr("catenary.solver.contact_problem.force_exchange._FIRST_CAPACITY", 2)
+        monkeypatch.setattr(complementarity, "_FIRST_ROOM", 1)
+    else:
+        monkeypatch.setattr("catenary.solver.schemes.one_solve._FIRST_BOUND", 1.0)
+        monkeypatch.setattr("catenary.solver.schemes.one_solve._FIRST_MARGIN", 1e-3)
+    finish, finished = OneSolve.finish, []
+
+    def counted(self: OneSolve, time: float, stop: bool) -> bool:
+        finished.append(time)
+        return finish(self, time, stop)
+
+    expected, outcome = from_python(scene, mesh)
+    monkeypatch.setattr(OneSolve, "finish", counted)
+    rows = Rows()
+    found = run(scene, mesh, rows)
+    assert 0 < len(finished) < len(rows.rows)
+    assert np.array_equal(rows.rows, expected.rows, equal_nan=True)
+    assert found.counters == outcome.counters
+    assert found.counters["slack_dropper_steps"] > 0
+    assert np.abs(np.array(rows.rows) - usual)[:, :8].max() < 1e-9
+    if fault == "cycles":
+        assert found.counters["pivoted_steps"] == len(finished) == found.n_steps
+    elif fault == "bound":
+        assert found.counters["repeated_steps"] > 0
+
+
+def test_a_step_that_breaks_amid_a_block_leaves_the_rows_before_it(
+    mesh: LineMesh, from_python: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    finish = OneSolve.finish
+    scene = problem("one", 100)
+    expected = from_python(scene, mesh)[0].rows
+
+    def breaks(self: OneSolve, time: float, stop: bool) -> bool:
+        if time > 0.0775:
+            raise RunBroken("it broke")
+        return finish(self, time, stop)
+
+    monkeypatch.setattr(OneSolve, "finish", breaks)
+    monkeypatch.setattr(complementarity, "_MAX_ROUNDS", 0)  # the loop finds nothing
+    rows = Rows(1000)
+    found = run(scene, mesh, rows)
+    assert found.outcome == "the step to t = 0.0780 s with the train at 95.8 m: it broke"
+    assert found.n_steps == 77 and len(rows.rows) == 78
+    assert np.abs(np.array(rows.rows) - expected[:78])[:, :5].max() < 1e-9
+
+
+def test_a_kinematic_contact_that_would_pull_ends_the_run_as_from_python(
+    mesh: LineMesh, from_python: Any
+) -> None:
+    scene = problem("kinematic", raise_time=0.07)
+    expected, outcome = from_python(scene, mesh)
+    assert "would have to pull" in outcome.outcome
+    rows = Rows()
+    found = run(scene, mesh, rows)
+    assert found.outcome == outcome.outcome and found.n_steps == outcome.n_steps > 50
+    assert np.array_equal(rows.rows, expected.rows, equal_nan=True)
+
+
+def test_a_wish_to_stop_is_seen_between_blocks(mesh: LineMesh) -> None:
+    asked: list[int] = []
+    rows = Rows(10**6)
+
+    def stop() -> bool:
+        asked.append(len(rows.rows))
+        return len(asked) == 3
+
+    found = run(problem("one", 1000), mesh, rows, stop)
+    assert found.outcome == rows.outcome == "interrupted"
+    # The step after the wish is the last one.
+    assert found.n_steps == asked[-1] and len(rows.rows) == asked[-1] + 1
+    assert asked[1] > 2
+
+
+def test_nobody_needs_to_look(mesh: LineMesh) -> None:
+    scene = problem("one", 200)
+    march, _ = start_march(scene, mesh)
+    with march:
+        bare = march.run([])
+    assert bare.outcome == "done" and bare.n_steps == 200
+    assert bare.counters == run(scene, mesh, Rows()).counters
+
+
+def test_an_observer_that_looks_at_each_state_is_shown_each(mesh: LineMesh) -> None:
+    by_blocks, march = Rows(), start_march(problem("one", raise_time=0.0), mesh)[0]
+    shown: list[float] = []
+
+    class Looking:
+        def start(self, stage: Stage) -> None:
+            """Nothing is needed."""
+
+        def observe(self, view: StepView) -> None:
+            shown.append(float(np.abs(view.node_uplift()).max()))
+
+        def finish(self, outcome: str) -> None:
+            """Nothing is left."""
+
+    with march:
+        march.run([by_blocks, Looking()])
+    assert len(shown) == len(by_blocks.rows) == 201
+    # The head meets the wire after a tenth of a second.
+    assert by_blocks.blocks == [] and len(set(shown)) > 50
