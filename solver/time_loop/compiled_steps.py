@@ -155,4 +155,6 @@ def compiled_steps(
         return None  # Numba was told to compile nothing
     if scheme.coupling.law.in_loop() is None or scheme.pantographs.records() is None:
         return None
+    if scheme.loads(0.0) is not None:
+        return None  # loads that change with time
     return CompiledSteps(scheme, showing, dt, shows)
