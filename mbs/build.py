@@ -75,6 +75,21 @@ def has_joints(data: PantographData) -> bool:
     return isinstance(data, MultibodyData) and data.all_bodies is not None
 
 
+def actuator_force(data: PantographData) -> float | None:
+    """Constant force of a multibody pantograph's actuator at its static force [N], None if it has
+    none that was calibrated."""
+    return None if isinstance(data, LumpedData) else stand(data).actuator_force
+
+
+def touching_mass(data: PantographData) -> float:
+    """Mass that one contact meets first [kg]: a strip on its suspension, or its share of the
+    head."""
+    if data.strips.suspension is not None:
+        return data.strips.suspension.mass
+    head = data.masses[0] if isinstance(data, LumpedData) else stand(data).head.mass
+    return head / data.strips.number
+
+
 def raising_data(data: MultibodyData, static_force: float, nominal_height: float) -> RaisingData:
     """Head and mechanism of a multibody pantograph on a vehicle of the right height.
 

@@ -207,7 +207,7 @@ def _passages(
                 x, values = record(results)
                 position = leading_position(results)[:: results.line_record.every]
                 first = results.first_position
-                speed = results.attributes["speed_m_per_s"]
+                speed = results.fact("speed")
             since = (position - x) / speed
             behind = float(np.ptp(first)) / speed
             colour = figures.colour(number)

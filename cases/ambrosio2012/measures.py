@@ -21,8 +21,8 @@ def measure(results: Results) -> dict[str, Any]:
     return {
         "slack": slack_droppers(results),
         "onset_m": uplift_onset(results),
-        "wave_speed_m_per_s": results.attributes["wave_speed_m_per_s"],
-        "train_speed_m_per_s": results.attributes["speed_m_per_s"],
+        "wave_speed_m_per_s": results.fact("wave_speed"),
+        "train_speed_m_per_s": results.fact("speed"),
         "span_m": float(np.diff(results.line("support_x"))[results.reference_span]),
     }
 

@@ -13,7 +13,8 @@ from catenary.postproc.record.header import Header
 from catenary.solver.base.errors import InputError
 
 # What a restart finds again; the rest of the head may be another version's.
-_SAME = ("case", "n_dofs", "speed_m_per_s", "wave_speed_m_per_s", "system", "edition")
+_SAME = ("case", "n_dofs", "system", "edition")
+_SAME_FACTS = ("time_step", "speed", "wave_speed")
 # Another machine's rounding at rest, as a share and as a size [m], [N].
 _RELATIVE, _ABSOLUTE = 1e-6, 1e-6
 
@@ -34,21 +35,21 @@ def state_to_continue(result: Path) -> dict[str, Any]:
         return results.checkpoint
 
 
-def refuse_other_run(result: Path, header: Header, dt: float, n_strips: tuple[int, ...]) -> None:
+def refuse_other_run(result: Path, header: Header, n_strips: tuple[int, ...]) -> None:
     """Raise InputError unless a result file is of the run that its scene makes. Not collective.
 
     Parameters
     ----------
     header : of the scene in the file, made anew
-    dt : time step of the scene [s]
     n_strips : strips of each pantograph
     """
     with Results(result) as results:
         about = results.attributes
-        wanted = {name: header.attributes[name] for name in _SAME} | {"dt_s": dt}
-        for name, value in wanted.items():
-            if not _same(about[name], value):
-                raise _refusal(result, f"{name} is {about[name]}, its scene makes {value}")
+        pairs = {name: (about[name], header.attributes[name]) for name in _SAME}
+        pairs |= {n: (results.fact(n), float(header.facts[n])) for n in _SAME_FACTS}
+        for name, (found, value) in pairs.items():
+            if not _same(found, value):
+                raise _refusal(result, f"{name} is {found}, its scene makes {value}")
         if results.n_strips() != list(n_strips):
             raise _refusal(result, f"its pantographs have {results.n_strips()} strips")
         _refuse_other_line(result, results, header.datasets)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.head.strips import Strips
@@ -41,16 +41,13 @@ def _strips_of(strips: Strips) -> str:
     return f"{text} of {own.mass:g} kg on {own.stiffness:g} N/m"
 
 
-def header_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
+def header_words(scene: Scene, problem: Problem) -> list[dict[str, str]]:
     """What a result file says of each pantograph, in running order. Not collective."""
     return [
         {
             "kind": place.name,
             "model": model_of(placement.data),
             "description": description_of(placement.data, placement.static_force),
-            "static_force_N": placement.static_force,
-            "actuator_force_N": _actuator_force(placement.data),
-            "touching_mass_kg": _touching_mass(placement.data),
         }
         for place, placement in zip(scene.train.pantographs, problem.train.placements, strict=True)
     ]
@@ -66,27 +63,3 @@ def kind_lines(scene: Scene, problem: Problem) -> dict[str, list[str]]:
 
             lines[place.name].append(describe_assembly(stand(placement.data).missed))
     return lines
-
-
-def _actuator_force(data: PantographData) -> float | None:
-    if isinstance(data, LumpedData):
-        return None
-    from catenary.mbs.mechanism.pantograph_data import stand
-
-    return stand(data).actuator_force
-
-
-def _touching_mass(data: PantographData) -> float:
-    """Mass that one contact meets first [kg]: a strip on its suspension, or its share of the
-    head."""
-    if data.strips.suspension is not None:
-        return data.strips.suspension.mass
-    return _head_mass(data) / data.strips.number
-
-
-def _head_mass(data: PantographData) -> float:
-    if isinstance(data, LumpedData):
-        return data.masses[0]
-    from catenary.mbs.mechanism.pantograph_data import stand
-
-    return stand(data).head.mass

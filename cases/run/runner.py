@@ -28,7 +28,7 @@ from catenary.cases.result_folder.output_folder import (
 from catenary.cases.run.continuing import refuse_other_run, state_to_continue
 from catenary.cases.run.describe_arrivals import arrival_facts
 from catenary.cases.run.describe_incidents import incident_facts
-from catenary.cases.run.describe_pantographs import header_facts
+from catenary.cases.run.describe_pantographs import header_words
 from catenary.cases.run.needs import (
     flush_cadence,
     needs_before_meshing,
@@ -42,6 +42,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.files.fields import FieldRecorder
 from catenary.postproc.files.own_files import remove_stale
+from catenary.postproc.record.facts import facts_of
 from catenary.postproc.record.header import Header, line_datasets, static_datasets
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
@@ -388,11 +389,9 @@ def _header(order: _Order, problem: Problem, at_rest: AtRest) -> Header:
             "case": scene.case.name,
             "title": scene.case.title,
             "n_dofs": at_rest.model.n_dofs,
-            "speed_m_per_s": problem.train.speed,
-            "wave_speed_m_per_s": line.contact_wire.wave_speed,
             "system": scene.evaluation.system,
             "edition": scene.evaluation.edition,
-            "pantographs": header_facts(scene, problem),
+            "pantographs": header_words(scene, problem),
             "incidents": incident_facts(scene, problem),
             "arrivals": arrival_facts(scene, problem),
             "versions": versions(),
@@ -405,6 +404,7 @@ def _header(order: _Order, problem: Problem, at_rest: AtRest) -> Header:
             **line_datasets(line, at_rest.mesh, problem.evaluation),
             **static_datasets(at_rest.mesh, at_rest.form, at_rest.lift),
         },
+        facts=facts_of(problem, at_rest.mesh, at_rest.model.dropper_lengths),
     )
 
 
@@ -427,4 +427,4 @@ def _performance(outcome: Outcome, phases: Phases, n_ranks: int) -> dict[str, An
 def _refuse_other_run(out_dir: Path, header: Header | None, problem: Problem) -> None:
     assert header is not None
     n_strips = tuple(len(place.data.strip_offsets) for place in problem.train.placements)
-    refuse_other_run(out_dir / RESULT, header, problem.numerics.dt, n_strips)
+    refuse_other_run(out_dir / RESULT, header, n_strips)

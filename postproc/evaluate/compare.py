@@ -49,7 +49,7 @@ def _heads(a: Results, b: Results) -> list[str]:
     for letter, run in (("A", a), ("B", b)):
         about = run.attributes
         lines.append(
-            f"{letter}: {run.path} ({about['case']}, {3.6 * about['speed_m_per_s']:.0f} km/h, "
+            f"{letter}: {run.path} ({about['case']}, {3.6 * run.fact('speed'):.0f} km/h, "
             f"dt {run.dt:g} s, {counted(about['n_ranks'], 'rank')}, "
             f"{counted(run.n_steps, 'step')}, {run.outcome})"
         )

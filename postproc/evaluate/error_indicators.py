@@ -20,9 +20,7 @@ from catenary.solver.base.errors import InputError
 from catenary.solver.model import elements
 from catenary.solver.problem.integrator_parameters import (
     AVERAGE_ACCELERATION,
-    NEWMARK,
     Integration,
-    integration_of,
 )
 
 # How long an error of phase goes on growing [s]: on the line without damping, where waves run
@@ -40,6 +38,10 @@ _WAVE_NUMBERS = 400
 _SPECTRUM, _SAMPLED_HZ = 100_000, 1000.0
 # Waves of two elements belong to the lower branch, whatever rounding says.
 _ZONE = np.pi * (1.0 + 1e-9)
+_EARLIER = (
+    "The result file is of an earlier version of Catenary and lacks the facts that error "
+    "indicators and remarks on settings need: for these run the case again."
+)
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ class Indicators:
     resolved_frequency : highest frequency of a wave on the contact wire that the elements carry
         with less than 1 % error in frequency [Hz]
     required_frequency : what the elements have to carry, ``required_frequency`` of 20 Hz [Hz];
-        infinite where the train is as fast as the wave
+        infinite where the train is as fast as the wave; both NaN in files of earlier formats
     warnings : sentences, empty if the settings are fine enough
     """
 
@@ -76,11 +78,11 @@ class Method(NamedTuple):
 
 def indicate(results: Results) -> Indicators:
     """The indicators of a run, as far as its record goes. Not collective."""
-    about = results.attributes
-    config = about["config"]
-    method = _method(config)
     n = results.n_pantographs
     error, deviation = np.full(n, np.nan), np.full(n, np.nan)
+    if results.of_earlier_format:
+        return Indicators(error, error, np.nan, np.nan, (_EARLIER,))
+    method = _method(results)
     start, end = results.evaluation
     for p in range(n):
         position = results.column("contact_position", p)
@@ -97,7 +99,7 @@ def indicate(results: Results) -> Indicators:
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = error / deviation
     resolved = _resolved(results)
-    speed = float(about["speed_m_per_s"]) / float(about["wave_speed_m_per_s"])
+    speed = results.fact("speed") / results.fact("wave_speed")
     required = required_frequency(filters.CUT_OFF, speed, method.alpha)
     told = (*_step_warning(relative, results.dt), *_mesh_warning(resolved, required))
     return Indicators(error, relative, resolved, required, told)
@@ -233,32 +235,23 @@ def as_table(indicators: Indicators) -> dict[str, Any]:
     }
 
 
-def _method(config: dict[str, Any]) -> Method:
-    damping, numerics = config["line"]["damping"], config["numerics"]
-    own = (damping.get("per_component") or {}).get("contact_wire") or damping
+def _method(results: Results) -> Method:
+    fact = results.fact
+    weights = fact("mass_weight"), fact("force_weight")
     return Method(
-        float(own["alpha_s"]),
-        float(own["beta_per_s"]),
-        integration_of(
-            str(numerics.get("integrator") or NEWMARK),
-            float(numerics.get("spectral_radius") or 0.0),
-            float(numerics.get("newmark_beta", 0.25)),
-            float(numerics.get("newmark_gamma", 0.5)),
-        ),
+        fact("contact_wire_stiffness_damping"),
+        fact("contact_wire_mass_damping"),
+        Integration(fact("newmark_beta"), fact("newmark_gamma"), *weights),
     )
 
 
 def _resolved(results: Results) -> float:
     """``resolved_frequency`` of the longest element of the contact wire where it is evaluated."""
-    x = results.line("node_points")[results.wires()["contact_wire"], 0]
-    start, end = results.evaluation
-    lengths = np.diff(x)[(x[1:] > start) & (x[:-1] < end)]
-    wire = results.attributes["config"]["line"]["contact_wire"]
     return resolved_frequency(
-        float(lengths.max()),
-        float(wire["tension_N"]),
-        float(wire["bending_stiffness_N_m2"]),
-        float(wire["mass_kg_per_m"]),
+        results.fact("longest_element"),
+        results.fact("contact_wire_tension"),
+        results.fact("contact_wire_bending_stiffness"),
+        results.fact("contact_wire_mass"),
     )
 
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from catenary.postproc.read.results import Results
-from catenary.solver.problem.problem import n_halvings
 
 # Statistics are taken below 20 Hz; a resonance below twice that still shows in them.
 _FELT_HZ = 40.0
@@ -36,41 +35,42 @@ class _Contact(NamedTuple):
 
 
 def remarks(results: Results) -> list[str]:
-    """Sentences about settings that shape the results, none if none do. Not collective."""
-    config = results.attributes["config"]
+    """Sentences about settings that shape the results, none if none do. Not collective.
+
+    Files of earlier formats lack the facts that some of them need, and have fewer.
+    """
     return [
         *results.attributes.get("arrivals", {}).get("warnings", []),
         *_about_incidents(results),
-        *_about_contact(results, config),
-        *_about_droppers(config),
-        *_about_iterations(results, config),
-        *_about_sizes(results, config),
+        *_about_contact(results),
+        *_about_droppers(results),
+        *_about_iterations(results),
+        *_about_sizes(results),
     ]
 
 
-def _about_iterations(results: Results, config: dict[str, Any]) -> list[str]:
+def _about_iterations(results: Results) -> list[str]:
     """That steps went on above the tolerances, where the scene has a fixed number of iterations."""
     counted = results.attributes.get("inner_iterations", {})
-    above, fixed = counted.get("unconverged_steps", 0), config["numerics"].get("iterations")
-    if not above or not fixed:
+    above, fixed = counted.get("unconverged_steps", 0), results.fact("fixed_iterations")
+    if not above or math.isnan(fixed):
         return []
     return [
         f"{above} of {counted['steps']} steps ended above the tolerances of the fixed-point "
-        f"correction, because numerics.iterations = {fixed} ends each: their forces and motions do "
-        "not belong together. Take more, or leave the key out."
+        f"correction, because numerics.iterations = {fixed:g} ends each: their forces and motions "
+        "do not belong together. Take more, or leave the key out."
     ]
 
 
-def _about_sizes(results: Results, config: dict[str, Any]) -> list[str]:
+def _about_sizes(results: Results) -> list[str]:
     """That steps could not be made as short as their estimated error asks for."""
-    numerics = config["numerics"]
     counted = results.attributes.get("inner_iterations", {})
     above = counted.get("steps_above_tolerance", 0)
     if not above:
         return []
     return [
         f"{above} of {counted['steps']} steps were taken with an estimated error of the contact "
-        f"force above numerics.adaptive_tolerance_N = {numerics['adaptive_tolerance_N']:g}, being "
+        f"force above numerics.adaptive_tolerance_N = {results.fact('step_tolerance'):g}, being "
         "the shortest: take a smaller numerics.smallest_dt_s, or a larger tolerance."
     ]
 
@@ -94,14 +94,10 @@ def _about_incidents(results: Results) -> list[str]:
     ]
 
 
-def _about_droppers(config: dict[str, Any]) -> list[str]:
-    dropper = config.get("line", {}).get("dropper", {})
-    stiffness, dt = dropper.get("stiffness_N_per_m"), config["numerics"]["dt_s"]
-    if not stiffness or stiffness * dt**2 <= _STIFF_DROPPER:
-        return []
-    damping = config["line"].get("damping", {})
-    own = (damping.get("per_component") or {}).get("droppers") or damping
-    if own.get("alpha_s", 0.0) >= dt:
+def _about_droppers(results: Results) -> list[str]:
+    stiffness, dt = results.fact("stiffest_dropper"), results.dt
+    # Not of NaN either.
+    if not stiffness * dt**2 > _STIFF_DROPPER or results.fact("dropper_stiffness_damping") >= dt:
         return []
     longest = math.sqrt(_STIFF_DROPPER / stiffness)
     return [
@@ -112,39 +108,16 @@ def _about_droppers(config: dict[str, Any]) -> list[str]:
     ]
 
 
-def _about_contact(results: Results, config: dict[str, Any]) -> list[str]:
-    contact = config.get("contact", {})
-    if contact.get("law") == "kinematic":
+def _about_contact(results: Results) -> list[str]:
+    stiffnesses = results.facts_of("contact_stiffness")
+    if np.isinf(stiffnesses).any():
         return ["The contact is kinematic: head and wire do not part, so that loss cannot occur."]
     found: dict[str, None] = {}
-    for facts in results.attributes.get("pantographs", []):
-        if facts.get("touching_mass_kg"):
-            head = _Contact(
-                facts["touching_mass_kg"],
-                _stiffness(contact, facts["static_force_N"]),
-                _step(config["numerics"]),
-            )
+    for mass, stiffness in zip(results.facts_of("touching_mass"), stiffnesses, strict=True):
+        if math.isfinite(mass) and math.isfinite(stiffness):
+            head = _Contact(float(mass), float(stiffness), results.fact("shortest_step"))
             found |= dict.fromkeys(_about_head(head))
     return list(found)
-
-
-def _step(numerics: dict[str, Any]) -> float:
-    """The shortest step that a run may take [s]."""
-    if not numerics.get("adaptive_tolerance_N"):
-        return float(numerics["dt_s"])
-    dt: float = numerics["dt_s"]
-    return dt / 2 ** n_halvings(dt, numerics.get("smallest_dt_s"))
-
-
-def _stiffness(contact: dict[str, Any], static_force: float) -> float:
-    """Stiffness of the contact, of Hertz's spring its tangent at the static force [N/m]."""
-    # Files written before there were laws hold the linear one.
-    if contact.get("law", "linear") == "linear":
-        return float(contact["stiffness_N_per_m"])
-    hertz = contact.get("hertz_stiffness_N_per_m1_5")
-    if hertz is None:
-        return 1.5 * float(contact["stiffness_N_per_m"])
-    return float(1.5 * hertz ** (2 / 3) * static_force ** (1 / 3))
 
 
 def _about_head(head: _Contact) -> list[str]:

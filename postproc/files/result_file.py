@@ -32,11 +32,12 @@ from catenary.postproc.files.trimming import trimmed
 from catenary.postproc.files.windowed_rows import write_window
 from catenary.postproc.record import channels
 from catenary.postproc.record.channels import Channel
+from catenary.postproc.record.facts import FACTS
 from catenary.postproc.record.header import Header
 from catenary.postproc.record.line_record import GZIP, GZIP_LEVEL, LineRecord
 from catenary.solver.time_loop.observers import Stage
 
-FORMAT = "catenary-run-2"
+FORMAT = "catenary-run-3"
 # Rows that are whole, of the channels, of the energies and of the line's channels; a table may be
 # longer after a kill.
 COMPLETE = "complete_rows"
@@ -274,7 +275,6 @@ def _write_head(
 ) -> None:
     fixed = {
         "format": FORMAT,
-        "dt_s": stage.dt,
         "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         "n_steps_planned": stage.n_steps,
         "n_strips": list(stage.n_strips),
@@ -292,6 +292,12 @@ def _write_head(
     }
     for name, array in {**header.datasets, **known, COMPLETE: [0, 0, 0]}.items():
         create_checked(file, name, array)
+    facts = file.create_group("facts")
+    for name, value in header.facts.items():
+        dataset = facts.create_dataset(name, data=value)
+        set_attribute(dataset, "unit", FACTS[name].unit)
+        set_attribute(dataset, "meaning", FACTS[name].meaning)
+    seal_arrays(facts, header.facts)
 
 
 def _create_growing(

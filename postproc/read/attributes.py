@@ -8,7 +8,7 @@ from typing import Any
 import h5py
 
 from catenary.postproc.files.checked import ATTRIBUTE_SUMS, broken_seals, text_of
-from catenary.postproc.read.file_schema import ATTRIBUTES, REQUIRED, config_fault
+from catenary.postproc.read.file_schema import ATTRIBUTES, REQUIRED
 
 # What HDF5 and h5py raise at a damaged file.
 HDF5_ERRORS = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError)
@@ -40,7 +40,7 @@ def read_attributes(file: h5py.File) -> tuple[dict[str, Any], list[str], list[st
         elif value is not _MISSING:
             value = _decoded(value, declared.is_json)
             if value is _MISSING or not declared.sound(value):
-                fault = f'its attribute "{name}" is not {declared.must_be}{_where(name, value)}'
+                fault = f'its attribute "{name}" is not {declared.must_be}{_where(value)}'
         if not fault and value is not _MISSING:
             values[name] = value
         elif declared.fallback is REQUIRED:
@@ -87,11 +87,9 @@ def _refuse(word: str) -> None:
     raise ValueError(f"{word} is no JSON")
 
 
-def _where(name: str, value: Any) -> str:
-    """The key of the scene that is wrong, or a short value."""
+def _where(value: Any) -> str:
+    """A value, cut short."""
     if value is _MISSING:
         return ""
-    if name == "config":
-        return f" (see {config_fault(value)})"
     shown = " ".join(str(value).split())
     return f" ({shown[:40]}{'...' if len(shown) > 40 else ''})"

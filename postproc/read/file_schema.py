@@ -18,7 +18,9 @@ from catenary.postproc.record.line_record import LineRecord, from_table
 LARGEST = {"s": 1e9, "m": 1e9, "N": 1e12, "J": 1e21, "-": 1e12}
 REQUIRED = object()
 # Files whose line channels stand beside the others, at every step, without extremes.
-EARLIER_FORMAT = "catenary-run-1"
+_FIRST_FORMAT = "catenary-run-1"
+# Files without facts, which are read, but not continued.
+EARLIER_FORMATS = (_FIRST_FORMAT, "catenary-run-2")
 
 
 class Attribute(NamedTuple):
@@ -77,15 +79,6 @@ def is_whole(value: Any, low: int = 0, high: int = 10**12) -> bool:
 def is_text(value: Any) -> bool:
     """Whether ``value`` is text without control characters."""
     return isinstance(value, str) and not any(ord(letter) < 32 for letter in value)
-
-
-def _number(low: float, high: float, unit: str, fallback: Any = REQUIRED) -> Attribute:
-    """A number above ``low``."""
-    return Attribute(
-        f"a number above {low:g} and up to {high:g} {unit}",
-        lambda value: is_number(value, low, high) and value > low,
-        fallback=fallback,
-    )
 
 
 def _not_negative(fallback: Any) -> Attribute:
@@ -155,72 +148,20 @@ def _arrivals(value: Any) -> bool:
     )
 
 
-_FACT_TEXTS, _FACT_NUMBERS = ("kind", "description"), ("static_force_N",)
-
-
 def _pantographs(value: Any) -> bool:
-    def sound(facts: Any) -> bool:
-        if not isinstance(facts, dict):
-            return False
-        if not facts:
-            return True
-        mass = facts.get("touching_mass_kg")
-        return (
-            all(isinstance(facts.get(name), str) for name in _FACT_TEXTS)
-            and all(is_number(facts.get(name), 0.0) for name in _FACT_NUMBERS)
-            and (mass is None or is_number(mass, 1e-9))
-        )
-
-    return isinstance(value, list) and all(map(sound, value))
-
-
-# What reports read of a scene: path, whether required, and what it must be.
-_CONFIG: tuple[tuple[tuple[str, ...], bool, Callable[[Any], bool]], ...] = (
-    (("line", "contact_wire", "tension_N"), True, lambda v: is_number(v, 1e-6)),
-    (("line", "contact_wire", "mass_kg_per_m"), True, lambda v: is_number(v, 1e-9)),
-    (("line", "contact_wire", "bending_stiffness_N_m2"), True, lambda v: is_number(v, 0.0)),
-    (("line", "damping", "alpha_s"), True, lambda v: is_number(v, 0.0)),
-    (("line", "damping", "beta_per_s"), True, lambda v: is_number(v, 0.0)),
-    (("line", "damping", "per_component"), False, lambda v: isinstance(v, dict)),
-    (("line", "damping", "per_component", "contact_wire"), False, _table_of_numbers),
-    (("line", "damping", "per_component", "droppers"), False, _table_of_numbers),
-    (("line", "dropper"), False, lambda v: isinstance(v, dict)),
-    (("line", "dropper", "stiffness_N_per_m"), False, lambda v: is_number(v, 0.0)),
-    (("numerics", "dt_s"), True, lambda v: is_number(v, 1e-12)),
-    (("numerics", "integrator"), False, is_text),
-    (("numerics", "spectral_radius"), False, lambda v: is_number(v, 0.0, 1.0)),
-    (("numerics", "newmark_beta"), False, lambda v: is_number(v, 0.0)),
-    (("numerics", "newmark_gamma"), False, lambda v: is_number(v, 0.0)),
-    (("numerics", "iterations"), False, is_whole),
-    (("numerics", "adaptive_tolerance_N"), False, lambda v: is_number(v, 0.0)),
-    (("numerics", "smallest_dt_s"), False, lambda v: is_number(v, 1e-12)),
-    (("contact",), False, lambda v: isinstance(v, dict)),
-    (("contact", "law"), False, is_text),
-    (("contact", "stiffness_N_per_m"), False, lambda v: is_number(v, 0.0)),
-    (("contact", "hertz_stiffness_N_per_m1_5"), False, lambda v: is_number(v, 0.0)),
-)
-
-
-def config_fault(config: Any) -> str:
-    """The first key of a scene that reports cannot take, empty if there is none."""
-    for path, required, sound in _CONFIG:
-        place = config
-        for key in path:
-            place = place.get(key) if isinstance(place, dict) else None
-        if (place is None and required) or (place is not None and not sound(place)):
-            return ".".join(path)
-    return ""
+    return isinstance(value, list) and all(
+        isinstance(row, dict)
+        and all(isinstance(row.get(name), str) for name in ("kind", "description") if row)
+        for row in value
+    )
 
 
 ATTRIBUTES: dict[str, Attribute] = {
     "case": _text(),
     "title": _text(""),
     "n_dofs": _whole(1),
-    "speed_m_per_s": _number(0.0, 1e4, "m/s"),
-    "wave_speed_m_per_s": _number(0.0, 1e6, "m/s"),
     "system": _one_of(SYSTEMS),
     "edition": _one_of(EDITIONS),
-    "dt_s": _number(0.0, 1e3, "s"),
     "n_steps_planned": _whole(1),
     "n_ranks": _whole(1, 1),
     "created": _text("unknown"),
@@ -229,7 +170,7 @@ ATTRIBUTES: dict[str, Attribute] = {
     "simulated_s": _not_negative(None),
     "marched_s": _not_negative(None),
     "march_wall_s": _not_negative(None),
-    "config": Attribute("a scene as JSON", lambda v: not config_fault(v), is_json=True),
+    "config": Attribute("a scene as JSON", lambda v: isinstance(v, dict), is_json=True),
     "versions": Attribute("a table", lambda v: isinstance(v, dict), True, {}),
     "effects_on": Attribute("a list of names with titles and reasons", _effects, True),
     "effects_off": Attribute("a list of names with titles and reasons", _effects, True),
@@ -300,7 +241,7 @@ def line_tables(about: Mapping[str, Any]) -> tuple[dict[str, Growing], dict[str,
     known = {channels.CHANNELS[name].per: name for name in channels.LINE_CHANNELS}
     letters = {known[channels.ARM]: "a", known[channels.DROPPER]: "d"}
     of = {name: Growing(channels.CHANNELS[name].unit, letter) for name, letter in letters.items()}
-    if about.get("format") == EARLIER_FORMAT:
+    if about.get("format") == _FIRST_FORMAT:
         return {f"channels/{name}": declared for name, declared in of.items()}, {}
     told = about.get("line_record")
     record = LineRecord() if told is None else from_table(told)

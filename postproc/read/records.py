@@ -76,12 +76,13 @@ def table_faults(file: h5py.File, about: dict[str, Any], sizes: dict[str, int]) 
     return found
 
 
-def scan(file: h5py.File, about: dict[str, Any], faults: list[TableFault]) -> Records:
+def scan(file: h5py.File, about: dict[str, Any], dt: float, faults: list[TableFault]) -> Records:
     """Read all records once, by blocks, and find the sound ones.
 
     Parameters
     ----------
     about : sound root attributes
+    dt : time between two records [s]
     faults : from ``table_faults``, none of them essential
     """
     unusable = {fault.path for fault in faults}
@@ -100,9 +101,9 @@ def scan(file: h5py.File, about: dict[str, Any], faults: list[TableFault]) -> Re
             continue
         if tables is ENERGIES and unusable & ENERGIES.keys():
             continue
-        dt = float(about["dt_s"]) if number == 0 else None
+        period = dt if number == 0 else None
         usable = {path: declared for path, declared in tables.items() if path not in unusable}
-        rows[number] = _rows(file, complete[number], dt, usable, damaged, told)
+        rows[number] = _rows(file, complete[number], period, usable, damaged, told)
     damaged |= {path: [] for path in unusable if path in of_steps or path in apart}
     told += _missing_end(about, rows[0])
     last = float(file["time"][rows[0] - 1]) if rows[0] else float("nan")

@@ -90,7 +90,20 @@ class Results:
     @property
     def dt(self) -> float:
         """Time step [s]."""
-        return float(self.attributes["dt_s"])
+        return self.fact("time_step")
+
+    def fact(self, name: str) -> float:
+        """A fact of ``postproc.record.facts``, NaN if a file of an earlier format lacks it."""
+        return float(self._file.facts[name])
+
+    def facts_of(self, name: str) -> np.ndarray:
+        """A fact of each pantograph, shape (n_pantographs,), NaN likewise."""
+        return np.broadcast_to(self._file.facts[name], self.n_pantographs)
+
+    @property
+    def of_earlier_format(self) -> bool:
+        """Whether an earlier version of the program wrote the file, with fewer facts."""
+        return self._file.of_earlier_format
 
     @property
     def n_steps(self) -> int:
@@ -284,9 +297,9 @@ class Results:
         found = self.extremes(name)[1]
         return [None if np.isnan(largest) else float(largest) for largest in found]
 
-    def pantograph_facts(self) -> list[dict[str, Any]]:
-        """What is told of each pantograph, by their order: ``kind``, ``model``, ``description``,
-        ``static_force_N``, ``actuator_force_N``; empty tables in files without."""
+    def pantograph_words(self) -> list[dict[str, Any]]:
+        """Words about each pantograph, by their order: ``kind``, ``model``, ``description``; empty
+        tables in files without."""
         told: list[dict[str, Any]] = self.attributes.get("pantographs", [])
         return told or [{} for _ in range(self.n_pantographs)]
 

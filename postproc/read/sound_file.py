@@ -16,8 +16,9 @@ from catenary.postproc.files.result_file import COMPLETE, FORMAT
 from catenary.postproc.read.attributes import HDF5_ERRORS, read_attributes
 from catenary.postproc.read.checkpoint import read_slot, slots_of
 from catenary.postproc.read.constants import constant_faults
+from catenary.postproc.read.facts import facts_of_earlier, read_facts
 from catenary.postproc.read.file_schema import (
-    EARLIER_FORMAT,
+    EARLIER_FORMATS,
     ENERGIES,
     OPTIONAL,
     line_tables,
@@ -44,6 +45,7 @@ class SoundFile:
     Attributes
     ----------
     attrs : sound root attributes, lists and tables decoded, numbers as Python's
+    facts : name -> value of the facts, NaN for those that files of earlier formats do not have
 
     Raises
     ------
@@ -66,7 +68,9 @@ class SoundFile:
         try:
             self._refuse_other_format()
             self.attrs, fatal, self._partial = read_attributes(self._file)
+            self.facts, wrong = self._read_facts()
             faults, self._sizes = constant_faults(self._file)
+            fatal += wrong
             self._faults = [] if fatal else table_faults(self._file, self.attrs, self._sizes)
             fatal += faults + [f"{f.path} {f.fault}" for f in self._faults if f.essential]
             fatal += self._strip_faults() if not fatal else []
@@ -81,7 +85,23 @@ class SoundFile:
     @cached_property
     def records(self) -> Records:
         """Which records are sound."""
-        return scan(self._file, self.attrs, self._faults)
+        return scan(self._file, self.attrs, self._dt, self._faults)
+
+    @property
+    def _dt(self) -> float:
+        """Time between two records [s]."""
+        return float(self.facts["time_step"])
+
+    def _read_facts(self) -> tuple[dict[str, np.ndarray], list[str]]:
+        """The facts, and what is wrong with them."""
+        if self.of_earlier_format:
+            return facts_of_earlier(self.attrs)
+        return read_facts(self._file)
+
+    @property
+    def of_earlier_format(self) -> bool:
+        """Whether an earlier version of the program wrote the file."""
+        return self.attrs.get("format") in EARLIER_FORMATS
 
     @property
     def told(self) -> list[str]:
@@ -172,7 +192,7 @@ class SoundFile:
                 f"{self.path} is damaged: the head of the file cannot be read; nothing in it can "
                 "be used"
             ) from error
-        if not isinstance(found, str) or found not in (FORMAT, EARLIER_FORMAT):
+        if not isinstance(found, str) or found not in (FORMAT, *EARLIER_FORMATS):
             raise InputError(
                 f'{self.path} is no result file of this program: its attribute "format" is '
                 f"{found!r}, not {FORMAT!r}"
@@ -186,6 +206,8 @@ class SoundFile:
         for name in ("n_strips", "pantographs"):
             if self.attrs[name] and len(self.attrs[name]) != n:
                 return [f'its attribute "{name}" has {len(self.attrs[name])} entries for {n}']
+        if not self.of_earlier_format and self.facts["static_force"].size != n:
+            return [f"its facts are of {self.facts['static_force'].size} pantographs of {n}"]
         strips = sum(self.attrs["n_strips"] or [1] * n)
         path = "channels/strip_force"
         if strips > n and self._sizes.get("S") != strips:
@@ -194,10 +216,11 @@ class SoundFile:
 
     def _usable(self) -> str:
         """What can still be used of a file of which no report can be made."""
-        if any(f.essential for f in self._faults) or "dt_s" not in self.attrs:
+        dt = float(self.facts.get("time_step", np.nan))
+        if any(f.essential for f in self._faults) or not dt > 0.0:
             return "no part of it can be reported"
         about = {"n_steps": None, "outcome": "running", **self.attrs}
-        last = scan(self._file, about, self._faults).last
+        last = scan(self._file, about, dt, self._faults).last
         return f"{_up_to(last)} and can be read with h5py"
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
+from catenary.postproc.record.facts import FACTS
 
 if TYPE_CHECKING:
     from catenary.solver.statics.equilibrium import Elasticity, Equilibrium
@@ -18,8 +19,6 @@ REQUIRED_ATTRIBUTES = (
     "case",
     "title",
     "n_dofs",
-    "speed_m_per_s",
-    "wave_speed_m_per_s",
     "system",
     "edition",
     "versions",
@@ -36,17 +35,19 @@ class Header:
     Attributes
     ----------
     attributes : at least ``REQUIRED_ATTRIBUTES``; text and numbers are stored as they are, lists
-        and tables as JSON. ``speed_m_per_s`` is the train's and ``wave_speed_m_per_s`` the contact
-        wire's [m/s]; ``system`` and ``edition`` are keys of ``postproc.standards``;
+        and tables as JSON. ``system`` and ``edition`` are keys of ``postproc.standards``;
         ``effects_on`` and ``effects_off`` are lists of (name, title, reason).
     datasets : path in the file -> array, from ``line_datasets`` and ``static_datasets``
+    facts : name -> value of all facts, from ``facts_of``
     """
 
     attributes: Mapping[str, Any]
     datasets: Mapping[str, np.ndarray]
+    facts: Mapping[str, np.ndarray]
 
     def __post_init__(self) -> None:
         missing = [name for name in REQUIRED_ATTRIBUTES if name not in self.attributes]
+        missing += [name for name in FACTS if name not in self.facts]
         if missing:
             raise ValueError(f"the head of a result file lacks {', '.join(missing)}")
 

@@ -126,8 +126,8 @@ def judge(results: Results, statistics: RunStatistics) -> list[Criterion]:
     about = results.attributes
     return standards.judge(
         statistics,
-        about["speed_m_per_s"],
-        about["wave_speed_m_per_s"],
+        results.fact("speed"),
+        results.fact("wave_speed"),
         about["system"],
         about["edition"],
     )
@@ -200,8 +200,8 @@ def _html(
         verdict=standards.verdict(criteria),
         edition=standards.EDITIONS[about["edition"]].title,
         system=standards.SYSTEMS[about["system"]],
-        speed_km_h=KMH * about["speed_m_per_s"],
-        wave_speed_km_h=KMH * about["wave_speed_m_per_s"],
+        speed_km_h=KMH * results.fact("speed"),
+        wave_speed_km_h=KMH * results.fact("wave_speed"),
         droppers=csv_tables.dropper_table(results),
         reference_span=results.reference_span + 1,
         elasticity=1e3 * results.static("elasticity"),
@@ -233,6 +233,8 @@ def _error_rows(found: Indicators) -> list[tuple[str, str, list[str]]]:
 
 def _mesh_facts(found: Indicators) -> list[tuple[str, str]]:
     """The shortest waves of the mesh beside those that matter."""
+    if np.isnan(found.resolved_frequency):
+        return []
     required = (
         f"{found.required_frequency:.0f} Hz" if np.isfinite(found.required_frequency) else "–"
     )
@@ -269,7 +271,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
         *(
             (name, f"{told['kind']}, {told['description']}")
             for name, told in zip(
-                results.pantograph_names(), results.pantograph_facts(), strict=True
+                results.pantograph_names(), results.pantograph_words(), strict=True
             )
             if told
         ),

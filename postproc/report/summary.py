@@ -28,7 +28,7 @@ def summarise(
         "case": attributes["case"],
         "title": attributes["title"],
         "outcome": results.outcome,
-        "speed_km_h": KMH * attributes["speed_m_per_s"],
+        "speed_km_h": KMH * results.fact("speed"),
         "n_dofs": attributes["n_dofs"],
         "n_ranks": attributes["n_ranks"],
         "n_steps": results.n_steps,
@@ -40,10 +40,12 @@ def summarise(
         "inner_iterations": attributes.get("inner_iterations", {}),
         "evaluation_m": [start, end],
         "pantographs": [
-            _pantograph(p, told, violation)
-            for p, told, violation in zip(
+            _pantograph(*row)
+            for row in zip(
                 statistics.pantographs,
-                results.pantograph_facts(),
+                results.pantograph_words(),
+                results.facts_of("static_force"),
+                results.facts_of("actuator_force"),
                 results.largest_violations(),
                 strict=True,
             )
@@ -83,14 +85,18 @@ def real_time_factor(results: Results) -> float | None:
 
 
 def _pantograph(
-    p: PantographStatistics, told: Mapping[str, Any], violation: float | None
+    p: PantographStatistics,
+    told: Mapping[str, Any],
+    static_force: float,
+    actuator_force: float,
+    violation: float | None,
 ) -> dict[str, Any]:
     return {
         "name": p.name,
         "kind": told.get("kind"),
         "model": told.get("model"),
-        "static_force_N": told.get("static_force_N"),
-        "actuator_force_N": told.get("actuator_force_N"),
+        "static_force_N": static_force,
+        "actuator_force_N": actuator_force,
         "mean_N": p.mean,
         "std_N": p.std,
         "std_0_5_N": p.std_0_5,

@@ -106,9 +106,10 @@ def unseal(file: h5py.File) -> None:
     """Take our checksums away, as in a file of an earlier version."""
     if ATTRIBUTE_SUMS in file.attrs:
         del file.attrs[ATTRIBUTE_SUMS]
-    for slot in file.get("checkpoint", {}).values():
-        if ARRAYS_SUM in slot.attrs:
-            del slot.attrs[ARRAYS_SUM]
+    facts = [file["facts"]] if "facts" in file else []
+    for group in (*facts, *file.get("checkpoint", {}).values()):
+        if ARRAYS_SUM in group.attrs:
+            del group.attrs[ARRAYS_SUM]
 
 
 def raw_ranges(path: Path) -> list[tuple[int, int]]:

@@ -10,10 +10,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.line import DropperKind, Line, SteadyArm, Wire
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
+from catenary.postproc.record.facts import facts_of
 from catenary.postproc.record.header import Header, line_datasets, static_datasets
 from catenary.postproc.record.recorder import Recorder
+from catenary.solver.problem.contact_laws import LinearLaw
+from catenary.solver.problem.problem import Damping, Numerics, Placement, Problem, Train
 from catenary.solver.statics.equilibrium import Elasticity, Equilibrium
 from catenary.solver.time_loop.observers import Observer, Stage, StepView
 
@@ -21,15 +25,6 @@ N_SPANS, SPAN = 16, 50.0
 DROPPERS = tuple(5.0 + 5.0 * k for k in range(9))
 SPEED = 300.0 / 3.6
 EVALUATION = (250.0, 550.0)
-LINE_CONFIG = {
-    "n_spans": N_SPANS,
-    "contact_wire": {
-        "tension_N": 20e3,
-        "mass_kg_per_m": 1.33,
-        "bending_stiffness_N_m2": 180.0,
-    },
-    "damping": {"alpha_s": 1e-4, "beta_per_s": 0.0125},
-}
 
 
 def make_line() -> Line:
@@ -90,7 +85,29 @@ def make_mesh(line: Line) -> LineMesh:
     )
 
 
-def make_header(line: Line, mesh: LineMesh, **attributes: Any) -> Header:
+def make_problem(line: Line, n_pantographs: int, **changes: Any) -> Problem:
+    """What facts are derived from; ``dt`` and ``speed`` may be others."""
+    pantograph = LumpedData((7.2, 15.0), (4.2e3, 50.0), (10.0, 90.0))
+    return Problem(
+        line=line,
+        damping=Damping(1e-4, 0.0125),
+        contact=LinearLaw(5e4, 0.0),
+        train=Train(
+            speed=changes.get("speed", SPEED),
+            start=60.0,
+            end=700.0,
+            raise_time=0.0,
+            placements=(Placement(pantograph, 150.0, 0.0),) * n_pantographs,
+        ),
+        numerics=Numerics(changes["dt"], "one_solve", 0.25, 0.5, 1e-6, 1e-6, 10),
+        evaluation=EVALUATION,
+        residual_stiffness_ratio=0.0,
+        effects=frozenset(),
+    )
+
+
+def make_header(problem: Problem, mesh: LineMesh, **attributes: Any) -> Header:
+    line = problem.line
     height = mesh.points[:, 2]
     length = height[mesh.droppers[:, 0]] - height[mesh.droppers[:, 1]]
     force = np.full(length.size, 65.0) + 8.0 * np.cos(mesh.x(mesh.droppers[:, 1]))
@@ -101,12 +118,10 @@ def make_header(line: Line, mesh: LineMesh, **attributes: Any) -> Header:
         "case": "made_up",
         "title": "A made-up line <with> & awkward title",
         "n_dofs": 2 * mesh.n_nodes,
-        "speed_m_per_s": SPEED,
-        "wave_speed_m_per_s": line.contact_wire.wave_speed,
         "system": "ac",
         "edition": "2006",
         "versions": {"catenary": "0.1.0", "petsc": "3.18.5", "python": "3.11"},
-        "config": {"line": LINE_CONFIG, "numerics": {"dt_s": 1e-3, "scheme": "one_solve"}},
+        "config": {"line": {"n_spans": N_SPANS}, "numerics": {"scheme": "one_solve"}},
         "effects_on": [
             ("vertical", "vertical motion of the tensioned wires", "always"),
             ("dropper_slackening", "droppers that slacken", "default"),
@@ -117,7 +132,7 @@ def make_header(line: Line, mesh: LineMesh, **attributes: Any) -> Header:
         **line_datasets(line, mesh, EVALUATION),
         **static_datasets(mesh, equilibrium, elasticity),
     }
-    return Header({**known, **attributes}, datasets)
+    return Header({**known, **attributes}, datasets, facts_of(problem, mesh, length))
 
 
 @dataclass
@@ -128,6 +143,7 @@ class March:
     dt: float = 1e-3
     start: float = 60.0
     separations: tuple[float, ...] = (0.0, 100.0)
+    speed: float = SPEED
     comm: Any = field(default_factory=lambda: MPI.COMM_SELF)
 
     def __post_init__(self) -> None:
@@ -137,7 +153,8 @@ class March:
         self.dropper_x = self.mesh.x(self.mesh.droppers[:, 1])
 
     def header(self, **attributes: Any) -> Header:
-        return make_header(self.line, self.mesh, **attributes)
+        problem = make_problem(self.line, len(self.separations), dt=self.dt, speed=self.speed)
+        return make_header(problem, self.mesh, **attributes)
 
     def own(self, count: int) -> np.ndarray:
         """This rank's share of ``count`` things: contiguous, as on a line cut into spans."""
@@ -258,3 +275,8 @@ def make_march() -> type[March]:
 @pytest.fixture(scope="session")
 def record_run() -> Any:
     return record
+
+
+@pytest.fixture(scope="session", name="make_problem")
+def _make_problem() -> Any:
+    return make_problem

@@ -97,6 +97,10 @@ def test_files_of_the_earlier_layout_are_read(
         rows = file[COMPLETE][:2]
         del file[COMPLETE]
         file[COMPLETE] = rows
+        for name, value in (("dt_s", "time_step"), ("speed_m_per_s", "speed")):
+            file.attrs[name] = file[f"facts/{value}"][()]
+        file.attrs["wave_speed_m_per_s"] = file["facts/wave_speed"][()]
+        del file["facts"]
         file.attrs["format"] = "catenary-run-1"
     with Results(path) as results:
         for name, values in known.items():

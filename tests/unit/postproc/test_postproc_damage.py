@@ -60,16 +60,34 @@ def gone(path: str) -> Callable[[h5py.File], None]:
     return lambda file: file.__delitem__(path)
 
 
+def fact(name: str, value: Any) -> Callable[[h5py.File], None]:
+    def apply(file: h5py.File) -> None:
+        del file["facts"][name]
+        file["facts"][name] = value
+
+    return apply
+
+
+def number(name: str, value: float) -> Callable[[h5py.File], None]:
+    return lambda file: file["facts"][name].write_direct(np.array(value))
+
+
 # Damage after which there is no report, and what is told. The checksums of attributes are taken
 # away first, as in a file of an earlier version.
 REFUSED: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     "no case": (removed("case"), 'its attribute "case" is missing'),
     "edition 2099": (put("edition", "2099"), '"edition" is not one of 2006, 2012'),
-    "no step": (put("dt_s", 0.0), '"dt_s" is not a number above 0'),
-    "step NaN": (put("dt_s", np.nan), '"dt_s" is not a number above 0'),
-    "speed as text": (put("speed_m_per_s", "fast"), '"speed_m_per_s" is not a number'),
+    "no step": (number("time_step", 0.0), "facts/time_step holds 0 in place of 1e-12 to 1000 s"),
+    "step NaN": (number("time_step", np.nan), "facts/time_step holds nan"),
+    "speed as text": (
+        fact("speed", np.bytes_("fast")),
+        "facts/speed holds |S4 where numbers belong",
+    ),
+    "two speeds": (fact("speed", [30.0, 40.0]), "facts/speed has the shape (2,)"),
+    "no tension": (gone("facts/contact_wire_tension"), "facts/contact_wire_tension is missing"),
+    "no facts": (gone("facts"), "its facts are missing"),
     "half a scene": (put("config", '{"line": {'), '"config" is not a scene as JSON'),
-    "scene without damping": (put("config", '{"line": {}}'), "(see line.contact_wire.tension_N)"),
+    "a list for a scene": (put("config", "[3]"), '"config" is not a scene as JSON ([3])'),
     "unknowns": (put("n_dofs", np.arange(3)), '"n_dofs" is not a whole number'),
     "no times": (gone("time"), "time is missing or cannot be read"),
     "no forces": (gone("channels/contact_force"), "channels/contact_force is missing"),

@@ -55,7 +55,7 @@ def test_round_trip_of_a_finished_run(run_folder: Path, march: Any) -> None:
 
 def test_channels_carry_unit_and_meaning(run_folder: Path) -> None:
     with h5py.File(run_folder / "run.h5") as file:
-        assert file.attrs["format"] == b"catenary-run-2"
+        assert file.attrs["format"] == b"catenary-run-3"
         assert file.attrs["outcome"] == b"done"
         assert file["line_channels/dropper_force"].attrs["unit"] == b"N"
         assert b"tension" in file["line_channels/dropper_force"].attrs["meaning"]
@@ -113,7 +113,7 @@ def test_a_line_without_arms_or_droppers_is_recorded(tmp_path: Path, make_march:
     march.arm_x = march.dropper_x = np.zeros(0)
     full = march.header()
     bare = {p: a[:0] if "dropper" in p else a for p, a in full.datasets.items()}
-    header = Header(full.attributes, bare)
+    header = Header(full.attributes, bare, full.facts)
     watcher = Recorder(march.comm, tmp_path / "run.h5", header, flush_every=8)
     march.drive(watcher)
     watcher.close()
@@ -125,7 +125,10 @@ def test_a_header_that_lacks_something_names_it(make_march: Any) -> None:
     header = make_march().header()
     attributes = {k: v for k, v in header.attributes.items() if k != "config"}
     with pytest.raises(ValueError, match="lacks config"):
-        Header(attributes, header.datasets)
+        Header(attributes, header.datasets, header.facts)
+    facts = {name: value for name, value in header.facts.items() if name != "speed"}
+    with pytest.raises(ValueError, match="lacks speed"):
+        Header(header.attributes, header.datasets, facts)
 
 
 def test_a_column_with_two_owners_is_refused(tmp_path: Path, make_march: Any) -> None:

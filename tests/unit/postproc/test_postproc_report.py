@@ -179,9 +179,8 @@ def test_channels_as_csv(run_folder: Path, march: Any) -> None:
 
 
 def test_a_failed_criterion_is_named(tmp_path: Path, make_march: Any, record_run: Any) -> None:
-    march = make_march(separations=(0.0,), n_steps=3750, dt=2e-3)
-    attributes = {"speed_m_per_s": 160.0 / 3.6, "title": "slow"}
-    record_run(tmp_path / "run.h5", march, attributes=attributes)
+    march = make_march(separations=(0.0,), n_steps=3750, dt=2e-3, speed=160.0 / 3.6)
+    record_run(tmp_path / "run.h5", march, attributes={"title": "slow"})
     found = write_report(tmp_path, tmp_path)
     assert found.verdict is False
     words = " ".join(Page((tmp_path / "report.html").read_text()).words.split())

@@ -1,0 +1,271 @@
+"""Facts of a run in SI units: derived once from its problem, stored in its result file.
+
+One table for the writer, the reader, their checks and the documentation. To add a fact, add a row
+to ``FACTS``; whatever evaluates a run reads it with ``Results.fact`` or ``Results.facts_of``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from catenary.meshgen.mesh import CONTACT_WIRE
+from catenary.postproc.record.channels import PANTOGRAPH, RUN
+from catenary.solver.problem.contact_laws import ContactLaw, HertzLaw, LinearLaw
+from catenary.solver.problem.integrator_parameters import Integration, integration_of
+
+if TYPE_CHECKING:
+    from catenary.meshgen.mesh import LineMesh
+    from catenary.solver.problem.problem import Problem
+
+# Bounds of what cannot be zero, and of everything.
+_POSITIVE, _MOST = 1e-12, 1e15
+NONE = float("nan")
+
+
+class Derivation(NamedTuple):
+    """What facts are derived from: the problem, its mesh, and the droppers' lengths (n,) [m]."""
+
+    problem: Problem
+    mesh: LineMesh
+    dropper_length: np.ndarray
+
+
+class Fact(NamedTuple):
+    """A fact.
+
+    Attributes
+    ----------
+    unit : SI unit, "-" if none
+    meaning : what it is, in words
+    of : how it is derived: a number, or a sequence with one for each pantograph
+    per : ``RUN`` or ``PANTOGRAPH``
+    low, high : bounds, inclusive
+    may_be_nan : whether NaN is a value, which then stands for "none"
+    earlier : where files of earlier formats have it: the root attribute, or the key in each table
+        of the root attribute ``pantographs``; empty if they do not
+    """
+
+    unit: str
+    meaning: str
+    of: Callable[[Derivation], float | Sequence[float]]
+    per: str = RUN
+    low: float = 0.0
+    high: float = _MOST
+    may_be_nan: bool = False
+    earlier: str = ""
+
+
+def facts_of(problem: Problem, mesh: LineMesh, dropper_length: np.ndarray) -> dict[str, np.ndarray]:
+    """All facts of a run by name, () or (n_pantographs,) each. Not collective.
+
+    Parameters
+    ----------
+    dropper_length : (n_droppers,) at rest [m]
+    """
+    source = Derivation(problem, mesh, dropper_length)
+    return {name: np.asarray(fact.of(source), dtype=float) for name, fact in FACTS.items()}
+
+
+def _or_none(value: float | None) -> float:
+    return NONE if value is None else float(value)
+
+
+def _shortest_step(source: Derivation) -> float:
+    from catenary.solver.problem.problem import n_halvings
+
+    numerics = source.problem.numerics
+    if not numerics.adaptive_tolerance:
+        return numerics.dt
+    return float(numerics.dt / 2 ** n_halvings(numerics.dt, numerics.smallest_dt))
+
+
+def _integration(source: Derivation) -> Integration:
+    numerics = source.problem.numerics
+    own = numerics.integrator, numerics.spectral_radius, numerics.beta, numerics.gamma
+    return integration_of(*own)
+
+
+def _damping(source: Derivation, component: str) -> tuple[float, float]:
+    own = source.problem.damping
+    return own.per_component.get(component, (own.alpha, own.beta))
+
+
+def _longest_element(source: Derivation) -> float:
+    """Of the contact wire, where it is evaluated."""
+    x = source.mesh.x(source.mesh.wires[CONTACT_WIRE])
+    start, end = source.problem.evaluation
+    lengths = np.diff(x)[(x[1:] > start) & (x[:-1] < end)]
+    return float(lengths.max(initial=np.diff(x).min()))
+
+
+def _stiffest_dropper(source: Derivation) -> float:
+    kind = source.problem.line.dropper
+    if not source.dropper_length.size:
+        return 0.0
+    if kind.axial_stiffness is not None:
+        return float(kind.axial_stiffness / source.dropper_length.min())
+    return _or_none(kind.stiffness)
+
+
+def _stiffness_under(law: ContactLaw, force: float) -> float:
+    """Tangent stiffness of a contact law under a force [N/m]."""
+    if isinstance(law, LinearLaw):
+        return law.stiffness
+    if isinstance(law, HertzLaw):
+        share = 1.0 / law.exponent
+        return float(law.exponent * law.stiffness**share * force ** (1.0 - share))
+    return math.inf
+
+
+def _touching_masses(source: Derivation) -> list[float]:
+    from catenary.mbs.build import touching_mass
+
+    return [touching_mass(place.data) for place in source.problem.train.placements]
+
+
+def _actuator_forces(source: Derivation) -> list[float]:
+    from catenary.mbs.build import actuator_force
+
+    return [_or_none(actuator_force(place.data)) for place in source.problem.train.placements]
+
+
+FACTS: dict[str, Fact] = {
+    "time_step": Fact(
+        "s",
+        "time between two records",
+        lambda source: source.problem.numerics.dt,
+        low=_POSITIVE,
+        high=1e3,
+        earlier="dt_s",
+    ),
+    "shortest_step": Fact(
+        "s", "shortest step that the run may take", _shortest_step, low=1e-15, high=1e3
+    ),
+    "step_tolerance": Fact(
+        "N",
+        "error of a contact force accepted in a step, NaN where steps are not adapted",
+        lambda source: _or_none(source.problem.numerics.adaptive_tolerance),
+        may_be_nan=True,
+    ),
+    "fixed_iterations": Fact(
+        "-",
+        "iterations of every step of the fixed-point scheme, NaN where it iterates to tolerances",
+        lambda source: _or_none(source.problem.numerics.iterations),
+        may_be_nan=True,
+    ),
+    "newmark_beta": Fact(
+        "-", "Newmark's beta of the line's integrator", lambda source: _integration(source).beta
+    ),
+    "newmark_gamma": Fact(
+        "-", "Newmark's gamma of the line's integrator", lambda source: _integration(source).gamma
+    ),
+    "mass_weight": Fact(
+        "-",
+        "weight of a step's start in the inertia forces (alpha_m of generalized alpha)",
+        lambda source: _integration(source).mass_weight,
+        low=-1.0,
+        high=1.0,
+    ),
+    "force_weight": Fact(
+        "-",
+        "weight of a step's start in all other forces (alpha_f of generalized alpha)",
+        lambda source: _integration(source).force_weight,
+        high=1.0,
+    ),
+    "speed": Fact(
+        "m/s",
+        "speed of the train",
+        lambda source: source.problem.train.speed,
+        low=_POSITIVE,
+        high=1e4,
+        earlier="speed_m_per_s",
+    ),
+    "wave_speed": Fact(
+        "m/s",
+        "speed of transverse waves on the contact wire as a string, at the start",
+        lambda source: source.problem.line.contact_wire.wave_speed,
+        low=_POSITIVE,
+        high=1e6,
+        earlier="wave_speed_m_per_s",
+    ),
+    "contact_wire_tension": Fact(
+        "N",
+        "tension of the contact wire at the start",
+        lambda source: source.problem.line.contact_wire.tension,
+        low=1e-6,
+    ),
+    "contact_wire_mass": Fact(
+        "kg/m",
+        "mass per length of the contact wire",
+        lambda source: source.problem.line.contact_wire.mass_per_length,
+        low=1e-9,
+    ),
+    "contact_wire_bending_stiffness": Fact(
+        "N m2",
+        "bending stiffness of the contact wire",
+        lambda source: source.problem.line.contact_wire.bending_stiffness,
+    ),
+    "contact_wire_stiffness_damping": Fact(
+        "s",
+        "alpha of the contact wire's proportional damping C = alpha K + beta M",
+        lambda source: _damping(source, CONTACT_WIRE)[0],
+    ),
+    "contact_wire_mass_damping": Fact(
+        "1/s",
+        "beta of the contact wire's proportional damping C = alpha K + beta M",
+        lambda source: _damping(source, CONTACT_WIRE)[1],
+    ),
+    "longest_element": Fact(
+        "m",
+        "length of the longest element of the contact wire in the evaluation stretch",
+        _longest_element,
+        low=_POSITIVE,
+        high=1e9,
+    ),
+    "stiffest_dropper": Fact("N/m", "largest stiffness of a dropper", _stiffest_dropper),
+    "dropper_stiffness_damping": Fact(
+        "s",
+        "alpha of the droppers' proportional damping C = alpha K + beta M",
+        lambda source: _damping(source, "droppers")[0],
+    ),
+    "static_force": Fact(
+        "N",
+        "static force of a pantograph",
+        lambda source: [place.static_force for place in source.problem.train.placements],
+        per=PANTOGRAPH,
+        earlier="static_force_N",
+    ),
+    "actuator_force": Fact(
+        "N",
+        "constant force of the actuator of a multibody pantograph at its static force, NaN for "
+        "others",
+        _actuator_forces,
+        per=PANTOGRAPH,
+        low=-_MOST,
+        may_be_nan=True,
+        earlier="actuator_force_N",
+    ),
+    "touching_mass": Fact(
+        "kg",
+        "mass that one contact meets first: a strip on its suspension, or its share of the head",
+        _touching_masses,
+        per=PANTOGRAPH,
+        low=1e-9,
+        earlier="touching_mass_kg",
+    ),
+    "contact_stiffness": Fact(
+        "N/m",
+        "stiffness of the contact, of a law that is not linear its tangent at the static force; "
+        "infinite where head and wire cannot part",
+        lambda source: [
+            _stiffness_under(source.problem.contact, place.static_force)
+            for place in source.problem.train.placements
+        ],
+        per=PANTOGRAPH,
+        high=math.inf,
+    ),
+}

@@ -1,0 +1,221 @@
+"""Facts of a run: derived once in SI units, stored with the run, read without its scene."""
+
+from __future__ import annotations
+
+import ast
+import json
+import math
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from catenary.cases.scene.keys import known_keys
+from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.units import unit_of
+from catenary.mbs.head.strips import Strips, Suspension
+from catenary.mbs.lumped_data import LumpedData
+from catenary.postproc.read.results import Results
+from catenary.postproc.record.channels import RUN
+from catenary.postproc.record.facts import FACTS, facts_of
+from catenary.postproc.report.report import write_report
+from catenary.solver.base.errors import InputError
+from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw
+from catenary.solver.problem.problem import Damping, Placement, Problem
+
+ROOT = Path(__file__).parents[3]
+# Keys of tables that the head of a result file has itself: when an incident happens.
+OWN_KEYS = {"time_s"}
+
+
+@pytest.fixture
+def problem(make_problem: Any, march: Any) -> Problem:
+    found: Problem = make_problem(march.line, 2, dt=1e-3)
+    return found
+
+
+@pytest.fixture
+def derived(march: Any) -> Any:
+    lengths = np.full(march.mesh.droppers.shape[0], 0.8)
+    lengths[7] = 0.5
+    return lambda problem: facts_of(problem, march.mesh, lengths)
+
+
+def test_every_fact_has_a_unit_a_meaning_and_a_value_within_its_bounds(
+    problem: Problem, derived: Any
+) -> None:
+    facts = derived(problem)
+    assert list(facts) == list(FACTS)
+    for name, fact in FACTS.items():
+        assert fact.unit and fact.meaning
+        values = facts[name]
+        assert values.shape == (() if fact.per == RUN else (2,))
+        known = ~np.isnan(values)
+        assert known.all() or fact.may_be_nan
+        assert ((values >= fact.low) & (values <= fact.high))[known].all()
+
+
+def test_facts_are_stored_with_unit_and_meaning_and_read_again(
+    run_folder: Path, problem: Problem, march: Any
+) -> None:
+    with h5py.File(run_folder / "run.h5", locking=False) as file, Results(run_folder) as results:
+        assert set(file["facts"]) == set(FACTS)
+        for name, fact in FACTS.items():
+            assert file[f"facts/{name}"].attrs["unit"].decode() == fact.unit
+            assert file[f"facts/{name}"].attrs["meaning"].decode() == fact.meaning
+            np.testing.assert_array_equal(results.facts_of(name), file[f"facts/{name}"][()])
+        assert results.dt == results.fact("time_step") == march.dt
+        assert results.fact("speed") == problem.train.speed
+
+
+def test_hertz_s_spring_counts_with_its_tangent(problem: Problem, derived: Any) -> None:
+    """Of K d^1.5 with the secant 5e4 N/m at 150 N: 1.5 times the secant; at F, F^(1/3) as much."""
+    law = HertzLaw(150.0 / (150.0 / 5e4) ** 1.5, 1.5, 0.0, 0.01)
+    first, second = problem.train.placements
+    train = replace(problem.train, placements=(first, replace(second, static_force=1200.0)))
+    found = derived(replace(problem, contact=law, train=train))["contact_stiffness"]
+    np.testing.assert_allclose(found, [7.5e4, 1.5e5], rtol=1e-12)
+
+
+def test_a_kinematic_contact_has_an_infinite_stiffness(problem: Problem, derived: Any) -> None:
+    found = derived(replace(problem, contact=KinematicLaw()))
+    assert np.isinf(found["contact_stiffness"]).all()
+
+
+def test_droppers_with_an_axial_stiffness_count_with_the_shortest(
+    problem: Problem, derived: Any
+) -> None:
+    """EA / l = 1e5 N / 0.5 m."""
+    kind = replace(problem.line.dropper, stiffness=None, axial_stiffness=1e5)
+    line = replace(problem.line, dropper=kind)
+    assert derived(replace(problem, line=line))["stiffest_dropper"] == 2e5
+    assert derived(problem)["stiffest_dropper"] == 1e5
+
+
+def test_damping_of_a_component_goes_before_that_of_the_line(
+    problem: Problem, derived: Any
+) -> None:
+    damping = Damping(1e-4, 0.0125, {"droppers": (3e-3, 0.0)})
+    found = derived(replace(problem, damping=damping))
+    assert found["dropper_stiffness_damping"] == 3e-3
+    assert found["contact_wire_stiffness_damping"] == 1e-4
+    assert found["contact_wire_mass_damping"] == 0.0125
+
+
+def test_the_shortest_step_is_a_power_of_two_of_the_record_s(
+    problem: Problem, derived: Any
+) -> None:
+    adapted = replace(problem.numerics, adaptive_tolerance=0.5, smallest_dt=1.2e-4)
+    found = derived(replace(problem, numerics=adapted))
+    assert found["shortest_step"] == 1.25e-4 and found["step_tolerance"] == 0.5
+    fixed = derived(problem)
+    assert fixed["shortest_step"] == 1e-3 and math.isnan(fixed["step_tolerance"])
+
+
+def test_weights_are_those_of_the_integrator(problem: Problem, derived: Any) -> None:
+    """HHT with a spectral radius of 1/2: a_f = 1/3, beta = 4/9, gamma = 5/6."""
+    found = derived(
+        replace(problem, numerics=replace(problem.numerics, integrator="hht", spectral_radius=0.5))
+    )
+    weights = [found[n] for n in ("newmark_beta", "newmark_gamma", "mass_weight", "force_weight")]
+    np.testing.assert_allclose(weights, [4 / 9, 5 / 6, 0.0, 1 / 3], rtol=1e-12)
+
+
+def test_a_strip_on_a_suspension_is_what_a_contact_meets_first(
+    problem: Problem, derived: Any
+) -> None:
+    chain = (7.2, 15.0), (4.2e3, 50.0), (10.0, 90.0)
+    stiff, soft = Strips(2, 0.4), Strips(2, 0.4, suspension=Suspension(1.1, 1e4, 0.0))
+    places = tuple(Placement(LumpedData(*chain, own), 150.0, 0.0) for own in (stiff, soft))
+    found = derived(replace(problem, train=replace(problem.train, placements=places)))
+    np.testing.assert_allclose(found["touching_mass"], [3.6, 1.1])
+    assert np.isnan(found["actuator_force"]).all()
+
+
+def as_earlier(path: Path) -> None:
+    """Make a file what format 2 was: three facts among its attributes."""
+    with h5py.File(path, "r+") as file:
+        for name, fact in (("dt_s", "time_step"), ("speed_m_per_s", "speed")):
+            file.attrs[name] = file[f"facts/{fact}"][()]
+        file.attrs["wave_speed_m_per_s"] = file["facts/wave_speed"][()]
+        words = [{"kind": "k", "description": "d", "static_force_N": f} for f in (150.0, 140.0)]
+        file.attrs["pantographs"] = json.dumps(words)
+        del file["facts"], file.attrs["attribute_crc32"]
+        file.attrs["format"] = "catenary-run-2"
+
+
+def test_files_of_the_earlier_format_have_a_report_that_says_what_it_lacks(
+    run_folder: Path, tmp_path: Path
+) -> None:
+    path = Path(shutil.copy(run_folder / "run.h5", tmp_path))
+    as_earlier(path)
+    write_report(tmp_path, tmp_path)
+    told = json.loads((tmp_path / "summary.json").read_text())
+    assert told["speed_km_h"] == pytest.approx(300.0)
+    assert [p["static_force_N"] for p in told["pantographs"]] == [150.0, 140.0]
+    (sentence,) = told["indicators"]["warnings"]
+    assert "run the case again" in sentence and told["indicators"]["mesh"]["resolved_hz"] is None
+    assert sentence in (tmp_path / "report.html").read_text()
+
+
+def test_an_earlier_file_with_an_impossible_step_is_refused(
+    run_folder: Path, tmp_path: Path
+) -> None:
+    path = Path(shutil.copy(run_folder / "run.h5", tmp_path))
+    as_earlier(path)
+    with h5py.File(path, "r+") as file:
+        file.attrs["dt_s"] = 0.0
+    with pytest.raises(InputError, match=r'attribute "dt_s" holds 0 in place of 1e-12 to 1000 s'):
+        Results(path)
+
+
+def test_a_flipped_fact_is_told(run_folder: Path, tmp_path: Path) -> None:
+    path = Path(shutil.copy(run_folder / "run.h5", tmp_path))
+    with h5py.File(path, "r+") as file:
+        file["facts/speed"][()] = 80.0
+    with pytest.raises(InputError, match="its facts differ from their checksum"):
+        Results(path)
+
+
+def lookups(tree: ast.AST) -> Iterator[tuple[str, int]]:
+    """Every literal key with which something is read: ``a["key"]``, ``a.get("key")``."""
+    for node in ast.walk(tree):
+        key: ast.AST | None = None
+        if isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Load):
+            key = node.slice
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            key = node.args[0] if node.func.attr in ("get", "pop") and node.args else None
+        if isinstance(key, ast.Constant) and isinstance(key.value, str):
+            yield key.value, node.lineno
+
+
+def scene_keys() -> set[str]:
+    """Last parts of all keys of a scene whose name ends in a unit."""
+    names = {key.rsplit(".", 1)[-1] for key in known_keys(Scene)}
+    return {name for name in names if unit_of(name)} - OWN_KEYS
+
+
+def reads_scene(source: str, shows: bool) -> list[tuple[str, int]]:
+    """Where a source reads a key of a scene; ``shows`` if it may take the scene as a whole."""
+    forbidden = scene_keys() | (set() if shows else {"config"})
+    return [found for found in lookups(ast.parse(source)) if found[0] in forbidden]
+
+
+def test_the_check_finds_what_it_is_for() -> None:
+    source = 'c = about["config"]\nx = c["line"].get("tension_N") + c["dt_s"]\nsum["dt_s"] = 1\n'
+    assert sorted(reads_scene(source, False)) == [("config", 1), ("dt_s", 2), ("tension_N", 2)]
+
+
+@pytest.mark.parametrize(
+    "path",
+    sorted((ROOT / "postproc").rglob("*.py")),
+    ids=lambda path: str(path.relative_to(ROOT)),
+)
+def test_postproc_reads_no_keys_of_scenes(path: Path) -> None:
+    """The report prints the scene as a whole; nothing else of postproc may open it."""
+    assert reads_scene(path.read_text(encoding="utf-8"), path.name == "report.py") == []
