@@ -45,8 +45,8 @@ def accuracy(
             "--axes",
             metavar="NAME,...",
             autocompletion=completion.axes,
-            help="Out of dt, elements, grid, scheme, coupling, contact, dropper, pantograph; all "
-            "if absent.",
+            help="Out of dt, elements, grid, scheme, coupling, adaptive, contact, dropper, "
+            "pantograph; all if absent.",
         ),
     ] = None,
     target: Annotated[

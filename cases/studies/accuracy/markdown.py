@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 
 from catenary.cases.studies.accuracy.analysis import HISTORY, QUANTITIES, Row
@@ -34,9 +35,9 @@ def page(
         "value for mean, deviations and uplift, of its standard deviation for maximum, minimum and "
         'the force "history" (rms). "est/true" is the error that a run estimates itself over the '
         'true one, "rounds" the solves of the small problem a step, "s/s" wall time of the march '
-        "per simulated second: read times as ratios. Where step and mesh are refined together, "
-        "errors of the history by the step and by the mesh alone stand beside the whole error, in "
-        "which they may cancel.",
+        "per simulated second, the least of those timed: only ratios within this page mean "
+        "anything. Where step and mesh are refined together, errors of the history by the step and "
+        "by the mesh alone stand beside the whole error, in which they may cancel.",
     ]
     if picture:
         parts.append(f"![work and precision]({picture})")
@@ -46,7 +47,8 @@ def page(
         parts.append(f"## {axis.title[0].upper()}{axis.title[1:]}")
         if axis.kind == DISCRETISATION:
             told = uncertainty_text(planned, found.uncertainty[axis.name])
-            parts.append(f"Reference: {planned.reference}. {told[0].upper()}{told[1:]}.")
+            reference = run_in_words(planned.reference)
+            parts.append(f"Reference: {reference}. {told[0].upper()}{told[1:]}.")
         else:
             parts.append("Differences from the case as it is: of models, not errors.")
         parts.append(_table(axis, found.rows_of(axis.name)))
@@ -63,7 +65,8 @@ def _command(found: Measured) -> str:
 
 def uncertainty_text(planned: PlannedAxis, percent: Mapping[str, float]) -> str:
     """How far the reference itself may be wrong, and from which runs that is known."""
-    from_runs = " and from ".join(", ".join(chain) for chain in planned.chains)
+    chains = [", ".join(map(run_in_words, chain)) for chain in planned.chains]
+    from_runs = " and from ".join(chains)
     known = {what: value for what, value in percent.items() if math.isfinite(value)}
     if not known:
         return f"the uncertainty of the reference is not known from {from_runs}"
@@ -74,15 +77,29 @@ def uncertainty_text(planned: PlannedAxis, percent: Mapping[str, float]) -> str:
 def _table(axis: Axis, rows: Sequence[Row]) -> str:
     both = any(row.by_step for row in rows)
     names = [*QUANTITIES, *(_SEPARATE if both else ()), *_LAST_COLUMNS]
+    figures = {row.level: _cells(axis, row, both) for row in rows if row.done}
+    used = [i for i in range(len(names)) if any(cells[i] for cells in figures.values())] or [0]
     lines = [
-        "| " + " | ".join([axis.name, *names]) + " |",
-        "|" + "---|" * (len(names) + 1),
+        "| " + " | ".join([axis.name, *(names[i] for i in used)]) + " |",
+        "|" + "---|" * (len(used) + 1),
     ]
     for row in rows:
-        cells = _cells(axis, row, both) if row.done else [row.outcome] + [""] * (len(names) - 1)
-        level = row.level.replace("_", " ")
-        lines.append("| " + " | ".join([level, *cells]) + " |")
+        cells = [row.outcome] + [""] * (len(used) - 1)
+        if row.done:
+            cells = [figures[row.level][i] for i in used]
+        lines.append("| " + " | ".join([in_words(row.level), *cells]) + " |")
     return "\n".join(lines)
+
+
+def in_words(level: str) -> str:
+    """A level's name as words: ``1_ms_1_elements`` is "1 ms 1 element"."""
+    words = re.sub(r"\b1 elements\b", "1 element", level.replace("_", " "))
+    return re.sub(r"\b([2-9]) mass\b", r"\1 masses", words)
+
+
+def run_in_words(name: str) -> str:
+    """The name of a run, axis and level, as that of its level alone."""
+    return in_words(name.rpartition("__")[2])
 
 
 def _cells(axis: Axis, row: Row, both: bool) -> list[str]:

@@ -22,7 +22,7 @@ from catenary.cases.studies.accuracy.analysis import (
     pareto,
 )
 from catenary.cases.studies.accuracy.axes import DISCRETISATION, Axis
-from catenary.cases.studies.accuracy.markdown import uncertainty_text
+from catenary.cases.studies.accuracy.markdown import run_in_words, uncertainty_text
 from catenary.cases.studies.accuracy.runs import Measured
 from catenary.cases.studies.sweep import output as sweep_output
 from catenary.postproc.files.disk import plain, write_all
@@ -33,6 +33,8 @@ PICTURE = "work_precision.png"
 _ADVISED = ("std", HISTORY)
 # Width and height that a name takes in the diagram, in its pixels.
 _ROOM = np.array([50.0, 12.0])
+# Share of the axis beside the outermost points, for their names.
+_MARGIN = 0.09
 
 
 def write(found: Measured, out_dir: Path, target: float) -> list[Path]:
@@ -130,6 +132,7 @@ def draw(found: Measured) -> Figure:
         )
         fronts += front
     figures.log_log(axes)
+    axes.margins(x=_MARGIN)
     _name(axes, fronts)
     figures.tidy(
         axes,
@@ -192,6 +195,7 @@ def _axis_text(axis: Axis, reference: str, rows: Sequence[Row]) -> str:
     what = "error against" if axis.kind == DISCRETISATION else "difference of models from"
     if axis.kind != DISCRETISATION:
         reference = "the case as it is"
+    reference = run_in_words(reference)
     width = max(len(row.level) for row in rows)
     names = list(QUANTITIES)
     head = "".join(f"{name:>9}" for name in names)

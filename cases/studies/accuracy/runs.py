@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import statistics
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -157,7 +156,7 @@ def _row(
         dict(level.sizes),
         errors,
         percent,
-        statistics.median(walls) / summary["simulated_s"],
+        min(walls) / summary["simulated_s"],
         len(walls),
         _estimate(summary),
         counted["rounds"] / counted["steps"],

@@ -1,0 +1,86 @@
+"""The page of an accuracy study: names as words, no empty columns, times that are the least."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from catenary.cases.studies.accuracy import markdown, runs
+from catenary.cases.studies.accuracy.analysis import QUANTITIES, Row
+from catenary.cases.studies.accuracy.axes import AXES, mesh
+from catenary.cases.studies.accuracy.plan import Plan, PlannedAxis
+from catenary.cases.studies.accuracy.runs import Measured
+from catenary.cases.studies.sweep.jobs import Ended
+from catenary.cases.studies.sweep.variants import Variant
+
+REFERENCE = "elements__0.2_ms_40_elements"
+
+
+def planned(name: str = "elements") -> PlannedAxis:
+    levels = [mesh(1), mesh(5)]
+    chains = ((REFERENCE, "elements__20_elements", "elements__10_elements"),)
+    made = {level.name: level.name for level in levels}
+    return PlannedAxis(AXES[name], levels, made, {}, REFERENCE, chains)
+
+
+def row(level: str, error: float) -> Row:
+    errors = dict.fromkeys(QUANTITIES, error)
+    return Row("elements", level, "done", {"h": 1.0}, errors, errors, 0.05, 3, 1.0, 1.01)
+
+
+def test_a_page_has_words_for_names_and_no_empty_column() -> None:
+    rows = [row("1_elements", 4.0), row("5_elements", 1.0), Row("elements", "9_elements", "broke")]
+    plan = Plan("a_case", [planned()], [], 3)
+    found = Measured(plan, rows, {"elements": dict.fromkeys(QUANTITIES, 0.1)}, 60.0)
+    lines = markdown.page(found, ["A sentence."], {"elements": []}, "").splitlines()
+    assert any(
+        line.startswith(
+            "Reference: 0.2 ms 40 elements. Uncertainty of the reference, from 0.2 ms 40 "
+        )
+        for line in lines
+    )
+    table = [line for line in lines if line.startswith("|")]
+    assert table[0] == "| elements | " + " | ".join([*QUANTITIES, "rounds", "s/s"]) + " |"
+    assert {line.count("|") for line in table} == {table[0].count("|")}
+    assert [line.split("|")[1].strip() for line in table[2:]] == [
+        "1 element",
+        "5 elements",
+        "9 elements",
+    ]
+    assert "broke" in table[4]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("1_ms_1_elements", "1 ms 1 element"),
+        ("0.5_ms_16_elements", "0.5 ms 16 elements"),
+        ("fitted_1_mass", "fitted 1 mass"),
+        ("fitted_3_mass", "fitted 3 masses"),
+        ("11_elements", "11 elements"),
+    ],
+)
+def test_names_of_levels_as_words(name: str, words: str) -> None:
+    assert markdown.in_words(name) == words
+
+
+def test_the_least_time_is_told() -> None:
+    def ended(name: str) -> Ended:
+        summary: dict[str, Any] = {
+            "simulated_s": 10.0,
+            "inner_iterations": {"rounds": 11, "steps": 10},
+            "pantographs": [
+                {quantity.key: 1.0 for quantity in QUANTITIES.values() if quantity.key}
+            ],
+            "supports": {"max_uplift_mm": 50.0},
+            "indicators": {"time_step": {"force_error_N": [0.5]}},
+        }
+        return Ended(Variant(name, ()), "done", summary, {"histories": [[1.0, 2.0]]})
+
+    one = planned()
+    names = ["1_elements", "5_elements", *one.chains[0]]
+    times = {name: [0.9, 0.4, 0.6] for name in names}
+    found = runs.evaluate(Plan("a_case", [one], [], 3), [ended(n) for n in names], times, 1.0)
+    assert [each.cost for each in found.rows] == [0.04, 0.04]
+    assert [each.timings for each in found.rows] == [3, 3]
