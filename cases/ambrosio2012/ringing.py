@@ -15,6 +15,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 from catenary.cases.ambrosio2012.statements import DAMPINGS, SINGLE, Run, Runs
 from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.postproc.report.study_report import StudyTable
 from catenary.solver.model.model import Model, iterate_entries
@@ -51,7 +52,7 @@ def first_band(model: Model, n_modes: int) -> Band:
 
 def band_of(scene: Scene) -> Band:
     """The band of a scene's running spans, one mode each; shorter transition spans lie above."""
-    problem = scene.to_problem()
+    problem = problem_of(scene)
     model, _ = find_form(problem, mesh_of(scene))
     line = problem.line
     return first_band(model, line.n_spans - sum(line.n_transition))

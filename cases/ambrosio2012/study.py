@@ -12,8 +12,8 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
 
+from catenary.cases.scene.input.toml_input import read_toml
 from catenary.cases.scene.scene import Scene
-from catenary.cases.scene.toml_input import read_toml
 from catenary.cases.studies.case_study import StudyRun, StudyVariant
 from catenary.cases.studies.sweep.variants import Variant, check_keys, slug
 from catenary.solver.base.errors import InputError

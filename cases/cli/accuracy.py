@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from catenary.cases.cli import completion
 from catenary.cases.cli.app import (
     Assignments,
     Case,
@@ -18,7 +19,7 @@ from catenary.cases.cli.app import (
     begin,
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible
-from catenary.cases.terminal import completion, console
+from catenary.cases.terminal import console
 from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ def accuracy(
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.accuracy import output as accuracy_output
     from catenary.cases.studies.accuracy import runs as study
-    from catenary.postproc.report.wording import counted
+    from catenary.postproc.evaluate.wording import counted
     from catenary.solver.base.parallel import on_root
 
     with held(out, comm, f"catenary accuracy {case}"):

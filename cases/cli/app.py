@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from catenary.cases.terminal import completion, console
+from catenary.cases.cli import completion
+from catenary.cases.terminal import console
 from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def load(
 ) -> Scene:
     """The scene of a verb that takes no options for PETSc. Not collective."""
     from catenary.cases.process.petsc_options import split_extras
-    from catenary.cases.scene.scene import load_scene
+    from catenary.cases.scene.load import load_scene
 
     more, options = split_extras(extras or [])
     if options:

@@ -9,7 +9,7 @@ import typer
 
 from catenary.cases.cli.app import Assignments, Case, Force, MoreAssignments, Shortened, app, load
 from catenary.cases.terminal import console
-from catenary.postproc.report.wording import counted
+from catenary.postproc.evaluate.wording import counted
 
 
 @app.command(
@@ -47,7 +47,7 @@ def check(
     shortened: Shortened = False,
 ) -> int:
     """Serial."""
-    from catenary.cases.scene.faults import SceneError
+    from catenary.cases.scene.input.faults import SceneError
 
     try:
         scene = load(case, assignments, extras, shortened)
@@ -59,9 +59,10 @@ def check(
     from catenary.cases.run.describe_arrivals import arrival_facts
     from catenary.cases.run.describe_pantographs import kind_lines
     from catenary.cases.run.scene_mesh import mesh_of
+    from catenary.cases.scene.convert.problem import problem_of
     from catenary.solver.statics.equilibrium import find_form
 
-    problem = scene.to_problem()
+    problem = problem_of(scene)
     mesh = mesh_of(scene)
     find_form(problem, mesh)
     console.say(
@@ -130,8 +131,9 @@ def static(
         new_file(out, (".csv", ".json"), force)
     scene = load(case, assignments, extras)
     from catenary.cases.run.runner import static_table
+    from catenary.cases.scene.convert.line import line_of
 
     table = static_table(scene)
     if out is not None:
         write_static(out, table)
-    console.say(terminal_text.static_text(table, scene.to_line()))
+    console.say(terminal_text.static_text(table, line_of(scene)))

@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
+from catenary.cases.cli import completion
 from catenary.cases.cli.app import app
-from catenary.cases.terminal import completion, console
+from catenary.cases.terminal import console
 from catenary.solver.base.errors import InputError
 
 
@@ -40,7 +41,7 @@ def list_cases(
         return
     if wanted is not None:
         raise InputError(f"{wanted} filters keys: write `catenary list --keys {wanted}`")
-    from catenary.cases.scene.case_files import entries
+    from catenary.cases.scene.input.case_files import entries
     from catenary.cases.terminal import terminal_text
 
     console.say(terminal_text.case_table(entries()))

@@ -53,7 +53,7 @@ def run(
 ) -> int:
     """Collective."""
     from catenary.cases.process.petsc_options import split_extras
-    from catenary.cases.scene.scene import load_scene
+    from catenary.cases.scene.load import load_scene
 
     if study:
         from catenary.cases.cli.sweep import run_study
@@ -105,8 +105,8 @@ def restart(
 ) -> int:
     """Collective."""
     from catenary.cases.process.petsc_options import split_extras
-    from catenary.cases.scene.error_sentences import Origin
-    from catenary.cases.scene.scene import scene_from
+    from catenary.cases.scene.input.origin import Origin
+    from catenary.cases.scene.load import scene_from
 
     def read() -> tuple[Scene, list[str]]:
         from catenary.postproc.read.guard import examined

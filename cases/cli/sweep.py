@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from catenary.cases.cli import completion
 from catenary.cases.cli.app import (
     Assignments,
     Case,
@@ -20,7 +21,7 @@ from catenary.cases.cli.app import (
     begin,
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible
-from catenary.cases.terminal import completion, console
+from catenary.cases.terminal import console
 from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from catenary.cases.scene.error_sentences import shown
+from catenary.cases.scene.input.origin import shown
 from catenary.solver.base.errors import InputError
 
 

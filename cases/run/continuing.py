@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from catenary.postproc.channels.header import Header
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.header import Header
 from catenary.solver.base.errors import InputError
 
 # What a restart finds again; the rest of the head may be another version's.

@@ -15,6 +15,7 @@ from catenary.cases.run.wave_arrivals import (
     reflection_felt,
     run_in_for,
 )
+from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.line import Line, Wire
 from catenary.solver.problem.problem import Problem
@@ -66,7 +67,7 @@ def arrival_facts(scene: Scene, problem: Problem) -> dict[str, Any]:
 
 def arrival_warnings(scene: Scene) -> list[str]:
     """The warnings among ``arrival_facts``, before a run is made. Not collective."""
-    warnings: list[str] = arrival_facts(scene, scene.to_problem())["warnings"]
+    warnings: list[str] = arrival_facts(scene, problem_of(scene))["warnings"]
     return warnings
 
 

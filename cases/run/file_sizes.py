@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from catenary.cases.run.recording import PER_NODE, THINNED_WINDOW, Recording
+from catenary.cases.scene.convert.course import resolved
 from catenary.mbs.build import has_joints
+from catenary.postproc.channels import channels
+from catenary.postproc.channels.channels import Channel
+from catenary.postproc.channels.line_record import GZIP
 from catenary.postproc.files.chunk_shapes import Chunk, chunks_of
-from catenary.postproc.record import channels
-from catenary.postproc.record.channels import Channel
-from catenary.postproc.record.line_record import GZIP
 from catenary.solver.problem.problem import Problem
 
 if TYPE_CHECKING:
@@ -84,7 +85,7 @@ def estimate_files(
     n_droppers, n_arms = recording.dropper_x.size, recording.arm_x.size
     kept = 2 * (_STATE_ARRAYS * n_dofs + 2 * (n_droppers + n_arms))
     at_rest = _PER_NODE * recording.n_nodes + _PER_DROPPER * n_droppers
-    head = _EMPTY_FILE + len(json.dumps(scene.resolved()))
+    head = _EMPTY_FILE + len(json.dumps(resolved(scene)))
     film = 0.0
     if recording.field_every:
         n_snapshots = recording.n_steps // recording.field_every + 1

@@ -16,11 +16,12 @@ from catenary.cases.run.recording import (
     extent_of,
     recording_of,
 )
-from catenary.cases.scene.mesh_size import size_of
+from catenary.cases.scene.checks.mesh_size import estimate_memory, size_of
+from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.effects import effect as effects
+from catenary.solver.effects import all_effects as effects
 from catenary.solver.problem.problem import Problem
 
 # Cost model of the march on one rank, records included: overhead of a step, and time per unknown.
@@ -43,12 +44,6 @@ FLUSH_MEMORY = 1e8
 # Steps of a flush whose chunks are not too small.
 LEAST_FLUSH = 256
 
-# Resident memory of runs of ambrosio2012 on 25, 300, 1000 and 2000 spans, report included, within
-# 10 %: program and libraries, then per unknown.
-MEMORY_BASE = 3.85e8  # [B]
-MEMORY_PER_UNKNOWN = 2200.0  # [B]
-# What a step adds, as the report takes the history of one pantograph after the other.
-MEMORY_PER_STEP = 40.0  # [B]
 _BYTES = 8
 _PER_PANTOGRAPH = 6  # channels of a pantograph at most
 
@@ -117,14 +112,14 @@ def needs_before_meshing(scene: Scene) -> Needs | None:
     size = size_of(scene)
     if size is None:
         return None
-    problem = scene.to_problem()
+    problem = problem_of(scene)
     extent = extent_before_meshing(problem.line, size.nodes)
     return needs_of(scene, problem, extent, size.unknowns)
 
 
 def needs_with_mesh(scene: Scene, mesh: LineMesh) -> Needs:
     """What a run on a mesh needs. Not collective."""
-    problem = scene.to_problem()
+    problem = problem_of(scene)
     n_unknowns = len(effects.unknowns_per_node(effects.active(problem)))
     return needs_of(scene, problem, extent_of(mesh), n_unknowns * mesh.n_nodes)
 
@@ -153,11 +148,6 @@ def total_size(runs: Iterable[Kept]) -> RunSize:
         seconds += needs.march
         n_steps += needs.n_steps
     return RunSize(left + largest, seconds, n_steps)
-
-
-def estimate_memory(n_dofs: int, n_steps: int = 0) -> float:
-    """Resident memory of a run on one rank, its report included [B]."""
-    return MEMORY_BASE + MEMORY_PER_UNKNOWN * n_dofs + MEMORY_PER_STEP * n_steps
 
 
 def estimate_march(n_dofs: int, n_steps: int, scheme: str, n_substeps: int = 0) -> float:

@@ -12,9 +12,10 @@ from catenary.cases.run.describe_pantographs import kind_lines
 from catenary.cases.run.file_sizes import FileSizes
 from catenary.cases.run.needs import needs_of, simulated_time
 from catenary.cases.run.recording import extent_of
+from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
-from catenary.postproc.report.wording import counted
-from catenary.solver.effects import effect as effects
+from catenary.postproc.evaluate.wording import counted
+from catenary.solver.effects import all_effects as effects
 from catenary.solver.problem.problem import Numerics, Problem, n_halvings
 
 if TYPE_CHECKING:
@@ -117,7 +118,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
     from catenary.cases.run.scene_mesh import mesh_of
     from catenary.meshgen.mesh import CONTACT_WIRE
 
-    problem = scene.to_problem()
+    problem = problem_of(scene)
     mesh = mesh_of(scene) if mesh is None else mesh
     extent = extent_of(mesh)
     on, off = effect_rows(scene, problem)

@@ -9,8 +9,8 @@ import numpy as np
 
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
-from catenary.postproc.record import channels
-from catenary.postproc.record.line_record import GZIP, NONE, LineRecord, says
+from catenary.postproc.channels import channels
+from catenary.postproc.channels.line_record import GZIP, NONE, LineRecord, says
 from catenary.solver.problem.problem import Problem
 
 if TYPE_CHECKING:

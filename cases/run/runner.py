@@ -38,19 +38,22 @@ from catenary.cases.run.needs import (
 from catenary.cases.run.plan import effect_rows
 from catenary.cases.run.recording import extent_of, recording_of
 from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.convert.course import resolved
+from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.mesh import LineMesh
-from catenary.postproc.files.fields import FieldRecorder
+from catenary.postproc.channels.facts import facts_of
+from catenary.postproc.channels.header import Header, line_datasets, static_datasets
 from catenary.postproc.files.own_files import remove_stale
-from catenary.postproc.record.facts import facts_of
-from catenary.postproc.record.header import Header, line_datasets, static_datasets
+from catenary.postproc.record.fields import FieldRecorder
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.report.report import write_report, write_summary
 from catenary.solver.base.errors import CatenaryError, RunBroken
 from catenary.solver.base.parallel import on_root
 from catenary.solver.base.petsc import PETSc
-from catenary.solver.model.model import Model, build
+from catenary.solver.effects.build_model import build
+from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.equilibrium import (
     Elasticity,
@@ -183,7 +186,7 @@ def restart_case(
 
 def static_table(scene: Scene) -> dict[str, np.ndarray]:
     """The line at rest, arrays named as in the result file's groups. Not collective."""
-    problem = scene.to_problem()
+    problem = problem_of(scene)
     mesh = mesh_of(scene)
     model, form = find_form(problem, mesh)
     lift = elasticity(model, *middle_span(problem.line))
@@ -229,7 +232,7 @@ def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
     left = f"{order.result} is as it was" if order.resume else "nothing was written"
     with ExitStack() as stack:
         with Phase(comm, "the line was read", left) as phase:
-            problem = scene.to_problem()
+            problem = problem_of(scene)
             on_root(comm, phase.alone(lambda: _judge_before_meshing(scene, judge)))
             order.ready()
             at_rest = _at_rest(scene, problem, comm, phases, phase, judge)
@@ -395,7 +398,7 @@ def _header(order: _Order, problem: Problem, at_rest: AtRest) -> Header:
             "incidents": incident_facts(scene, problem),
             "arrivals": arrival_facts(scene, problem),
             "versions": versions(),
-            "config": scene.resolved(),
+            "config": resolved(scene),
             "petsc_options": list(order.petsc_options),
             "effects_on": [tuple(row) for row in on],
             "effects_off": [tuple(row) for row in off],

@@ -6,7 +6,8 @@ import logging
 from pathlib import Path
 
 from catenary.cases.result_folder.output_files import new_file
-from catenary.cases.scene.mesh_size import MANY_NODES, size_of
+from catenary.cases.scene.checks.mesh_size import MANY_NODES, size_of
+from catenary.cases.scene.convert.line import line_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.build import make_mesh, use_mesh
 from catenary.meshgen.mesh import LineMesh
@@ -23,7 +24,7 @@ def mesh_of(scene: Scene, path: Path | None = None) -> LineMesh:
     InputError
         If the user's mesh is refused.
     """
-    line, own = scene.to_line(), scene.mesh_file()
+    line, own = line_of(scene), scene.mesh_file()
     if own is not None:
         return use_mesh(line, own)
     size = size_of(scene)

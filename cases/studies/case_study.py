@@ -19,8 +19,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from catenary.cases.scene.case_files import find_case
-from catenary.cases.scene.scene import Scene, load_scene
+from catenary.cases.scene.input.case_files import find_case
+from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.jobs import Ended, Job, make_jobs
 from catenary.cases.studies.sweep.variants import Variant, slug
 from catenary.solver.base.errors import InputError

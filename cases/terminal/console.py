@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 import typer
 
-from catenary.cases.scene.plain_text import plain
+from catenary.cases.scene.input.plain_text import plain
 from catenary.solver.base.errors import CatenaryError, InputError
 from catenary.solver.base.parallel import NO_MEMORY, launched_by_mpirun, on_root
 

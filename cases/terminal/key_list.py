@@ -13,13 +13,13 @@ from pydantic import BaseModel, TypeAdapter
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from catenary.cases.scene.keys import ANY, kind_of, tables_in
-from catenary.cases.scene.typical_values import TYPICAL
-from catenary.cases.scene.units import unit_of
-from catenary.cases.scene.usual_ranges import usual_range
-from catenary.postproc.evaluate.standards import EDITIONS, SYSTEMS
+from catenary.cases.scene.keys.keys import ANY, kind_of, tables_in
+from catenary.cases.scene.keys.typical_values import TYPICAL
+from catenary.cases.scene.keys.usual_ranges import usual_range
+from catenary.cases.scene.tables.units import unit_of
+from catenary.postproc.standards.en50367 import EDITIONS, SYSTEMS
 from catenary.solver.base.errors import InputError
-from catenary.solver.effects import effect as effects
+from catenary.solver.effects import all_effects as effects
 
 # Words that a check takes, where the key's type is plain text.
 _WORDS = {"evaluation.edition": list(EDITIONS), "evaluation.system": list(SYSTEMS)}

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from catenary.cases.scene.case_files import CaseEntry
+from catenary.cases.scene.input.case_files import CaseEntry
 from catenary.meshgen.line import Line
 from catenary.postproc.evaluate.comparing import decimals_that_tell
-from catenary.postproc.report.wording import counted, fixed
+from catenary.postproc.evaluate.wording import counted, fixed
 
 
 def case_table(cases: Sequence[CaseEntry]) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from catenary.mbs.head import head_kernels
+from catenary.mbs.vehicle import curves
 from catenary.mbs.vehicle.base_motion import BaseMotion
 
 
@@ -48,7 +48,7 @@ class LateralPath:
     def move_to(self, time: float) -> None:
         """Put ``place`` and ``rate`` to ``time`` [s]."""
         np.add(self._start, self._speed * time, out=self._along)
-        head_kernels.polyline_at(self._x, self._y, self._along, self.place, self.rate)
+        curves.polyline_at(self._x, self._y, self._along, self.place, self.rate)
         self.rate *= self._speed
         if self._base is not None:
             sway = self._base.lateral(time)

@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from catenary.mbs.head import head_kernels
+from catenary.mbs.vehicle import curves
 from catenary.mbs.vehicle.motion_sources import Harmonic, Source, Table, VehicleMotion
 
 
@@ -37,7 +37,7 @@ class _Spline:
         self._coefficients = np.ascontiguousarray(spline.c.T)
 
     def __call__(self, x: float) -> tuple[float, float, float]:
-        value, first, second = head_kernels.spline_at(self._breaks, self._coefficients, x)
+        value, first, second = curves.spline_at(self._breaks, self._coefficients, x)
         return value, first, second
 
 
@@ -46,7 +46,7 @@ class _Sines:
         self._waves = (amplitudes, rates, phases)
 
     def __call__(self, x: float) -> tuple[float, float, float]:
-        value, first, second = head_kernels.sines_at(*self._waves, x)
+        value, first, second = curves.sines_at(*self._waves, x)
         return value, first, second
 
 

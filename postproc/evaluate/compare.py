@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from catenary.postproc.evaluate import statistics as stats
+from catenary.postproc.evaluate.wording import counted, fixed
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.wording import counted, fixed
 
 _FORCES = (
     ("mean [N]", "mean", 1.0),

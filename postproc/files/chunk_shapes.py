@@ -12,9 +12,9 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from catenary.postproc.record import channels
-from catenary.postproc.record.channels import Channel
-from catenary.postproc.record.line_record import GZIP, LineRecord
+from catenary.postproc.channels import channels
+from catenary.postproc.channels.channels import Channel
+from catenary.postproc.channels.line_record import GZIP, LineRecord
 
 # Largest numbers of rows of a chunk: of one column, and of a block of columns.
 _ROWS_OF_ONE, _ROWS_OF_MANY = 4096, 512

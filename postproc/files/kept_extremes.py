@@ -11,8 +11,8 @@ from collections.abc import Mapping
 import h5py
 import numpy as np
 
+from catenary.postproc.channels import channels
 from catenary.postproc.files.checked import ARRAYS_SUM, seal_arrays, sum_of_arrays
-from catenary.postproc.record import channels
 
 GROUP, ROWS = "extremes", "rows"
 _SLOTS = ("0", "1")

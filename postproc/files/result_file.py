@@ -17,6 +17,11 @@ from typing import Any, NamedTuple
 import h5py
 import numpy as np
 
+from catenary.postproc.channels import channels
+from catenary.postproc.channels.channels import Channel
+from catenary.postproc.channels.facts import FACTS
+from catenary.postproc.channels.header import Header
+from catenary.postproc.channels.line_record import GZIP, GZIP_LEVEL, LineRecord
 from catenary.postproc.files.checked import (
     FORMAT_BOUNDS,
     create_checked,
@@ -30,11 +35,6 @@ from catenary.postproc.files.kept_extremes import drop_extremes, extremes_at, st
 from catenary.postproc.files.own_files import part_of
 from catenary.postproc.files.trimming import trimmed
 from catenary.postproc.files.windowed_rows import write_window
-from catenary.postproc.record import channels
-from catenary.postproc.record.channels import Channel
-from catenary.postproc.record.facts import FACTS
-from catenary.postproc.record.header import Header
-from catenary.postproc.record.line_record import GZIP, GZIP_LEVEL, LineRecord
 from catenary.solver.time_loop.observers import Stage
 
 FORMAT = "catenary-run-3"

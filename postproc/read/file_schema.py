@@ -9,9 +9,9 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from catenary.postproc.evaluate.standards import EDITIONS, SYSTEMS
-from catenary.postproc.record import channels
-from catenary.postproc.record.line_record import LineRecord, from_table
+from catenary.postproc.channels import channels
+from catenary.postproc.channels.line_record import LineRecord, from_table
+from catenary.postproc.standards.en50367 import EDITIONS, SYSTEMS
 
 # Beyond these sizes a recorded value is damage, by unit; the march itself ends a run whose contact
 # force passes 1e9 N.

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from catenary.postproc.channels import channels
+from catenary.postproc.channels.line_record import LineRecord, from_table
 from catenary.postproc.files import block_reading
 from catenary.postproc.files.result_file import DONE, FORMAT, LINE_TIME, RUNNING, complete_rows
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.sound_file import SoundFile
-from catenary.postproc.record import channels
-from catenary.postproc.record.line_record import LineRecord, from_table
 from catenary.solver.base.errors import InputError
 
 logger = logging.getLogger("catenary.results")

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catenary.postproc.record import channels
+from catenary.postproc.channels import channels
+from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.record.column_gather import ColumnGather
 from catenary.postproc.record.extremes import Extremes
-from catenary.postproc.record.line_record import LineRecord
 from catenary.solver.time_loop.observers import Stage
 
 

@@ -7,9 +7,9 @@ from typing import NamedTuple, TextIO
 
 import numpy as np
 
+from catenary.postproc.channels import channels
 from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.read.results import Results
-from catenary.postproc.record import channels
 
 # Steps that are written at once.
 _ROWS = 10_000

@@ -11,10 +11,10 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from catenary.postproc.channels import channels
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.read.results import Results
-from catenary.postproc.record import channels
 from catenary.postproc.report.envelope import thinned
 from catenary.postproc.report.figures import (
     COLOURS,

@@ -16,20 +16,22 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from catenary.postproc.evaluate import standards
+from catenary.postproc.channels.line_record import says
 from catenary.postproc.evaluate import statistics as stats
+from catenary.postproc.evaluate import verdict as acceptance
 from catenary.postproc.evaluate.comparing import decimals_that_tell
 from catenary.postproc.evaluate.error_indicators import Indicators, indicate
 from catenary.postproc.evaluate.remarks import remarks
-from catenary.postproc.evaluate.standards import KMH, Criterion
 from catenary.postproc.evaluate.statistics import RunStatistics
+from catenary.postproc.evaluate.verdict import Criterion
+from catenary.postproc.evaluate.wording import counted, fixed
 from catenary.postproc.files.disk import write_into
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.line_record import says
 from catenary.postproc.report import csv_tables, figures, plots
 from catenary.postproc.report.summary import as_json, real_time_factor, summarise
-from catenary.postproc.report.wording import counted, fixed
+from catenary.postproc.standards import en50367 as standards
+from catenary.postproc.standards.en50367 import KMH
 
 logger = logging.getLogger("catenary.report")
 
@@ -100,7 +102,7 @@ def write_report(
         content["droppers.csv"] = csv_tables.droppers_csv(results)
         content["report.html"] = _html(results, statistics, criteria, pictures)
         content["summary.json"] = as_json(summarise(results, statistics, criteria))
-        verdict = standards.verdict(criteria) if results.complete else None
+        verdict = acceptance.verdict(criteria) if results.complete else None
     return Report(write_into(out, content), criteria, verdict)
 
 
@@ -116,7 +118,7 @@ def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
         statistics = stats.evaluate(results)
         criteria = judge(results, statistics)
         text = as_json(summarise(results, statistics, criteria))
-        verdict = standards.verdict(criteria) if results.complete else None
+        verdict = acceptance.verdict(criteria) if results.complete else None
     write_into(Path(out_dir), {"summary.json": text})
     return verdict
 
@@ -124,7 +126,7 @@ def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
 def judge(results: Results, statistics: RunStatistics) -> list[Criterion]:
     """The criteria of the edition and system that the result file names. Not collective."""
     about = results.attributes
-    return standards.judge(
+    return acceptance.judge(
         statistics,
         results.fact("speed"),
         results.fact("wave_speed"),
@@ -197,7 +199,7 @@ def _html(
         criteria=criteria,
         digits=lambda c: decimals_that_tell(c.value, c.limit, 3 if c.unit == "%" else 1),
         failed=[c for c in criteria if c.passed is False],
-        verdict=standards.verdict(criteria),
+        verdict=acceptance.verdict(criteria),
         edition=standards.EDITIONS[about["edition"]].title,
         system=standards.SYSTEMS[about["system"]],
         speed_km_h=KMH * results.fact("speed"),

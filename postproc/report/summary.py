@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from catenary.postproc.evaluate import error_indicators
-from catenary.postproc.evaluate.standards import KMH, Criterion, verdict
 from catenary.postproc.evaluate.statistics import PantographStatistics, RunStatistics
+from catenary.postproc.evaluate.verdict import Criterion, verdict
 from catenary.postproc.files.disk import plain
 from catenary.postproc.read.results import Results
+from catenary.postproc.standards.en50367 import KMH
 
 
 def summarise(

@@ -19,7 +19,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from catenary.solver.integrators.state_kernels import compiled
+from catenary.solver.base.compiled import compiled
 
 # What is told below is understood by this family only.
 _UNDERSTOOD = platform.machine().lower() in ("x86_64", "amd64")

@@ -12,11 +12,11 @@ from scipy import integrate
 from catenary.mbs.build import Operation, has_joints, make_pantograph
 from catenary.mbs.head.head_records import HEAD, fill_head
 from catenary.mbs.head.newmark_head import SteppedHead
-from catenary.mbs.head.roll import roll_of
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
+from catenary.mbs.roll import roll_of
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.base.bound import bound

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.integrators.state_kernels import compiled
+from catenary.solver.base.compiled import compiled
 
 # Columns of a row of a dropper that may slacken, before its 3 n numbers for n contacts.
 NUMBER, TENSION, COUPLINGS = 0, 1, 2

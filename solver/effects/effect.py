@@ -7,12 +7,12 @@ read this one table. To add an effect, write a module with such a function and `
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from catenary.solver.model.model import ModelBuilder
+    from catenary.solver.model.builder import ModelBuilder
     from catenary.solver.problem.problem import Problem
 
 
@@ -62,18 +62,6 @@ def unregister(name: str) -> None:
     del _REGISTRY[name]
 
 
-def registry() -> dict[str, Effect]:
-    """All effects by name, in the order in which they are built."""
-    from catenary.solver.effects import vertical_effects  # noqa: F401  (registers on first import)
-
+def registered() -> dict[str, Effect]:
+    """The effects registered so far by name, in the order in which they are built."""
     return dict(_REGISTRY)
-
-
-def active(problem: Problem) -> list[Effect]:
-    """The effects that ``problem`` asks for and has something for, in building order."""
-    return [e for e in registry().values() if e.name in problem.effects and e.applies(problem)]
-
-
-def unknowns_per_node(effects: Iterable[Effect]) -> tuple[str, ...]:
-    """Unknowns that a set of effects needs at each wire node, without repetition."""
-    return tuple(dict.fromkeys(name for effect in effects for name in effect.unknowns))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from catenary.mbs.head.roll import roll_of
+from catenary.mbs.roll import roll_of
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.problem.contact_laws import KinematicLaw
@@ -12,7 +12,7 @@ from catenary.solver.problem.incidents import DropperBreak, TensionLoss
 from catenary.solver.problem.problem import slowest_wave_speed
 
 if TYPE_CHECKING:
-    from catenary.solver.model.model import ModelBuilder
+    from catenary.solver.model.builder import ModelBuilder
 
 
 def _vertical(builder: ModelBuilder) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.integrators.state_kernels import compiled
+from catenary.solver.base.compiled import compiled
 
 
 @compiled

@@ -12,8 +12,8 @@ import numpy as np
 from scipy import sparse
 
 from catenary.solver.base.bound import bound
+from catenary.solver.base.compiled import compiled, in_line
 from catenary.solver.base.petsc import PETSc
-from catenary.solver.integrators.state_kernels import compiled, in_line
 from catenary.solver.linear import station_products
 from catenary.solver.linear.lanes import Layout, add_product, block_size, load, pitch, store, zero
 

@@ -13,7 +13,7 @@ from scipy import sparse
 
 from catenary.solver.base import aligned_arrays
 from catenary.solver.base.bound import bound
-from catenary.solver.integrators.state_kernels import compiled, in_line
+from catenary.solver.base.compiled import compiled, in_line
 from catenary.solver.linear.lanes import (
     WIDEST,
     Layout,

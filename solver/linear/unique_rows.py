@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from catenary.solver.integrators.state_kernels import compiled
+from catenary.solver.base.compiled import compiled
 
 # Rows for each kind below which a stored matrix is no slower, and unknowns of a node that the
 # kernel is written for.

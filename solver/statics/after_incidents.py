@@ -29,11 +29,12 @@ from typing import Any
 import numpy as np
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.solver.effects.build_model import build
 from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.step_operators import LineOperators
 from catenary.solver.linear.unit_responses import Windows
 from catenary.solver.model import elements
-from catenary.solver.model.model import Model, build, iterate_entries
+from catenary.solver.model.model import Model, iterate_entries
 from catenary.solver.model.partition import Ownership
 from catenary.solver.problem.incidents import DropperBreak, LineIncident
 from catenary.solver.problem.problem import Problem

@@ -16,8 +16,9 @@ from scipy.sparse import linalg as sparse_linalg
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.solver.base.errors import InputError
+from catenary.solver.effects.build_model import build
 from catenary.solver.model import elements
-from catenary.solver.model.model import Model, build, iterate_entries
+from catenary.solver.model.model import Model, iterate_entries
 from catenary.solver.problem.problem import Problem
 
 # Lengths are printed to the millimetre; the iteration contracts by the ratio of dropper weight

@@ -15,7 +15,8 @@ import pytest
 from mpi4py import MPI
 
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
 from catenary.mbs.build import Operation, PantographData, make_pantograph
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.head.wire_crossing import LateralPath
@@ -39,7 +40,7 @@ PAIR = Strips(2, 0.56, 1.6, Suspension(1.0, 8000.0, 10.0))
 
 @pytest.fixture(scope="module")
 def seven_bodies() -> PantographData:
-    return load_scene(CASE).to_problem().train.placements[0].data
+    return problem_of(load_scene(CASE)).train.placements[0].data
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -113,7 +114,7 @@ def test_seven_bodies(
 
 def test_whole_step(benchmark: Any) -> None:
     scene = load_scene(CASE)
-    problem = scene.to_problem()
+    problem = problem_of(scene)
     train = problem.train
     end = train.start + N_STEPS * problem.numerics.dt * train.speed
     problem = replace(problem, train=replace(train, end=end))

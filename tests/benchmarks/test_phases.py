@@ -10,7 +10,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
 from catenary.solver.base.petsc_events import NAMES
 from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
 from catenary.solver.time_loop.march import March
@@ -23,7 +24,7 @@ def test_phases_of_a_step(benchmark: Any, pantograph: str) -> None:
     """Times of events add up to the step but for what Python does between them."""
     train = f'train.pantographs=[{{name="{pantograph}"}}]'
     scene = load_scene("ambrosio2012", ["train.start_m=310", train])
-    problem = scene.to_problem()
+    problem = problem_of(scene)
     model, form = find_form(problem, mesh_of(scene))
     lift = elasticity(model, *middle_span(problem.line))
     train_of = problem.train

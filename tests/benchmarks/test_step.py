@@ -18,7 +18,8 @@ from floor import LIBRARIES
 from mpi4py import MPI
 
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
 from catenary.solver.integrators.newmark import NewmarkLine
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
@@ -46,7 +47,7 @@ def at_rest() -> tuple[Any, ...]:
 
 def rest(train: str) -> tuple[Any, ...]:
     scene = load_scene(CASE, ["train.start_m=310", f"train.pantographs={train}"])
-    problem = scene.to_problem()
+    problem = problem_of(scene)
     model, form = find_form(problem, mesh_of(scene))
     return problem, model, form, elasticity(model, *middle_span(problem.line))
 

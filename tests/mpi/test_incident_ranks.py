@@ -14,7 +14,8 @@ import pytest
 from mpi4py import MPI
 
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
 from catenary.mbs.lowering import Lowering
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.solver.base.parallel import on_root
@@ -82,7 +83,7 @@ def case() -> tuple[Problem, LineMesh, float]:
 
     def make() -> tuple[Problem, LineMesh, float]:
         scene = load_scene("en50318_2002", SCENE)
-        problem, mesh = scene.to_problem(), mesh_of(scene)
+        problem, mesh = problem_of(scene), mesh_of(scene)
         model, _ = find_form(problem, mesh)
         x = np.sort(mesh.x(mesh.droppers[:, 1]))
         nodes = mesh.wires[CONTACT_WIRE]

@@ -13,7 +13,8 @@ import pytest
 from mpi4py import MPI
 
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.base.errors import NotConverged, RunBroken
 from catenary.solver.base.parallel import on_root
@@ -58,7 +59,7 @@ class Watched:
 def case() -> tuple[Problem, LineMesh]:
     def make() -> tuple[Problem, LineMesh]:
         scene = load_scene("ambrosio2012", SCENE)
-        return scene.to_problem(), mesh_of(scene)
+        return problem_of(scene), mesh_of(scene)
 
     return on_root(MPI.COMM_WORLD, make)
 

@@ -17,12 +17,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from catenary.postproc.channels.header import Header
+from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files import result_file
 from catenary.postproc.files.disk import NoRoom
-from catenary.postproc.files.fields import FieldRecorder
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.header import Header
-from catenary.postproc.record.line_record import LineRecord
+from catenary.postproc.record.fields import FieldRecorder
 from catenary.postproc.record.recorder import Recorder
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.time_loop.observers import Stage, StepView

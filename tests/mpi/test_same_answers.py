@@ -14,7 +14,8 @@ import pytest
 from mpi4py import MPI
 
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.solver.base.errors import InputError
 from catenary.solver.base.parallel import on_root
@@ -109,7 +110,7 @@ def largest_difference(problem: Problem, mesh: LineMesh) -> dict[str, float]:
 def case() -> tuple[Problem, LineMesh]:
     def make() -> tuple[Problem, LineMesh]:
         scene = load_scene("en50318_2002", SCENE)
-        return scene.to_problem(), mesh_of(scene)
+        return problem_of(scene), mesh_of(scene)
 
     return on_root(MPI.COMM_WORLD, make)
 
@@ -188,7 +189,7 @@ def test_rank_0_may_have_less_of_a_long_line() -> None:
 
     def make() -> tuple[Problem, LineMesh, np.ndarray, float]:
         scene = load_scene("en50318_2002", ["line.n_spans=140"])
-        problem, mesh = scene.to_problem(), mesh_of(scene)
+        problem, mesh = problem_of(scene), mesh_of(scene)
         model, _ = find_form(problem, mesh)
         ownership = distribute(model, max(2, MPI.COMM_WORLD.size), 0)
         nodes = mesh.wires[CONTACT_WIRE]

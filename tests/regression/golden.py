@@ -19,7 +19,7 @@ import tempfile
 from datetime import date
 from pathlib import Path
 
-from catenary.cases.scene.case_files import shipped
+from catenary.cases.scene.input.case_files import shipped
 
 FILE = Path(__file__).with_name("golden.csv")
 COLUMNS = ["case", "pantograph", "mean_N", "std_N", "date", "reason"]

@@ -9,7 +9,7 @@ import pytest
 from measuring import COMM
 from program import catenary
 
-from catenary.cases.scene.case_files import shipped
+from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.studies.sweep.jobs import make_jobs
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import parse_vary, product

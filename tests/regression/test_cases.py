@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 from program import assert_sound, catenary
 
-from catenary.cases.scene.case_files import shipped
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.convert.line import line_of
+from catenary.cases.scene.input.case_files import shipped
+from catenary.cases.scene.load import load_scene
 
 CASES = shipped()
 FILES = {"run.h5", "fields.xdmf", "fields.h5", "summary.json", "report.html"}
@@ -188,7 +189,7 @@ def test_ac_simple_finds_the_nominal_dropper_lengths(tmp_path: Path) -> None:
     rows = table(out)
     scene = load_scene("ac_simple")
     assert len(rows) == len(nominal) * scene.line.n_spans
-    length = scene.to_line().span_lengths[0]
+    length = line_of(scene).span_lengths[0]
     differences = []
     for row in rows:
         span = int(row["span"])

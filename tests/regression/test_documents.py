@@ -31,8 +31,8 @@ from documents import (
 )
 
 from catenary.cases.cli.main import app
-from catenary.cases.scene.case_files import shipped
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.input.case_files import shipped
+from catenary.cases.scene.load import load_scene
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted(

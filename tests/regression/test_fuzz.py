@@ -26,7 +26,8 @@ from mpi4py import MPI
 from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
-from catenary.cases.scene.scene import Scene, load_scene
+from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.runs import Watched
 from catenary.solver.base.errors import InputError

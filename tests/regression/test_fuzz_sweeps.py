@@ -20,7 +20,7 @@ from program import assert_sound
 from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.load import load_scene
 from catenary.postproc.read.results import Results
 
 FIRST = int(os.environ.get("FUZZ_SEED", "1"))

@@ -18,9 +18,10 @@ from typer.testing import CliRunner
 from catenary.cases.cli.main import app
 from catenary.cases.run import scene_mesh
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.error_sentences import Origin
-from catenary.cases.scene.mesh_size import size_of
-from catenary.cases.scene.scene import load_scene, scene_from
+from catenary.cases.scene.checks.mesh_size import size_of
+from catenary.cases.scene.convert.course import resolved
+from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.studies.sweep.variants import read_named
 from catenary.solver.base.errors import InputError
 
@@ -258,7 +259,7 @@ def test_fifos_and_devices_are_refused_at_once(tmp_path: Path) -> None:
 
 
 def test_the_scene_of_a_result_file_is_judged_like_any_other() -> None:
-    config = json.loads(json.dumps(load_scene("en50318_2002").resolved()))
+    config = json.loads(json.dumps(resolved(load_scene("en50318_2002"))))
     config["petsc"] = {"log_view": ":canary"}
     with pytest.raises(InputError, match=NOT_FOR_A_SCENE):
         scene_from(config, Origin("run.h5"))

@@ -12,7 +12,7 @@ import pytest
 from mpi4py import MPI
 
 from catenary.cases.run.runner import run_case
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.load import load_scene
 from catenary.postproc.evaluate.statistics import evaluate
 from catenary.postproc.read.results import Results
 

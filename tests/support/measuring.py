@@ -13,7 +13,8 @@ from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.effects.effect import Effect, register, registry, unregister
+from catenary.solver.effects.all_effects import registry
+from catenary.solver.effects.effect import Effect, register, unregister
 from catenary.solver.integrators.line_integrator import LineMotion
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.model import Model, iterate_entries

@@ -20,8 +20,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from catenary.postproc.channels.channels import CHANNELS
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.channels import CHANNELS
 
 MPIRUN = shutil.which("mpirun")
 LIMIT = 120.0  # for anything that is to end by itself [s]; a loaded machine takes ten times as long

@@ -9,7 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.convert.course import resolved
+from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.accuracy.axes import AXES, DISCRETISATION, parse_axes
 from catenary.cases.studies.accuracy.plan import Plan, make_plan
 from catenary.solver.base.errors import InputError
@@ -34,7 +35,7 @@ def test_all_levels_of_the_reference_model_make_scenes(plan: Plan) -> None:
 
 
 def test_settings_that_make_the_same_scene_are_run_once(plan: Plan) -> None:
-    scenes = [json.dumps(job.scene.resolved(), sort_keys=True, default=str) for job in plan.jobs]
+    scenes = [json.dumps(resolved(job.scene), sort_keys=True, default=str) for job in plan.jobs]
     assert len(set(scenes)) == len(scenes)
     runs = {planned.axis.name: planned.runs for planned in plan.axes}
     # The case has 1 ms, average acceleration, 5e4 N/m and droppers that slacken.

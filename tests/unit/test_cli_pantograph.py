@@ -12,9 +12,10 @@ from measuring import check
 from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
-from catenary.cases.scene.case_files import shipped
-from catenary.cases.scene.scene import load_scene
-from catenary.cases.scene.toml_input import read_toml
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.input.case_files import shipped
+from catenary.cases.scene.input.toml_input import read_toml
+from catenary.cases.scene.load import load_scene
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.response.linearisation import of_chain
 
@@ -69,9 +70,9 @@ def test_fitted_model_runs_in_the_pantograph_s_place(
     scene = tmp_path / "case.toml"
     original = shipped()["en50318_2002"].read_text(encoding="utf-8")
     scene.write_text(f"{original}\n{fragment}", encoding="utf-8")
-    changed = load_scene(scene, ["train.pantographs.0.name=reference_lumped"]).to_problem()
+    changed = problem_of(load_scene(scene, ["train.pantographs.0.name=reference_lumped"]))
     (placement,) = changed.train.placements
-    (before,) = load_scene("en50318_2002").to_problem().train.placements
+    (before,) = problem_of(load_scene("en50318_2002")).train.placements
     assert placement.static_force == before.static_force == 120.0
     check("stiffnesses [N/m]", placement.data.stiffnesses, before.data.stiffnesses, within=0.1)
     again = invoke(str(scene), "--kind", "reference_lumped", "--fit", "1")

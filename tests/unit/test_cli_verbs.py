@@ -15,11 +15,11 @@ import pytest
 from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
-from catenary.cases.scene.case_files import shipped
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.input.case_files import shipped
+from catenary.cases.scene.load import load_scene
 from catenary.cases.terminal import console
 from catenary.solver.base.errors import RunBroken
-from catenary.solver.effects import effect as effects
+from catenary.solver.effects import all_effects as effects
 
 VERBS = ["run", "restart", "sweep", "list", "plan", "check", "mesh", "static", "pantograph"]
 VERBS += ["report", "compare", "hard", "stability-map"]

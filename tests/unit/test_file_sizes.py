@@ -9,20 +9,16 @@ import pytest
 import typer
 from mpi4py import MPI
 
-from catenary.cases.run.needs import (
-    Kept,
-    estimate_memory,
-    needs_before_meshing,
-    needs_with_mesh,
-    total_size,
-)
+from catenary.cases.run.needs import Kept, needs_before_meshing, needs_with_mesh, total_size
 from catenary.cases.run.plan import make_plan, plan_text
 from catenary.cases.run.runner import run_case
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.scene import Scene, load_scene
+from catenary.cases.scene.checks.mesh_size import estimate_memory
+from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.scene import Scene
 from catenary.cases.terminal import console
+from catenary.postproc.channels.line_record import GZIP
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.line_record import GZIP
 from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.base.parallel import on_root
 

@@ -17,7 +17,8 @@ from program import SHORT_SCENE
 from catenary.cases.process import interrupts
 from catenary.cases.process.interrupts import STOPPING, Interrupted, Phase, Stopped, StopRequest
 from catenary.cases.run import runner
-from catenary.cases.scene.scene import Scene, load_scene
+from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.jobs import make_jobs
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import parse_vary, product
@@ -180,7 +181,7 @@ from catenary.cases.process.petsc_options import start_petsc
 start_petsc([])
 check("petsc")
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.load import load_scene
 mesh_of(load_scene("en50318_2002"))
 check("gmsh")
 os._exit(0)

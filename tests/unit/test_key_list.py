@@ -8,8 +8,8 @@ import pytest
 from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
-from catenary.cases.scene.scene import load_scene
-from catenary.cases.scene.typical_values import TYPICAL
+from catenary.cases.scene.keys.typical_values import TYPICAL
+from catenary.cases.scene.load import load_scene
 from catenary.cases.terminal.key_list import key_details, key_table, keys_of_a_scene
 from catenary.solver.base.errors import InputError
 

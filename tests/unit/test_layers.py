@@ -28,6 +28,40 @@ LEAVES = {
     "catenary.solver.base.python_signals",
     "catenary.solver.base.parallel",
 }
+# The rooms of each part from below to above: each imports only itself and those before it. A file
+# beside sub-packages is a room of its own.
+ROOMS = {
+    "meshgen": (),
+    "mbs": (
+        "frame", "interface", "rigid", "time_steps", "vehicle", "head", "mechanism", "lumped_data",
+        "response", "lumped", "lowering", "roll", "build",
+    ),
+    "solver": (
+        "base", "problem", "model", "effects", "linear", "statics", "integrators", "contact",
+        "contact_problem", "schemes", "time_loop",
+    ),
+    "postproc": ("standards", "channels", "files", "read", "record", "evaluate", "report"),
+    "cases": (
+        "scene.input", "scene.tables", "scene.keys", "scene.scene", "scene.convert",
+        "scene.checks", "scene.load", "terminal", "process", "result_folder", "run",
+        "studies.sweep", "studies.pantograph", "studies.accuracy", "studies.hard",
+        "studies.stability", "studies.case_study", "ambrosio2012", "cli",
+    ),
+}  # fmt: skip
+# Arrows that still point up.
+_SMALL = "catenary.solver.contact_problem.complementarity_kernels"
+_LAYOUT = {f"{_SMALL}.{name}" for name in ("COUPLINGS", "FLAGS", "NUMBER", "TENSION", "parts")}
+STILL_UP = {
+    "solver/contact/contact_kernels.py": _LAYOUT,
+    "solver/contact/line_response.py": _LAYOUT,
+    "solver/contact/pantographs.py": {_SMALL},
+    "solver/integrators/line_integrator.py": {_SMALL, "catenary.solver.contact.contact_kernels"},
+    "solver/linear/step_operators.py": {
+        "catenary.solver.integrators.line_state.MotionAhead",
+        "catenary.solver.integrators.line_state.Steps",
+        "catenary.solver.integrators.two_pass_step.StationPasses",
+    },
+}
 FILES = sorted(path for part in PARTS for path in (ROOT / part).rglob("*.py"))
 
 
@@ -147,3 +181,38 @@ def world_at_import(tree: ast.Module) -> Iterator[int]:
 )
 def test_no_module_holds_the_world_communicator(path: Path) -> None:
     assert list(world_at_import(tree_of(path))) == []
+
+
+def room_of(module: str) -> str | None:
+    """The room of a part that holds a module, None if none is declared for it."""
+    _, part, *rest = module.split(".")
+    name = ".".join(rest)
+    return next((room for room in ROOMS[part] if is_within(name, room)), None)
+
+
+def arrows_up(path: Path) -> list[str]:
+    """What a file imports from rooms above its own."""
+    part, *rest = path.relative_to(ROOT).with_suffix("").parts
+    own = room_of(".".join(("catenary", part, *rest)))
+    if own is None:
+        return []
+    order = ROOMS[part]
+    found = []
+    for module in imports_in(tree_of(path)):
+        if is_within(module, f"catenary.{part}"):
+            room = room_of(module)
+            if room is not None and order.index(room) > order.index(own):
+                found.append(module)
+    return found
+
+
+def test_the_order_of_rooms_names_each_of_them() -> None:
+    for path in FILES:
+        part, *rest = path.relative_to(ROOT).with_suffix("").parts
+        if ROOMS[part] and rest[-1] != "__init__":
+            assert room_of(".".join(("catenary", part, *rest))), path
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_file_imports_only_rooms_below_its_own(path: Path) -> None:
+    assert set(arrows_up(path)) <= STILL_UP.get(str(path.relative_to(ROOT)), set())

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.case_files import shipped
 from catenary.cases.scene.checks.scene import estimated_dropper_lengths
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.convert.line import line_of
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.input.case_files import shipped
+from catenary.cases.scene.load import load_scene
 from catenary.solver.statics.equilibrium import find_form
 
 
@@ -50,7 +52,7 @@ def test_form_finding_meets_the_nominal_dropper_lengths_of_ac_simple() -> None:
         [float(r["length_m"]) for r in reference("ac_simple", "dropper_lengths.csv")]
     )
     scene = load_scene("ac_simple")
-    _, form = find_form(scene.to_problem(), mesh_of(scene))
+    _, form = find_form(problem_of(scene), mesh_of(scene))
     middle = 9 * (scene.line.n_spans // 2)
     found = form.dropper_length[middle : middle + 9]
     print("expected", nominal, "observed", np.round(found, 4))
@@ -62,7 +64,7 @@ def test_estimated_dropper_lengths_come_near_those_of_form_finding() -> None:
     # clamps and that the load is not even; it only has to tell the possible from the impossible.
     for case in shipped():
         scene = load_scene(case)
-        problem = scene.to_problem()
+        problem = problem_of(scene)
         _, form = find_form(problem, mesh_of(scene))
         estimate = np.concatenate(estimated_dropper_lengths(problem.line, problem.gravity))
         assert np.abs(estimate - form.dropper_length).max() < 0.06
@@ -71,12 +73,12 @@ def test_estimated_dropper_lengths_come_near_those_of_form_finding() -> None:
 def test_ac_simple_starts_from_the_mean_force_of_the_standard() -> None:
     for speed in (275.0, 320.0):
         scene = load_scene("ac_simple", [f"train.speed_km_h={speed}"])
-        force = scene.to_problem().train.placements[0].static_force
+        force = problem_of(scene).train.placements[0].static_force
         assert force == pytest.approx(0.00097 * speed**2 + 70, rel=0.1)
 
 
 def test_ambrosio_has_the_papers_line() -> None:
-    line = load_scene("ambrosio2012").to_line()
+    line = line_of(load_scene("ambrosio2012"))
     assert line.n_spans == 25
     assert line.n_spans - sum(line.n_transition) == 20
     assert all(len(x) == 8 for x in line.dropper_positions)
@@ -94,7 +96,7 @@ def test_ambrosio_dropper_lengths_come_near_the_papers() -> None:
     # Table 1 gives 1.25 to 1.075 m. With the paper's weights and tensions the messenger wire sags
     # more between the outer and the inner droppers than that; the ends agree to a span's 1/1000.
     scene = load_scene("ambrosio2012")
-    _, form = find_form(scene.to_problem(), mesh_of(scene))
+    _, form = find_form(problem_of(scene), mesh_of(scene))
     middle = form.dropper_length[8 * 12 : 8 * 13]
     print("paper 1.25-1.075, observed", np.round(middle, 3))
     assert middle.max() == pytest.approx(1.25, abs=0.03)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.cases.scene.error_sentences import Origin
-from catenary.cases.scene.scene import load_scene, scene_from
+from catenary.cases.scene.convert.course import resolved
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.load import load_scene, scene_from
 from catenary.solver.base.errors import InputError
 from catenary.solver.problem.contact_laws import HYSTERESIS, HertzLaw, KinematicLaw, LinearLaw
 
@@ -15,7 +17,7 @@ DAMPED = ["numerics.newmark_gamma=0.55", "numerics.newmark_beta=0.28"]
 
 
 def test_linear_is_the_default() -> None:
-    assert load_scene(CASE).to_problem().contact == LinearLaw(5e4, 0.0)
+    assert problem_of(load_scene(CASE)).contact == LinearLaw(5e4, 0.0)
 
 
 @pytest.mark.parametrize("name", HYSTERESIS)
@@ -24,7 +26,7 @@ def test_laws_of_impact_have_the_factor_of_their_restitution(name: str) -> None:
         CASE,
         [f"contact.law={name}", "contact.restitution=0.8", "effects.contact_damping=true"],
     )
-    law = scene.to_problem().contact
+    law = problem_of(scene).contact
     assert isinstance(law, HertzLaw)
     assert law.hysteresis == HYSTERESIS[name](0.8)
     assert law.least_speed == 0.1
@@ -36,12 +38,12 @@ def test_hertz_s_stiffness_may_be_given_itself() -> None:
     scene = load_scene(
         CASE, ["contact.law=hertz", "contact.hertz_stiffness_N_per_m1_5=2e6", NO_STIFFNESS]
     )
-    assert scene.to_problem().contact == HertzLaw(2e6, 1.5, 0.0, 0.1)
+    assert problem_of(scene).contact == HertzLaw(2e6, 1.5, 0.0, 0.1)
 
 
 def test_kinematic_contact_has_no_loss_to_simulate() -> None:
     scene = load_scene(CASE, ["contact.law=kinematic", NO_STIFFNESS, *DAMPED])
-    assert scene.to_problem().contact == KinematicLaw()
+    assert problem_of(scene).contact == KinematicLaw()
 
 
 @pytest.mark.parametrize(
@@ -57,8 +59,8 @@ def test_kinematic_contact_has_no_loss_to_simulate() -> None:
 )
 def test_the_resolved_scene_is_the_same_again(overrides: list[str]) -> None:
     scene = load_scene(CASE, overrides)
-    again = scene_from(scene.resolved(), Origin("a result"))
-    assert again.to_problem() == scene.to_problem()
+    again = scene_from(resolved(scene), Origin("a result"))
+    assert problem_of(again) == problem_of(scene)
 
 
 @pytest.mark.parametrize(
@@ -120,9 +122,9 @@ def test_a_scene_with_a_number_of_iterations_can_be_resolved_and_read_again() ->
     """A restart reads the resolved scene, which holds all defaults."""
     words = ["numerics.scheme=fixed_point", "numerics.iterations=6"]
     scene = load_scene("en50318_2002", words)
-    resolved = scene.resolved()
-    assert resolved["numerics"]["iterations"] == 6
-    assert "max_iterations" not in resolved["numerics"]
-    assert type(scene.numerics).model_validate(resolved["numerics"]) == scene.numerics
-    assert scene.to_problem().numerics.iterations == 6
-    assert load_scene("en50318_2002").resolved()["numerics"]["max_iterations"] == 50
+    plain = resolved(scene)
+    assert plain["numerics"]["iterations"] == 6
+    assert "max_iterations" not in plain["numerics"]
+    assert type(scene.numerics).model_validate(plain["numerics"]) == scene.numerics
+    assert problem_of(scene).numerics.iterations == 6
+    assert resolved(load_scene("en50318_2002"))["numerics"]["max_iterations"] == 50

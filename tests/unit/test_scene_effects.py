@@ -7,18 +7,21 @@ from collections.abc import Iterator
 import pytest
 
 from catenary.cases.run.plan import effect_rows
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.convert.course import resolved
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
 from catenary.solver.base.errors import InputError
-from catenary.solver.effects import effect as effects
+from catenary.solver.effects import all_effects as effects
+from catenary.solver.effects.effect import Effect, register, unregister
 
 OPTIONAL = [name for name, effect in effects.registry().items() if not effect.always]
 
 
 @pytest.fixture
-def wind() -> Iterator[effects.Effect]:
+def wind() -> Iterator[Effect]:
     effects.registry()
-    effect = effects.register(
-        effects.Effect(
+    effect = register(
+        Effect(
             "side_wind",
             "wind on the wires",
             "a load",
@@ -29,15 +32,15 @@ def wind() -> Iterator[effects.Effect]:
         )
     )
     yield effect
-    effects.unregister("side_wind")
+    unregister("side_wind")
 
 
 @pytest.mark.parametrize("name", OPTIONAL)
 def test_each_effect_can_be_left_out_with_those_that_require_it(name: str) -> None:
     dependent = [n for n, e in effects.registry().items() if name in e.requires]
     scene = load_scene("ac_simple", [f"effects.{n}=false" for n in [name, *dependent]])
-    on, off = effect_rows(scene, scene.to_problem())
-    assert name not in scene.to_problem().effects
+    on, off = effect_rows(scene, problem_of(scene))
+    assert name not in problem_of(scene).effects
     assert name not in [row.name for row in on]
     assert [row.reason for row in off if row.name == name] == ["left out by the scene"]
 
@@ -52,24 +55,24 @@ def test_an_effect_without_what_it_requires_is_refused(name: str) -> None:
 @pytest.mark.parametrize("case", ["en50318_2002", "ac_simple", "ambrosio2012"])
 def test_the_plan_names_every_effect_once(case: str) -> None:
     scene = load_scene(case)
-    on, off = effect_rows(scene, scene.to_problem())
+    on, off = effect_rows(scene, problem_of(scene))
     assert sorted(row.name for row in on + off) == sorted(effects.registry())
 
 
 def test_the_plan_tells_why_an_effect_is_not_simulated() -> None:
     scene = load_scene("en50318_2002", ["effects.arm_stiffness=false"])
-    _, off = effect_rows(scene, scene.to_problem())
+    _, off = effect_rows(scene, problem_of(scene))
     reason = {row.name: row.reason for row in off}
     assert reason["arm_stiffness"] == "left out by the scene"
     assert reason["pre_sag"] == "nothing in the scene calls for it"
     assert reason["contact_damping"] == "off unless the scene asks for it"
 
 
-def test_a_new_effect_becomes_a_key_without_a_change_here(wind: effects.Effect) -> None:
+def test_a_new_effect_becomes_a_key_without_a_change_here(wind: Effect) -> None:
     assert load_scene("ac_simple").switches()[wind.name] is False
     scene = load_scene("ac_simple", ["effects.side_wind=true"])
-    assert wind.name in scene.to_problem().effects
-    assert scene.resolved()["effects"][wind.name] is True
+    assert wind.name in problem_of(scene).effects
+    assert resolved(scene)["effects"][wind.name] is True
     with pytest.raises(InputError, match=r"did you mean effects\.side_wind\?"):
         load_scene("ac_simple", ["effects.sidewind=true"])
 
@@ -85,11 +88,11 @@ def test_the_speed_limit_is_the_wave_speed_of_the_contact_wire() -> None:
     with pytest.raises(InputError, match="below the wave speed"):
         load_scene("en50318_2002", ["train.speed_km_h=438.2"])
     scene = load_scene("en50318_2002", ["train.speed_km_h=450", "effects.supercritical_speed=true"])
-    assert "supercritical_speed" in scene.to_problem().effects
+    assert "supercritical_speed" in problem_of(scene).effects
 
 
 def test_data_of_an_effect_may_stand_if_it_is_left_out_knowingly() -> None:
     scene = load_scene(
         "en50318_2002", ["contact.damping_N_s_per_m=10", "effects.contact_damping=false"]
     )
-    assert "contact_damping" not in scene.to_problem().effects
+    assert "contact_damping" not in problem_of(scene).effects

@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 from catenary.cases.scene.checks.scene import MIN_SEPARATION
-from catenary.cases.scene.error_sentences import Origin
-from catenary.cases.scene.scene import Scene, load_scene, scene_from
+from catenary.cases.scene.convert.course import end_of, resolved
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.scene import Scene
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.mechanism.pantograph_data import MultibodyData
 from catenary.mbs.vehicle.irregularity import Irregularity
@@ -31,7 +34,7 @@ def load(*overrides: str) -> Scene:
 
 
 def test_one_strip_fixed_to_the_head_is_the_default() -> None:
-    (place,) = load().to_problem().train.placements
+    (place,) = problem_of(load()).train.placements
     assert place.data.strips == Strips()
     assert place.data.strip_offsets == (0.0,)
 
@@ -41,7 +44,7 @@ def test_a_head_s_springs_become_those_of_its_roll_and_pitch() -> None:
     pitch = [f"{KIND}.strips.pitch_inertia_kg_m2=0.4", f"{KIND}.strips.pitch_spring_distance_m=0.3"]
     own = [f"{KIND}.strips.mass_kg=1.2", f"{KIND}.strips.stiffness_N_per_m=9000"]
     more = [f"{KIND}.strips.damping_N_s_per_m=20", LONG]
-    (place,) = load(*TWO, *pitch, *own, *more, *ROLL).to_problem().train.placements
+    (place,) = problem_of(load(*TWO, *pitch, *own, *more, *ROLL)).train.placements
     strips = place.data.strips
     assert place.data.roll == Turning(2.0, 7000 * 0.3**2, 45 * 0.3**2)
     assert strips == Strips(
@@ -57,7 +60,7 @@ def test_a_multibody_head_takes_strips_and_rolls_as_its_bodies_do() -> None:
         [f"{kind}.strips.number=2", f"{kind}.strips.spacing_m=0.5", f"{kind}.strips.length_m=1.6",
          "effects.head_roll=true", "train.start_m=120"],
     )  # fmt: skip
-    (place,) = scene.to_problem().train.placements
+    (place,) = problem_of(scene).train.placements
     assert isinstance(place.data, MultibodyData)
     assert place.data.strips == Strips(2, 0.5, 1.6)
 
@@ -72,7 +75,7 @@ def test_a_vehicle_is_the_sum_of_what_its_tables_give() -> None:
     lateral = ["vehicle.lateral.by_place=[[0, 0], [500, 0.05], [1000, 0], [2000, 0.01]]"]
     scene = load(*vertical, *lateral, FRA, "vehicle.irregularity.seed=5", MOVES, *ROLL, LONG)
     track = Irregularity("fra_6", 3.0, 100.0, 5)
-    assert scene.to_problem().train.vehicle == VehicleMotion(
+    assert problem_of(scene).train.vehicle == VehicleMotion(
         (
             Table((0, 10, 20, 30), (0, 0.01, 0.02, 0)),
             Harmonic(0.01, 1.5, math.pi / 2),
@@ -91,12 +94,12 @@ def test_files_are_taken_in_and_the_resolved_scene_needs_them_no_more(tmp_path: 
     assert scene.vehicle is not None and scene.vehicle.vertical is not None
     assert scene.vehicle.vertical.by_place == pairs
     file.unlink()
-    again = scene_from(scene.resolved(), Origin("a result"))
-    assert again.to_problem() == scene.to_problem()
+    again = scene_from(resolved(scene), Origin("a result"))
+    assert problem_of(again) == problem_of(scene)
 
 
 def test_a_case_s_files_are_beside_it(tmp_path: Path) -> None:
-    from catenary.cases.scene.case_files import find_case
+    from catenary.cases.scene.input.case_files import find_case
 
     (tmp_path / "sway.csv").write_text("0,0\n10,0.01\n20,0\n30,0.01\n")
     case = find_case(CASE).read_text()
@@ -108,8 +111,8 @@ def test_a_case_s_files_are_beside_it(tmp_path: Path) -> None:
 
 def test_a_run_ends_before_the_foremost_strip_leaves_the_line() -> None:
     to_the_end = ["evaluation.to_m=1600"]
-    assert load(*to_the_end).end_m == pytest.approx(1650.0)
-    assert load(*to_the_end, *TWO).end_m == pytest.approx(1650.0 - 0.28)
+    assert end_of(load(*to_the_end)) == pytest.approx(1650.0)
+    assert end_of(load(*to_the_end, *TWO)) == pytest.approx(1650.0 - 0.28)
 
 
 @pytest.mark.parametrize(
@@ -185,14 +188,14 @@ def test_what_cannot_be_is_refused(overrides: list[str], sentence: str) -> None:
 
 def test_strips_of_neighbours_must_not_overlap() -> None:
     """A metre between heads, and half a spacing of either."""
-    two = load_scene(CASE).resolved()
+    two = resolved(load_scene(CASE))
     two["pantographs"]["three_masses"]["strips"] = {"number": 2, "spacing_m": 0.56}
     two["train"]["pantographs"].append({"name": "three_masses", "behind_m": 1.5})
     with pytest.raises(InputError, match="at least 1.56 m more than the 0 m .* strips") as refused:
         scene_from(two, Origin("here"))
     assert "train.pantographs.1.behind_m is 1.5 m" in str(refused.value)
     two["train"]["pantographs"][1]["behind_m"] = MIN_SEPARATION + 0.56
-    assert len(scene_from(two, Origin("here")).to_problem().train.placements) == 2
+    assert len(problem_of(scene_from(two, Origin("here"))).train.placements) == 2
 
 
 @pytest.mark.parametrize(
@@ -231,7 +234,7 @@ def test_a_multibody_head_s_pitch_is_its_bodies_business() -> None:
 def test_a_sway_that_the_strip_covers_is_fine() -> None:
     """0.2 m of stagger and 0.05 m of sway, whose sum of 0.25 m is nearly reached."""
     sway = ["vehicle.lateral.amplitude_m=0.05", "vehicle.lateral.frequency_hz=1.7", MOVES, *ROLL]
-    assert load(*sway, f"{KIND}.strips.length_m=0.5").to_problem()
+    assert problem_of(load(*sway, f"{KIND}.strips.length_m=0.5"))
     with pytest.raises(InputError) as refused:
         load(*sway, f"{KIND}.strips.length_m=0.45")
     needed = float(str(refused.value).split("at least ")[1].split(" m")[0])

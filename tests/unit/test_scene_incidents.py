@@ -6,8 +6,11 @@ import pytest
 
 from catenary.cases.run.describe_incidents import incident_facts
 from catenary.cases.run.plan import make_plan, plan_text
-from catenary.cases.scene.error_sentences import Origin
-from catenary.cases.scene.scene import Scene, load_scene, scene_from
+from catenary.cases.scene.convert.course import resolved
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.scene import Scene
 from catenary.mbs.lowering import Lowering
 from catenary.solver.problem.incidents import DropperBreak, TensionLoss
 
@@ -24,29 +27,29 @@ def scene(*more: str) -> Scene:
 
 
 def test_incidents_are_converted_and_rounded_to_steps() -> None:
-    problem = scene().to_problem()
+    problem = problem_of(scene())
     # Spans of 60 m, the third dropper at 17 m.
     assert problem.incidents == (
         DropperBreak(2.0, 4 * 60.0 + 17.0),
         TensionLoss(2.5, "messenger_wire", 0.8),
     )
     assert problem.train.placements[0].lowering == Lowering(3.0, -75.0, 0.2, 0.25)
-    coarse = scene("numerics.dt_s=4e-3").to_problem()
+    coarse = problem_of(scene("numerics.dt_s=4e-3"))
     assert [incident.time for incident in coarse.incidents] == pytest.approx([2.0, 2.5])
     assert coarse.train.placements[0].lowering.time == pytest.approx(3.0)
-    rounded = scene("numerics.dt_s=3e-3").to_problem()
+    rounded = problem_of(scene("numerics.dt_s=3e-3"))
     assert rounded.incidents[0].time == pytest.approx(667 * 3e-3)
 
 
 def test_a_resolved_scene_is_the_same_again() -> None:
     first = scene()
-    again = scene_from(first.resolved(), Origin("the result file"))
-    assert again.to_problem() == first.to_problem()
+    again = scene_from(resolved(first), Origin("the result file"))
+    assert problem_of(again) == problem_of(first)
     assert len(again.incidents) == 3
 
 
 def test_one_key_of_an_incident_is_changed() -> None:
-    assert scene("incidents.1.dropper=9").to_problem().incidents[0].x == 4 * 60.0 + 55.0
+    assert problem_of(scene("incidents.1.dropper=9")).incidents[0].x == 4 * 60.0 + 55.0
 
 
 def test_the_plan_tells_incidents_in_order_of_time() -> None:
@@ -64,7 +67,7 @@ def test_the_plan_tells_incidents_in_order_of_time() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_effect_that_is_left_out_is_not_told(kind: str) -> None:
     found = scene(f"effects.{kind}=false")
-    told = [fact["type"] for fact in incident_facts(found, found.to_problem())]
+    told = [fact["type"] for fact in incident_facts(found, problem_of(found))]
     assert sorted([*told, kind]) == sorted(KINDS)
     plan = make_plan(found)
     assert kind in [row.name for row in plan.off]

@@ -10,9 +10,11 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
-from catenary.cases.scene.error_sentences import Origin
-from catenary.cases.scene.keys import known_keys
-from catenary.cases.scene.scene import Scene, load_scene, scene_from
+from catenary.cases.scene.convert.course import resolved
+from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.keys.keys import known_keys
+from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.scene import Scene
 from catenary.solver.base.errors import InputError
 
 KEYS = [key.replace("*", "0") for key in known_keys(Scene)]
@@ -64,7 +66,7 @@ def test_any_assignment(text: str) -> None:
 @PLENTY
 @given(key=st.sampled_from(KEYS), value=VALUES)
 def test_any_content_of_a_table(key: str, value: object) -> None:
-    raw = load_scene("ac_simple").resolved()
+    raw = resolved(load_scene("ac_simple"))
     table, parts = raw, key.split(".")
     for part in parts[:-1]:
         table = table.setdefault(part, {}) if isinstance(table, dict) else raw

@@ -8,10 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from catenary.cases.scene.case_files import find_case, shipped
-from catenary.cases.scene.error_sentences import Origin
-from catenary.cases.scene.scene import Scene, load_scene, scene_from
-from catenary.cases.scene.units import unit_of
+from catenary.cases.scene.convert.course import end_of, resolved
+from catenary.cases.scene.convert.line import line_of
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.input.case_files import find_case, shipped
+from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.tables.units import unit_of
 from catenary.solver.base.errors import InputError
 
 # Keys that other programs rely on.
@@ -40,7 +44,7 @@ def test_the_promised_cases_are_shipped(case: str) -> None:
 @pytest.mark.parametrize("shortened", [False, True])
 def test_every_shipped_case_loads(case: str, shortened: bool) -> None:
     scene = load_scene(case, shortened=shortened)
-    problem = scene.to_problem()
+    problem = problem_of(scene)
     assert scene.case.name == case
     assert scene.case.title and scene.case.source
     assert problem.train.end > problem.evaluation[1]
@@ -51,27 +55,27 @@ def test_every_shipped_case_loads(case: str, shortened: bool) -> None:
 @pytest.mark.parametrize("case", list(shipped()))
 def test_the_resolved_configuration_loads_to_the_same_problem(case: str) -> None:
     scene = load_scene(case, ["train.speed_km_h=290"])
-    carried = json.loads(json.dumps(scene.resolved(), allow_nan=False))
+    carried = json.loads(json.dumps(resolved(scene), allow_nan=False))
     again = scene_from(carried, Origin("the result file"))
-    assert again.to_problem() == scene.to_problem()
-    assert again.resolved() == scene.resolved()
+    assert problem_of(again) == problem_of(scene)
+    assert resolved(again) == resolved(scene)
 
 
 @pytest.mark.parametrize("key", CONTRACT)
 def test_contract_keys_can_be_set_and_are_resolved(key: str) -> None:
-    resolved = load_scene("en50318_2002").resolved()
-    table, name = resolved, key
+    plain = resolved(load_scene("en50318_2002"))
+    table, name = plain, key
     while "." in name:
         first, name = name.split(".", 1)
         table = table[first]
     value = table[name]
     again = load_scene("en50318_2002", [f"{key}={json.dumps(value)}"])
-    assert again.resolved() == resolved
+    assert resolved(again) == plain
 
 
 def test_the_later_assignment_wins_over_the_earlier_and_both_over_the_file() -> None:
     scene = load_scene("en50318_2002", ["train.speed_km_h=260", "train.speed_km_h = 300"])
-    assert scene.to_problem().train.speed == pytest.approx(300 / 3.6, rel=1e-15)
+    assert problem_of(scene).train.speed == pytest.approx(300 / 3.6, rel=1e-15)
 
 
 def test_assignments_win_over_the_test_table() -> None:
@@ -86,7 +90,7 @@ def test_an_empty_value_takes_a_key_away() -> None:
     scene = load_scene(
         "ac_simple", [f"{kind}.static_force_N=140", f"{kind}.static_force_by_speed="]
     )
-    assert scene.to_problem().train.placements[0].static_force == 140.0
+    assert problem_of(scene).train.placements[0].static_force == 140.0
     assert load_scene("ac_simple", ["numerics.dt_s="]).numerics.dt_s == 1e-3
 
 
@@ -99,7 +103,7 @@ def test_a_second_pantograph_is_appended_by_its_number() -> None:
             "train.pantographs.1.behind_m=200",
         ],
     )
-    train = scene.to_problem().train
+    train = problem_of(scene).train
     assert [place.behind for place in train.placements] == [0.0, 200.0]
     # The trailing one is to cross the evaluated stretch as well, and one span more.
     assert train.end == scene.evaluation.to_m + 200.0 + 60.0
@@ -107,11 +111,11 @@ def test_a_second_pantograph_is_appended_by_its_number() -> None:
 
 def test_the_end_stops_at_the_end_of_the_running_range() -> None:
     scene = load_scene("en50318_2002", ["line.n_spans=13", "evaluation.to_m=750"])
-    assert scene.end_m == 780.0
+    assert end_of(scene) == 780.0
 
 
 def test_quantities_reach_the_problem_in_si_units() -> None:
-    problem = load_scene("ac_simple", ["train.speed_km_h=288"]).to_problem()
+    problem = problem_of(load_scene("ac_simple", ["train.speed_km_h=288"]))
     assert problem.train.speed == pytest.approx(80.0, rel=1e-15)
     assert problem.line.pre_sag[0] == pytest.approx(
         (0, 0.024, 0.041, 0.052, 0.055, 0.052, 0.041, 0.024, 0)
@@ -126,7 +130,7 @@ def test_quantities_reach_the_problem_in_si_units() -> None:
 def test_the_static_force_is_interpolated_over_the_speed() -> None:
     def force(speed: float) -> float:
         scene = load_scene("ac_simple", [f"train.speed_km_h={speed}"])
-        return scene.to_problem().train.placements[0].static_force
+        return problem_of(scene).train.placements[0].static_force
 
     low, high = force(290), force(295)
     assert force(292.5) == pytest.approx(0.5 * (low + high), rel=1e-12)
@@ -136,12 +140,12 @@ def test_span_lengths_are_repeated_over_the_running_spans() -> None:
     scene = load_scene(
         "ambrosio2012", ["line.span_m=[54, 52]", "line.n_spans=9", *_short_evaluation()]
     )
-    assert scene.to_line().span_lengths == (50, 50, 54, 52, 54, 52, 50, 50, 50)
+    assert line_of(scene).span_lengths == (50, 50, 54, 52, 54, 52, 50, 50, 50)
     without = load_scene(
         "ambrosio2012",
         ["line.span_m=[54, 52]", "line.n_spans=9", "line.transition.span_m=", *_short_evaluation()],
     )
-    assert without.to_line().span_lengths == (54, 52, 54, 52, 54, 52, 54, 52, 54)
+    assert line_of(without).span_lengths == (54, 52, 54, 52, 54, 52, 54, 52, 54)
 
 
 def _short_evaluation() -> list[str]:
@@ -149,7 +153,7 @@ def _short_evaluation() -> list[str]:
 
 
 def test_counted_droppers_are_centred_and_their_pre_sag_is_a_parabola() -> None:
-    line = load_scene("ambrosio2012").to_line()
+    line = line_of(load_scene("ambrosio2012"))
     x, sag = np.array(line.dropper_positions[10]), np.array(line.pre_sag[10])
     assert x[0] == pytest.approx(54 - x[-1])
     assert np.diff(x) == pytest.approx(np.full(7, 6.75))
@@ -167,7 +171,7 @@ def test_patterns_give_each_span_length_its_droppers() -> None:
         " {span_m=54, positions_m=[10, 27, 44], pre_sag_mm=[0, 20, 0]}]"
     )
     removed = [f"line.dropper.{key}=" for key in ("count", "spacing_m", "pre_sag_mid_mm")]
-    line = load_scene("ambrosio2012", [patterns, *removed]).to_line()
+    line = line_of(load_scene("ambrosio2012", [patterns, *removed]))
     assert line.dropper_positions[0] == (10, 40)
     assert line.dropper_positions[5] == (10, 27, 44)
     assert line.pre_sag[5] == (0, 0.02, 0)
@@ -179,7 +183,7 @@ def test_damping_of_single_components_replaces_the_lines() -> None:
     scene = load_scene(
         "en50318_2002", ["line.damping.per_component.droppers={alpha_s=0.01, beta_per_s=0.0}"]
     )
-    assert scene.to_problem().damping.per_component == {"droppers": (0.01, 0.0)}
+    assert problem_of(scene).damping.per_component == {"droppers": (0.01, 0.0)}
 
 
 def test_a_mesh_file_is_relative_to_its_case_or_to_the_working_directory(
@@ -195,7 +199,7 @@ def test_a_mesh_file_is_relative_to_its_case_or_to_the_working_directory(
     monkeypatch.chdir(here)
     assert load_scene(case).mesh_file() == there / "own.msh"
     assert load_scene(case, ["mesh.file=own.msh"]).mesh_file() == here / "own.msh"
-    assert load_scene(case).resolved()["mesh"] == {"file": str(there / "own.msh")}
+    assert resolved(load_scene(case))["mesh"] == {"file": str(there / "own.msh")}
 
 
 def test_a_case_is_found_by_name_file_and_folder_and_takes_its_folders_name(
@@ -206,7 +210,7 @@ def test_a_case_is_found_by_name_file_and_folder_and_takes_its_folders_name(
     text = find_case("en50318_2002").read_text().replace('name = "en50318_2002"\n', "")
     (folder / "case.toml").write_text(text)
     assert load_scene(folder).case.name == "my_line"
-    assert load_scene(folder / "case.toml").to_problem() == load_scene("en50318_2002").to_problem()
+    assert problem_of(load_scene(folder / "case.toml")) == problem_of(load_scene("en50318_2002"))
 
 
 def test_a_sentence_says_whether_the_file_or_the_command_line_is_wrong(tmp_path: Path) -> None:
@@ -229,7 +233,7 @@ def test_the_number_of_further_problems_is_told() -> None:
 
 
 def test_every_key_has_a_help_text() -> None:
-    from catenary.cases.scene.keys import tables_in
+    from catenary.cases.scene.keys.keys import tables_in
 
     tables = [Scene]
     for table in tables:

@@ -7,8 +7,11 @@ import pytest
 
 from catenary.cases.run.needs import estimate_march
 from catenary.cases.run.plan import make_plan, plan_text
-from catenary.cases.scene.error_sentences import Origin
-from catenary.cases.scene.scene import Scene, load_scene, scene_from
+from catenary.cases.scene.convert.course import resolved
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.load import load_scene, scene_from
+from catenary.cases.scene.scene import Scene
 from catenary.mbs.build import has_joints
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
@@ -27,7 +30,7 @@ def load(*overrides: str) -> Scene:
 
 
 def data(scene: Scene) -> MultibodyData:
-    found = scene.to_problem().train.placements[0].data
+    found = problem_of(scene).train.placements[0].data
     assert isinstance(found, MultibodyData)
     return found
 
@@ -66,10 +69,10 @@ def test_the_model_is_the_one_that_was_asked_for() -> None:
 @pytest.mark.parametrize("overrides", [[], [ALL], [ALL, f"{KIND}.substeps=3"]])
 def test_resolved_scene_is_the_same_again_and_holds_only_what_acts(overrides: list[str]) -> None:
     scene = load(*overrides)
-    table = scene.resolved()["pantographs"]["seven_body"]
+    table = resolved(scene)["pantographs"]["seven_body"]
     assert OWN_KEYS & set(table) == (OWN_KEYS if overrides else set())
-    again = scene_from(scene.resolved(), Origin("a result"))
-    assert again.to_problem() == scene.to_problem()
+    again = scene_from(resolved(scene), Origin("a result"))
+    assert problem_of(again) == problem_of(scene)
 
 
 @pytest.mark.parametrize(

@@ -14,10 +14,12 @@ from catenary.cases.run.describe_pantographs import header_words, kind_lines
 from catenary.cases.scene.checks.pantograph import check_pantographs
 from catenary.cases.scene.convert.mechanism import multibody_of
 from catenary.cases.scene.convert.pantograph import static_force
-from catenary.cases.scene.keys import is_known, known_keys
-from catenary.cases.scene.scene import Scene, load_scene
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.input.toml_input import read_toml
+from catenary.cases.scene.keys.keys import is_known, known_keys
+from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.tables.pantograph import MultibodyTable
-from catenary.cases.scene.toml_input import read_toml
 from catenary.cases.terminal.key_list import key_table
 from catenary.mbs.build import PantographData, actuator_force
 from catenary.mbs.lumped_data import LumpedData
@@ -113,7 +115,7 @@ def converted(raw: dict[str, Any], speed: float = 250.0) -> MultibodyData:
 
 
 def of_the_train(scene: Scene) -> PantographData:
-    return scene.to_problem().train.placements[0].data
+    return problem_of(scene).train.placements[0].data
 
 
 @pytest.mark.parametrize("kind", JOINTS)
@@ -204,17 +206,17 @@ def test_scene_of_the_paper_has_seven_bodies_and_its_equivalent() -> None:
 
 def test_what_is_told_of_a_pantograph() -> None:
     scene = load_scene("ambrosio2012")
-    (told,) = header_words(scene, scene.to_problem())
+    (told,) = header_words(scene, problem_of(scene))
     assert (told["kind"], told["model"]) == ("seven_body", "multibody")
     # 9.89 kN by virtual work, within 1 %.
     push = actuator_force(of_the_train(scene))
     assert push is not None
     check("actuator [N]", push, 9890.0, within=98.9)
-    what, assembly = kind_lines(scene, scene.to_problem())["seven_body"]
+    what, assembly = kind_lines(scene, problem_of(scene))["seven_body"]
     assert "7 bodies, 9 joints, 1 of 5 degrees of freedom is the raising" in what
     assert "joint_6 13.8 mm" in assembly
     plain = load_scene("en50318_2002")
-    (told,) = header_words(plain, plain.to_problem())
+    (told,) = header_words(plain, problem_of(plain))
     assert told["model"] == "lumped" and actuator_force(of_the_train(plain)) is None
     assert "2 masses of 7.2, 15 kg" in told["description"]
 

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
 from catenary.solver.base.errors import InputError
 
 GIVEN = ("numerics.adaptive_tolerance_N=0.5", "numerics.smallest_dt_s=1e-4")
 
 
 def test_keys_reach_the_problem() -> None:
-    numerics = load_scene("en50318_2002", GIVEN).to_problem().numerics
+    numerics = problem_of(load_scene("en50318_2002", GIVEN)).numerics
     assert (numerics.adaptive_tolerance, numerics.smallest_dt) == (0.5, 1e-4)
-    plain = load_scene("en50318_2002").to_problem().numerics
+    plain = problem_of(load_scene("en50318_2002")).numerics
     assert (plain.adaptive_tolerance, plain.smallest_dt) == (None, None)
 
 

@@ -15,8 +15,10 @@ from typer.testing import CliRunner
 
 from catenary.cases.ambrosio2012.study import read_table, searched, variants
 from catenary.cases.cli.main import app
-from catenary.cases.scene.case_files import shipped
-from catenary.cases.scene.scene import Scene, load_scene
+from catenary.cases.scene.convert.course import resolved
+from catenary.cases.scene.input.case_files import shipped
+from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.case_study import StudyVariant, make_plan
 from catenary.postproc.report.study_report import (
     NOT_REPRODUCED,
@@ -142,7 +144,7 @@ def test_the_search_takes_each_option_in_the_place_of_the_best_readings(
     best = scenes.pop("best")
     del scenes["best_released"]
     assert len(scenes) == len(searched(read_table()))
-    records = [json.dumps(scene.resolved(), sort_keys=True, default=str) for scene in
+    records = [json.dumps(resolved(scene), sort_keys=True, default=str) for scene in
                (best, *scenes.values())]  # fmt: skip
     assert len(set(records)) == len(records)
     for scene in scenes.values():

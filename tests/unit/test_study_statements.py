@@ -14,7 +14,7 @@ from small_lines import BARE, bare_wires, mesh_of, problem_of
 from catenary.cases.ambrosio2012 import ranking, ringing, statements
 from catenary.cases.ambrosio2012.statements import AVERAGE, LIGHT, Force, Run, Runs, Slack
 from catenary.postproc.report.study_report import NOT_REPRODUCED, REPRODUCED, UNDECIDED
-from catenary.solver.model.model import build
+from catenary.solver.effects.build_model import build
 
 SEPARATIONS = {"single": None, "31m": 31.0, "85m": 85.0, "200m": 200.0}
 

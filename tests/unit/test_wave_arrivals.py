@@ -20,7 +20,8 @@ from catenary.cases.run.wave_arrivals import (
     run_in_for,
     start_share,
 )
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
 
 # One string, 1000 m, waves of 100 m/s.
 STRING = WaveLine(0.0, 1000.0, 50.0, 100.0, 100.0, 0.0, 0.0)
@@ -97,15 +98,15 @@ def test_the_run_in_that_is_asked_for_leaves_the_limit() -> None:
 
 def test_a_line_for_waves_has_both_wires_and_what_hangs_on_them() -> None:
     """EN 50318 has massless droppers without clamps: (20 + 16) kN / (1.35 + 1.07) kg/m."""
-    line = wave_line(load_scene("en50318_2002").to_problem())
+    line = wave_line(problem_of(load_scene("en50318_2002")))
     check("both wires [m/s]", line.speed, math.sqrt(36000.0 / 2.42), within=1e-9)
     check("faster wire [m/s]", line.fastest, math.sqrt(16000.0 / 1.07), within=1e-9)
     assert (line.start, line.end, line.span) == (0.0, 1320.0, 60.0)
     assert (line.alpha, line.beta) == (1e-4, 0.0125)
-    bare = load_scene("en50318_2002", ["effects.structural_damping=false"]).to_problem()
+    bare = problem_of(load_scene("en50318_2002", ["effects.structural_damping=false"]))
     assert wave_line(bare).decay == 0.0
     # Clamps of 0.36 kg and droppers every 6.1 m make the wires of ac_simple 3 % heavier.
-    heavy = wave_line(load_scene("ac_simple").to_problem())
+    heavy = wave_line(problem_of(load_scene("ac_simple")))
     assert 0.975 < heavy.speed / math.sqrt(38000.0 / 2.43) < 0.99
 
 
@@ -127,7 +128,7 @@ TWO = 'train.pantographs=[{name="reference"}, {name="reference", behind_m=200}]'
 )
 def test_warnings_name_what_would_do(assignments: list[str], words: list[str]) -> None:
     scene = load_scene("en50318_2002", assignments)
-    facts = arrival_facts(scene, scene.to_problem())
+    facts = arrival_facts(scene, problem_of(scene))
     json.dumps(facts, allow_nan=False)
     print(facts["warnings"])
     assert len(facts["warnings"]) == bool(words)
@@ -139,9 +140,9 @@ def test_warnings_name_what_would_do(assignments: list[str], words: list[str]) -
 @pytest.mark.parametrize("remedy", [["line.n_spans=14"], ["evaluation.to_m=547"]])
 def test_what_a_warning_advises_ends_it(remedy: list[str]) -> None:
     scene = load_scene("en50318_2002", ["line.n_spans=12", *remedy])
-    assert arrival_facts(scene, scene.to_problem())["warnings"] == []
+    assert arrival_facts(scene, problem_of(scene))["warnings"] == []
 
 
 def test_the_start_that_is_advised_ends_the_warning() -> None:
     scene = load_scene("en50318_2002", ["train.start_m=126"])
-    assert arrival_facts(scene, scene.to_problem())["warnings"] == []
+    assert arrival_facts(scene, problem_of(scene))["warnings"] == []

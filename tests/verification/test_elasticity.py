@@ -17,7 +17,7 @@ from small_lines import (
 )
 
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.solver.model.model import build
+from catenary.solver.effects.build_model import build
 from catenary.solver.statics.equilibrium import elasticity, find_form
 
 

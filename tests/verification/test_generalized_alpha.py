@@ -30,7 +30,8 @@ from scipy.sparse import linalg as sparse_linalg
 from small_lines import BARE, HANGING, bare_wires, en50318_line, mesh_of, numerics, problem_of
 
 from catenary.meshgen.line import Wire
-from catenary.solver.model.model import Model, build
+from catenary.solver.effects.build_model import build
+from catenary.solver.model.model import Model
 from catenary.solver.problem.integrator_parameters import integration_of
 from catenary.solver.problem.problem import Damping, Numerics
 from catenary.solver.statics.equilibrium import find_form, stiffness_matrix

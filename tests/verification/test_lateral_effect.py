@@ -15,10 +15,10 @@ from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, trai
 
 from catenary.meshgen.line import Wire
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
-from catenary.solver.effects import effect as effects
-from catenary.solver.effects.effect import Effect
+from catenary.solver.effects import all_effects as effects
+from catenary.solver.effects.effect import Effect, register
+from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.elements import uniform_load
-from catenary.solver.model.model import ModelBuilder
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.statics.equilibrium import find_form
 
@@ -89,7 +89,7 @@ def mesh() -> LineMesh:
 
 def test_a_second_effect_of_the_same_name_is_an_error() -> None:
     with pytest.raises(ValueError, match=NAME):
-        effects.register(LATERAL)
+        register(LATERAL)
 
 
 def test_four_unknowns_a_node_if_asked_for_and_two_otherwise(mesh: LineMesh) -> None:

@@ -14,7 +14,7 @@ import pytest
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.hard import checks as hard_checks
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.cases import HardCase, hard_cases

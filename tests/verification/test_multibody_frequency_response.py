@@ -13,7 +13,7 @@ from seven_bodies import ARM, HEAD, at_rest, calibrated, pressed
 from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
-from catenary.cases.scene.toml_input import read_toml
+from catenary.cases.scene.input.toml_input import read_toml
 from catenary.mbs.build import raising_data
 from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.lumped_data import LumpedData

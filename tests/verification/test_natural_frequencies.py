@@ -27,7 +27,8 @@ from scipy.sparse import linalg as sparse_linalg
 from small_lines import BARE, bare_wires, mesh_of, problem_of
 
 from catenary.meshgen.line import Wire
-from catenary.solver.model.model import Model, build
+from catenary.solver.effects.build_model import build
+from catenary.solver.model.model import Model
 
 LENGTH = 60.0
 STRING = Wire(tension=20e3, mass_per_length=1.35, bending_stiffness=0.0)

@@ -12,7 +12,6 @@ from scipy.integrate import solve_ivp
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
 from catenary.mbs.build import raising_data
-from catenary.mbs.head.roll import roll_of
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
@@ -23,6 +22,7 @@ from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import PrescribedPoint, constant
 from catenary.mbs.rigid.statics import equilibrium
+from catenary.mbs.roll import roll_of
 from catenary.solver.problem.contact_laws import ContactLaw, KinematicLaw, LinearLaw
 
 EPS = np.finfo(float).eps

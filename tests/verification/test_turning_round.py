@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from measuring import check
 
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, reduced, stand
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.reversed_system import turned_round
@@ -23,7 +24,7 @@ REVERSED = 'train.pantographs=[{name="seven_body", reversed=true}]'
 
 def data_of(assignment: str) -> MultibodyData:
     scene = load_scene("ambrosio2012", [assignment])
-    (placement,) = scene.to_problem().train.placements
+    (placement,) = problem_of(scene).train.placements
     assert isinstance(placement.data, MultibodyData)
     return placement.data
 

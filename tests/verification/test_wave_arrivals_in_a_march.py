@@ -16,7 +16,8 @@ from measuring import COMM
 
 from catenary.cases.run.describe_arrivals import arrival_facts, wave_line
 from catenary.cases.run.wave_arrivals import Course, from_far_end
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.sweep.jobs import make_jobs
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import parse_vary, product
@@ -48,7 +49,7 @@ def test_the_force_changes_where_the_wave_is_met(
     case: str, speed: int, short: int, long: int, tmp_path: Path
 ) -> None:
     scene = load_scene(case, [f"train.speed_km_h={speed}", f"line.n_spans={short}"])
-    problem = scene.to_problem()
+    problem = problem_of(scene)
     facts = arrival_facts(scene, problem)
     (told,) = facts["pantographs"]
     variants = product([parse_vary(f"line.n_spans={short},{long}")], {})

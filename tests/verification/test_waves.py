@@ -10,7 +10,8 @@ from measuring import check, line_alone, release, step
 from small_lines import BARE, EN_CONTACT_WIRE, bare_wires, mesh_of, numerics, problem_of
 
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.solver.model.model import Model, build
+from catenary.solver.effects.build_model import build
+from catenary.solver.model.model import Model
 
 
 def wire_model(length: float, n_elements: int, bending_stiffness: float) -> Model:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from catenary.cases.scene.error_sentences import refusal
-from catenary.cases.scene.faults import Fault
+from catenary.cases.scene.input.faults import Fault
+from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.tables.contact import HERTZ, WITH_RESTITUTION
 from catenary.solver.problem.integrator_parameters import NEWMARK
 

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from catenary.cases.scene.checks.pantograph import reaches_below
-from catenary.cases.scene.error_sentences import refusal
-from catenary.cases.scene.faults import Fault
+from catenary.cases.scene.convert.course import end_of
+from catenary.cases.scene.input.faults import Fault
+from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.tables.incidents import (
     DropperBreakTable,
     IncidentTable,
@@ -16,7 +17,7 @@ from catenary.cases.scene.tables.incidents import (
     TensionLossTable,
 )
 from catenary.meshgen.line import Line
-from catenary.postproc.report.wording import counted
+from catenary.postproc.evaluate.wording import counted
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 def check_incidents(scene: Scene, line: Line) -> Iterator[Fault]:
     """The incidents that cannot be."""
     seen: dict[tuple[object, ...], int] = {}
-    duration = (scene.end_m - scene.train.start_m) / (scene.train.speed_km_h / 3.6)
+    duration = (end_of(scene) - scene.train.start_m) / (scene.train.speed_km_h / 3.6)
     for i, table in enumerate(scene.incidents):
         key, what = _what(scene, table)
         if what in seen:

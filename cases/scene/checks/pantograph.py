@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from catenary.cases.scene.convert.pantograph import wanted_force
-from catenary.cases.scene.error_sentences import refusal, shown
-from catenary.cases.scene.faults import Fault
+from catenary.cases.scene.input.faults import Fault
+from catenary.cases.scene.input.origin import shown
+from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.tables.mechanism import ActuatorTable
 from catenary.cases.scene.tables.pantograph import MultibodyTable
 from catenary.mbs.frame import SPACE

@@ -18,23 +18,27 @@ import numpy as np
 
 from catenary.cases.scene.checks.contact import check_contact
 from catenary.cases.scene.checks.incidents import check_incidents
+from catenary.cases.scene.checks.mesh_size import size_faults
 from catenary.cases.scene.checks.output import check_output
 from catenary.cases.scene.checks.pantograph import check_mechanisms, check_pantographs
 from catenary.cases.scene.checks.scheme import check_scheme
+from catenary.cases.scene.checks.usual import usual_faults
 from catenary.cases.scene.checks.vehicle import check_vehicle
-from catenary.cases.scene.error_sentences import refusal, shown, unknown_key
-from catenary.cases.scene.faults import Fault, SceneError
-from catenary.cases.scene.keys import is_known, known_keys
-from catenary.cases.scene.mesh_size import size_faults
-from catenary.cases.scene.usual_ranges import usual_faults
+from catenary.cases.scene.convert.course import end_of, strips_ahead
+from catenary.cases.scene.convert.line import line_of
+from catenary.cases.scene.input.faults import Fault, SceneError
+from catenary.cases.scene.input.origin import shown
+from catenary.cases.scene.keys.error_sentences import refusal, unknown_key
+from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.meshgen.geometry import SHORTEST_GAP
 from catenary.meshgen.line import Line
 from catenary.solver.base.errors import InputError
-from catenary.solver.effects import effect as effects
+from catenary.solver.effects import all_effects as effects
 from catenary.solver.problem.problem import Problem
 
 if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
+    from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.scene import Scene
 
 # Two heads cannot stand closer on a roof; their contacts would also share one finite element.
 MIN_SEPARATION = 1.0
@@ -105,7 +109,7 @@ def _line(scene: Scene, found: _Findings) -> Line | None:
     lines: list[Line] = []
 
     def make() -> Iterator[Fault]:
-        lines.append(scene.to_line())
+        lines.append(line_of(scene))
         yield from _droppers_inside_spans(scene, lines[0])
 
     return lines[0] if found.nothing_by(make) else None
@@ -142,7 +146,7 @@ def _requirements_of_chosen(scene: Scene) -> Iterator[Fault]:
 
 def _requirements_of_defaults(scene: Scene) -> Iterator[Fault]:
     """Of effects that are on by default, unless the scene holds nothing for them to act on."""
-    problem = functools.cache(scene.to_problem)
+    problem = functools.cache(lambda: problem_of(scene))
     for name, effect in effects.registry().items():
         if name in scene.effects:
             continue
@@ -211,7 +215,7 @@ def _separations(scene: Scene) -> Iterator[Fault]:
     if behind[0] != 0:
         key = "train.pantographs.0.behind_m"
         yield _refusal(scene, key, behind[0], "the first pantograph leads, so it must be 0")
-    ahead = scene.strips_ahead()
+    ahead = strips_ahead(scene)
     for i in range(1, len(behind)):
         strips = ahead[i - 1] + ahead[i]
         if behind[i] < behind[i - 1] + MIN_SEPARATION + strips - _TINY:
@@ -322,9 +326,9 @@ def _speed(scene: Scene, line: Line) -> Iterator[Fault]:
 
 def _running(scene: Scene, line: Line) -> Iterator[Fault]:
     first, last = line.running_range
-    start, end = scene.train.start_m, scene.end_m
+    start, end = scene.train.start_m, end_of(scene)
     rear = scene.train.pantographs[-1].behind_m
-    ahead = scene.strips_ahead()
+    ahead = strips_ahead(scene)
     first, last = first + ahead[-1], last - max(ahead)
     inside = f"the running range is {first:g} to {last:g} m"
     if any(ahead):
@@ -357,7 +361,7 @@ def _running(scene: Scene, line: Line) -> Iterator[Fault]:
 
 
 def _evaluation(scene: Scene) -> Iterator[Fault]:
-    start, end = scene.train.start_m, scene.end_m
+    start, end = scene.train.start_m, end_of(scene)
     stretch = scene.evaluation
     for i, place in enumerate(scene.train.pantographs):
         who = "the pantograph" if len(scene.train.pantographs) == 1 else f"pantograph {i + 1}"
@@ -381,7 +385,7 @@ def _raising(scene: Scene) -> Iterator[Fault]:
 
 
 def _standard(scene: Scene) -> Iterator[Fault]:
-    from catenary.postproc.evaluate.standards import EDITIONS, SYSTEMS
+    from catenary.postproc.standards.en50367 import EDITIONS, SYSTEMS
 
     for key, value, known in (
         ("evaluation.edition", scene.evaluation.edition, EDITIONS),

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from catenary.cases.scene.convert.course import end_of, strips_ahead
 from catenary.cases.scene.convert.pantograph import pantograph_of
 from catenary.cases.scene.convert.vehicle import vehicle_of
-from catenary.cases.scene.error_sentences import refusal
-from catenary.cases.scene.faults import Fault
+from catenary.cases.scene.input.faults import Fault
+from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.tables.pantograph import LumpedTable, MultibodyTable
 from catenary.cases.scene.tables.vehicle import MotionTable
-from catenary.mbs.head.roll import roll_of
+from catenary.mbs.roll import roll_of
 from catenary.meshgen.line import Line
 
 if TYPE_CHECKING:
@@ -110,7 +111,7 @@ def _tables_reach(scene: Scene) -> Iterator[Fault]:
     """Tables must hold for all of the run; splines are not continued."""
     if scene.vehicle is None:
         return
-    start, end = scene.train.start_m, scene.end_m
+    start, end = scene.train.start_m, end_of(scene)
     rear = scene.train.pantographs[-1].behind_m
     duration = (end - start) / (scene.train.speed_km_h / 3.6)
     for direction in ("vertical", "lateral"):
@@ -174,8 +175,8 @@ def _farthest(scene: Scene, line: Line, number: int) -> tuple[float, float]:
     pantograph's place then [m]."""
     place, speed = scene.train.pantographs[number], scene.train.speed_km_h / 3.6
     start = scene.train.start_m - place.behind_m
-    duration = (scene.end_m - scene.train.start_m) / speed
-    offsets = np.array([1.0, -1.0]) * scene.strips_ahead()[number]
+    duration = (end_of(scene) - scene.train.start_m) / speed
+    offsets = np.array([1.0, -1.0]) * strips_ahead(scene)[number]
     base = None
     if scene.switches()["vehicle_motion"] and scene.vehicle is not None:
         from catenary.mbs.vehicle.base_motion import BaseMotion

@@ -13,7 +13,7 @@ import numpy as np
 from catenary.cases.scene.convert.pantograph import strips_of, wanted_force
 from catenary.cases.scene.tables import mechanism as schema
 from catenary.cases.scene.tables.pantograph import MultibodyTable
-from catenary.cases.scene.units import angle_from_deg, speed_from_km_h
+from catenary.cases.scene.tables.units import angle_from_deg, speed_from_km_h
 from catenary.mbs.mechanism.pantograph_data import AllBodies, MultibodyData
 from catenary.mbs.rigid.bodies import Body
 from catenary.mbs.rigid.forces import (

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from catenary.cases.scene.table import TAKE_AWAY, Table
+from catenary.cases.scene.tables.table import TAKE_AWAY, Table
 
 Law = Literal[
     "linear", "hertz", "lankarani_nikravesh", "hunt_crossley", "flores", "gonthier", "kinematic"

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from catenary.cases.scene.table import TAKE_AWAY, Table
+from catenary.cases.scene.tables.table import TAKE_AWAY, Table
 
 # What belongs together: a strip's own suspension, a head's pitch.
 _SUSPENSION = ("mass_kg", "stiffness_N_per_m")

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from catenary.cases.scene.table import Table
+from catenary.cases.scene.tables.table import Table
 
 # With less a wire sags by more than a hundred times as much: as much as a span is long, which is
 # no small displacement of a stretched wire any longer.

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from catenary.cases.scene.table import TAKE_AWAY, OneOrMore, Table, ascending, exactly_one
+from catenary.cases.scene.tables.table import TAKE_AWAY, OneOrMore, Table, ascending, exactly_one
 
 Span = Annotated[float, Field(ge=5, le=500)]
 Stagger = Annotated[float, Field(ge=-2, le=2)]

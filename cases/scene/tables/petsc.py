@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from catenary.cases.scene.table import Table
+from catenary.cases.scene.tables.table import Table
 
 _Ksp = Literal["preonly", "richardson", "cg", "minres", "gmres", "fgmres", "bcgs"]
 _Norm = Literal["none", "preconditioned", "unpreconditioned", "natural"]

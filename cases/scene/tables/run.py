@@ -13,7 +13,7 @@ from pydantic import (
     model_validator,
 )
 
-from catenary.cases.scene.table import TAKE_AWAY, Table
+from catenary.cases.scene.tables.table import TAKE_AWAY, Table
 from catenary.solver.problem.integrator_parameters import (
     AVERAGE_ACCELERATION,
     HHT,

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from catenary.cases.scene.table import TAKE_AWAY, Table, ascending
+from catenary.cases.scene.tables.table import TAKE_AWAY, Table, ascending
 
 _PAIR = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=2, max_length=2)]
 # Farther than this no vehicle moves [m].

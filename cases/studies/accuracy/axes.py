@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from catenary.cases.scene.error_sentences import shown
+from catenary.cases.scene.input.origin import shown
 from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:

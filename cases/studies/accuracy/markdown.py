@@ -10,7 +10,7 @@ from catenary.cases.studies.accuracy.analysis import HISTORY, QUANTITIES, Row
 from catenary.cases.studies.accuracy.axes import AXES, DISCRETISATION, Axis
 from catenary.cases.studies.accuracy.plan import PlannedAxis
 from catenary.cases.studies.accuracy.runs import Measured
-from catenary.postproc.report.wording import counted
+from catenary.postproc.evaluate.wording import counted
 
 _SEPARATE = ("history by step", "history by mesh")
 _LAST_COLUMNS = ("est/true", "rounds", "s/s")

@@ -6,8 +6,10 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
-from catenary.cases.scene.case_files import find_case
-from catenary.cases.scene.scene import Scene, load_scene
+from catenary.cases.scene.convert.course import resolved
+from catenary.cases.scene.input.case_files import find_case
+from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.accuracy.axes import MODEL, Axis, Level, Reference
 from catenary.cases.studies.sweep.jobs import Job
 from catenary.cases.studies.sweep.variants import Variant, slug
@@ -59,7 +61,7 @@ class _Jobs:
     def add(self, axis: str, level: Level) -> str:
         """The name of the run of a level; raises InputError if it makes no scene."""
         scene = load_scene(self.case, [*self.overrides, *level.assignments], self.shortened)
-        content = json.dumps(plain(scene.resolved()), sort_keys=True)
+        content = json.dumps(plain(resolved(scene)), sort_keys=True)
         if content not in self.known:
             name = slug(f"{axis}__{level.name}")
             self.known[content] = name

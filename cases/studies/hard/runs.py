@@ -18,12 +18,14 @@ from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import spsolve
 
 from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.solver.base.parallel import on_root
 from catenary.solver.contact.contact_wire import ContactWire
+from catenary.solver.effects.build_model import build
 from catenary.solver.integrators.make_line import make_line
-from catenary.solver.model.model import Model, build, iterate_entries
+from catenary.solver.model.model import Model, iterate_entries
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import in_steps
 from catenary.solver.problem.problem import Problem
@@ -282,7 +284,7 @@ class AtRest:
 
 def at_rest(scene: Scene, comm: Any) -> AtRest:
     """The line of a scene in equilibrium, found on rank 0 and given to all. Collective."""
-    problem = scene.to_problem()
+    problem = problem_of(scene)
 
     def make() -> tuple[LineMesh, np.ndarray, Equilibrium, Elasticity]:
         mesh = mesh_of(scene)

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from catenary.cases.scene.error_sentences import shown
-from catenary.cases.scene.keys import nearest
-from catenary.cases.scene.scene import Scene, load_scene
-from catenary.cases.scene.toml_input import Assigned
+from catenary.cases.scene.input.origin import shown
+from catenary.cases.scene.input.toml_input import Assigned
+from catenary.cases.scene.keys.keys import nearest
+from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.variants import NAMES, Variant
 from catenary.solver.base.errors import InputError
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from catenary.cases.scene.toml_input import parse_assignment
+from catenary.cases.scene.input.toml_input import parse_assignment
 from catenary.cases.studies.sweep.axis_words import (
     STATISTICS_IN_WORDS,
     key_in_words,
@@ -18,10 +18,10 @@ from catenary.cases.studies.sweep.axis_words import (
 )
 from catenary.cases.studies.sweep.jobs import LINE_COLUMNS, PANTOGRAPH_COLUMNS, Ended
 from catenary.cases.studies.sweep.variants import NAMES
+from catenary.postproc.evaluate.wording import fixed
 from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.report import figures
-from catenary.postproc.report.wording import fixed
 
 TABLE, RECORD, PICTURE = "sweep.csv", "sweep.json", "sweep.png"
 PLOTTED = ("mean_N", "std_N", "max_N", "min_N", "max_uplift_mm")

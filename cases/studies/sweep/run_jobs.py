@@ -20,6 +20,7 @@ from catenary.cases.result_folder.output_folder import (
 )
 from catenary.cases.run.needs import Kept, total_size
 from catenary.cases.run.runner import RESULT, run_case
+from catenary.cases.scene.convert.course import resolved
 from catenary.cases.studies.sweep.done_before import read_record, read_summary, record_text
 from catenary.cases.studies.sweep.jobs import Ended, Job
 from catenary.postproc.files.disk import plain, write_all
@@ -128,7 +129,7 @@ def _leave_record(job: Job, folder: Path, measure: Measure | None, wall: float) 
     record = {
         "variant": job.variant.name,
         "assignments": job.variant.assignments,
-        "config": job.scene.resolved(),
+        "config": resolved(job.scene),
         "wall_s": wall,
         "measured": measured,
     }
@@ -155,7 +156,7 @@ def _check_room(jobs: Sequence[Job], out_dir: Path, force: bool) -> None:
 
 
 def _found(job: Job, folder: Path, measured: bool) -> Ended | None:
-    wanted = json.loads(json.dumps(plain(job.scene.resolved())))
+    wanted = json.loads(json.dumps(plain(resolved(job.scene))))
     record = read_record(folder / RECORD)
     if record is None:
         _refuse_other_run(folder, wanted)

@@ -11,10 +11,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from catenary.cases.scene.error_sentences import shown, unknown_key
-from catenary.cases.scene.keys import is_known, known_keys
-from catenary.cases.scene.plain_text import steers
-from catenary.cases.scene.toml_input import parse_assignment, read_toml
+from catenary.cases.scene.input.origin import shown
+from catenary.cases.scene.input.plain_text import steers
+from catenary.cases.scene.input.toml_input import parse_assignment, read_toml
+from catenary.cases.scene.keys.error_sentences import unknown_key
+from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.postproc.files.csv_text import begins_formula
 from catenary.solver.base.errors import InputError
 

@@ -23,7 +23,7 @@ import numpy as np
 from mpi4py import MPI
 from step_cost import room
 
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.hard.runs import at_rest
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.observers import Stage, StepView

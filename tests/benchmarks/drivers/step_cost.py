@@ -18,10 +18,12 @@ from floor import LIBRARIES
 from mpi4py import MPI
 
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
 from catenary.solver.base.parallel import on_root
+from catenary.solver.effects.build_model import build
 from catenary.solver.integrators.newmark import NewmarkLine
-from catenary.solver.model.model import Model, build
+from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
@@ -38,7 +40,7 @@ def main(n_spans: int, n_steps: int) -> None:
     # Since the benchmark started this process, on the clock that processes share.
     imported = time.time() - float(os.environ.get("STARTED_AT", time.time()))
     scene = load_scene("ambrosio2012", [f"line.n_spans={n_spans}", *room(n_spans)])
-    problem = scene.to_problem()
+    problem = problem_of(scene)
     mesh = on_root(comm, lambda: mesh_of(scene))
 
     def rest() -> tuple:

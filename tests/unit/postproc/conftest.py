@@ -13,8 +13,8 @@ from mpi4py import MPI
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.line import DropperKind, Line, SteadyArm, Wire
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
-from catenary.postproc.record.facts import facts_of
-from catenary.postproc.record.header import Header, line_datasets, static_datasets
+from catenary.postproc.channels.facts import facts_of
+from catenary.postproc.channels.header import Header, line_datasets, static_datasets
 from catenary.postproc.record.recorder import Recorder
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Numerics, Placement, Problem, Train

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from catenary.postproc.record.channels import RUN
-from catenary.postproc.record.facts import FACTS
+from catenary.postproc.channels.channels import RUN
+from catenary.postproc.channels.facts import FACTS
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "architecture.md"
 

@@ -15,14 +15,14 @@ import h5py
 import numpy as np
 import pytest
 
-from catenary.cases.scene.keys import known_keys
+from catenary.cases.scene.keys.keys import known_keys
 from catenary.cases.scene.scene import Scene
-from catenary.cases.scene.units import unit_of
+from catenary.cases.scene.tables.units import unit_of
 from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.lumped_data import LumpedData
+from catenary.postproc.channels.channels import RUN
+from catenary.postproc.channels.facts import FACTS, facts_of
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.channels import RUN
-from catenary.postproc.record.facts import FACTS, facts_of
 from catenary.postproc.report.report import write_report
 from catenary.solver.base.errors import InputError
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw

@@ -9,10 +9,10 @@ import h5py
 import numpy as np
 import pytest
 
+from catenary.postproc.channels.channels import LINE_CHANNELS
+from catenary.postproc.channels.line_record import GZIP, LineRecord, from_table, says
 from catenary.postproc.evaluate import statistics
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.channels import LINE_CHANNELS
-from catenary.postproc.record.line_record import GZIP, LineRecord, from_table, says
 from catenary.postproc.record.recorder import Recorder
 
 N_STEPS, FLUSH = 3000, 400

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import pyvista
 
-from catenary.postproc.files import fields
-from catenary.postproc.files.fields import FieldRecorder
+from catenary.postproc.record import fields
+from catenary.postproc.record.fields import FieldRecorder
 from catenary.solver.base.errors import RunBroken
 
 

@@ -12,7 +12,6 @@ import pytest
 
 from catenary.postproc.files.disk import broken_write
 from catenary.postproc.files.disk_errors import reason, remedy
-from catenary.postproc.files.fields import FieldRecorder
 from catenary.postproc.files.own_files import (
     OWN_FILES,
     REPORT_FILES,
@@ -21,6 +20,7 @@ from catenary.postproc.files.own_files import (
     remove_stale,
 )
 from catenary.postproc.read.results import Results
+from catenary.postproc.record.fields import FieldRecorder
 from catenary.postproc.record.recorder import Recorder
 from catenary.solver.base.errors import RunBroken
 

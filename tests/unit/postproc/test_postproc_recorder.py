@@ -13,11 +13,11 @@ import h5py
 import numpy as np
 import pytest
 
+from catenary.postproc.channels import channels
+from catenary.postproc.channels.header import Header
 from catenary.postproc.files import result_file
 from catenary.postproc.files.disk import NoRoom
 from catenary.postproc.read.results import Results
-from catenary.postproc.record import channels
-from catenary.postproc.record.header import Header
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.report.summary import real_time_factor
 from catenary.solver.base.errors import InputError, RunBroken

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from catenary.postproc.report.wording import counted, fixed
+from catenary.postproc.evaluate.wording import counted, fixed
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from small_lines import BARE, ac_simple_line, mesh_of, problem_of
 
-from catenary.solver.model.model import Model, build
+from catenary.solver.effects.build_model import build
+from catenary.solver.model.model import Model
 from catenary.solver.model.partition import PANTOGRAPH_NODES, distribute
 
 

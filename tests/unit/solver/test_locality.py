@@ -22,11 +22,12 @@ from small_lines import (
 )
 
 from catenary.solver.base.errors import RunBroken
+from catenary.solver.effects.build_model import build
 from catenary.solver.integrators.line_integrator import LineMotion
 from catenary.solver.linear import unit_responses
 from catenary.solver.linear.decay_length import DECAY, reach
 from catenary.solver.linear.unit_responses import Windows
-from catenary.solver.model.model import Model, build
+from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Damping
 from catenary.solver.statics.equilibrium import find_form
 

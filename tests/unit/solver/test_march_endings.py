@@ -13,7 +13,7 @@ from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, trai
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.effects.effect import Effect
-from catenary.solver.model.model import ModelBuilder
+from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.problem.problem import Problem
 from catenary.solver.time_loop.observers import StepView
 

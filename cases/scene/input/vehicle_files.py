@@ -10,8 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from catenary.cases.scene.error_sentences import Origin, shown
-from catenary.cases.scene.plain_text import decode, read_whole
+from catenary.cases.scene.input.origin import Origin, shown
+from catenary.cases.scene.input.plain_text import decode, read_whole
 from catenary.solver.base.errors import InputError
 
 _LONGEST_NAME = 1000

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.postproc.record.channels import PANTOGRAPH, RUN
+from catenary.postproc.channels.channels import PANTOGRAPH, RUN
 from catenary.solver.problem.contact_laws import ContactLaw, HertzLaw, LinearLaw
 from catenary.solver.problem.integrator_parameters import Integration, integration_of
 

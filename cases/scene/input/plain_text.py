@@ -9,11 +9,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from catenary.cases.scene.faults import MOST_TOLD, Fault
+from catenary.cases.scene.input.faults import MOST_TOLD, Fault
 from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:
-    from catenary.cases.scene.error_sentences import Origin
+    from catenary.cases.scene.input.origin import Origin
 
 MOST_BYTES = 10_000_000  # an input file is written by hand or is a table; more is some other file
 DEEPEST = 32  # tables in tables; the schema has no more than eight

@@ -8,10 +8,10 @@ from catenary.mbs.head.strips import Turning
 from catenary.mbs.lumped_data import LumpedData
 
 if TYPE_CHECKING:
-    from catenary.mbs.build import PantographData
+    from catenary.mbs.mechanism.pantograph_data import MultibodyData
 
 
-def roll_of(data: PantographData) -> Turning | None:
+def roll_of(data: LumpedData | MultibodyData) -> Turning | None:
     """How the head of a pantograph rolls, None if it cannot. Not collective.
 
     Only a mechanism needs the machinery of multibody systems, which is imported for it alone.

@@ -10,7 +10,7 @@ import numpy as np
 
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
-from catenary.postproc.record.facts import FACTS
+from catenary.postproc.channels.facts import FACTS
 
 if TYPE_CHECKING:
     from catenary.solver.statics.equilibrium import Elasticity, Equilibrium

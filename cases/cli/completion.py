@@ -9,7 +9,7 @@ from __future__ import annotations
 
 def cases(incomplete: str) -> list[tuple[str, str]]:
     """Names of shipped cases with their titles; shells complete paths themselves."""
-    from catenary.cases.scene.case_files import entries
+    from catenary.cases.scene.input.case_files import entries
 
     return [(one.name, one.title) for one in entries() if one.name.startswith(incomplete)]
 
@@ -19,7 +19,7 @@ def assignments(incomplete: str) -> list[tuple[str, str]]:
 
     Keys below what a scene names itself, such as its kinds of pantograph, are left out.
     """
-    from catenary.cases.scene.keys import ANY
+    from catenary.cases.scene.keys.keys import ANY
     from catenary.cases.terminal.key_list import keys_of_a_scene, words_of
 
     name, equals, begun = incomplete.partition("=")

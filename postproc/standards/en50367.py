@@ -1,4 +1,4 @@
-"""Acceptance of pantograph and line: the limits of EN 50367, edition by edition, and the verdict.
+"""The limits of EN 50367, edition by edition.
 
 The edition of 2006 is the one that Ambrosio et al. (2012) quote in their section 1. The curves of
 the allowed mean force for AC, DC 3 kV and DC 1.5 kV are those of EN 50367 and of the TSI Energy.
@@ -11,12 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from catenary.solver.base.errors import InputError
-
-if TYPE_CHECKING:
-    from catenary.postproc.evaluate.statistics import PantographStatistics, RunStatistics
 
 SYSTEMS = {"ac": "AC", "dc_3kv": "DC 3 kV", "dc_1500v": "DC 1.5 kV"}
 KMH = 3.6  # km/h in 1 m/s
@@ -136,155 +132,19 @@ EDITIONS: dict[str, Edition] = {
 }
 
 
-@dataclass(frozen=True)
-class Criterion:
-    """One judged line of the table.
-
-    Attributes
-    ----------
-    criterion : what is judged, in words; names the pantograph where there are several
-    value, limit : in ``unit``; the value is NaN where the run gives none
-    unit : for readers: N, mm, %, km/h
-    relation : how the value must stand to the limit, "<=", "<" or ">"
-    passed : None if there is no value to judge
-    clause : where the limit comes from
-    """
-
-    criterion: str
-    value: float
-    limit: float
-    unit: str
-    relation: str
-    passed: bool | None
-    clause: str
-
-
 def mean_force_limit(speed: float, system: str, edition: str) -> float:
     """Largest allowed mean contact force [N] at ``speed`` [m/s]."""
     v = speed * KMH
-    rule = next(r for r in _edition(edition).mean_force[_system(system)] if _up_to(v, r.up_to))
+    rule = next(r for r in edition_of(edition).mean_force[system_of(system)] if _up_to(v, r.up_to))
     return rule.factor * v**2 + rule.base
 
 
 def max_force_limit(speed: float, system: str, edition: str) -> float:
     """Force [N] below which the contact force must stay at ``speed`` [m/s]."""
     v = speed * KMH
-    return next(s.limit for s in _edition(edition).max_force[_system(system)] if _up_to(v, s.up_to))
-
-
-def judge(
-    statistics: RunStatistics, speed: float, wave_speed: float, system: str, edition: str
-) -> list[Criterion]:
-    """Every line of an edition's table, judged: those of each pantograph, then those of the line.
-
-    Parameters
-    ----------
-    statistics : of the run
-    speed : of the train [m/s]
-    wave_speed : of transverse waves on the contact wire [m/s]
-    system : key of ``SYSTEMS``
-    edition : key of ``EDITIONS``
-
-    Raises
-    ------
-    InputError
-        If system or edition is unknown.
-    """
-    table = _edition(edition)
-    judged = []
-    several = len(statistics.pantographs) > 1
-    for pantograph in statistics.pantographs:
-        suffix = f", {pantograph.name}" if several else ""
-        judged += _of_pantograph(pantograph, suffix, speed, system, edition)
-    uplift = statistics.supports.maximum
-    judged.append(
-        _criterion(
-            "contact-wire uplift at steady arms",
-            1e3 * uplift,
-            1e3 * table.arm_uplift,
-            "mm",
-            "<=",
-            table.clause["uplift"],
-        )
+    return next(
+        s.limit for s in edition_of(edition).max_force[system_of(system)] if _up_to(v, s.up_to)
     )
-    judged.append(
-        _criterion(
-            f"train speed against {table.speed_ratio:g} of the wave speed",
-            KMH * speed,
-            KMH * table.speed_ratio * wave_speed,
-            "km/h",
-            "<=",
-            table.clause["speed"],
-        )
-    )
-    return judged
-
-
-def verdict(criteria: list[Criterion]) -> bool | None:
-    """True if all passed, False if one failed, None if none failed but some were not judged."""
-    if any(c.passed is False for c in criteria):
-        return False
-    return None if any(c.passed is None for c in criteria) else True
-
-
-def _of_pantograph(
-    p: PantographStatistics, suffix: str, speed: float, system: str, edition: str
-) -> list[Criterion]:
-    table = _edition(edition)
-    mean_limit = mean_force_limit(speed, system, edition)
-    rows = [
-        ("mean contact force", p.mean, mean_limit, "N", "<=", "mean"),
-        (
-            f"standard deviation, {table.std_ratio:g} of the mean",
-            p.std,
-            table.std_ratio * p.mean,
-            "N",
-            "<=",
-            "std",
-        ),
-        (
-            f"standard deviation, {table.std_ratio:g} of the allowed mean",
-            p.std,
-            table.std_ratio * mean_limit,
-            "N",
-            "<=",
-            "std",
-        ),
-        (
-            "maximum contact force",
-            p.maximum,
-            max_force_limit(speed, system, edition),
-            "N",
-            "<",
-            "max",
-        ),
-    ]
-    if table.min_force is not None:
-        rows.append(("minimum contact force", p.minimum, table.min_force, "N", ">", "min"))
-    rows += [
-        (
-            "vertical amplitude of the contact point",
-            1e3 * p.contact_height_range,
-            1e3 * table.height_range,
-            "mm",
-            "<=",
-            "height",
-        ),
-        ("arcing NQ", p.arcing_percent, table.arcing_percent, "%", "<=", "arcing"),
-    ]
-    return [
-        _criterion(what + suffix, value, limit, unit, relation, table.clause[line])
-        for what, value, limit, unit, relation, line in rows
-    ]
-
-
-def _criterion(
-    what: str, value: float, limit: float, unit: str, relation: str, clause: str
-) -> Criterion:
-    passed: bool | None = None
-    if not (math.isnan(value) or math.isnan(limit)):
-        passed = bool({"<=": value <= limit, "<": value < limit, ">": value > limit}[relation])
-    return Criterion(what, value, limit, unit, relation, passed, clause)
 
 
 def _up_to(speed_km_h: float, bound: float) -> bool:
@@ -292,7 +152,8 @@ def _up_to(speed_km_h: float, bound: float) -> bool:
     return speed_km_h <= bound * (1.0 + 1e-9)
 
 
-def _edition(name: str) -> Edition:
+def edition_of(name: str) -> Edition:
+    """The edition of that name; InputError if there is none."""
     if name not in EDITIONS:
         raise InputError(
             f'there is no edition "{name}" of EN 50367 here: choose one of {", ".join(EDITIONS)}'
@@ -300,7 +161,8 @@ def _edition(name: str) -> Edition:
     return EDITIONS[name]
 
 
-def _system(name: str) -> str:
+def system_of(name: str) -> str:
+    """The name of a supply system; InputError if it is none."""
     if name not in SYSTEMS:
         raise InputError(f'there is no supply system "{name}": choose one of {", ".join(SYSTEMS)}')
     return name

@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from catenary.cases.scene.error_sentences import COMMAND_LINE, shown
-from catenary.cases.scene.plain_text import DEEPEST, decode, plain, read_whole
+from catenary.cases.scene.input.origin import COMMAND_LINE, shown
+from catenary.cases.scene.input.plain_text import DEEPEST, decode, plain, read_whole
 from catenary.solver.base.errors import InputError
 
 if sys.version_info >= (3, 11):

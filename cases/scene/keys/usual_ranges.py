@@ -6,15 +6,12 @@ of ten that would lie inside in a unit a thousand times larger or smaller is tak
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from catenary.cases.scene.faults import Fault
-from catenary.cases.scene.units import unit_of
+from catenary.cases.scene.tables.units import unit_of
 
 if TYPE_CHECKING:
-    from catenary.cases.scene.error_sentences import Origin
-    from catenary.cases.scene.scene import Scene
+    pass
 
 # Lowest and highest usual value by key, in the key's unit; zero is always allowed. A * stands for a
 # name that the scene chooses; of a list each number is meant.
@@ -73,25 +70,3 @@ def unit_guess(key: str, value: float) -> str:
                 f"{others[unit]}? write {value * factor:.12g}"
             )
     return ""
-
-
-def usual_faults(scene: Scene) -> Iterator[Fault]:
-    """A fault for every number that was probably written in another unit."""
-    plain = scene.model_dump(exclude_none=True)
-    for pattern in USUAL:
-        yield from _faults(plain, pattern.split("."), "", scene.origin)
-
-
-def _faults(value: Any, parts: list[str], key: str, origin: Origin) -> Iterator[Fault]:
-    if parts:
-        inner = value if isinstance(value, dict) else {}
-        for name in inner if parts[0] == "*" else [parts[0]] if parts[0] in inner else []:
-            below = f"{key}.{name}" if key else name
-            yield from _faults(inner[name], parts[1:], below, origin)
-        return
-    for number in value if isinstance(value, list) else [value]:
-        guess = unit_guess(key, number)
-        if guess:
-            unit = unit_of(key)
-            yield Fault(key, f"{key} is {number:.12g} {unit} {origin.of(key)}; {guess}")
-            return

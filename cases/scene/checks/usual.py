@@ -1,0 +1,34 @@
+"""Whether numbers of a scene were probably written in another unit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from catenary.cases.scene.input.faults import Fault
+from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.keys.usual_ranges import USUAL, unit_guess
+from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.tables.units import unit_of
+
+
+def usual_faults(scene: Scene) -> Iterator[Fault]:
+    """A fault for every number that was probably written in another unit."""
+    plain = scene.model_dump(exclude_none=True)
+    for pattern in USUAL:
+        yield from _faults(plain, pattern.split("."), "", scene.origin)
+
+
+def _faults(value: Any, parts: list[str], key: str, origin: Origin) -> Iterator[Fault]:
+    if parts:
+        inner = value if isinstance(value, dict) else {}
+        for name in inner if parts[0] == "*" else [parts[0]] if parts[0] in inner else []:
+            below = f"{key}.{name}" if key else name
+            yield from _faults(inner[name], parts[1:], below, origin)
+        return
+    for number in value if isinstance(value, list) else [value]:
+        guess = unit_guess(key, number)
+        if guess:
+            unit = unit_of(key)
+            yield Fault(key, f"{key} is {number:.12g} {unit} {origin.of(key)}; {guess}")
+            return

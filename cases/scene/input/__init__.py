@@ -1,0 +1,1 @@
+"""Texts and files from anybody, read within bounds; which faults they have."""

@@ -1,0 +1,1 @@
+"""The limits of EN 50367, edition by edition."""

@@ -1,0 +1,24 @@
+"""All effects: the registry with the shipped ones in it, and which of them a problem asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from catenary.solver.effects import vertical_effects  # noqa: F401  (registers on import)
+from catenary.solver.effects.effect import Effect, registered
+from catenary.solver.problem.problem import Problem
+
+
+def registry() -> dict[str, Effect]:
+    """All effects by name, in the order in which they are built."""
+    return registered()
+
+
+def active(problem: Problem) -> list[Effect]:
+    """The effects that ``problem`` asks for and has something for, in building order."""
+    return [e for e in registry().values() if e.name in problem.effects and e.applies(problem)]
+
+
+def unknowns_per_node(effects: Iterable[Effect]) -> tuple[str, ...]:
+    """Unknowns that a set of effects needs at each wire node, without repetition."""
+    return tuple(dict.fromkeys(name for effect in effects for name in effect.unknowns))

@@ -1,0 +1,42 @@
+"""The model of a problem on a mesh: each active effect adds its terms."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from catenary.meshgen.mesh import LineMesh
+from catenary.solver.effects import all_effects as effects
+from catenary.solver.model.builder import ModelBuilder
+from catenary.solver.model.model import Model, along_the_track
+from catenary.solver.problem.problem import Problem
+
+
+def build(
+    problem: Problem,
+    mesh: LineMesh,
+    dropper_lengths: np.ndarray,
+    broken: np.ndarray | None = None,
+) -> Model:
+    """The model of a problem on a mesh, for given dropper lengths [m]. Not collective.
+
+    ``broken`` (n_droppers,) bool tells which droppers carry nothing; none if not given.
+    """
+    active = effects.active(problem)
+    row_of_node = np.empty(mesh.n_nodes, dtype=np.int64)
+    row_of_node[along_the_track(mesh)] = np.arange(mesh.n_nodes)
+    model = Model(
+        problem,
+        mesh,
+        tuple(effect.name for effect in active),
+        effects.unknowns_per_node(active),
+        row_of_node,
+        dropper_lengths,
+    )
+    model.broken = np.zeros(mesh.droppers.shape[0], dtype=bool) if broken is None else broken
+    model.terms_of = {effect.name: 0 for effect in active}
+    builder = ModelBuilder(model)
+    for effect in active:
+        if effect.build is not None:
+            effect.build(builder)
+        model.terms_of[effect.name] = builder.take_count()
+    return builder.finish()

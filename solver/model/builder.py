@@ -1,0 +1,114 @@
+"""What an effect sees of a model under construction."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from catenary.solver.model import elements
+from catenary.solver.model.model import Block, Model, StepLoad, wire_elements
+from catenary.solver.problem.problem import Problem
+
+
+class ModelBuilder:
+    """What an effect sees of a model under construction."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.problem: Problem = model.problem
+        self.mesh = model.mesh
+        self._gravity = 0.0
+        self._hanging: list[tuple[np.ndarray, np.ndarray]] = []
+        self._constrained: list[np.ndarray] = []
+        self._n_terms = 0
+
+    def add_wire(self, wire: str, unknowns: tuple[str, str] = ("w", "theta_y")) -> None:
+        """Bending and tension of a wire in the plane of two unknowns; its mass and weight."""
+        dofs, length = wire_elements(self.model, wire, unknowns)
+        data = getattr(self.problem.line, wire)
+        self._add_block(
+            wire,
+            dofs,
+            elements.mass(length, data.mass_per_length),
+            elements.stiffness(length, data.bending_stiffness, data.tension),
+        )
+        if unknowns[0] == "w":
+            load = data.mass_per_length * elements.uniform_load(length)
+            self._hanging.append((dofs.ravel(), load.ravel()))
+
+    def add_springs(
+        self, component: str, nodes: np.ndarray, unknown: str, stiffness: float | np.ndarray
+    ) -> None:
+        """Springs from nodes to the ground [N/m], without force in the equilibrium."""
+        values = np.broadcast_to(np.asarray(stiffness, dtype=float), nodes.shape)
+        self._add_block(
+            component, self.model.dofs(nodes, unknown)[:, None], None, values[:, None, None].copy()
+        )
+
+    def add_masses(
+        self,
+        component: str,
+        nodes: np.ndarray,
+        mass: float | np.ndarray,
+        hanging_mass: float | np.ndarray | None = None,
+        unknown: str = "w",
+    ) -> None:
+        """Point masses [kg]; ``hanging_mass`` is what the node carries if it is not the same."""
+        values = np.broadcast_to(np.asarray(mass, dtype=float), nodes.shape)
+        dofs = self.model.dofs(nodes, unknown)
+        self._add_block(component, dofs[:, None], values[:, None, None].copy(), None)
+        if unknown == "w":
+            hanging = values if hanging_mass is None else hanging_mass
+            self._hanging.append((dofs, np.broadcast_to(np.asarray(hanging), nodes.shape)))
+
+    def add_links(
+        self, component: str, pairs: np.ndarray, unknown: str, stiffness: np.ndarray
+    ) -> None:
+        """Springs between pairs of nodes, shape (n, 2) and (n,) [N/m]."""
+        unit = np.array([[1.0, -1.0], [-1.0, 1.0]])
+        self._add_block(
+            component, self.model.dofs(pairs, unknown), None, stiffness[:, None, None] * unit
+        )
+
+    def add_step_load(self, load: StepLoad) -> None:
+        """A load that changes with time."""
+        self.model.step_loads.append(load)
+        self._n_terms += len(load.dofs)
+
+    def hold(self, nodes: np.ndarray, unknown: str) -> None:
+        """Hold an unknown of some nodes at its equilibrium value."""
+        self._constrained.append(self.model.dofs(nodes, unknown))
+
+    def set_gravity(self, gravity: float) -> None:
+        """Let all masses hang, those of effects built later included [m/s2]."""
+        self._gravity = gravity
+        self._n_terms += 1
+
+    def count_term(self) -> None:
+        """Count a term that is no matrix, such as a law in the time loop."""
+        self._n_terms += 1
+
+    def take_count(self) -> int:
+        """Terms added since the last call."""
+        count, self._n_terms = self._n_terms, 0
+        return count
+
+    def finish(self) -> Model:
+        """The model, its weights and constraints put together."""
+        model = self.model
+        model.weight = np.zeros(model.n_dofs)
+        if self._gravity:
+            for dofs, mass in self._hanging:
+                np.add.at(model.weight, dofs, -self._gravity * mass)
+        if self._constrained:
+            model.constrained = np.unique(np.concatenate(self._constrained))
+        return model
+
+    def _add_block(
+        self,
+        component: str,
+        dofs: np.ndarray,
+        mass: np.ndarray | None,
+        stiffness: np.ndarray | None,
+    ) -> None:
+        self.model.blocks.append(Block(component, dofs, mass, stiffness))
+        self._n_terms += dofs.shape[0]
