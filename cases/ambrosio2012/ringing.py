@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from catenary.cases.ambrosio2012.statements import DAMPINGS, SINGLE, Run, Runs
@@ -18,8 +17,9 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.postproc.report.study_report import StudyTable
-from catenary.solver.model.model import Model, iterate_entries
-from catenary.solver.statics.equilibrium import find_form, stiffness_matrix
+from catenary.solver.model.matrices import stiffness_matrix, whole_matrix
+from catenary.solver.model.model import Model
+from catenary.solver.statics.equilibrium import find_form
 
 
 class Band(NamedTuple):
@@ -35,9 +35,7 @@ def first_band(model: Model, n_modes: int) -> Band:
     Not collective. From K x = omega^2 M x on the unknowns that are not held.
     """
     free = np.setdiff1d(np.arange(model.n_dofs), model.constrained)
-    parts = list(iterate_entries(model, 0, model.n_dofs, 1.0, 0.0, 0.0))
-    rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
-    mass = sparse.csc_matrix((values, (rows, columns)), shape=(model.n_dofs, model.n_dofs))
+    mass = whole_matrix(model, mass=1.0)
     stiffness = stiffness_matrix(model)
     squares = sparse_linalg.eigsh(
         stiffness[free][:, free].tocsc(),

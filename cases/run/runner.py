@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -52,16 +52,8 @@ from catenary.postproc.report.report import write_report, write_summary
 from catenary.solver.base.errors import CatenaryError, RunBroken
 from catenary.solver.base.parallel import on_root
 from catenary.solver.base.petsc import PETSc
-from catenary.solver.effects.build_model import build
-from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.equilibrium import (
-    Elasticity,
-    Equilibrium,
-    elasticity,
-    find_form,
-    middle_span,
-)
+from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest, line_at_rest_on_all
 from catenary.solver.time_loop.march import March, Outcome
 from catenary.solver.time_loop.observers import Observer
 
@@ -81,15 +73,6 @@ class RunOutcome:
     outcome: str
     accepted: bool | None
     summary: dict[str, Any] = field(default_factory=dict)
-
-
-class AtRest(NamedTuple):
-    """A line in equilibrium, on all ranks."""
-
-    mesh: LineMesh
-    model: Model
-    form: Equilibrium
-    lift: Elasticity
 
 
 class Phases:
@@ -188,11 +171,10 @@ def static_table(scene: Scene) -> dict[str, np.ndarray]:
     """The line at rest, arrays named as in the result file's groups. Not collective."""
     problem = problem_of(scene)
     mesh = mesh_of(scene)
-    model, form = find_form(problem, mesh)
-    lift = elasticity(model, *middle_span(problem.line))
+    rest = line_at_rest(problem, mesh)
     data = {
         **line_datasets(problem.line, mesh, problem.evaluation),
-        **static_datasets(mesh, form, lift),
+        **static_datasets(mesh, rest.form, rest.lift),
         "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
     }
     return {name.rsplit("/", 1)[-1]: values for name, values in data.items()}
@@ -241,8 +223,7 @@ def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
                 on_root(comm, lambda: _refuse_other_run(order.out_dir, header, problem))
             phase.next("the line was distributed")
             with phases("distribute"):
-                parts = problem, at_rest.model, at_rest.form, at_rest.lift
-                march = stack.enter_context(March(comm, *parts))
+                march = stack.enter_context(March(comm, *at_rest))
                 if order.state is not None:
                     march.restore(order.state)
             observers, recorder = _observers(
@@ -274,7 +255,7 @@ def _at_rest(
     phases: Phases,
     phase: Phase,
     judge: Callable[[RunSize], None],
-) -> AtRest:
+) -> LineAtRest:
     """Mesh and equilibrium, found on rank 0 and given to all. Collective."""
 
     def make_mesh() -> LineMesh:
@@ -283,25 +264,18 @@ def _at_rest(
             judge(run_size(needs_with_mesh(scene, mesh)))
         return mesh
 
-    def rest() -> tuple[Equilibrium, np.ndarray, Elasticity]:
-        model, form = find_form(problem, mesh)
-        lift = elasticity(model, *middle_span(problem.line))
-        return form, model.dropper_lengths, lift
-
     phase.next("the mesh was made")
     with phases("mesh"):
         mesh: LineMesh = on_root(comm, phase.alone(make_mesh))
     phase.next("the equilibrium was found")
     with phases("equilibrium"):
-        form, lengths, lift = on_root(comm, phase.alone(rest))
-        model = build(problem, mesh, lengths)
-    return AtRest(mesh, model, form, lift)
+        return line_at_rest_on_all(problem, mesh, comm, phase.alone)
 
 
 def _observers(
     order: _Order,
     problem: Problem,
-    at_rest: AtRest,
+    at_rest: LineAtRest,
     header: Header | None,
     progress: Progress,
     n_steps: int,
@@ -383,7 +357,7 @@ def _report(out_dir: Path, outcome: Outcome, only_summary: bool) -> RunOutcome:
     return RunOutcome(outcome.outcome, accepted, summary)
 
 
-def _header(order: _Order, problem: Problem, at_rest: AtRest) -> Header:
+def _header(order: _Order, problem: Problem, at_rest: LineAtRest) -> Header:
     scene = order.scene
     on, off = effect_rows(scene, problem)
     line = problem.line

@@ -13,7 +13,8 @@ from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.postproc.channels.facts import FACTS
 
 if TYPE_CHECKING:
-    from catenary.solver.statics.equilibrium import Elasticity, Equilibrium
+    from catenary.solver.statics.elasticity import Elasticity
+    from catenary.solver.statics.equilibrium import Equilibrium
 
 REQUIRED_ATTRIBUTES = (
     "case",

@@ -28,7 +28,8 @@ from catenary.solver.integrators import state_kernels
 from catenary.solver.model.model import Model
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.problem import Placement, Problem
-from catenary.solver.statics.equilibrium import Elasticity, Equilibrium
+from catenary.solver.statics.elasticity import Elasticity
+from catenary.solver.statics.equilibrium import Equilibrium
 
 
 class Pantographs:

@@ -11,7 +11,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from catenary.solver.model.model import Model, iterate_entries
+from catenary.solver.model.matrices import iterate_entries
+from catenary.solver.model.model import Model
 
 # Beyond the reach a column is below this share of its peak; two orders under what an iteration
 # over a whole run may add up to and still agree to 1e-9.

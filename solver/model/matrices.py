@@ -1,15 +1,69 @@
-"""Sums of M, K and C of a model as PETSc matrices in blocks of nodes or stations."""
+"""M, K and C of a model and their sums: entries, whole matrices, parts of rows, PETSc matrices."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 from catenary.solver.base.petsc import PETSc
-from catenary.solver.model.model import SAME_STATION, Model, iterate_entries
+from catenary.solver.model.model import SAME_STATION, Model
 from catenary.solver.model.partition import Ownership
+
+
+def iterate_entries(
+    model: Model, first: int, last: int, mass: float, stiffness: float, damping: float
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Entries (rows, columns, values) of ``mass`` M + ``stiffness`` K + ``damping`` C.
+
+    Only rows in [first, last); rows and columns of constrained unknowns are left out.
+    """
+    free = np.ones(model.n_dofs, dtype=bool)
+    free[model.constrained] = False
+    for block in model.blocks:
+        alpha, beta = model.damping_of(block.component)
+        near = ((block.dofs >= first) & (block.dofs < last)).any(axis=1)
+        if not near.any():
+            continue
+        dofs = block.dofs[near]
+        matrix = np.zeros((dofs.shape[0], dofs.shape[1], dofs.shape[1]))
+        if block.mass is not None:
+            matrix += (mass + damping * beta) * block.mass[near]
+        if block.stiffness is not None:
+            matrix += (stiffness + damping * alpha) * block.stiffness[near]
+        rows = np.broadcast_to(dofs[:, :, None], matrix.shape)
+        columns = np.broadcast_to(dofs[:, None, :], matrix.shape)
+        keep = (rows >= first) & (rows < last) & free[rows] & free[columns]
+        yield rows[keep], columns[keep], matrix[keep]
+
+
+def whole_matrix(
+    model: Model,
+    mass: float = 0.0,
+    stiffness: float = 0.0,
+    damping: float = 0.0,
+    held_diagonal: float = 0.0,
+) -> sparse.csc_matrix:
+    """``mass`` M + ``stiffness`` K + ``damping`` C on all unknowns. Not collective.
+
+    Rows and columns of held unknowns are empty but for ``held_diagonal``.
+    """
+    n = model.n_dofs
+    parts = list(iterate_entries(model, 0, n, mass, stiffness, damping))
+    if held_diagonal:
+        held = model.constrained
+        parts.append((held, held, np.full(held.size, held_diagonal)))
+    if not parts:
+        return sparse.csc_matrix((n, n))
+    rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return sparse.csc_matrix((values, (rows, columns)), shape=(n, n))
+
+
+def stiffness_matrix(model: Model) -> sparse.csc_matrix:
+    """K of the whole line, held unknowns with a unit diagonal. Not collective."""
+    return whole_matrix(model, stiffness=1.0, held_diagonal=1.0)
 
 
 def part_of(

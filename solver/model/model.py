@@ -6,7 +6,6 @@ by the effects, each of which adds its own through a ``ModelBuilder``.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -137,32 +136,6 @@ def along_the_track(mesh: LineMesh) -> np.ndarray:
     order = np.argsort(x, kind="stable")
     station = np.cumsum(np.diff(x[order], prepend=x[order[:1]]) > SAME_STATION)
     return order[np.lexsort((wire[order], station))]
-
-
-def iterate_entries(
-    model: Model, first: int, last: int, mass: float, stiffness: float, damping: float
-) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Entries (rows, columns, values) of ``mass`` M + ``stiffness`` K + ``damping`` C.
-
-    Only rows in [first, last); rows and columns of constrained unknowns are left out.
-    """
-    free = np.ones(model.n_dofs, dtype=bool)
-    free[model.constrained] = False
-    for block in model.blocks:
-        alpha, beta = model.damping_of(block.component)
-        near = ((block.dofs >= first) & (block.dofs < last)).any(axis=1)
-        if not near.any():
-            continue
-        dofs = block.dofs[near]
-        matrix = np.zeros((dofs.shape[0], dofs.shape[1], dofs.shape[1]))
-        if block.mass is not None:
-            matrix += (mass + damping * beta) * block.mass[near]
-        if block.stiffness is not None:
-            matrix += (stiffness + damping * alpha) * block.stiffness[near]
-        rows = np.broadcast_to(dofs[:, :, None], matrix.shape)
-        columns = np.broadcast_to(dofs[:, None, :], matrix.shape)
-        keep = (rows >= first) & (rows < last) & free[rows] & free[columns]
-        yield rows[keep], columns[keep], matrix[keep]
 
 
 def wire_elements(

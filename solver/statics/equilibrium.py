@@ -10,15 +10,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg, sparse
-from scipy.sparse import linalg as sparse_linalg
+from scipy import linalg
 
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects.build_model import build
 from catenary.solver.model import elements
-from catenary.solver.model.model import Model, iterate_entries
+from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Problem
 
 # Lengths are printed to the millimetre; the iteration contracts by the ratio of dropper weight
@@ -43,14 +42,6 @@ class Equilibrium:
     slope: np.ndarray
     dropper_force: np.ndarray
     dropper_length: np.ndarray
-
-
-@dataclass(frozen=True)
-class Elasticity:
-    """Static lift of the contact wire under a unit force, ``lift`` [m/N] at ``x`` [m], (n,)."""
-
-    x: np.ndarray
-    lift: np.ndarray
 
 
 def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
@@ -209,43 +200,3 @@ def _refuse(line: Line, mesh: LineMesh, bad: np.ndarray, what: Callable[[int], s
         f"the dropper in {place} {what(int(found[0]))}{more}: change line.dropper.pre_sag_mm, the "
         "dropper positions, line.encumbrance_m or the tensions"
     )
-
-
-def stiffness_matrix(model: Model) -> sparse.csc_matrix:
-    """K of the whole line on one process, constrained unknowns held by a unit diagonal."""
-    parts = list(iterate_entries(model, 0, model.n_dofs, 0.0, 1.0, 0.0))
-    rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
-    held = model.constrained
-    rows = np.concatenate([rows, held])
-    columns = np.concatenate([columns, held])
-    values = np.concatenate([values, np.ones(held.size)])
-    return sparse.csc_matrix((values, (rows, columns)), shape=(model.n_dofs, model.n_dofs))
-
-
-def elasticity(model: Model, x_from: float, x_to: float) -> Elasticity:
-    """Static lift under a unit force at the contact wire's nodes in [x_from, x_to] [m].
-
-    Droppers taut, arms included. Not collective; solves once per node.
-    """
-    nodes = model.mesh.wires[CONTACT_WIRE]
-    x = model.mesh.x(nodes)
-    inside = np.flatnonzero((x >= x_from - 1e-9) & (x <= x_to + 1e-9))
-    factor = sparse_linalg.splu(stiffness_matrix(model))
-    dofs = model.dofs(nodes[inside])
-    # Where the wire is held it does not give way; the matrix has a one there, which is no spring.
-    gives_way = ~np.isin(dofs, model.constrained)
-    lift = np.zeros(inside.size)
-    unit = np.zeros(model.n_dofs)
-    for i, dof in zip(np.flatnonzero(gives_way), dofs[gives_way], strict=True):
-        unit[dof] = 1.0
-        lift[i] = factor.solve(unit)[dof]
-        unit[dof] = 0.0
-    return Elasticity(x[inside], lift)
-
-
-def middle_span(line: Line) -> tuple[float, float]:
-    """Ends of the running span in the middle of the line [m]."""
-    masts = line.support_positions
-    first, last = line.n_transition[0], line.n_spans - line.n_transition[1]
-    span = (first + last) // 2 if last > first else line.n_spans // 2
-    return float(masts[span]), float(masts[span + 1])

@@ -45,7 +45,8 @@ from catenary.solver.statics.after_incidents import (
     changed_line,
     unchanged,
 )
-from catenary.solver.statics.equilibrium import Elasticity, Equilibrium
+from catenary.solver.statics.elasticity import Elasticity
+from catenary.solver.statics.equilibrium import Equilibrium
 from catenary.solver.time_loop.audience import Audience
 from catenary.solver.time_loop.compiled_steps import compiled_steps
 from catenary.solver.time_loop.observers import Observer

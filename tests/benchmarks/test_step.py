@@ -23,7 +23,7 @@ from catenary.cases.scene.load import load_scene
 from catenary.solver.integrators.newmark import NewmarkLine
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
-from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March
 
 CASE = "ambrosio2012"
@@ -47,9 +47,7 @@ def at_rest() -> tuple[Any, ...]:
 
 def rest(train: str) -> tuple[Any, ...]:
     scene = load_scene(CASE, ["train.start_m=310", f"train.pantographs={train}"])
-    problem = problem_of(scene)
-    model, form = find_form(problem, mesh_of(scene))
-    return problem, model, form, elasticity(model, *middle_span(problem.line))
+    return line_at_rest(problem_of(scene), mesh_of(scene))
 
 
 @pytest.fixture(scope="module", autouse=True)

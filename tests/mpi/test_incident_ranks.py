@@ -22,7 +22,8 @@ from catenary.solver.base.parallel import on_root
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.observers import Stage, StepView
 
@@ -67,10 +68,8 @@ def run(
     comm: Any, problem: Problem, mesh: LineMesh, kept: int = -1, since: dict[str, Any] | None = None
 ) -> Watching:
     """March on ``comm``, from a checkpoint or from the start. Collective."""
-    model, form = find_form(problem, mesh)
     watching = Watching(kept)
-    lift = elasticity(model, *middle_span(problem.line))
-    with March(comm, problem, model, form, lift) as march:
+    with March(comm, *line_at_rest(problem, mesh)) as march:
         if since is not None:
             march.restore(since)
         march.run([watching])

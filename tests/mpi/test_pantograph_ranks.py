@@ -19,7 +19,7 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.solver.base.errors import NotConverged, RunBroken
 from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.observers import Stage, StepView
 
@@ -66,10 +66,8 @@ def case() -> tuple[Problem, LineMesh]:
 
 def marched(comm: Any, problem: Problem, mesh: LineMesh) -> tuple[str, Watched]:
     """March on ``comm``; how it ended, and what was seen. Collective."""
-    model, form = find_form(problem, mesh)
-    lift = elasticity(model, *middle_span(problem.line))
     watched = Watched()
-    with March(comm, problem, model, form, lift) as march:
+    with March(comm, *line_at_rest(problem, mesh)) as march:
         outcome = march.run([watched]).outcome
     return outcome, watched
 
@@ -117,9 +115,7 @@ def test_a_pantograph_that_cannot_go_on_ends_the_run_on_all_ranks(
         return predict(self, time)
 
     monkeypatch.setattr(kind, "predict", lost)
-    model, form = find_form(problem, mesh)
-    lift = elasticity(model, *middle_span(problem.line))
-    with March(MPI.COMM_WORLD, problem, model, form, lift) as march:
+    with March(MPI.COMM_WORLD, *line_at_rest(problem, mesh)) as march:
         ended = march.run([])
     assert "lost its way" in ended.outcome
     assert ended.n_steps == 10

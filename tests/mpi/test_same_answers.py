@@ -21,7 +21,8 @@ from catenary.solver.base.errors import InputError
 from catenary.solver.base.parallel import on_root
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.observers import Stage, StepView
 
@@ -81,8 +82,7 @@ class Histories:
 
 def histories(comm: Any, problem: Problem, mesh: LineMesh) -> dict[str, np.ndarray] | None:
     """March a problem on ``comm`` and return its histories on rank 0. Collective."""
-    model, form = find_form(problem, mesh)
-    march = March(comm, problem, model, form, elasticity(model, *middle_span(problem.line)))
+    march = March(comm, *line_at_rest(problem, mesh))
     watched = Histories(comm)
     march.run([watched])
     march.destroy()

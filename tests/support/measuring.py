@@ -17,10 +17,12 @@ from catenary.solver.effects.all_effects import registry
 from catenary.solver.effects.effect import Effect, register, unregister
 from catenary.solver.integrators.line_integrator import LineMotion
 from catenary.solver.integrators.make_line import make_line
-from catenary.solver.model.model import Model, iterate_entries
+from catenary.solver.model.matrices import whole_matrix
+from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Numerics, Problem
-from catenary.solver.statics.equilibrium import Equilibrium, elasticity, find_form, middle_span
+from catenary.solver.statics.equilibrium import Equilibrium
+from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March, Outcome
 from catenary.solver.time_loop.observers import Stage, StepView
 
@@ -69,12 +71,7 @@ def matrix_of(
     model: Model, mass: float = 0.0, stiffness: float = 0.0, damping: float = 0.0
 ) -> sparse.csc_matrix:
     """``mass`` M + ``stiffness`` K + ``damping`` C on all unknowns; held ones are empty."""
-    n = model.n_dofs
-    rows, columns, values = (
-        np.concatenate(part)
-        for part in zip(*iterate_entries(model, 0, n, mass, stiffness, damping), strict=True)
-    )
-    return sparse.csc_matrix((values, (rows, columns)), shape=(n, n))
+    return whole_matrix(model, mass, stiffness, damping)
 
 
 def free_matrices(model: Model) -> tuple[sparse.csc_matrix, sparse.csc_matrix]:
@@ -160,9 +157,8 @@ def start_march(
     change_form: Callable[[Equilibrium], Equilibrium] = lambda f: f,
 ) -> tuple[March, Model]:
     """A march on a line at rest, or on what ``change_form`` makes of its shape at rest."""
-    model, form = find_form(problem, mesh)
-    lift = elasticity(model, *middle_span(problem.line))
-    return March(COMM, problem, model, change_form(form), lift), model
+    rest = line_at_rest(problem, mesh)
+    return March(COMM, *rest._replace(form=change_form(rest.form))), rest.model
 
 
 def march(

@@ -20,7 +20,8 @@ from small_lines import (
 )
 
 from catenary.mbs.lumped_data import LumpedData
-from catenary.solver.statics.equilibrium import find_form, stiffness_matrix
+from catenary.solver.model.matrices import stiffness_matrix
+from catenary.solver.statics.equilibrium import find_form
 
 EPS = np.finfo(float).eps
 

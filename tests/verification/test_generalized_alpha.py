@@ -31,10 +31,11 @@ from small_lines import BARE, HANGING, bare_wires, en50318_line, mesh_of, numeri
 
 from catenary.meshgen.line import Wire
 from catenary.solver.effects.build_model import build
+from catenary.solver.model.matrices import stiffness_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.problem.integrator_parameters import integration_of
 from catenary.solver.problem.problem import Damping, Numerics
-from catenary.solver.statics.equilibrium import find_form, stiffness_matrix
+from catenary.solver.statics.equilibrium import find_form
 
 METHODS = [
     ("generalized_alpha", 1.0),

@@ -36,7 +36,8 @@ from catenary.solver.problem.incidents import (
 )
 from catenary.solver.problem.problem import Damping, Problem, Train
 from catenary.solver.statics.after_incidents import changed_line
-from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.line_at_rest import line_at_rest
 
 EPS = np.finfo(float).eps
 INCIDENTS = {"dropper_break", "tension_loss"}
@@ -179,9 +180,8 @@ def test_the_energy_that_leaves_is_what_broke_or_ran_out(incident: LineIncident)
     """Energy less work stays, but for T^2 / 2k of the dropper or the tensioner's share of it."""
     problem = undamped((incident,))
     mesh = mesh_of(problem.line, 3)
-    model, form = find_form(problem, mesh)
-    lift = elasticity(model, *middle_span(problem.line))
-    run = hard_runs.run(hard_runs.AtRest(problem, model, form, lift), COMM, with_work=True)
+    rest = line_at_rest(problem, mesh)
+    run = hard_runs.run(rest, COMM, with_work=True)
     assert run.outcome == "done"
     at = round(incident.time / problem.numerics.dt)
     seen = march(problem, mesh, lambda view: view.step == at and view.checkpoint())
@@ -191,8 +191,8 @@ def test_the_energy_that_leaves_is_what_broke_or_ran_out(incident: LineIncident)
         assert force[at] > 50.0 and not force[at + 1 :].any()
         released = force[at] ** 2 / (2 * problem.line.dropper.stiffness)
     else:
-        shape = first_rest(model, form) + seen.watched[at]["displacement"]
-        released = (1 - incident.share) * slope_energy(problem, model, shape, incident.wire)
+        shape = first_rest(rest.model, rest.form) + seen.watched[at]["displacement"]
+        released = (1 - incident.share) * slope_energy(problem, rest.model, shape, incident.wire)
     balance = run.energy - run.work
     exchanged = max(np.abs(run.energy).max(), np.abs(run.work).max())
     # Round-off of some thousand steps, each of eps of what is added up.

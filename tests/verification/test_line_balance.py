@@ -19,7 +19,8 @@ from catenary.cases.studies.hard import checks as hard_checks
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.cases import HardCase, hard_cases
 from catenary.solver.contact.contact_wire import ContactWire
-from catenary.solver.model.model import Model, iterate_entries
+from catenary.solver.model.matrices import whole_matrix
+from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.observers import StepView
@@ -55,9 +56,7 @@ class States(hard_runs.Watcher):
 
 
 def matrix(model: Model, *shares: float) -> csr_matrix:
-    entries = list(iterate_entries(model, 0, model.n_dofs, *shares))
-    rows, columns, values = (np.concatenate(part) for part in zip(*entries, strict=True))
-    return csr_matrix((values, (rows, columns)), shape=(model.n_dofs, model.n_dofs))
+    return whole_matrix(model, *shares).tocsr()
 
 
 @pytest.mark.parametrize("damping", [0.0, 1e-3])
@@ -116,7 +115,7 @@ def test_the_criterion_fails_where_energy_is_made(monkeypatch: pytest.MonkeyPatc
     def fed(scene: Any, comm: Any) -> hard_runs.AtRest:
         rest = sound(scene, comm)
         numerics = replace(rest.problem.numerics, gamma=0.3, beta=0.25)
-        return replace(rest, problem=replace(rest.problem, numerics=numerics))
+        return rest._replace(problem=replace(rest.problem, numerics=numerics))
 
     with monkeypatch.context() as wrong:
         wrong.setattr(hard_runs, "at_rest", fed)

@@ -11,7 +11,6 @@ from mpi4py import MPI
 from scipy import linalg
 from small_lines import EN_PANTOGRAPH, HANGING, en50318_line, mesh_of, problem_of
 
-from catenary.cases.studies.hard.runs import AtRest
 from catenary.cases.studies.stability import from_matrices as theory
 from catenary.cases.studies.stability.by_marching import COUPLINGS, Bench
 from catenary.cases.studies.stability.map import RESOLUTION, Grid, as_rows, find, make_map
@@ -19,7 +18,7 @@ from catenary.cases.studies.stability.picture import draw
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.contact.contact_wire import ContactWire
 from catenary.solver.model.partition import distribute
-from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.statics.line_at_rest import line_at_rest
 
 GRID = ((1e5, 0.5), (1e5, 8.0), (1e7, 2.0))
 NEWMARK = (0.25, 0.5)
@@ -29,11 +28,10 @@ NEWMARK = (0.25, 0.5)
 def bench() -> Bench:
     """Three spans with damping, droppers that stay taut, contact that lasts."""
     problem = problem_of(en50318_line(3), HANGING | {"structural_damping"})
-    model, form = find_form(problem, mesh_of(en50318_line(3), 3))
-    lift = elasticity(model, *middle_span(problem.line))
-    wire = ContactWire(model, form, distribute(model, 1, 0))
-    place = theory.lightest_place(model, wire, 60.0, 120.0)
-    return Bench(AtRest(problem, model, form, lift), EN_PANTOGRAPH, place, MPI.COMM_SELF)
+    rest = line_at_rest(problem, mesh_of(en50318_line(3), 3))
+    wire = ContactWire(rest.model, rest.form, distribute(rest.model, 1, 0))
+    place = theory.lightest_place(rest.model, wire, 60.0, 120.0)
+    return Bench(rest, EN_PANTOGRAPH, place, MPI.COMM_SELF)
 
 
 def line_at(bench: Bench, n_vectors: int = theory.N_VECTORS) -> theory.PointModel:

@@ -20,7 +20,8 @@ from small_lines import (
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.base.errors import InputError
-from catenary.solver.statics.equilibrium import find_form, middle_span
+from catenary.solver.statics.elasticity import middle_span
+from catenary.solver.statics.equilibrium import find_form
 
 GRAVITY = 9.81
 EPS = np.finfo(float).eps

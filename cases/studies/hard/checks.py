@@ -15,9 +15,10 @@ import numpy as np
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.cases import HardCase
 from catenary.cases.studies.hard.energy import energy_that_left
-from catenary.cases.studies.hard.runs import AtRest, Watched
+from catenary.cases.studies.hard.runs import Watched, cut_of, node_places, rest_height
 from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.incidents import in_steps
+from catenary.solver.statics.line_at_rest import LineAtRest
 
 FALLS = 0.6
 # Energy that rises by less [-] is round-off of some thousand steps: of its largest value.
@@ -73,12 +74,12 @@ def _check_alone(case: HardCase, comm: Any, short: bool) -> list[Criterion]:
     return [*found, *_needs(case, rest, base)]
 
 
-def _rest(case: HardCase, comm: Any, short: bool, halvings: int) -> AtRest:
+def _rest(case: HardCase, comm: Any, short: bool, halvings: int) -> LineAtRest:
     return hard_runs.at_rest(case.scene(short, halvings), comm)
 
 
-def _bounded(case: HardCase, rest: AtRest, base: Watched) -> list[Criterion]:
-    lifted = base.wire - rest.rest_height(base.position)
+def _bounded(case: HardCase, rest: LineAtRest, base: Watched) -> list[Criterion]:
+    lifted = base.wire - rest_height(rest, base.position)
     return [
         _below(case, "largest contact force [N]", float(base.force.max()), case.force_below_N),
         _below(case, "largest lift [m]", float(np.abs(lifted).max()), case.uplift_below_m),
@@ -128,7 +129,7 @@ def _correction(case: HardCase, base: Watched, comm: Any, short: bool) -> Criter
     return _below(case, "fixed-point correction, head height [m]", apart, case.schemes_m)
 
 
-def _needs(case: HardCase, rest: AtRest, base: Watched) -> list[Criterion]:
+def _needs(case: HardCase, rest: LineAtRest, base: Watched) -> list[Criterion]:
     """Whether the run was the hard one that the case is named after."""
     needs, found = case.needs, []
     if needs.switches:
@@ -139,10 +140,10 @@ def _needs(case: HardCase, rest: AtRest, base: Watched) -> list[Criterion]:
         share = float((base.force[base.time.size // 2 :] == 0.0).mean())
         found.append(_below(case, "share without contact", share, needs.lost_share_below))
     if needs.on_nodes:
-        far = np.abs(base.position.reshape(-1, 1) - rest.node_places()).min(axis=1)
+        far = np.abs(base.position.reshape(-1, 1) - node_places(rest)).min(axis=1)
         found.append(_reaches(case, "steps on a node", (far < 1e-9).sum(), needs.on_nodes))
     if needs.crossing:
-        step = int(np.argmax(base.position[:, 0] > rest.cut()))
+        step = int(np.argmax(base.position[:, 0] > cut_of(rest)))
         found.append(_reaches(case, "switches at the crossing", base.switches()[step - 1], 1))
     if needs.touches_after_s:
         touched = base.time[np.argmax(base.force[:, 0] > 0.0)]
@@ -150,8 +151,8 @@ def _needs(case: HardCase, rest: AtRest, base: Watched) -> list[Criterion]:
     if needs.breaks:
         found.append(_reaches(case, "droppers that break", broken(rest, base).size, needs.breaks))
     if needs.breaks_at_cut:
-        far = float(np.abs(broken(rest, base) - rest.cut()).min(initial=np.inf))
-        longest = float(np.diff(rest.node_places()).max())
+        far = float(np.abs(broken(rest, base) - cut_of(rest)).min(initial=np.inf))
+        longest = float(np.diff(node_places(rest)).max())
         found.append(_below(case, "broken dropper to the boundary [m]", far, longest))
     if needs.energy_leaves is not None:
         left = energy_that_left(rest, base)
@@ -169,7 +170,7 @@ def _needs(case: HardCase, rest: AtRest, base: Watched) -> list[Criterion]:
     return found
 
 
-def broken(rest: AtRest, run: Watched) -> np.ndarray:
+def broken(rest: LineAtRest, run: Watched) -> np.ndarray:
     """Places of the droppers that carry up to an incident and never after [m]."""
     found = []
     for happened in in_steps(rest.problem.incidents, rest.problem.numerics.dt):

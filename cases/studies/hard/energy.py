@@ -12,9 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.cases.studies.hard.runs import AtRest, Watched
+from catenary.cases.studies.hard.runs import Watched
 from catenary.solver.model.elements import shape_slopes
 from catenary.solver.problem.incidents import DropperBreak, LineIncident, in_steps
+from catenary.solver.statics.line_at_rest import LineAtRest
 
 # Gauss's rule of three points is exact for the square of a cubic's slope.
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
@@ -28,7 +29,7 @@ class Left(NamedTuple):
     expected: float
 
 
-def energy_that_left(rest: AtRest, run: Watched) -> list[Left]:
+def energy_that_left(rest: LineAtRest, run: Watched) -> list[Left]:
     """What left at each incident of a run that was watched for it. Not collective."""
     found: list[Left] = []
     shares: dict[str, float] = {}
@@ -45,7 +46,7 @@ def energy_that_left(rest: AtRest, run: Watched) -> list[Left]:
 
 
 def _leaves(
-    rest: AtRest,
+    rest: LineAtRest,
     incident: LineIncident,
     shares: dict[str, float],
     force: np.ndarray,

@@ -14,30 +14,23 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_matrix, csr_matrix
+from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import spsolve
 
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
-from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
+from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.base.parallel import on_root
 from catenary.solver.contact.contact_wire import ContactWire
-from catenary.solver.effects.build_model import build
 from catenary.solver.integrators.make_line import make_line
-from catenary.solver.model.model import Model, iterate_entries
+from catenary.solver.model.matrices import stiffness_matrix, whole_matrix
+from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import in_steps
 from catenary.solver.problem.problem import Problem
 from catenary.solver.schemes.make_scheme import kept_ratio
-from catenary.solver.statics.equilibrium import (
-    Elasticity,
-    Equilibrium,
-    elasticity,
-    find_form,
-    middle_span,
-    stiffness_matrix,
-)
+from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.observers import Stage, StepView
 
@@ -135,8 +128,8 @@ class LineBalance:
         self.weights = 1.0 - gamma, gamma
         self._terms: list[tuple[str, csr_matrix]] = []
         if gamma != 0.5 or excess != 0.0:
-            damping = _matrix(model, damping=0.5 * dt * (gamma - 0.5))
-            of_acceleration = _matrix(model, mass=0.5) + damping
+            damping = whole_matrix(model, damping=0.5 * dt * (gamma - 0.5))
+            of_acceleration = whole_matrix(model, mass=0.5) + damping
             self._terms = [
                 ("velocity", damping),
                 ("acceleration", dt**2 * excess * of_acceleration),
@@ -257,57 +250,42 @@ class Watcher:
         self._before, self._pushed = displacement.copy(), pushed
 
 
-@dataclass
-class AtRest:
-    """A scene's problem with its line in equilibrium, on all ranks."""
-
-    problem: Problem
-    model: Model
-    form: Equilibrium
-    lift: Elasticity
-
-    def cut(self) -> float:
-        """Where the boundary between two ranks lies [m]: the last node that the first one owns."""
-        nodes = self.model.mesh.wires[CONTACT_WIRE]
-        mine = distribute(self.model, 2, 0).owned(self.model.dofs(nodes))
-        return float(self.model.mesh.x(nodes[mine]).max())
-
-    def rest_height(self, x: np.ndarray) -> np.ndarray:
-        """Height of the contact wire at rest at places ``x`` [m], shape as ``x``."""
-        wire = ContactWire(self.model, self.form, distribute(self.model, 1, 0))
-        return wire.rest_height(x.ravel()).reshape(x.shape)
-
-    def node_places(self) -> np.ndarray:
-        """Places of the contact wire's nodes [m]."""
-        return np.asarray(self.model.mesh.x(self.model.mesh.wires[CONTACT_WIRE]))
+def at_rest(scene: Scene, comm: Any) -> LineAtRest:
+    """The line of a scene in equilibrium, on all ranks. Collective."""
+    return line_at_rest_on_all(problem_of(scene), on_root(comm, lambda: mesh_of(scene)), comm)
 
 
-def at_rest(scene: Scene, comm: Any) -> AtRest:
-    """The line of a scene in equilibrium, found on rank 0 and given to all. Collective."""
-    problem = problem_of(scene)
-
-    def make() -> tuple[LineMesh, np.ndarray, Equilibrium, Elasticity]:
-        mesh = mesh_of(scene)
-        model, form = find_form(problem, mesh)
-        return mesh, model.dropper_lengths, form, elasticity(model, *middle_span(problem.line))
-
-    mesh, lengths, form, lift = on_root(comm, make)
-    return AtRest(problem, build(problem, mesh, lengths), form, lift)
+def cut_of(rest: LineAtRest) -> float:
+    """Where the boundary between two ranks lies [m]: the last node that the first one owns."""
+    nodes = rest.mesh.wires[CONTACT_WIRE]
+    mine = distribute(rest.model, 2, 0).owned(rest.model.dofs(nodes))
+    return float(rest.mesh.x(nodes[mine]).max())
 
 
-def run(rest: AtRest, comm: Any, with_work: bool = False) -> Watched:
+def rest_height(rest: LineAtRest, x: np.ndarray) -> np.ndarray:
+    """Height of the contact wire at rest at places ``x`` [m], shape as ``x``."""
+    wire = ContactWire(rest.model, rest.form, distribute(rest.model, 1, 0))
+    return wire.rest_height(x.ravel()).reshape(x.shape)
+
+
+def node_places(rest: LineAtRest) -> np.ndarray:
+    """Places of the contact wire's nodes [m]."""
+    return np.asarray(rest.mesh.x(rest.mesh.wires[CONTACT_WIRE]))
+
+
+def run(rest: LineAtRest, comm: Any, with_work: bool = False) -> Watched:
     """March to the end, or to where it breaks. Collective; ``with_work`` on one rank only."""
     wire = ContactWire(rest.model, rest.form, distribute(rest.model, 1, 0)) if with_work else None
     problem = rest.problem
     balance = LineBalance(rest.model, problem) if with_work else None
     keep = [happened.step for happened in in_steps(problem.incidents, problem.numerics.dt)]
     watcher = Watcher(wire, keep, balance)
-    with March(comm, rest.problem, rest.model, rest.form, rest.lift) as march:
+    with March(comm, *rest) as march:
         ended = march.run([watcher])
     return watcher.watched(ended.outcome, ended.counters)
 
 
-def run_free(rest: AtRest, comm: Any, n_steps: int) -> Watched:
+def run_free(rest: LineAtRest, comm: Any, n_steps: int) -> Watched:
     """Energy of a line that is let go from under a force at its middle; no train. Collective.
 
     The acceleration at the start is the one that belongs to the shape: M a = -K u.
@@ -318,7 +296,7 @@ def run_free(rest: AtRest, comm: Any, n_steps: int) -> Watched:
     load[model.dofs(nodes[nodes.size // 2])] = PULL
     stiffness = stiffness_matrix(model)
     shape = spsolve(stiffness, load)
-    acceleration = spsolve(_mass_matrix(model), -load)
+    acceleration = spsolve(whole_matrix(model, mass=1.0, held_diagonal=1.0), -load)
     ownership = distribute(model, comm.size, comm.rank)
     rows = slice(ownership.first, ownership.last)
     line = make_line(comm, model, ownership, numerics)
@@ -334,17 +312,3 @@ def run_free(rest: AtRest, comm: Any, n_steps: int) -> Watched:
         line.destroy()
     values = np.array(energy)
     return Watched("done", energy=values, work=np.zeros_like(values), counters={"steps": n_steps})
-
-
-def _mass_matrix(model: Model) -> csc_matrix:
-    """M with ones at the unknowns that are held, which then have no acceleration."""
-    n, held = model.n_dofs, model.constrained
-    ones = csc_matrix((np.ones(held.size), (held, held)), shape=(n, n))
-    return csc_matrix(_matrix(model, mass=1.0) + ones)
-
-
-def _matrix(model: Model, mass: float = 0.0, damping: float = 0.0) -> csr_matrix:
-    """``mass`` M + ``damping`` C without rows and columns of unknowns that are held."""
-    parts = list(iterate_entries(model, 0, model.n_dofs, mass, 0.0, damping))
-    rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return csr_matrix((values, (rows, columns)), shape=(model.n_dofs, model.n_dofs))

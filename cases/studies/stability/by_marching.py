@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from catenary.cases.studies.hard.runs import AtRest
+from catenary.cases.studies.hard.runs import rest_height
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.observers import Stage, StepView
 
@@ -39,7 +40,7 @@ class Bench:
     ``data``; ``x`` [m]. Lives on one process: ``comm`` is its own.
     """
 
-    rest: AtRest
+    rest: LineAtRest
     data: LumpedData
     x: float
     comm: Any
@@ -47,7 +48,7 @@ class Bench:
     def problem(self, coupling: str, stiffness: float, head_mass: float, dt: float) -> Problem:
         """A head [kg] on a contact [N/m], for as many steps of ``dt`` [s] as tell stability."""
         usual = self.rest.problem
-        height = float(self.rest.rest_height(np.array([self.x]))[0])
+        height = float(rest_height(self.rest, np.array([self.x]))[0])
         data = LumpedData(
             (head_mass, *self.data.masses[1:]), self.data.stiffnesses, self.data.dampings
         )

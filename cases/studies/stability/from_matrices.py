@@ -26,7 +26,8 @@ from scipy.sparse.linalg import splu
 
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.contact.contact_wire import ContactWire
-from catenary.solver.model.model import Model, iterate_entries
+from catenary.solver.model.matrices import whole_matrix
+from catenary.solver.model.model import Model
 
 # Vectors of Lanczos's method. What decides is within a few elements of the contact.
 N_VECTORS = 40
@@ -78,14 +79,11 @@ class Coupled:
 
 def matrices(model: Model) -> tuple[csc_matrix, csc_matrix, csc_matrix]:
     """M, K and C of the line on its free unknowns, held ones with ones in M. Not collective."""
-    n, held = model.n_dofs, model.constrained
-    found = []
-    for weights in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)):
-        parts = list(iterate_entries(model, 0, n, *weights))
-        rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
-        found.append(csc_matrix((values, (rows, columns)), shape=(n, n)))
-    ones = csc_matrix((np.ones(held.size), (held, held)), shape=(n, n))
-    return (found[0] + ones).tocsc(), found[1], found[2]
+    return (
+        whole_matrix(model, mass=1.0, held_diagonal=1.0),
+        whole_matrix(model, stiffness=1.0),
+        whole_matrix(model, damping=1.0),
+    )
 
 
 def load_at(wire: ContactWire, x: float, n_dofs: int) -> np.ndarray:

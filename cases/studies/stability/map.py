@@ -29,7 +29,7 @@ from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.base.errors import InputError
 from catenary.solver.contact.contact_wire import ContactWire
 from catenary.solver.model.partition import distribute
-from catenary.solver.statics.equilibrium import middle_span
+from catenary.solver.statics.elasticity import middle_span
 
 # Newmark's method and a linear problem: one contact that neither parts nor damps, taut droppers.
 _LINEAR = (

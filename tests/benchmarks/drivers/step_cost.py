@@ -21,12 +21,11 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.solver.base.parallel import on_root
-from catenary.solver.effects.build_model import build
 from catenary.solver.integrators.newmark import NewmarkLine
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.statics.line_at_rest import line_at_rest_on_all
 from catenary.solver.time_loop.march import March
 
 CHUNKS, ROUNDS = 5, 20
@@ -42,13 +41,7 @@ def main(n_spans: int, n_steps: int) -> None:
     scene = load_scene("ambrosio2012", [f"line.n_spans={n_spans}", *room(n_spans)])
     problem = problem_of(scene)
     mesh = on_root(comm, lambda: mesh_of(scene))
-
-    def rest() -> tuple:
-        model, form = find_form(problem, mesh)
-        return form, model.dropper_lengths, elasticity(model, *middle_span(problem.line))
-
-    form, lengths, lift = on_root(comm, rest)
-    model = build(problem, mesh, lengths)
+    _, model, form, lift = line_at_rest_on_all(problem, mesh, comm)
     at_rest = time.perf_counter()
     walls: list[float] = []
     for chunk in range(CHUNKS + 1):

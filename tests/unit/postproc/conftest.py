@@ -18,7 +18,8 @@ from catenary.postproc.channels.header import Header, line_datasets, static_data
 from catenary.postproc.record.recorder import Recorder
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Numerics, Placement, Problem, Train
-from catenary.solver.statics.equilibrium import Elasticity, Equilibrium
+from catenary.solver.statics.elasticity import Elasticity
+from catenary.solver.statics.equilibrium import Equilibrium
 from catenary.solver.time_loop.observers import Observer, Stage, StepView
 
 N_SPANS, SPAN = 16, 50.0

@@ -17,7 +17,8 @@ from small_lines import (
 from catenary.meshgen.line import Line
 from catenary.solver.contact.pantographs import nominal_height_rule
 from catenary.solver.problem.problem import Placement
-from catenary.solver.statics.equilibrium import elasticity, find_form, middle_span
+from catenary.solver.statics.elasticity import elasticity, middle_span
+from catenary.solver.statics.equilibrium import find_form
 
 
 def height_on(line: Line, elements: int, placement: Placement) -> float:

@@ -1,0 +1,50 @@
+"""The static lift of the contact wire under a unit force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import linalg as sparse_linalg
+
+from catenary.meshgen.line import Line
+from catenary.meshgen.mesh import CONTACT_WIRE
+from catenary.solver.model.matrices import stiffness_matrix
+from catenary.solver.model.model import Model
+
+
+@dataclass(frozen=True)
+class Elasticity:
+    """Static lift of the contact wire under a unit force, ``lift`` [m/N] at ``x`` [m], (n,)."""
+
+    x: np.ndarray
+    lift: np.ndarray
+
+
+def elasticity(model: Model, x_from: float, x_to: float) -> Elasticity:
+    """Static lift under a unit force at the contact wire's nodes in [x_from, x_to] [m].
+
+    Droppers taut, arms included. Not collective; solves once per node.
+    """
+    nodes = model.mesh.wires[CONTACT_WIRE]
+    x = model.mesh.x(nodes)
+    inside = np.flatnonzero((x >= x_from - 1e-9) & (x <= x_to + 1e-9))
+    factor = sparse_linalg.splu(stiffness_matrix(model))
+    dofs = model.dofs(nodes[inside])
+    # Where the wire is held it does not give way; the matrix has a one there, which is no spring.
+    gives_way = ~np.isin(dofs, model.constrained)
+    lift = np.zeros(inside.size)
+    unit = np.zeros(model.n_dofs)
+    for i, dof in zip(np.flatnonzero(gives_way), dofs[gives_way], strict=True):
+        unit[dof] = 1.0
+        lift[i] = factor.solve(unit)[dof]
+        unit[dof] = 0.0
+    return Elasticity(x[inside], lift)
+
+
+def middle_span(line: Line) -> tuple[float, float]:
+    """Ends of the running span in the middle of the line [m]."""
+    masts = line.support_positions
+    first, last = line.n_transition[0], line.n_spans - line.n_transition[1]
+    span = (first + last) // 2 if last > first else line.n_spans // 2
+    return float(masts[span]), float(masts[span + 1])

@@ -1,0 +1,78 @@
+"""The line at rest: what a march, a study and a report start from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from catenary.meshgen.mesh import LineMesh
+from catenary.solver.base.parallel import on_root
+from catenary.solver.effects.build_model import build
+from catenary.solver.model.model import Model
+from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.elasticity import Elasticity, elasticity, middle_span
+from catenary.solver.statics.equilibrium import Equilibrium, find_form
+
+
+class LineAtRest(NamedTuple):
+    """A problem with its line in equilibrium; ``March(comm, *rest)`` runs it.
+
+    Attributes
+    ----------
+    problem : everything that the run is made of, in SI units
+    model : the discrete line, with the lengths of its droppers
+    form : its shape at rest
+    lift : elasticity of the running span in the middle of the line
+    """
+
+    problem: Problem
+    model: Model
+    form: Equilibrium
+    lift: Elasticity
+
+    @property
+    def mesh(self) -> LineMesh:
+        """The mesh of the line."""
+        return self.model.mesh
+
+
+def line_at_rest(problem: Problem, mesh: LineMesh) -> LineAtRest:
+    """The line of a problem at rest, found by this process. Not collective.
+
+    Raises
+    ------
+    InputError
+        If there is no equilibrium with all droppers taut.
+    """
+    model, form = find_form(problem, mesh)
+    return LineAtRest(problem, model, form, elasticity(model, *middle_span(problem.line)))
+
+
+def line_at_rest_on_all(
+    problem: Problem,
+    mesh: LineMesh,
+    comm: Any,
+    alone: Callable[[Callable[[], Any]], Callable[[], Any]] = lambda work: work,
+) -> LineAtRest:
+    """The same on all ranks, found on rank 0. Collective.
+
+    Parameters
+    ----------
+    problem, mesh : the same on all ranks
+    comm : mpi4py communicator
+    alone : wraps the work of rank 0, e.g. to end it in good order at a signal
+
+    Raises
+    ------
+    InputError
+        On all ranks, if there is no equilibrium with all droppers taut.
+    """
+
+    def work() -> tuple[np.ndarray, Equilibrium, Elasticity]:
+        rest = line_at_rest(problem, mesh)
+        return rest.model.dropper_lengths, rest.form, rest.lift
+
+    lengths, form, lift = on_root(comm, alone(work))
+    return LineAtRest(problem, build(problem, mesh, lengths), form, lift)
