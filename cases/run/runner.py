@@ -290,7 +290,7 @@ def _observers(
     for sentence in recording.told(dt):
         logger.info(sentence)
     flush_every = output.flush_every_steps or flush_cadence(
-        problem, at_rest.model.n_dofs, recording
+        problem, at_rest.model.n_unknowns, recording
     )
     fields: FieldRecorder | None = None
     if recording.field_every:
@@ -365,7 +365,7 @@ def _header(order: _Order, problem: Problem, at_rest: LineAtRest) -> Header:
         attributes={
             "case": scene.case.name,
             "title": scene.case.title,
-            "n_dofs": at_rest.model.n_dofs,
+            "n_dofs": at_rest.model.n_unknowns,
             "system": scene.evaluation.system,
             "edition": scene.evaluation.edition,
             "pantographs": header_words(scene, problem),

@@ -21,4 +21,14 @@ def active(problem: Problem) -> list[Effect]:
 
 def unknowns_per_node(effects: Iterable[Effect]) -> tuple[str, ...]:
     """Unknowns that a set of effects needs at each wire node, without repetition."""
-    return tuple(dict.fromkeys(name for effect in effects for name in effect.unknowns))
+    return tuple(name for group in unknown_groups(effects) for name in group)
+
+
+def unknown_groups(effects: Iterable[Effect]) -> list[tuple[str, ...]]:
+    """The same in groups: what an effect is the first to need."""
+    groups: list[tuple[str, ...]] = []
+    for effect in effects:
+        known = {name for group in groups for name in group}
+        new = tuple(name for name in dict.fromkeys(effect.unknowns) if name not in known)
+        groups += [new] if new else []
+    return groups

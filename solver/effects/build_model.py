@@ -7,7 +7,8 @@ import numpy as np
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.model.builder import ModelBuilder
-from catenary.solver.model.model import Model, along_the_track
+from catenary.solver.model.model import Model
+from catenary.solver.model.unknowns import along_the_track, number_unknowns
 from catenary.solver.problem.problem import Problem
 
 
@@ -28,7 +29,7 @@ def build(
         problem,
         mesh,
         tuple(effect.name for effect in active),
-        effects.unknowns_per_node(active),
+        number_unknowns(mesh, effects.unknown_groups(active)),
         row_of_node,
         dropper_lengths,
     )

@@ -20,7 +20,6 @@ from catenary.solver.contact_problem import complementarity_kernels
 from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_state import Motion
 from catenary.solver.integrators.two_pass_step import StationPasses
-from catenary.solver.linear import unique_rows
 from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.step_operators import LineOperators, Loads
 from catenary.solver.linear.unit_responses import Windows
@@ -54,14 +53,13 @@ class LineMotion(ABC):
         state_kernels.warm_up()
         contact_kernels.warm_up()
         complementarity_kernels.warm_up()
-        unique_rows.warm_up()
         flush_to_zero.warm_up()
         self._comm = comm
         self.ownership = ownership
         self.position_factor = position_factor
         self.velocity_factor = velocity_factor
         coefficients = (1.0, self.position_factor, self.velocity_factor)
-        self.windows = Windows(_row_positions(model), model.block_size, reach(model, coefficients))
+        self.windows = Windows(model.numbering, reach(model, coefficients))
         self.operators = LineOperators(comm, model, ownership, coefficients, self.windows)
         self._proportional = model.damping_is_proportional
         # What is folded into the product with K, and what is left to do after the solve.
@@ -204,9 +202,3 @@ class LineMotion(ABC):
         """Free all PETSc objects. Collective."""
         self.operators.destroy()
         self.solution.destroy()
-
-
-def _row_positions(model: Model) -> np.ndarray:
-    positions = np.empty(model.mesh.n_nodes)
-    positions[model.row_of_node] = model.mesh.points[:, 0]
-    return positions

@@ -13,6 +13,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 from catenary.solver.model.matrices import iterate_entries
 from catenary.solver.model.model import Model
+from catenary.solver.model.unknowns import SAME_STATION
 
 # Beyond the reach a column is below this share of its peak; two orders under what an iteration
 # over a whole run may add up to and still agree to 1e-9.
@@ -22,8 +23,6 @@ _MARGIN = 1.25
 _WINDOW = 400.0
 # How far around the longest element loads are tried, about a span to either side [m].
 _NEAR = 75.0
-# Nodes closer than this along the track belong to one station [m].
-_SAME_STATION = 1e-6
 
 
 def reach(model: Model, coefficients: tuple[float, float, float]) -> float:
@@ -34,8 +33,7 @@ def reach(model: Model, coefficients: tuple[float, float, float]) -> float:
     of the decay, so that this needs more way where elements are long. Returns the length of the
     line if a column does not decay within its window.
     """
-    positions = np.empty(model.mesh.n_nodes)
-    positions[model.row_of_node] = model.mesh.points[:, 0]
+    positions = np.sort(model.mesh.points[:, 0])
     total = float(positions[-1] - positions[0])
     furthest = 0.0
     for place, loads in (_in_the_middle(positions), _around_the_longest(positions)):
@@ -54,7 +52,7 @@ def _in_the_middle(positions: np.ndarray) -> tuple[float, np.ndarray]:
 
 def _around_the_longest(positions: np.ndarray) -> tuple[float, np.ndarray]:
     """Where the longest element is [m], and the stations near it where element lengths change."""
-    stations = positions[np.append(True, np.diff(positions) > _SAME_STATION)]
+    stations = positions[np.append(True, np.diff(positions) > SAME_STATION)]
     lengths = np.diff(stations)
     place = float(stations[np.argmax(lengths)])
     changes = np.abs(np.diff(lengths)) > 0.01 * lengths[1:]
@@ -74,8 +72,7 @@ def _reach_of(
 
     The window lies around ``place``. At an end of the line only one side is there to be seen.
     """
-    low, high = np.searchsorted(positions, [place - _WINDOW, place + _WINDOW])
-    first, last = int(low) * model.block_size, int(high) * model.block_size
+    first, last = model.numbering.within(place - _WINDOW, place + _WINDOW)
     parts = list(iterate_entries(model, first, last, *coefficients))
     rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
     inside = (columns >= first) & (columns < last)
@@ -85,12 +82,14 @@ def _reach_of(
     )
     empty = matrix.diagonal() == 0
     factor = sparse_linalg.splu((matrix + sparse.diags(empty.astype(float))).tocsc())
-    x = np.repeat(positions[low:high], model.block_size)
+    x = np.full(model.n_dofs, np.inf)
+    x[model.numbering.numbers] = model.mesh.points[:, :1]
+    x = x[first:last]
     furthest, seen = 0.0, np.inf
     for station in loads:
         ahead, behind = float(positions[-1] - station), float(station - positions[0])
         seen = min(seen, _WINDOW - abs(station - place), max(ahead, behind))
-        for load in np.flatnonzero((np.abs(x - station) <= _SAME_STATION) & ~empty):
+        for load in np.flatnonzero((np.abs(x - station) <= SAME_STATION) & ~empty):
             unit = np.zeros(last - first)
             unit[load] = 1.0
             column = np.abs(factor.solve(unit))

@@ -37,9 +37,8 @@ from catenary.solver.linear.station_products import (
     neighbours,
     station_product,
 )
-from catenary.solver.linear.unique_rows import RepeatedRows, repeated_rows
 from catenary.solver.linear.unit_responses import Windows
-from catenary.solver.model.matrices import as_petsc, columns_of, part_of, station_block
+from catenary.solver.model.matrices import as_petsc, columns_of, part_of
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 
@@ -88,7 +87,7 @@ class LineOperators:
         self._model = model
         self._ownership = ownership
         self._coefficients = coefficients
-        self._block = station_block(model, ownership)
+        self._block = model.numbering.width
         self._product_event, self._solve_event = event("LineProduct"), event("LineSolve")
         if comm.size > 1 and wants_distributed_solver():
             self._solve_together(windows)
@@ -119,7 +118,7 @@ class LineOperators:
             if comm.size > 1 and comm.rank == 0 and wants_view():
                 self._solver.view()  # one for all; on one rank PETSc shows it at its first solve
             self._solver.hurry()
-        self._rows_by_kinds("stiffness")  # that no step has to wait for them
+        self._station_product("stiffness")  # that no step has to wait for them
 
     def passes(self, motion: MotionAhead, steps: Steps) -> StationPasses | None:
         """Free steps of Newmark's method in two passes over a motion, if they can be.
@@ -128,8 +127,8 @@ class LineOperators:
 
         For that the operator is to be factored and multiplied by stations. Not collective.
         """
-        stiffness, solver = self._rows_by_kinds("stiffness"), self._solver
-        if not (isinstance(stiffness, StationProduct) and isinstance(solver, PartSolver)):
+        stiffness, solver = self._station_product("stiffness"), self._solver
+        if stiffness is None or not isinstance(solver, PartSolver):
             return None
         if solver.factors is None or not self._is_direct:
             return None
@@ -151,8 +150,8 @@ class LineOperators:
 
     def add_damping(self) -> None:
         """Add C ``factor`` to the internal force. Right after ``exchange``. Not collective."""
-        if self.domain.size:
-            self._product("damping").multAdd(self._read, self._force_here, self._force_here)
+        self._multiply("damping", self._loaded.array, self._loaded_here)
+        self._force.array[:] += self._loaded.array
 
     def add_force(self, force: np.ndarray) -> None:
         """Add a force on all that is solved for, shape (domain.size,) [N], to the internal force.
@@ -265,7 +264,7 @@ class LineOperators:
 
     @property
     def _in_stations(self) -> bool:
-        return self._block > self._model.block_size
+        return self._model.numbering.in_stations
 
     def _overlap(self, windows: Windows) -> tuple[int, int]:
         """Range of unknowns that influence this rank's own within a step, in whole blocks."""
@@ -273,8 +272,9 @@ class LineOperators:
         first, last = ownership.first, ownership.last
         if first == last:
             return first, last
-        ends = windows.positions[[first // model.block_size, last // model.block_size - 1]]
-        near, coupled = windows.around(*map(float, ends)), columns_of(model, (first, last))
+        places = model.numbering
+        ends = float(places.low[first // block]), float(places.high[last // block - 1])
+        near, coupled = windows.around(*ends), columns_of(model, (first, last))
         low, high = min(near[0], coupled[0]), max(near[1], coupled[1])
         # There are none but whole blocks, and ends of the line are ends of blocks.
         return low - low % block, high + -high % block
@@ -306,7 +306,7 @@ class LineOperators:
         self._read_domain = read_domain.vector
         self._vectors = (*here, *(pair.vector for pair in solved))
         self._products: dict[str, PETSc.Mat] = {}
-        self._by_kinds: dict[str, StationProduct | RepeatedRows | None] = {}
+        self._by_stations: dict[str, StationProduct | None] = {}
         self.factor, self.answer = read[domain.owned_of_read], answer[domain.owned]
         self._halo = Halo(self._comm, own, read_low, read)
         self._loaded_halo = Halo(self._comm, own, low, loaded)
@@ -314,45 +314,40 @@ class LineOperators:
     def _product(self, name: str) -> PETSc.Mat:
         """M, K or C for the rows of the subdomain, made when it is first asked for."""
         if name not in self._products:
-            rows = self._rows_of(name, self._model.block_size)
-            self._products[name] = as_petsc(rows, PETSc.COMM_SELF)
+            self._products[name] = as_petsc(self._rows_of(name), PETSc.COMM_SELF)
         return self._products[name]
 
     def _multiply(self, name: str, result: np.ndarray, wrapped: PETSc.Vec) -> None:
-        """Make ``result``, and the vector around it, the product of M or K with what is read."""
-        by_kinds = self._rows_by_kinds(name)
-        if isinstance(by_kinds, StationProduct):
-            by_kinds.multiply(self._read_padded, result)
-        elif by_kinds is not None:
-            by_kinds.multiply(self._read_array, result)
+        """Make ``result``, and the vector around it, the product of M, K or C with what is
+        read."""
+        by_stations = self._station_product(name)
+        if by_stations is not None:
+            by_stations.multiply(self._read_padded, result)
         elif self.domain.size:
             self._product(name).mult(self._read, wrapped)
 
-    def _rows_by_kinds(self, name: str) -> StationProduct | RepeatedRows | None:
-        """Products with M or K that read each kind of rows once, by the fastest way that it allows.
-
-        Made when they are first asked for.
-        """
-        if name not in self._by_kinds:
+    def _station_product(self, name: str) -> StationProduct | None:
+        """Products with M, K or C by stations, made when they are first asked for; None if they
+        cannot be."""
+        if name not in self._by_stations:
             domain, product = self.domain, None
             if self._layout is not None and domain.size:
                 first = (domain.low - domain.read_low) // self._block
-                product = station_product(self._rows_of(name, self._block), first, self._layout)
-            rows = product or repeated_rows(self._rows_of(name, self._model.block_size))
-            self._by_kinds[name] = rows
-        return self._by_kinds[name]
+                product = station_product(self._rows_of(name), first, self._layout)
+            self._by_stations[name] = product
+        return self._by_stations[name]
 
     def _find_layout(self, part: sparse.bsr_matrix) -> Layout | None:
         """How unknowns of a station stand in lanes; None if they cannot, or nodes do not pair."""
         domain = self.domain
         first = (domain.low - domain.read_low) // self._block
         operator = neighbours(part) if self._in_stations else None
-        stiffness = neighbours(self._rows_of("stiffness", self._block), first)
+        stiffness = neighbours(self._rows_of("stiffness"), first)
         if operator is None or stiffness is None:
             return None
         return layout_of(operator, stiffness)
 
-    def _rows_of(self, name: str, block: int) -> sparse.bsr_matrix:
+    def _rows_of(self, name: str) -> sparse.bsr_matrix:
         domain = self.domain
         return part_of(
             self._model,
@@ -360,7 +355,7 @@ class LineOperators:
             (domain.read_low, domain.read_high),
             _COEFFICIENTS[name],
             0.0,
-            block,
+            self._block,
         )
 
     def _solve(self, right: Wrapped) -> None:

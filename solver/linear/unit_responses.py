@@ -15,36 +15,27 @@ from mpi4py import MPI
 
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.model.partition import Ownership
+from catenary.solver.model.unknowns import Unknowns
 
 # What may stand outside the windows, relative to the peak: round-off of one solve.
 _LEAK = 1e-13
 
 
-class Windows:
-    """Where along the line the unknowns stand, and which of them a force at x can move.
-
-    Parameters
-    ----------
-    positions : (n_nodes,) ascending positions of the rows of nodes [m]
-    block_size : unknowns per node
-    reach : half width of a window [m]
+class Windows(NamedTuple):
+    """Where along the line unknowns stand, and which of them a force at x can move.
 
     Attributes
     ----------
-    positions, reach : as given
+    numbering : Unknowns, which says where they stand
+    reach : half width of a window [m]
     """
 
-    def __init__(self, positions: np.ndarray, block_size: int, reach: float) -> None:
-        self.positions = positions
-        self._block_size = block_size
-        self.reach = reach
+    numbering: Unknowns
+    reach: float
 
     def around(self, x_low: float, x_high: float) -> tuple[int, int]:
         """Range of unknowns within reach of [x_low, x_high]."""
-        low, high = np.searchsorted(
-            self.positions, [x_low - self.reach - 1e-9, x_high + self.reach + 1e-9]
-        )
-        return int(low) * self._block_size, int(high) * self._block_size
+        return self.numbering.within(x_low - self.reach, x_high + self.reach)
 
 
 class ShortColumns:

@@ -99,8 +99,8 @@ class ModelBuilder:
         if self._gravity:
             for dofs, mass in self._hanging:
                 np.add.at(model.weight, dofs, -self._gravity * mass)
-        if self._constrained:
-            model.constrained = np.unique(np.concatenate(self._constrained))
+        held = [model.numbering.missing, *self._constrained]
+        model.constrained = np.unique(np.concatenate(held))
         return model
 
     def _add_block(

@@ -9,8 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from catenary.solver.base.petsc import PETSc
-from catenary.solver.model.model import SAME_STATION, Model
-from catenary.solver.model.partition import Ownership
+from catenary.solver.model.model import Model
 
 
 def iterate_entries(
@@ -118,15 +117,3 @@ def columns_of(model: Model, rows: tuple[int, int]) -> tuple[int, int]:
             low = min(low, int(block.dofs[near].min()))
             high = max(high, int(block.dofs[near].max()) + 1)
     return low, high
-
-
-def station_block(model: Model, ownership: Ownership) -> int:
-    """Unknowns of a station, a node of each wire at one place, or of a node if nodes do not pair.
-
-    Not collective; the same on all ranks.
-    """
-    size, x = model.block_size, np.empty(model.mesh.n_nodes)
-    if x.size % 2 or (ownership.bounds % (2 * size)).any():
-        return size
-    x[model.row_of_node] = model.mesh.points[:, 0]
-    return 2 * size if (np.abs(x[1::2] - x[::2]) < SAME_STATION).all() else size

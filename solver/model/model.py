@@ -12,10 +12,8 @@ from typing import Protocol
 import numpy as np
 
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
+from catenary.solver.model.unknowns import Unknowns
 from catenary.solver.problem.problem import Problem
-
-# Nodes closer than this along the track belong to one station [m].
-SAME_STATION = 1e-6
 
 
 class StepLoad(Protocol):
@@ -42,14 +40,14 @@ class Block:
 
 @dataclass
 class Model:
-    """A line as matrices to be. Unknown k of the node in row i has number ``n_unknowns`` i + k.
+    """A line as matrices to be.
 
     Attributes
     ----------
-    unknowns : names of the unknowns at each node
+    numbering : Unknowns, the registry of all unknowns and their numbers
     row_of_node : (n_nodes,) place of each mesh node in the order along the track
     blocks : element blocks; their sums are M and K
-    constrained : (n,) int, unknowns held at zero
+    constrained : (n,) int, unknowns held at zero, and numbers that are no node's
     weight : (n_dofs,) gravity load [N], [N m]
     dropper_lengths : (n_droppers,) [m]
     dropper_stiffness, dropper_damping : (n_droppers,) [N/m], [N s/m], of the taut dropper
@@ -62,7 +60,7 @@ class Model:
     problem: Problem
     mesh: LineMesh
     active: tuple[str, ...]
-    unknowns: tuple[str, ...]
+    numbering: Unknowns
     row_of_node: np.ndarray
     dropper_lengths: np.ndarray
     blocks: list[Block] = field(default_factory=list)
@@ -73,16 +71,23 @@ class Model:
     broken: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     @property
-    def block_size(self) -> int:
-        return len(self.unknowns)
+    def unknowns(self) -> tuple[str, ...]:
+        """Names of the unknowns of a node."""
+        return self.numbering.names
 
     @property
     def n_dofs(self) -> int:
-        return self.mesh.n_nodes * self.block_size
+        """Size of vectors: unknowns, and numbers that are no node's."""
+        return self.numbering.size
+
+    @property
+    def n_unknowns(self) -> int:
+        """How many unknowns all nodes have."""
+        return self.numbering.numbers.size
 
     def dofs(self, nodes: np.ndarray, unknown: str = "w") -> np.ndarray:
         """Numbers of one unknown at mesh nodes, shape as ``nodes``."""
-        return self.row_of_node[nodes] * self.block_size + self.unknowns.index(unknown)
+        return self.numbering.of(nodes, unknown)
 
     @property
     def dropper_stiffness(self) -> np.ndarray:
@@ -125,17 +130,6 @@ class Model:
     def contact_x(self) -> np.ndarray:
         """Positions of the contact wire's nodes [m], ascending."""
         return self.mesh.x(self.mesh.wires[CONTACT_WIRE])
-
-
-def along_the_track(mesh: LineMesh) -> np.ndarray:
-    """Nodes in the order along the track, those of a station in the order of the wires."""
-    wire = np.zeros(mesh.n_nodes, dtype=np.int64)
-    for number, nodes in enumerate(mesh.wires.values()):
-        wire[nodes] = number
-    x = mesh.points[:, 0]
-    order = np.argsort(x, kind="stable")
-    station = np.cumsum(np.diff(x[order], prepend=x[order[:1]]) > SAME_STATION)
-    return order[np.lexsort((wire[order], station))]
 
 
 def wire_elements(

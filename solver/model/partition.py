@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.solver.model.model import SAME_STATION, Model
+from catenary.solver.model.model import Model
 
 # Nodes whose steps take as long as what rank 0 does for pantographs while the others are at the
 # line: some 7 us, more where a long line leaves the caches cold.
@@ -53,20 +53,18 @@ def distribute(model: Model, n_ranks: int, rank: int) -> Ownership:
     dropper, so that dropper forces need no communication. Ranks beyond the number of stations own
     nothing.
     """
-    n_nodes = model.mesh.n_nodes
-    x = np.empty(n_nodes)
-    x[model.row_of_node] = model.mesh.points[:, 0]
-    can_cut = np.ones(n_nodes + 1, dtype=bool)
-    can_cut[1:-1] = np.diff(x) > SAME_STATION
-    ends = np.sort(model.row_of_node[model.mesh.droppers], axis=1)
-    # +1 where a dropper's range of rows begins to forbid cuts, -1 where it ends.
-    steps = np.zeros(n_nodes + 2)
+    numbering, droppers = model.numbering, model.mesh.droppers
+    n_stations = numbering.low.size
+    ends = np.sort(numbering.station_of(droppers), axis=1)
+    # +1 where a dropper's range of stations begins to forbid cuts, -1 where it ends.
+    steps = np.zeros(n_stations + 2)
     np.add.at(steps, ends[:, 0] + 1, 1)
     np.add.at(steps, ends[:, 1] + 1, -1)
-    can_cut &= np.cumsum(steps)[: n_nodes + 1] == 0
-    cuts = np.flatnonzero(can_cut)
-    spared = PANTOGRAPH_NODES if n_nodes >= _LONG * PANTOGRAPH_NODES * n_ranks else 0
-    wanted = np.linspace(-spared, n_nodes, n_ranks + 1)
+    cuts = np.flatnonzero(np.cumsum(steps)[: n_stations + 1] == 0)
+    nodes_of_station = model.mesh.n_nodes / n_stations
+    long = model.mesh.n_nodes >= _LONG * PANTOGRAPH_NODES * n_ranks
+    spared = PANTOGRAPH_NODES / nodes_of_station if long else 0
+    wanted = np.linspace(-spared, n_stations, n_ranks + 1)
     wanted[0] = 0.0
     nearest = cuts[np.clip(np.searchsorted(cuts, wanted), 0, cuts.size - 1)]
-    return Ownership(nearest * model.block_size, rank)
+    return Ownership(nearest * numbering.width, rank)

@@ -168,9 +168,7 @@ def _divided_by_mass(
 ) -> np.ndarray:
     """M^-1 ``force``, owned parts (n_local,). Collective."""
     only_mass = (1.0, 0.0, 0.0)
-    positions = np.empty(model.mesh.n_nodes)
-    positions[model.row_of_node] = model.mesh.points[:, 0]
-    windows = Windows(positions, model.block_size, reach(model, only_mass))
+    windows = Windows(model.numbering, reach(model, only_mass))
     operators = LineOperators(comm, model, ownership, only_mass, windows)
     try:
         whole = np.concatenate(comm.allgather(force))

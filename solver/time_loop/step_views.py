@@ -152,20 +152,20 @@ class Showing:
         row_of_node = _like(checkpoint, "row_of_node", model.row_of_node)
         if not np.array_equal(np.sort(row_of_node), np.arange(n_nodes)):
             raise _impossible("row_of_node does not number the nodes of this line")
-        then = np.empty(n_nodes, dtype=np.int64)
-        then[model.row_of_node] = row_of_node
-        rows = slice(line.ownership.first, line.ownership.last)
-        whole = np.empty(n_nodes * model.block_size)
-        by_node = {
-            name: np.reshape(_like(checkpoint, name, whole), (-1, model.block_size))
-            for name in line.exact_state()
-            if name in checkpoint or name in _MOTION
-        }
+        names = len(model.unknowns)
+        owned = slice(line.ownership.first, line.ownership.last)
+        states = {}
+        for name in line.exact_state():
+            if name in checkpoint or name in _MOTION:
+                by_row = np.reshape(_like(checkpoint, name, np.empty(n_nodes * names)), (-1, names))
+                state = np.zeros(model.n_dofs)
+                state[model.numbering.numbers] = by_row[row_of_node]
+                states[name] = state[owned]
         told = {
             name: _like(checkpoint, name, getattr(pantographs, name)) for name in _OF_PANTOGRAPHS
         }
         on_root(self._comm, lambda: self._refuse_other_states(checkpoint))
-        line.restore({name: values[then].ravel()[rows] for name, values in by_node.items()})
+        line.restore(states)
         for name, values in told.items():
             getattr(pantographs, name)[:] = values
         self._scheme.restore(checkpoint["contacts"])
@@ -206,7 +206,11 @@ class Showing:
         }
         if self._comm.rank != 0:
             return None
-        result: dict[str, Any] = {k: np.concatenate(parts) for k, parts in whole.items() if parts}
+        numbers = np.empty_like(self._model.numbering.numbers)
+        numbers[self._model.row_of_node] = self._model.numbering.numbers
+        result: dict[str, Any] = {
+            k: np.concatenate(parts)[numbers.ravel()] for k, parts in whole.items() if parts
+        }
         result["row_of_node"] = self._model.row_of_node
         result["step"] = self._view.step
         result["contact_force"] = pantographs.contact_force.copy()

@@ -37,7 +37,7 @@ def test_rank_0_of_a_long_line_has_less_by_what_pantographs_take() -> None:
     mesh = mesh_of(line, 9)
     long = build(problem_of(line, BARE), mesh, np.ones(mesh.droppers.shape[0]))
     bounds = distribute(long, 3, 0).bounds
-    spared = PANTOGRAPH_NODES * long.block_size
+    spared = PANTOGRAPH_NODES * len(long.unknowns)
     assert np.abs(np.diff(bounds) + [spared, 0, 0] - (long.n_dofs + spared) / 3).max() <= 8
 
 

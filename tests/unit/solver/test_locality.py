@@ -28,6 +28,7 @@ from catenary.solver.linear import unit_responses
 from catenary.solver.linear.decay_length import DECAY, reach
 from catenary.solver.linear.unit_responses import Windows
 from catenary.solver.model.model import Model
+from catenary.solver.model.unknowns import Unknowns
 from catenary.solver.problem.problem import Damping
 from catenary.solver.statics.equilibrium import find_form
 
@@ -43,9 +44,9 @@ def line_model(alpha: float, n_spans: int = 12, elements: int = 5) -> Model:
 
 def positions(model: Model) -> np.ndarray:
     """Place of every unknown along the track [m]."""
-    x = np.empty(model.mesh.n_nodes)
-    x[model.row_of_node] = model.mesh.points[:, 0]
-    return np.repeat(x, model.block_size)
+    x = np.empty(model.n_dofs)
+    x[model.numbering.numbers] = model.mesh.points[:, :1]
+    return x
 
 
 def inverse_columns(
@@ -69,7 +70,7 @@ def test_columns_vanish_beyond_a_reach_of_less_than_a_span(alpha: float, dt: flo
     found = reach(model, coefficients)
     x = positions(model)
     # Loads in every part of two spans: on wires, near droppers, masts, in gaps.
-    rows = np.flatnonzero((x > 270.0) & (x < 335.0))[:: max(1, model.block_size + 1)]
+    rows = np.flatnonzero((x > 270.0) & (x < 335.0))[::3]
     columns = np.abs(inverse_columns(model, coefficients, rows))
     outside = np.abs(x[:, None] - x[rows]) > found
     leak = np.where(outside, columns, 0.0).max(axis=0) / columns.max(axis=0)
@@ -137,17 +138,20 @@ def test_columns_that_leak_are_refused(stepper: LineMotion) -> None:
     model = line_model(2.75e-3, n_spans=6)
     nodes = model.mesh.wires["contact_wire"][40:44]
     dofs, x = model.dofs(nodes)[:, None], model.mesh.x(nodes)
-    too_short = Windows(positions(model)[:: model.block_size], model.block_size, 4.0)
+    too_short = Windows(model.numbering, 4.0)
     solve_for, ones = stepper.operators.solve_for, np.ones(dofs.shape)
     with pytest.raises(RunBroken, match=r"does not decay within 4 m.*numerics\.dt_s"):
         unit_responses.compute(COMM, solve_for, stepper.ownership, too_short, dofs, ones, x)
 
 
 def test_windows_hold_all_unknowns_within_reach() -> None:
-    windows = Windows(np.array([0.0, 0.0, 1.0, 1.0, 2.5, 2.5, 4.0]), 2, 1.5)
-    assert windows.around(2.5, 2.5) == (2 * 2, 7 * 2)
-    assert windows.around(0.0, 0.0) == (0, 4 * 2)
-    assert windows.around(0.0, 2.5) == (0, 7 * 2)
+    """Stations of nodes that stand apart: of the second from 1.0 to 1.2 m."""
+    low, high = np.array([[0.0, 1.0, 2.5, 4.0], [0.0, 1.2, 2.5, 4.0]])
+    windows = Windows(Unknowns(("w",), np.arange(8)[:, None], 2, True, low, high), 1.3)
+    assert windows.around(2.5, 2.5) == (2, 6)
+    assert windows.around(0.0, 0.0) == (0, 4)
+    assert windows.around(0.0, 2.7) == (0, 8)
+    assert windows.around(5.4, 9.0) == (8, 8)
 
 
 def test_reach_covers_gaps_of_very_different_lengths() -> None:

@@ -11,7 +11,6 @@ from scipy.sparse.linalg import spsolve
 from catenary.solver.linear.lanes import WIDEST, Layout
 from catenary.solver.linear.station_factors import station_factors
 from catenary.solver.linear.station_products import layout_of, neighbours, station_product
-from catenary.solver.linear.unique_rows import repeated_rows
 
 RNG = np.random.default_rng(7)
 # Sums of a dozen products of numbers of order one; solves lose a few digits to the condition, 1e2.
@@ -122,14 +121,3 @@ def test_products_with_part_of_a_line(low: int, high: int) -> None:
 def test_a_product_that_joins_more_than_its_layout_is_refused() -> None:
     assert station_product(line(10, joined=True), 0, layout(line(10))) is None
     assert station_product(line(10), 0, Layout((2, 2))) is None
-
-
-def test_a_product_by_rows_where_stations_do_not_pair() -> None:
-    matrix = line(400, widths=(2,))
-    # The first and the last row have a neighbour on one side only, so that they take in more.
-    product = repeated_rows(matrix)
-    assert product is not None
-    factor, result = RNG.standard_normal(800), np.zeros(800)
-    product.multiply(factor, result)
-    assert np.abs(result - matrix @ factor).max() < ROUND_OFF * np.abs(factor).max() * 100.0
-    assert repeated_rows(line(20, widths=(2,))) is None
