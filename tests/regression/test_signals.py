@@ -14,7 +14,7 @@ WAITING = """
 import time
 from pathlib import Path
 from mpi4py import MPI
-from catenary.cases.run import {module}
+from {package} import {module}
 from catenary.cases.cli.main import main
 
 before = {module}.{name}
@@ -34,7 +34,7 @@ needs_mpirun = pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
 
 def signalled(
     folder: Path,
-    place: tuple[str, str],
+    place: tuple[str, str, str],
     words: list[str],
     number: signal.Signals,
     ranks: int = 1,
@@ -42,7 +42,7 @@ def signalled(
 ) -> Done:
     """Run the program, send it a signal where it waits; to mpirun if no rank is named."""
     script = folder / "script.py"
-    script.write_text(WAITING.format(module=place[0], name=place[1]))
+    script.write_text(WAITING.format(package=place[0], module=place[1], name=place[2]))
     with started(python(str(script), *words), folder, ranks=ranks) as program:
         program.wait_for((folder / "waiting").exists)
         if to_rank is None:
@@ -54,9 +54,10 @@ def signalled(
         return program.end()
 
 
-MESH = ("runner", "mesh_of")
-EQUILIBRIUM = ("runner", "find_form")
-REPORT = ("runner", "write_report")
+RUN = "catenary.cases.run"
+MESH = (RUN, "runner", "mesh_of")
+EQUILIBRIUM = ("catenary.solver.statics", "line_at_rest", "find_form")
+REPORT = (RUN, "runner", "write_report")
 
 
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGXCPU])
@@ -81,16 +82,16 @@ def test_after_the_march(tmp_path: Path) -> None:
 
 
 VERBS = {
-    "check": ("scene_mesh", "mesh_of", ["check", "ac_simple"]),
-    "static": ("runner", "find_form", ["static", "ac_simple"]),
-    "hard": ("hard_runs", "March", ["hard", "--short"]),
+    "check": ((RUN, "scene_mesh", "mesh_of"), ["check", "ac_simple"]),
+    "static": (EQUILIBRIUM, ["static", "ac_simple"]),
+    "hard": (("catenary.cases.studies.hard", "runs", "March"), ["hard", "--short"]),
 }
 
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_other_verbs(verb: str, tmp_path: Path) -> None:
-    module, name, words = VERBS[verb]
-    done = signalled(tmp_path, (module, name), words, signal.SIGTERM)
+    place, words = VERBS[verb]
+    done = signalled(tmp_path, place, words, signal.SIGTERM)
     assert done.code == 1
     assert done.stderr.splitlines()[-1] == "catenary: interrupted by SIGTERM"
     assert "Traceback" not in done.stderr
@@ -102,7 +103,7 @@ def test_other_verbs(verb: str, tmp_path: Path) -> None:
     ("place", "to_rank"), [(MESH, 1), (EQUILIBRIUM, 0), (REPORT, 0)], ids=["mesh", "rest", "report"]
 )
 def test_a_signal_to_one_of_several_ranks(
-    place: tuple[str, str], to_rank: int, tmp_path: Path
+    place: tuple[str, str, str], to_rank: int, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
     done = signalled(tmp_path, place, short_run(out), signal.SIGUSR2, 2, to_rank)
@@ -131,7 +132,7 @@ def test_a_signal_to_mpirun_before_the_march(tmp_path: Path) -> None:
 def test_nohup_is_respected(tmp_path: Path) -> None:
     out = tmp_path / "out"
     script = tmp_path / "script.py"
-    script.write_text(WAITING.format(module=MESH[0], name=MESH[1]))
+    script.write_text(WAITING.format(package=MESH[0], module=MESH[1], name=MESH[2]))
     with started(["nohup", *python(str(script), *short_run(out))], tmp_path) as program:
         program.wait_for((tmp_path / "waiting").exists)
         program.send(signal.SIGHUP)

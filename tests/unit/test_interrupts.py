@@ -23,12 +23,13 @@ from catenary.cases.studies.sweep.jobs import make_jobs
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import parse_vary, product
 from catenary.postproc.read.results import Results
+from catenary.solver.statics import line_at_rest
 
 # What is called in each phase of a run before its march.
 BEFORE = {
-    "the mesh was made": "mesh_of",
-    "the equilibrium was found": "find_form",
-    "the line was distributed": "March",
+    "the mesh was made": (runner, "mesh_of"),
+    "the equilibrium was found": (line_at_rest, "find_form"),
+    "the line was distributed": (runner, "March"),
 }
 
 
@@ -66,8 +67,8 @@ def test_a_signal_before_the_march_leaves_nothing(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    name = BEFORE[doing]
-    monkeypatch.setattr(runner, name, signalled(getattr(runner, name), number))
+    module, name = BEFORE[doing]
+    monkeypatch.setattr(module, name, signalled(getattr(module, name), number))
     with pytest.raises(Interrupted) as caught:
         runner.run_case(scene, tmp_path / "a" / "out", MPI.COMM_SELF)
     assert str(caught.value) == f"interrupted by {number.name} while {doing}; nothing was written"
@@ -80,7 +81,8 @@ def test_with_force_the_earlier_run_stays_as_it_was(
 ) -> None:
     (tmp_path / "run.h5").write_text("the earlier run")
     (tmp_path / "summary.json").write_text("{}")
-    monkeypatch.setattr(runner, "find_form", signalled(runner.find_form, signal.SIGTERM))
+    work = signalled(line_at_rest.find_form, signal.SIGTERM)
+    monkeypatch.setattr(line_at_rest, "find_form", work)
     with pytest.raises(Interrupted, match="nothing was written"):
         runner.run_case(scene, tmp_path, MPI.COMM_SELF, force=True)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.h5", "summary.json"]
