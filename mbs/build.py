@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import NamedTuple
 
-from catenary.mbs.head import head_kernels
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph, Lowering
@@ -21,7 +20,6 @@ from catenary.mbs.mechanism.pantograph_data import (
 )
 from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
 from catenary.mbs.roll import roll_of
-from catenary.mbs.vehicle import curves
 from catenary.mbs.vehicle.base_motion import BaseMotion
 
 # What a pantograph can be described by.
@@ -51,8 +49,6 @@ class Operation(NamedTuple):
 
 def make_pantograph(data: PantographData, operation: Operation) -> Pantograph:
     """The model that ``data`` describes. Not collective."""
-    head_kernels.warm_up()
-    curves.warm_up()
     model = _model(data, operation)
     if operation.lowering is None:
         return model

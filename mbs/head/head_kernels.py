@@ -177,27 +177,3 @@ def extrapolate(newmark, touch, state, early):
             velocity += touch[0, i, k] * (state[n + k] + faster * state[2 * n + k])
             velocity += touch[1, i, k] * place
         early[0, i], early[1, i] = height, velocity
-
-
-def warm_up() -> None:
-    """Compile all kernels, or load them from Numba's cache, before the clock of a march starts."""
-    one, three, breaks = np.ones(1), np.ones(3), np.array([0.0, 1.0])
-    touch, square, newmark = np.ones((2, 1, 1)), np.ones((1, 1)), np.ones(5)
-    state, free, by_force, out = np.ones(3), np.ones(3), np.ones((3, 1)), np.ones(4)
-    linear_step(np.eye(3), three, square, 1.0, 1.0, touch, state, free, by_force, out, 1.0)
-    raising_step(
-        newmark,
-        np.zeros(6),
-        one,
-        square,
-        square,
-        breaks,
-        np.ones((1, 4, 4)),
-        touch,
-        state,
-        free,
-        by_force,
-        out,
-    )
-    take(free, by_force, one, state)
-    extrapolate(newmark, touch, state, np.ones((2, 1)))

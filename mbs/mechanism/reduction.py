@@ -15,8 +15,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from catenary.mbs.rigid.bodies import Motion, Vector
-from catenary.mbs.rigid.joints import ORIGIN, PrescribedPoint, constant
-from catenary.mbs.rigid.kinematics import point
+from catenary.mbs.rigid.joints import ORIGIN, PrescribedPoint
+from catenary.mbs.rigid.kinematics import Law, point
 from catenary.mbs.rigid.least_squares import least_squares
 from catenary.mbs.rigid.statics import equilibrium
 from catenary.mbs.rigid.system import System
@@ -137,12 +137,13 @@ def reduce_mechanism(
     # Heights are visited from the one that is nearest to the start, each from its neighbour.
     motion = system.assemble(system.start() if start is None else start).motion
     first = int(np.argmin(np.abs(table - point(motion, body, at).value[2])))
-    places = [_at_height(system, body, at, motion, table[first])]
+    raised = _Raised(system, body, at)
+    places = [raised.to(table[first], motion)]
     for way in (table[first + 1 :], table[:first][::-1]):
         there = places[0]
         for height in way:
             try:
-                there = _at_height(system, body, at, there.motion, height)
+                there = raised.to(height, there.motion)
             except (InputError, RunBroken):
                 if not as_far_as_it_goes:
                     raise
@@ -157,7 +158,7 @@ def reduce_mechanism(
         )
     places.sort(key=lambda place: place.height)
     if tolerance is not None:
-        places = _refined(system, body, at, places, tolerance)
+        places = _refined(raised, places, tolerance)
     reached = np.array([place.height for place in places])
     masses, lifts, dampings, carried = np.array([place.columns for place in places]).T
     return ReducedMechanism(reached, masses, lifts, dampings, name, carried)
@@ -171,9 +172,37 @@ class _Place(NamedTuple):
     columns: np.ndarray
 
 
-def _refined(
-    system: System, body: str, at: Vector, places: list[_Place], tolerance: float
-) -> list[_Place]:
+class _Raised:
+    """A system with the point ``at`` of a body held at heights that follow one another."""
+
+    def __init__(self, system: System, body: str, at: Vector) -> None:
+        self._system, self._height = system, 0.0
+        # Its law reads the height of the moment, so that the system is made once.
+        self._holder = PrescribedPoint("height", body, self._law, at)
+        self._held = system.with_joints(self._holder)
+
+    def _law(self, time: float) -> Law:
+        return Law(self._height, 0.0, 0.0)
+
+    def to(self, height: float, near: Motion) -> _Place:
+        """The system at rest with the point at a height [m], assembled from a motion near by."""
+        system, self._height = self._system, float(height)
+        motion = equilibrium(self._held, near).motion
+        rows = self._holder.rows(motion, 0.0)
+        jacobian = np.vstack([system.constraints(motion, 0.0).jacobian, rows.jacobian])
+        # Of all velocities with unit speed of the point those of least kinetic energy.
+        root = np.sqrt(system.inverse_mass)
+        unit_speed = np.append(np.zeros(len(jacobian) - 1), 1.0)
+        way = root * least_squares(jacobian * root, unit_speed, 1e-8)
+        lift = way @ system.generalised_forces(motion, 0.0)
+        damping = lift - way @ system.generalised_forces(motion.with_velocities(way), 0.0)
+        # Where the third of the six numbers of a body is its velocity upward.
+        carried = system.mass[2::6] @ way[2::6]
+        columns = np.array([system.mass @ way**2, lift, damping, carried])
+        return _Place(float(height), motion, columns)
+
+
+def _refined(raised: _Raised, places: list[_Place], tolerance: float) -> list[_Place]:
     """The same with further heights in between where splines miss the lift, such as at stops."""
     doubtful = list(pairwise(places))
     while doubtful:
@@ -182,7 +211,7 @@ def _refined(
         for low, high in doubtful:
             if high.height - low.height > 2.0 * FINEST:
                 middle = 0.5 * (low.height + high.height)
-                there = _at_height(system, body, at, low.motion, middle)
+                there = raised.to(middle, low.motion)
                 if abs(lift(middle) - there.columns[1]) > tolerance:
                     missed.add(middle)
                     places.append(there)
@@ -192,21 +221,3 @@ def _refined(
         near = {i for k in new for i in range(max(k - 2, 0), min(k + 2, len(places) - 1))}
         doubtful = [(places[i], places[i + 1]) for i in sorted(near)]
     return places
-
-
-def _at_height(system: System, body: str, at: Vector, near: Motion, height: float) -> _Place:
-    """The system at rest with a point at a height: mass, lift, damping and carried mass there."""
-    holder = PrescribedPoint("height", body, constant(float(height)), at)
-    motion = equilibrium(system.with_joints(holder), near).motion
-    rows = holder.rows(motion, 0.0)
-    jacobian = np.vstack([system.constraints(motion, 0.0).jacobian, rows.jacobian])
-    # Of all velocities with unit speed of the point those of least kinetic energy.
-    root = np.sqrt(system.inverse_mass)
-    unit_speed = np.append(np.zeros(len(jacobian) - 1), 1.0)
-    way = root * least_squares(jacobian * root, unit_speed, 1e-8)
-    lift = way @ system.generalised_forces(motion, 0.0)
-    damping = lift - way @ system.generalised_forces(motion.with_velocities(way), 0.0)
-    # Where the third of the six numbers of a body is its velocity upward.
-    carried = system.mass[2::6] @ way[2::6]
-    columns = np.array([system.mass @ way**2, lift, damping, carried])
-    return _Place(float(height), motion, columns)

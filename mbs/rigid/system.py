@@ -41,10 +41,9 @@ class Miss(NamedTuple):
 
 
 class Assembly(NamedTuple):
-    """Result of a position projection: ``missed`` holds what each joint missed before it."""
+    """Result of a position projection."""
 
     motion: Motion
-    missed: tuple[Miss, ...]
     n_iterations: int
 
 
@@ -261,14 +260,13 @@ class System:
         InputError
             The joints cannot be closed from there; it names the one that misses most.
         """
-        missed = self.misses(motion, time)
         if not self.joints:
-            return Assembly(motion, missed, 0)
+            return Assembly(motion, 0)
         limit = tolerance * max(1.0, float(np.abs(motion.position).max()))
         for number in range(max_iterations + 1):
             rows = self.constraints(motion, time)
             if np.abs(rows.value).max() <= limit:
-                return Assembly(motion, missed, number)
+                return Assembly(motion, number)
             step = least_squares(rows.jacobian, -rows.value, DEPENDENT)
             # Newton's method must not turn bodies around on its way.
             motion = motion.moved(step / max(1.0, float(np.abs(step).max())))

@@ -42,11 +42,3 @@ def polyline_at(x, y, places, values, slopes):
         else:
             slopes[j] = (y[i + 1] - y[i]) / (x[i + 1] - x[i])
             values[j] = y[i] + slopes[j] * (places[j] - x[i])
-
-
-def warm_up() -> None:
-    """Compile all kernels, or load them from Numba's cache, before the clock of a march starts."""
-    one, breaks = np.ones(1), np.array([0.0, 1.0])
-    spline_at(breaks, np.ones((1, 4)), 0.5)
-    sines_at(one, one, one, 0.5)
-    polyline_at(breaks, breaks, one, one, one)

@@ -74,9 +74,3 @@ def taken_for_zero() -> Iterator[None]:
         yield
     finally:
         _exchange(0, before)
-
-
-def warm_up() -> None:
-    """Compile what it needs, or load it from Numba's cache, before the clock of a march starts."""
-    with taken_for_zero():
-        pass

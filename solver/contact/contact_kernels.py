@@ -325,21 +325,3 @@ def compensate(numbers, compensation, start, offset, data, motion, gains):
                 z[begin + j] -= change
                 x[begin + j] -= gains[0] * change
                 y[begin + j] -= gains[1] * change
-
-
-def warm_up() -> None:
-    """Compile all kernels, or load them from Numba's cache, before the clock of a march starts."""
-    one, reals, table = np.zeros(1), np.zeros(4), np.zeros((1, 4))
-    nodes, touches = np.zeros(2, dtype=NODE), np.zeros(1, dtype=TOUCH)
-    nodes["x"] = [0.0, 1.0]
-    motion, numbers = (reals, reals, reals, np.zeros(5)), np.zeros(1, dtype=np.int64)
-    locate(one, nodes, touches)
-    place(one, nodes, one, touches, table, table)
-    heights(motion, touches, 1.0, one, one)
-    respond(
-        motion, touches, 1.0, 1.0, 1.0, 1.0, table, table, np.zeros(2), numbers,
-        np.zeros((1, 2), dtype=np.int64), table, one, np.zeros(8), np.zeros((1, 5)),
-    )  # fmt: skip
-    offset, gains = np.zeros(2, dtype=np.int64), np.zeros(2)
-    superpose(one, table, touches, motion, gains)
-    compensate(numbers, one, numbers, offset, one, motion, gains)

@@ -300,21 +300,3 @@ def tell(force, reported, heads, depth, ends, told):
             told[3 * n + i] = reported[i]
         strips = ends[p + 1] - ends[p]
         told[p], told[n + p], told[2 * n + p] = total, mean / strips, mean_of_wire / strips
-
-
-def warm_up() -> None:
-    """Compile all of them, or load them from Numba's cache."""
-    one, square, rows = np.zeros(1), np.eye(1), np.zeros((1, 5))
-    numbers, found = np.zeros(4), np.zeros((2, 1))
-    gap(numbers, numbers, 1, numbers)
-    hertz(one, one, one, 1.0, 1.5, 0.0, one, one, one, one)
-    any_pushed(rows, 1, 1, one)
-    solve(
-        numbers, np.zeros(8), rows, np.zeros(2), numbers, np.ones((4, 1)), 1.0, np.zeros((1, 1)),
-        np.zeros(2, dtype=np.bool_), np.eye(2), np.zeros(2), np.zeros(2), found, one, 1,
-    )  # fmt: skip
-    settle(square, one, np.zeros(1, dtype=np.bool_), one, 1)
-    solve_on(square, one, np.zeros(1, dtype=np.bool_), one)
-    under(numbers, rows, 1, one, one, found)
-    leaves_out(one, one, rows, np.zeros(2), np.zeros((1, 1)), one)
-    tell(one, one, numbers, one, np.array([0, 1]), np.zeros(4))

@@ -5,8 +5,6 @@ Works on this rank's arrays and knows nothing of MPI or PETSc. Not collective.
 
 from __future__ import annotations
 
-import numpy as np
-
 from catenary.solver.base.compiled import compiled
 
 
@@ -33,9 +31,3 @@ def predict(displacement, velocity, balanced, known, work, coefficients):
         displacement[i] = d
         velocity[i] = v
         work[i] = -(d + share * v)
-
-
-def warm_up() -> None:
-    """Compile the kernel, or load it from Numba's cache, before the clock of a march starts."""
-    reals = np.zeros(4)
-    predict(reals, reals, reals, reals, reals, np.zeros(9))

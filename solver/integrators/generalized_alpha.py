@@ -39,7 +39,6 @@ class GeneralizedAlphaLine(LineMotion):
         beta, gamma, mass_weight, force_weight = integration
         ratio = (1.0 - force_weight) / (1.0 - mass_weight)
         super().__init__(comm, model, ownership, ratio * beta * dt**2, ratio * gamma * dt)
-        alpha_kernels.warm_up()
         self._known = np.zeros(ownership.n_local)
         self._coefficients = np.array(
             [

@@ -13,10 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from catenary.solver.base import aligned_arrays, flush_to_zero
+from catenary.solver.base import aligned_arrays
 from catenary.solver.base.petsc import PETSc
-from catenary.solver.contact import contact_kernels
-from catenary.solver.contact_problem import complementarity_kernels
 from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_state import Motion
 from catenary.solver.integrators.two_pass_step import StationPasses
@@ -50,10 +48,6 @@ class LineMotion(ABC):
         position_factor: float,
         velocity_factor: float,
     ) -> None:
-        state_kernels.warm_up()
-        contact_kernels.warm_up()
-        complementarity_kernels.warm_up()
-        flush_to_zero.warm_up()
         self._comm = comm
         self.ownership = ownership
         self.position_factor = position_factor

@@ -110,17 +110,3 @@ def show(motion, arms, ends, laws, kept, uplift, force):
     for d in range(force.size):
         if force[d] < 0.0:
             force[d] *= kept
-
-
-def warm_up() -> None:
-    """Compile all kernels, or load them from Numba's cache, before the clock of a march starts."""
-    reals, one, numbers = np.zeros(4), np.zeros(1), np.zeros(1, dtype=np.int64)
-    predict(reals, reals, reals, reals, 1.0, 1.0, 1.0, 1.0)
-    correct(reals, reals, reals, 1.0, 1.0, 1.0)
-    shift(reals, reals, 1.0)
-    motion = reals, reals, reals, np.zeros(5)
-    displacements(motion, reals)
-    velocities(motion, reals)
-    ends, laws = np.zeros((1, 2), dtype=np.int64), np.zeros((1, 4))
-    tension(motion, ends, laws, one)
-    show(motion, numbers, ends, laws, 0.0, one, one)

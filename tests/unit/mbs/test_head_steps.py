@@ -7,7 +7,6 @@ import pytest
 from scipy import linalg
 from scipy.interpolate import CubicSpline
 
-from catenary.mbs.head import head_kernels
 from catenary.mbs.head.strips import Strips, Suspension, Turning, head_parts
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
@@ -28,11 +27,6 @@ FRAME = ReducedMechanism(
     name="tall",
 )
 RAISING = RaisingData(FRAME, 7.8, 6000.0, 26.0, 76.0, 0.08, base_height=3.6)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def compiled() -> None:
-    head_kernels.warm_up()
 
 
 def newmark(
