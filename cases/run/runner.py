@@ -48,7 +48,6 @@ from catenary.postproc.files.own_files import remove_stale
 from catenary.postproc.record.fields import FieldRecorder
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
-from catenary.postproc.report.report import write_report, write_summary
 from catenary.solver.base.errors import CatenaryError, RunBroken
 from catenary.solver.base.parallel import on_root
 from catenary.solver.base.petsc import PETSc
@@ -341,6 +340,9 @@ def _reported(order: _Order, outcome: Outcome) -> RunOutcome:
 
 
 def _report(out_dir: Path, outcome: Outcome, only_summary: bool) -> RunOutcome:
+    # On the rank that writes it, once the march is over: filters and pictures load for long.
+    from catenary.postproc.report.report import write_report, write_summary
+
     try:
         if only_summary:
             accepted = write_summary(out_dir / RESULT, out_dir)

@@ -10,11 +10,9 @@ import json
 import logging
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from matplotlib.figure import Figure
 
 from catenary.postproc.channels.line_record import says
 from catenary.postproc.evaluate import statistics as stats
@@ -28,10 +26,13 @@ from catenary.postproc.evaluate.wording import counted, fixed
 from catenary.postproc.files.disk import write_into
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
-from catenary.postproc.report import csv_tables, figures, plots
+from catenary.postproc.report import csv_tables
 from catenary.postproc.report.summary import as_json, real_time_factor, summarise
 from catenary.postproc.standards import en50367 as standards
 from catenary.postproc.standards.en50367 import KMH
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 logger = logging.getLogger("catenary.report")
 
@@ -136,6 +137,8 @@ def judge(results: Results, statistics: RunStatistics) -> list[Criterion]:
 
 
 def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
+    from catenary.postproc.report import figures, plots  # a summary alone does without Matplotlib
+
     drawn: list[tuple[str, str, Figure | None]] = []
     if results.n_rows("time") > 1:
         drawn.append(
@@ -179,6 +182,8 @@ def _html(
     criteria: list[Criterion],
     pictures: list[_Picture],
 ) -> str:
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES),
         autoescape=True,

@@ -23,6 +23,7 @@ from catenary.cases.studies.sweep.jobs import make_jobs
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import parse_vary, product
 from catenary.postproc.read.results import Results
+from catenary.postproc.report import report
 from catenary.solver.statics import line_at_rest
 
 # What is called in each phase of a run before its march.
@@ -107,7 +108,7 @@ def test_a_signal_during_the_march_ends_it_in_good_order(
 def test_a_signal_during_the_report_leaves_a_whole_result(
     scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(runner, "write_report", signalled(runner.write_report, signal.SIGHUP))
+    monkeypatch.setattr(report, "write_report", signalled(report.write_report, signal.SIGHUP))
     with pytest.raises(Interrupted) as caught:
         runner.run_case(scene, tmp_path, MPI.COMM_SELF)
     assert str(caught.value) == (
