@@ -96,8 +96,9 @@ def _sections(
     found = []
     for pole in (1.0 + poles) / (1.0 - poles):
         below = -2.0 * float(pole.real), float(abs(pole)) ** 2
-        gain = 1.0 / abs(_Section(*zeros, *below).at(passed))
-        found.append(_Section(*(gain * zero for zero in zeros), *below))
+        section = _Section(*zeros, *below)
+        b0, b1, b2 = (zero / abs(section.at(passed)) for zero in zeros)
+        found.append(section._replace(b0=b0, b1=b1, b2=b2))
     return tuple(found)
 
 
