@@ -9,13 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.contact_problem.complementarity_kernels import (
-    COUPLINGS,
-    FLAGS,
-    NUMBER,
-    TENSION,
-    parts,
-)
+from catenary.solver.contact.line_response import COUPLINGS, FLAGS, NUMBER, TENSION
 from catenary.solver.integrators.state_kernels import (
     compiled,
     displacement_at,
@@ -325,3 +319,34 @@ def compensate(numbers, compensation, start, offset, data, motion, gains):
                 z[begin + j] -= change
                 x[begin + j] -= gains[0] * change
                 y[begin + j] -= gains[1] * change
+
+
+@compiled
+def parts(numbers, n):
+    """Depth, rate, by_force and rate_by_force of n contacts from what ``gap`` filled."""
+    compliances = numbers[2 * n :].reshape((2, n, n))
+    return numbers[:n], numbers[n : 2 * n], compliances[0], compliances[1]
+
+
+@compiled
+def tell(force, reported, heads, depth, ends, told):
+    """Contact force, head height and wire height of each pantograph, then the force of each strip.
+
+    These are the 3 n_pantographs + n numbers of ``told``; ``heads`` are those of ``gap``.
+    Pantograph p has the contacts from ``ends[p]`` to ``ends[p + 1]``: the sum of their forces, and
+    the means of their heights.
+    """
+    n = ends.size - 1
+    head_height, _, compliance, _ = parts(heads, force.size)
+    for p in range(n):
+        total, mean, mean_of_wire = 0.0, 0.0, 0.0
+        for i in range(ends[p], ends[p + 1]):
+            height = head_height[i]
+            for j in range(ends[p], ends[p + 1]):
+                height -= compliance[i, j] * force[j]
+            total += reported[i]
+            mean += height
+            mean_of_wire += height - depth[i]
+            told[3 * n + i] = reported[i]
+        strips = ends[p + 1] - ends[p]
+        told[p], told[n + p], told[2 * n + p] = total, mean / strips, mean_of_wire / strips

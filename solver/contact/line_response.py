@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.contact_problem.complementarity_kernels import (
-    COUPLINGS,
-    FLAGS,
-    NUMBER,
-    TENSION,
-)
+# Columns of a row of a dropper that may slacken, before its 3 n numbers for n contacts.
+NUMBER, TENSION, COUPLINGS = 0, 1, 2
+# Numbers before the answers in ``LineResponse.summed``: droppers with a row, wish to stop, whether
+# something is no number, droppers that there is no room for.
+FLAGS = 4
 
 
 class LineResponse:

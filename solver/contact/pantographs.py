@@ -21,9 +21,9 @@ from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.base.bound import bound
 from catenary.solver.base.parallel import on_root
+from catenary.solver.contact import contact_kernels
 from catenary.solver.contact.contact_wire import ContactWire
 from catenary.solver.contact.head_states import Heads
-from catenary.solver.contact_problem import complementarity_kernels
 from catenary.solver.integrators import state_kernels
 from catenary.solver.model.model import Model
 from catenary.solver.problem.contact_laws import KinematicLaw
@@ -146,7 +146,7 @@ class Pantographs:
                 model.advance(contact_force[strips])
         if self.joints_in_loop:
             self.look_at_joints()
-        complementarity_kernels.tell(
+        contact_kernels.tell(
             contact_force, reported, self._heads.numbers, depth, self.ends, self.of_step
         )
 

@@ -8,12 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.solver.base.compiled import compiled
-
-# Columns of a row of a dropper that may slacken, before its 3 n numbers for n contacts.
-NUMBER, TENSION, COUPLINGS = 0, 1, 2
-# Numbers before the answers in ``LineResponse.summed``: droppers with a row, wish to stop, whether
-# something is no number, droppers that there is no room for.
-FLAGS = 4
+from catenary.solver.contact.contact_kernels import parts
+from catenary.solver.contact.line_response import COUPLINGS, FLAGS, NUMBER, TENSION
 
 
 @compiled
@@ -28,13 +24,6 @@ def gap(heads, line, n, numbers):
         numbers[i] = heads[i] - line[i] if i < 2 * n else heads[i] + line[i]
         total += numbers[i]
     return np.isfinite(total)
-
-
-@compiled
-def parts(numbers, n):
-    """Depth, rate, by_force and rate_by_force of n contacts from what ``gap`` filled."""
-    compliances = numbers[2 * n :].reshape((2, n, n))
-    return numbers[:n], numbers[n : 2 * n], compliances[0], compliances[1]
 
 
 @compiled
@@ -276,27 +265,3 @@ def solve(
     finite &= under(numbers, rows, size - n, solution, solution[n:], found)
     complete = not leaves_out(solution[:n], solution[n:size], rows, limits, band, drop)
     return rounds, size, finite, complete
-
-
-@compiled
-def tell(force, reported, heads, depth, ends, told):
-    """Contact force, head height and wire height of each pantograph, then the force of each strip.
-
-    These are the 3 n_pantographs + n numbers of ``told``; ``heads`` are those of ``gap``.
-    Pantograph p has the contacts from ``ends[p]`` to ``ends[p + 1]``: the sum of their forces, and
-    the means of their heights.
-    """
-    n = ends.size - 1
-    head_height, _, compliance, _ = parts(heads, force.size)
-    for p in range(n):
-        total, mean, mean_of_wire = 0.0, 0.0, 0.0
-        for i in range(ends[p], ends[p + 1]):
-            height = head_height[i]
-            for j in range(ends[p], ends[p + 1]):
-                height -= compliance[i, j] * force[j]
-            total += reported[i]
-            mean += height
-            mean_of_wire += height - depth[i]
-            told[3 * n + i] = reported[i]
-        strips = ends[p + 1] - ends[p]
-        told[p], told[n + p], told[2 * n + p] = total, mean / strips, mean_of_wire / strips

@@ -47,8 +47,11 @@ class NewmarkLine(LineMotion):
         )
         operators, (shown, velocity, acceleration, _) = self.operators, self.motion.read
         motion = MotionAhead(operators.factor, velocity, acceleration, shown, steps)
-        self._passes = operators.passes(motion, steps)
-        if self._passes is not None:
+        if (parts := operators.by_stations()) is not None:
+            product, factors, read, answer = parts
+            self._passes = StationPasses(
+                product, factors, read, read, np.zeros(0), answer, motion, steps
+            )
             self._passes.look_at(*self._droppers)
             motion.put(self.displacement, self.velocity, self.acceleration)
             self.motion = motion

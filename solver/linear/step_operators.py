@@ -8,7 +8,7 @@ its own.
 from __future__ import annotations
 
 import logging
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -18,8 +18,6 @@ from catenary.solver.base import aligned_arrays
 from catenary.solver.base.errors import NotConverged, RunBroken
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.base.petsc_events import event
-from catenary.solver.integrators.line_state import MotionAhead, Steps
-from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.linear.halo import Halo, Subdomain
 from catenary.solver.linear.lanes import Layout
 from catenary.solver.linear.petsc_solvers import (
@@ -31,6 +29,7 @@ from catenary.solver.linear.petsc_solvers import (
     wants_distributed_solver,
     wants_view,
 )
+from catenary.solver.linear.station_factors import StationFactors
 from catenary.solver.linear.station_products import (
     StationProduct,
     layout_of,
@@ -50,6 +49,18 @@ _COEFFICIENTS = {
     "stiffness": (0.0, 1.0, 0.0),
     "damping": (0.0, 0.0, 1.0),
 }
+
+
+class ByStations(NamedTuple):
+    """A product with K and factors of A by stations, and the arrays that both work on.
+
+    ``read`` is what the product reads, ``answer`` what the solve fills, of all that is solved for.
+    """
+
+    product: StationProduct
+    factors: StationFactors
+    read: np.ndarray
+    answer: np.ndarray
 
 
 class LineOperators:
@@ -120,23 +131,17 @@ class LineOperators:
             self._solver.hurry()
         self._station_product("stiffness")  # that no step has to wait for them
 
-    def passes(self, motion: MotionAhead, steps: Steps) -> StationPasses | None:
-        """Free steps of Newmark's method in two passes over a motion, if they can be.
+    def by_stations(self) -> ByStations | None:
+        """What a step in two passes works on, None unless all goes by stations. Not collective.
 
-        ``motion`` is kept in ``factor``, ``answer`` and an array of its own.
-
-        For that the operator is to be factored and multiplied by stations. Not collective.
+        The operator is then factored and multiplied by stations, and solved for in one application.
         """
         stiffness, solver = self._station_product("stiffness"), self._solver
         if stiffness is None or not isinstance(solver, PartSolver):
             return None
         if solver.factors is None or not self._is_direct:
             return None
-        padded, answer = self._read_padded, self._solution.array
-        loads = np.zeros(0)
-        return StationPasses(
-            stiffness, solver.factors, padded, padded, loads, answer, motion, steps
-        )
+        return ByStations(stiffness, solver.factors, self._read_padded, self._solution.array)
 
     def exchange(self) -> None:
         """Bring ``factor`` up to date where it is others'. Collective."""

@@ -14,8 +14,8 @@ from catenary.mbs.head import head_records
 from catenary.solver.base.compiled import compiled
 from catenary.solver.base.pointers import call
 from catenary.solver.contact import contact_kernels
+from catenary.solver.contact.line_response import NUMBER
 from catenary.solver.contact_problem import complementarity_kernels
-from catenary.solver.contact_problem.complementarity_kernels import NUMBER
 from catenary.solver.integrators import state_kernels
 
 # Numbers of ``counts``, named as in `schemes.Counters`.
@@ -138,7 +138,7 @@ def take(steps, times, drives, rows, counts, shows, first, n_steps):
         for h in range(steps.records.size):
             head_records.move(steps.records[h], force)
         reported = steps.law[3]
-        complementarity_kernels.tell(force, reported, steps.heads, depth, steps.ends, steps.of_step)
+        contact_kernels.tell(force, reported, steps.heads, depth, steps.ends, steps.of_step)
         if shows:
             row = rows[i]
             row[:n_told] = steps.told
