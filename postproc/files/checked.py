@@ -103,6 +103,14 @@ def sum_of_arrays(arrays: Mapping[str, Any]) -> int:
     return total
 
 
+def sum_is_kept(group: h5py.Group, arrays: Mapping[str, Any]) -> bool | None:
+    """Whether arrays have the checksum that stands beside them, None if none does."""
+    known = group.attrs.get(ARRAYS_SUM)
+    if known is None:
+        return None
+    return np.ndim(known) == 0 and bool(known == sum_of_arrays(arrays))
+
+
 def create_checked(file: h5py.Group, path: str, values: Any) -> h5py.Dataset:
     """A dataset with HDF5's own checksum; an empty one has nothing to check."""
     array = np.asarray(values)

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from catenary.postproc.channels import channels
-from catenary.postproc.files.checked import ARRAYS_SUM, seal_arrays, sum_of_arrays
+from catenary.postproc.files.checked import seal_arrays, sum_is_kept
 
 GROUP, ROWS = "extremes", "rows"
 _SLOTS = ("0", "1")
@@ -26,7 +26,7 @@ def store_extremes(file: h5py.File, n_rows: int, extremes: Mapping[str, np.ndarr
     extremes : name of a channel -> (2, columns), smallest and largest
     """
     group = file.require_group(GROUP)
-    counts = [int(group[slot][ROWS][()]) if slot in group else -1 for slot in _SLOTS]
+    counts = [_rows_of(group[slot]) if slot in group else -1 for slot in _SLOTS]
     place = group.require_group(_SLOTS[int(np.argmin(counts))])
     arrays = {**extremes, ROWS: np.array(n_rows, dtype=np.int64)}
     for name, values in arrays.items():
@@ -40,7 +40,7 @@ def store_extremes(file: h5py.File, n_rows: int, extremes: Mapping[str, np.ndarr
 def drop_extremes(file: h5py.File, n_rows: int) -> None:
     """Forget extremes of more steps than a run that goes on after ``n_rows`` has shown."""
     for slot in file[GROUP].values():
-        if slot[ROWS][()] > n_rows + 1:
+        if _rows_of(slot) > n_rows + 1:
             slot[ROWS][...] = 0
 
 
@@ -50,12 +50,20 @@ def extremes_at(file: h5py.File, n_rows: int) -> dict[str, np.ndarray] | None:
     Those of one step more serve as well: a run that goes on from a state shows it again. Those
     whose checksum is wrong count as not kept.
     """
-    found = {int(slot[ROWS][()]): slot for slot in file.get(GROUP, {}).values()}
+    found = {_rows_of(slot): slot for slot in file.get(GROUP, {}).values()}
     slot = found.get(n_rows, found.get(n_rows + 1))
     if slot is None:
         return None
     arrays = {name: slot[name][...] for name in (*channels.LINE_CHANNELS, ROWS)}
-    if slot.attrs.get(ARRAYS_SUM) != sum_of_arrays(arrays):
+    if not sum_is_kept(slot, arrays):
         return None
     del arrays[ROWS]
     return arrays
+
+
+def _rows_of(slot: h5py.Group) -> int:
+    """For how many steps a slot holds, -1 if that is not a single whole number."""
+    rows = slot.get(ROWS)
+    if not isinstance(rows, h5py.Dataset) or rows.shape != () or rows.dtype.kind not in "iu":
+        return -1
+    return int(rows[()])

@@ -7,7 +7,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from catenary.postproc.files.checked import ARRAYS_SUM, sum_of_arrays, text_of
+from catenary.postproc.files.checked import sum_is_kept, text_of
 from catenary.postproc.read.attributes import HDF5_ERRORS
 
 
@@ -40,8 +40,7 @@ def read_slot(file: h5py.File, slot: str, n_rows: int) -> dict[str, Any]:
     try:
         group = file[f"checkpoint/{slot}"]
         state = {name: text_of(dataset[()]) for name, dataset in group.items()}
-        known = group.attrs.get(ARRAYS_SUM)
-        same = known is None or sum_of_arrays(state) == int(known)
+        same = sum_is_kept(group, state) is not False
     except HDF5_ERRORS as error:
         raise ValueError("it cannot be read") from error
     if not same:

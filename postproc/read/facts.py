@@ -10,7 +10,7 @@ import numpy as np
 
 from catenary.postproc.channels.channels import RUN
 from catenary.postproc.channels.facts import FACTS, NONE, Fact
-from catenary.postproc.files.checked import ARRAYS_SUM, sum_of_arrays
+from catenary.postproc.files.checked import sum_is_kept
 from catenary.postproc.read.attributes import HDF5_ERRORS
 
 # Without these there is no report.
@@ -22,8 +22,7 @@ def read_facts(file: h5py.File) -> tuple[dict[str, np.ndarray], list[str]]:
     try:
         group = file["facts"]
         found = {name: np.asarray(group[name][()]) for name in group}
-        known = group.attrs[ARRAYS_SUM] if ARRAYS_SUM in group.attrs else None
-        same = known is None or sum_of_arrays(found) == int(known)
+        same = sum_is_kept(group, found) is not False
     except HDF5_ERRORS:
         return {}, ["its facts are missing or cannot be read"]
     if not same:

@@ -14,6 +14,7 @@ from catenary.postproc.evaluate.wording import counted
 
 _SEPARATE = ("history by step", "history by mesh")
 _LAST_COLUMNS = ("est/true", "rounds", "s/s")
+_USUAL_REPEATS = 3  # that of the command line
 
 
 def page(
@@ -60,7 +61,8 @@ def _command(found: Measured) -> str:
     """The words that make this study again, the folder left out."""
     names = [planned.axis.name for planned in found.plan.axes]
     some = "" if names == list(AXES) else f" --axes {','.join(names)}"
-    return f"catenary accuracy {found.plan.case}{some}"
+    repeats = "" if found.plan.repeats == _USUAL_REPEATS else f" --repeats {found.plan.repeats}"
+    return f"catenary accuracy {found.plan.case}{some}{repeats}"
 
 
 def uncertainty_text(planned: PlannedAxis, percent: Mapping[str, float]) -> str:

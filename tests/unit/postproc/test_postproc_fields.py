@@ -81,6 +81,7 @@ def test_xdmf_names_the_numbers_beside_it(tmp_path: Path, make_march: Any) -> No
         assert len(file["uplift"]) == len(file["times"]) == 3
 
 
+@pytest.mark.process
 def test_resumed_fields_replace_what_follows(tmp_path: Path, make_march: Any) -> None:
     march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
     march.drive(watch(march, path), outcome="interrupted", last=620)
@@ -89,6 +90,7 @@ def test_resumed_fields_replace_what_follows(tmp_path: Path, make_march: Any) ->
     np.testing.assert_allclose(reader.time_values, 0.05 * np.arange(21), rtol=1e-12)
 
 
+@pytest.mark.process
 def test_a_snapshot_that_a_kill_left_half_written_is_replaced(
     tmp_path: Path, make_march: Any
 ) -> None:
@@ -126,6 +128,7 @@ def broken_tables(path: Path) -> None:
     path.write_bytes(data)
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("damage", [other_times, other_mesh, no_snapshots, broken_tables])
 def test_damaged_snapshots_are_begun_anew(
     damage: Any, tmp_path: Path, make_march: Any, caplog: pytest.LogCaptureFixture
@@ -170,6 +173,7 @@ def test_times_tell_how_far_a_run_came(tmp_path: Path, make_march: Any) -> None:
     assert times.size == 21 and np.isnan(times[13:]).all()
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("share", [0.0, 0.6])
 def test_a_file_that_a_kill_has_spoilt_is_begun_anew(
     share: float, tmp_path: Path, make_march: Any, monkeypatch: pytest.MonkeyPatch
