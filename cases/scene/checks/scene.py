@@ -37,8 +37,7 @@ from catenary.solver.effects import all_effects as effects
 from catenary.solver.problem.problem import Problem
 
 if TYPE_CHECKING:
-    from catenary.cases.scene.convert.problem import problem_of
-from catenary.cases.scene.scene import Scene
+    from catenary.cases.scene.scene import Scene
 
 # Two heads cannot stand closer on a roof; their contacts would also share one finite element.
 MIN_SEPARATION = 1.0
@@ -146,6 +145,8 @@ def _requirements_of_chosen(scene: Scene) -> Iterator[Fault]:
 
 def _requirements_of_defaults(scene: Scene) -> Iterator[Fault]:
     """Of effects that are on by default, unless the scene holds nothing for them to act on."""
+    from catenary.cases.scene.convert.problem import problem_of
+
     problem = functools.cache(lambda: problem_of(scene))
     for name, effect in effects.registry().items():
         if name in scene.effects:
