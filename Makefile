@@ -7,8 +7,9 @@ unexport PYTHONPATH PYTHONHOME
 
 PYTHON := .venv/bin/python
 PYTEST := $(PYTHON) -m pytest
-# Tests that measure no time share the cores, a file at a time (benchmarks cannot).
-PYTEST_SHARED = $(PYTEST) -p no:benchmark --numprocesses auto --maxprocesses 4 --dist loadfile
+# Tests that measure no time share the cores, a file at a time (benchmarks cannot), in the order of the
+# folders named: the longest files first, so that quick ones fill the cores up at the end.
+PYTEST_SHARED = $(PYTEST) -p no:benchmark --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 # An uncaught error on one rank ends all; ranks must not write one cache at a time.
 MPI_PYTEST := $(PYTHON) -m mpi4py -m pytest -p no:cacheprovider
 PARTS := meshgen solver mbs postproc cases
@@ -60,7 +61,7 @@ check: setup lint ## lint, and the unit tests that start no process; under a min
 	$(PYTEST_SHARED) -q -m "not process" tests/unit
 
 test: setup lint ## lint and all tests, as CI runs them
-	$(PYTEST_SHARED) tests/unit tests/verification tests/regression
+	$(PYTEST_SHARED) tests/regression tests/verification tests/unit
 	@$(MAKE) --no-print-directory test-mpi
 
 test-unit: setup ## tests of single parts

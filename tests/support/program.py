@@ -1,4 +1,4 @@
-"""The program as a user starts it: a process of its own, alone or under mpirun, with a limit.
+"""The program as a process of its own, alone or under mpirun, with a limit.
 
 Every process inherits a mark, by which those that outlive their launcher are found.
 """
@@ -19,6 +19,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+from forked_program import forks
 
 from catenary.postproc.channels.channels import CHANNELS
 from catenary.postproc.read.results import Results
@@ -105,12 +106,17 @@ class Program:
     def end(self, limit: float | None = None) -> Done:
         """Wait for the end, within ``limit`` [s] or its own, and for the last of its processes."""
         stdout, stderr = self.process.communicate(timeout=limit or self.limit)
-        for _ in range(200):  # the launcher may end a moment before those it has killed
-            left = [pid for pid, _ in _processes(self.mark)]
-            if not left:
-                break
-            time.sleep(0.05)
-        return Done(self.process.returncode, stdout, stderr, left)
+        return _ended(self.process.returncode, stdout, stderr, self.mark)
+
+
+def _ended(code: int, stdout: str, stderr: str, mark: str) -> Done:
+    """What a program was that has ended, when the last of its processes had time to end."""
+    for _ in range(200):  # the launcher may end a moment before those it has killed
+        left = [pid for pid, _ in _processes(mark)]
+        if not left:
+            break
+        time.sleep(0.05)
+    return Done(code, stdout, stderr, left)
 
 
 @contextmanager
@@ -140,7 +146,11 @@ def python(*words: str) -> list[str]:
 
 
 def catenary(*words: str, cwd: Path, ranks: int = 1) -> Done:
-    """Run the command line to its end."""
+    """Run the command line to its end; on one rank forked from ``forking_server.py``."""
+    if ranks == 1:
+        mark = uuid.uuid4().hex
+        environment = {**os.environ, **RANKS_ENVIRONMENT, _MARK: mark}
+        return _ended(*forks().run(list(words), cwd, environment, LIMIT), mark)
     with started(python("-c", _ENTRY, *words), cwd, ranks) as program:
         return program.end()
 

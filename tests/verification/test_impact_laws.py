@@ -169,7 +169,7 @@ def test_no_cycle_of_contact_creates_energy(name: str) -> None:
 
     The energy m v^2 / 2 - F z at the moment of leaving may only fall, by more than round-off.
     """
-    lift, dt, rest_time = 100.0, 2e-4, 0.2
+    lift, dt, rest_time = 300.0, 2e-4, 0.1  # two periods of the ball on the pressed wire
     rest = (lift / STIFFNESS) ** (1 / 1.5)
     bounce = Bounce(hertz(HYSTERESIS[name](0.8)), dt, lift)
     bounce.start(-0.01, 4.0)
@@ -184,7 +184,7 @@ def test_no_cycle_of_contact_creates_energy(name: str) -> None:
             moved = bounce.time
     print(f"{len(energies)} bounces, {energies[:4]} J")
     assert len(energies) >= 4
-    assert (np.diff(energies[:4]) < 0.0).all()
+    assert (np.diff(energies) < 0.0).all()
     # And it comes to rest where the spring carries the lift.
     check("force at rest [N]", bounce.force, lift, within=1e-2 * lift)
     check("depth at rest [m]", bounce.depth, rest, within=1e-2 * rest)

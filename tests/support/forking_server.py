@@ -1,0 +1,60 @@
+"""Runs command lines of the program, each in a process that is forked from this one.
+
+Packages that are imported here, none of which starts MPI, are not imported again by every process:
+that is most of what a short run costs. The program's own modules, PETSc, MPI and HDF5 are.
+
+A request is a line of JSON on standard input: ``words``, ``folder``, ``environment`` and the files
+``stdout`` and ``stderr``. It is answered with the number of the process, and with its exit code
+when it has ended, negative for a signal.
+"""
+
+import gc
+import importlib
+import json
+import os
+import sys
+
+PACKAGES = (
+    "gmsh", "jinja2", "matplotlib.backends.backend_agg", "matplotlib.figure", "meshio", "numba",
+    "pydantic", "scipy.integrate", "scipy.interpolate", "scipy.optimize", "scipy.signal",
+    "scipy.sparse.linalg", "tqdm", "typer",
+)  # fmt: skip
+
+
+def answer(number: int) -> None:
+    """Write a line for who asked."""
+    os.write(1, f"{number}\n".encode())
+
+
+def become(words: list[str], folder: str, environment: dict[str, str], files: list[str]) -> None:
+    """Give this process the surroundings of a process that a user starts."""
+    os.chdir(folder)
+    os.environ.clear()
+    os.environ.update(environment)
+    sys.argv = ["-c", *words]
+    sys.path[0] = ""
+    for number, file in enumerate(files):
+        opened = os.open(file, os.O_WRONLY if number else os.O_RDONLY)
+        os.dup2(opened, number)
+        os.close(opened)
+
+
+for name in PACKAGES:
+    importlib.import_module(name)
+gc.freeze()
+for line in sys.stdin:
+    request = json.loads(line)
+    child = os.fork()
+    if child == 0:
+        files = [os.devnull, request["stdout"], request["stderr"]]
+        become(request["words"], request["folder"], request["environment"], files)
+        break
+    answer(child)
+    answer(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+else:
+    sys.exit()
+
+# As in a process of its own, the program is the last that runs: what ends Python comes after it.
+from catenary.cases.cli.main import main  # noqa: E402
+
+main()
