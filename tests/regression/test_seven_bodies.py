@@ -18,7 +18,7 @@ from catenary.postproc.read.results import Results
 def run(folder: Path, *words: str) -> dict[str, Any]:
     done = catenary("run", "ambrosio2012", "--short", *words, "-o", str(folder), cwd=folder.parent)
     assert done.code == 0, done.stderr
-    assert done.stderr == ""
+    assert "WARNING" not in done.stderr and done.sentences == []  # phases may take long
     return dict(json.loads((folder / "summary.json").read_text()))
 
 
