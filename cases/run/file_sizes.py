@@ -15,11 +15,11 @@ import numpy as np
 from catenary.cases.run.recording import PER_NODE, THINNED_WINDOW, Recording
 from catenary.cases.scene.convert.course import resolved
 from catenary.mbs.build import has_joints
-from catenary.postproc.channels import channels
-from catenary.postproc.channels.channels import Channel
 from catenary.postproc.channels.line_record import GZIP
 from catenary.postproc.files.chunk_shapes import Chunk, chunks_of
 from catenary.solver.problem.problem import Problem
+from catenary.solver.time_loop import channels
+from catenary.solver.time_loop.channels import Channel
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
@@ -38,6 +38,7 @@ _PER_NODE, _PER_DROPPER = 6, 7
 _SAMPLES = 10_000
 # What gzip leaves of a number near the train, within ``THINNED_WINDOW``, and of one far from it.
 _COMPRESSED = {"dropper_force": (0.7, 0.1), "arm_uplift": (0.95, 0.85)}
+_INCOMPRESSIBLE = (1.0, 1.0)
 # Report and pictures of any run, and what a dropper and an arm add to its tables [B].
 _REPORT, _REPORT_PER_DROPPER, _REPORT_PER_ARM = 1.2e6, 300.0, 90.0
 # Tables of a snapshot in the file of its numbers, and its lines in the XDMF file [B].
@@ -101,15 +102,11 @@ def estimate_files(
 def _tables(problem: Problem, recording: Recording) -> dict[str, tuple[Channel, int]]:
     """The growing tables of the result file: path -> channel and columns."""
     places = problem.train.placements
-    strips = [len(place.data.strip_offsets) for place in places]
+    strips = tuple(len(place.data.strip_offsets) for place in places)
+    train = channels.Train(strips, any(has_joints(place.data) for place in places))
     table = {"time": (channels.TIME, 0), "line_channels/time": (channels.TIME, 0)}
-    for channel in channels.CHANNELS.values():
-        if channel.per == channels.PANTOGRAPH:
-            table[f"channels/{channel.name}"] = (channel, len(places))
-    if max(strips) > 1:
-        table["channels/strip_force"] = (channels.STRIP_FORCE, sum(strips))
-    if any(has_joints(place.data) for place in places):
-        table["channels/constraint_violation"] = (channels.CONSTRAINT_VIOLATION, len(places))
+    for channel in channels.train_channels(train):
+        table[f"channels/{channel.name}"] = (channel, channel.n_columns(train))
     for name in recording.line.names:
         columns = recording.line.columns(_places(name, recording)).size
         table[f"line_channels/{name}"] = (channels.CHANNELS[name], columns)
@@ -119,7 +116,8 @@ def _tables(problem: Problem, recording: Recording) -> dict[str, tuple[Channel, 
 
 
 def _places(name: str, recording: Recording) -> np.ndarray:
-    return recording.arm_x if name == "arm_uplift" else recording.dropper_x
+    own = channels.CHANNELS[name].per == channels.ARM
+    return recording.arm_x if own else recording.dropper_x
 
 
 def _table_bytes(
@@ -134,7 +132,7 @@ def _table_bytes(
     down, across = math.ceil(n_rows / shape.rows), math.ceil(max(columns, 1) / shape.columns)
     n_chunks = down * across
     name = path.rsplit("/", 1)[-1]
-    if name not in channels.LINE_CHANNELS:
+    if name not in channels.line_channels():
         return n_chunks * (_BYTES * shape.rows * shape.columns + _PER_CHUNK)
     if not columns:
         return 0.0
@@ -145,7 +143,7 @@ def _table_bytes(
         n_chunks = own.chunks(shape, window)
     if recording.line.compression != GZIP:
         return n_chunks * (_BYTES * shape.rows * shape.columns + _PER_CHUNK)
-    near, far = _COMPRESSED[name]
+    near, far = _COMPRESSED.get(name, _INCOMPRESSIBLE)
     n_near, n_values = own.values(THINNED_WINDOW), float(n_rows * columns)
     if window is not None:
         n_near, n_values = min(n_near, own.values(window)), own.values(window)

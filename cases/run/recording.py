@@ -9,9 +9,9 @@ import numpy as np
 
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
-from catenary.postproc.channels import channels
 from catenary.postproc.channels.line_record import GZIP, NONE, LineRecord, says
 from catenary.solver.problem.problem import Problem
+from catenary.solver.time_loop import channels
 
 if TYPE_CHECKING:
     from catenary.cases.scene.tables.run import OutputTable
@@ -104,7 +104,8 @@ def recording_of(output: OutputTable, problem: Problem, extent: Extent, n_steps:
     n_steps : steps after step 0
     """
     field_every, by_size = _field_every(output, problem.numerics.dt, extent.n_nodes, n_steps)
-    n_columns = extent.arm_x.size + extent.dropper_x.size
+    places = {channels.ARM: extent.arm_x.size, channels.DROPPER: extent.dropper_x.size}
+    n_columns = sum(places[channels.CHANNELS[name].per] for name in channels.line_channels())
     return Recording(
         _line_record(output, problem, n_columns, n_steps),
         field_every,
@@ -139,9 +140,7 @@ def _line_record(output: OutputTable, problem: Problem, n_columns: int, n_steps:
         every=cadence(every_s, dt) or 1,
         window=None if window is None else (window[0], window[1]),
         stretch=None if spans is None else (float(masts[spans[0] - 1]), float(masts[spans[1]])),
-        names=channels.LINE_CHANNELS
-        if names is None
-        else tuple(name for name in channels.LINE_CHANNELS if name in names),
+        names=tuple(n for n in channels.line_channels() if names is None or n in names),
         compression=output.line_channels_compression or NONE,
     )
 

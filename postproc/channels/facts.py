@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.postproc.channels.channels import PANTOGRAPH, RUN
 from catenary.solver.problem.contact_laws import ContactLaw, HertzLaw, LinearLaw
 from catenary.solver.problem.integrator_parameters import Integration, integration_of
+from catenary.solver.time_loop.channels import PANTOGRAPH, RUN
 
 if TYPE_CHECKING:
     from catenary.meshgen.mesh import LineMesh

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from catenary.postproc.channels import channels
+from catenary.solver.time_loop import channels
 
 NONE, GZIP = "none", "gzip"
 # Level 4 was not smaller than level 1 on the forces of droppers, and slower.
@@ -33,7 +33,7 @@ class LineRecord:
     every: int = 1
     window: tuple[float, float] | None = None
     stretch: tuple[float, float] | None = None
-    names: tuple[str, ...] = channels.LINE_CHANNELS
+    names: tuple[str, ...] = field(default_factory=channels.line_channels)
     compression: str = NONE
     by_size: bool = False
 
@@ -44,7 +44,7 @@ class LineRecord:
             self.every == 1
             and self.window is None
             and self.stretch is None
-            and set(self.names) == set(channels.LINE_CHANNELS)
+            and set(self.names) == set(channels.line_channels())
         )
 
     def columns(self, x: np.ndarray) -> np.ndarray:
@@ -105,7 +105,7 @@ def says(record: LineRecord, dt: float) -> str:
             told += f" within {behind:g} m behind and {ahead:g} m ahead of the train"
         if record.stretch is not None:
             told += f" from {record.stretch[0]:g} to {record.stretch[1]:g} m"
-        if set(record.names) != set(channels.LINE_CHANNELS):
+        if set(record.names) != set(channels.line_channels()):
             told = f"of these {', '.join(record.names)} {told}"
         told += "; extremes are kept of every step"
     if record.compression != NONE:

@@ -12,9 +12,8 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from catenary.postproc.channels import channels
-from catenary.postproc.channels.channels import Channel
 from catenary.postproc.channels.line_record import GZIP, LineRecord
+from catenary.solver.time_loop.channels import Channel
 
 # Largest numbers of rows of a chunk: of one column, and of a block of columns.
 _ROWS_OF_ONE, _ROWS_OF_MANY = 4096, 512
@@ -68,7 +67,7 @@ def chunks_of(
         if path.startswith("energy/"):
             # Its rows are few, and not so many a flush.
             shapes[path] = Chunk(min(_ROWS_OF_MANY, n_steps + 1), 1)
-        elif channel.name in channels.LINE_CHANNELS:
+        elif channel.of_line:
             shapes[path] = line_chunk(*line, columns)
         else:
             own = line if path.startswith("line_channels/") else step
@@ -90,7 +89,7 @@ def room_of(
         added = math.ceil(rows / shape.rows)
         # The chunks that were begun move if they are compressed, or get neighbours in a window.
         moves = record.window is not None or record.compression == GZIP
-        added += channel.name in channels.LINE_CHANNELS and moves
+        added += channel.of_line and moves
         total += 8 * across * shape.rows * added
     return total
 

@@ -11,7 +11,6 @@ from collections.abc import Mapping
 import h5py
 import numpy as np
 
-from catenary.postproc.channels import channels
 from catenary.postproc.files.checked import seal_arrays, sum_is_kept
 
 GROUP, ROWS = "extremes", "rows"
@@ -54,7 +53,7 @@ def extremes_at(file: h5py.File, n_rows: int) -> dict[str, np.ndarray] | None:
     slot = found.get(n_rows, found.get(n_rows + 1))
     if slot is None:
         return None
-    arrays = {name: slot[name][...] for name in (*channels.LINE_CHANNELS, ROWS)}
+    arrays = {name: values[...] for name, values in slot.items()}
     if not sum_is_kept(slot, arrays):
         return None
     del arrays[ROWS]

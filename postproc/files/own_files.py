@@ -11,6 +11,8 @@ import re
 import time
 from pathlib import Path
 
+from catenary.solver.time_loop.channels import CHANNELS, ENERGIES
+
 logger = logging.getLogger("catenary.record")
 
 RUN_FILE = "run.h5"
@@ -27,6 +29,11 @@ REPORT_FILES = (
     "droppers.png",
     "static.png",
     "energy.png",
+    *(
+        f"channel_{channel.name}.png"
+        for channel in (*CHANNELS.values(), *ENERGIES.values())
+        if (channel.values or channel.energy) and not channel.own_picture
+    ),
 )
 # What a sweep leaves beside a run's files.
 VARIANT_FILE = "variant.json"

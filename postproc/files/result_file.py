@@ -17,8 +17,6 @@ from typing import Any, NamedTuple
 import h5py
 import numpy as np
 
-from catenary.postproc.channels import channels
-from catenary.postproc.channels.channels import Channel
 from catenary.postproc.channels.facts import FACTS
 from catenary.postproc.channels.header import Header
 from catenary.postproc.channels.line_record import GZIP, GZIP_LEVEL, LineRecord
@@ -35,6 +33,8 @@ from catenary.postproc.files.kept_extremes import drop_extremes, extremes_at, st
 from catenary.postproc.files.own_files import part_of
 from catenary.postproc.files.trimming import trimmed
 from catenary.postproc.files.windowed_rows import write_window
+from catenary.solver.time_loop import channels
+from catenary.solver.time_loop.channels import Channel
 from catenary.solver.time_loop.observers import Stage
 
 FORMAT = "catenary-run-3"
@@ -254,14 +254,8 @@ def _table(
 ) -> dict[str, tuple[Channel, int]]:
     """Growing datasets: path -> channel and columns, 0 columns for one value a row."""
     table = {"time": (channels.TIME, 0)}
-    for channel in channels.CHANNELS.values():
-        if channel.per == channels.PANTOGRAPH:
-            table[f"channels/{channel.name}"] = (channel, stage.n_pantographs)
-    if stage.several_strips:
-        table[f"channels/{channels.STRIP_FORCE.name}"] = (channels.STRIP_FORCE, sum(stage.n_strips))
-    if stage.joints_in_loop:
-        channel = channels.CONSTRAINT_VIOLATION
-        table[f"channels/{channel.name}"] = (channel, stage.n_pantographs)
+    for channel in channels.train_channels(stage.train):
+        table[f"channels/{channel.name}"] = (channel, channel.n_columns(stage.train))
     table[LINE_TIME] = (channels.TIME, 0)
     for name in record.names:
         table[f"line_channels/{name}"] = (channels.CHANNELS[name], int(x[name].size))
@@ -310,7 +304,7 @@ def _create_growing(
         else ((0, columns), (None, columns or None), tuple(chunk))
     )
     known: dict[str, Any] = {}
-    if channel.name in channels.LINE_CHANNELS and record.compression == GZIP:
+    if channel.of_line and record.compression == GZIP:
         known = {"compression": "gzip", "compression_opts": GZIP_LEVEL, "shuffle": True}
     # A chunk that HDF5's index has lost, or that was never written, reads as NaN, not as zeros.
     dataset = file.create_dataset(

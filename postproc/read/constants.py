@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 
 from catenary.postproc.read.attributes import HDF5_ERRORS, is_there
-from catenary.postproc.read.file_schema import CONSTANTS, LINE_COLUMNS, Constant
+from catenary.postproc.read.file_schema import CONSTANTS, Constant, line_columns
 
 
 def constant_faults(file: h5py.File) -> tuple[list[str], dict[str, int]]:
@@ -24,23 +24,23 @@ def constant_faults(file: h5py.File) -> tuple[list[str], dict[str, int]]:
         fault = _fault(values, declared, sizes)
         if fault:
             faults.append(f"{path} {fault}")
-    for path, (recorded, all_of) in LINE_COLUMNS.items():
+    listed = line_columns()
+    for path, (recorded, all_of) in listed.items():
         if is_there(file, path):
-            faults += _columns(file, path, recorded, sizes)
-        else:
-            sizes[recorded] = sizes.get(all_of, 0)
+            faults += _columns(file, path, Constant(recorded, 0, sizes.get(all_of, 0) - 1), sizes)
+    for recorded, all_of in listed.values():
+        sizes.setdefault(recorded, sizes.get(all_of, 0))
     if not faults:
         faults = _between(file, sizes)
     return faults, sizes
 
 
-def _columns(file: h5py.File, path: str, recorded: str, sizes: dict[str, int]) -> list[str]:
+def _columns(file: h5py.File, path: str, declared: Constant, sizes: dict[str, int]) -> list[str]:
     try:
         values = np.asarray(file[path][...])
     except HDF5_ERRORS:
         return [f"{path} cannot be read"]
-    most = sizes.get(LINE_COLUMNS[path][1], 0)
-    fault = _fault(values, Constant(recorded, 0, most - 1, whole=True), sizes)
+    fault = _fault(values, declared._replace(whole=True), sizes)
     return [f"{path} {fault}"] if fault else []
 
 

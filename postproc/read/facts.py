@@ -8,10 +8,10 @@ from typing import Any
 import h5py
 import numpy as np
 
-from catenary.postproc.channels.channels import RUN
 from catenary.postproc.channels.facts import FACTS, NONE, Fact
 from catenary.postproc.files.checked import sum_is_kept
 from catenary.postproc.read.attributes import HDF5_ERRORS
+from catenary.solver.time_loop.channels import RUN
 
 # Without these there is no report.
 _ESSENTIAL = ("time_step", "speed", "wave_speed")

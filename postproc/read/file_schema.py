@@ -9,9 +9,9 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from catenary.postproc.channels import channels
 from catenary.postproc.channels.line_record import LineRecord, from_table
 from catenary.postproc.standards.en50367 import EDITIONS, SYSTEMS
+from catenary.solver.time_loop import channels
 
 # Beyond these sizes a recorded value is damage, by unit; the march itself ends a run whose contact
 # force passes 1e9 N.
@@ -19,6 +19,7 @@ LARGEST = {"s": 1e9, "m": 1e9, "N": 1e12, "J": 1e21, "-": 1e12}
 REQUIRED = object()
 # Files whose line channels stand beside the others, at every step, without extremes.
 _FIRST_FORMAT = "catenary-run-1"
+_FIRST_LINE_CHANNELS = ("arm_uplift", "dropper_force")
 # Files without facts, which are read, but not continued.
 EARLIER_FORMATS = (_FIRST_FORMAT, "catenary-run-2")
 
@@ -116,7 +117,7 @@ def _line_record(value: Any) -> bool:
     return (
         1 <= record.every <= 10**9
         and all(map(math.isfinite, ends))
-        and set(record.names) <= set(channels.LINE_CHANNELS)
+        and set(record.names) <= set(channels.line_channels())
     )
 
 
@@ -209,42 +210,58 @@ CONSTANTS: dict[str, Constant] = {
     "static/elasticity": Constant("E"),
 }
 
-# Columns that are recorded of a line's channel, in files that do not record all.
-LINE_COLUMNS: dict[str, tuple[str, str]] = {
-    "line_columns/arm_uplift": ("a", "A"),
-    "line_columns/dropper_force": ("d", "D"),
-}
-
+# Letters of the columns of a channel: those that are recorded, and all that there are.
+_LETTERS = {channels.PANTOGRAPH: "P", channels.STRIP: "S", channels.ARM: "a", channels.DROPPER: "d"}
+_ALL_OF = {channels.ARM: "A", channels.DROPPER: "D"}
 CLOCK = Growing("s", "", essential=True)
-GROWING: dict[str, Growing] = {
-    f"channels/{channel.name}": Growing(channel.unit, "P", essential=True)
-    for channel in channels.CHANNELS.values()
-    if channel.per == channels.PANTOGRAPH
-}
-# Channels that not every run has.
-OPTIONAL: dict[str, Growing] = {
-    f"channels/{channels.STRIP_FORCE.name}": Growing("N", "S"),
-    f"channels/{channels.CONSTRAINT_VIOLATION.name}": Growing("m", "P", may_be_nan=True),
-}
-ENERGIES: dict[str, Growing] = {
-    f"energy/{channel.name}": Growing(channel.unit, "", essential=True)
-    for channel in channels.ENERGIES.values()
-}
 LINE_CLOCK = "line_channels/time"
+
+
+def largest(unit: str) -> float:
+    """The largest size of a recorded value that is no damage."""
+    return LARGEST.get(unit, LARGEST["-"])
+
+
+def line_columns() -> dict[str, tuple[str, str]]:
+    """Where files that do not record all columns of a line's channel list them, and the letters of
+    recorded and all columns."""
+    own = (channels.CHANNELS[name] for name in channels.line_channels())
+    return {f"line_columns/{c.name}": (_LETTERS[c.per], _ALL_OF[c.per]) for c in own}
+
+
+def step_tables() -> tuple[dict[str, Growing], dict[str, Growing]]:
+    """The tables of pantographs and strips by path: those of every run, and the others."""
+    declared = {
+        f"channels/{c.name}": Growing(c.unit, _LETTERS[c.per], c.essential, c.may_be_nan)
+        for c in channels.train_channels()
+    }
+    always = {path: table for path, table in declared.items() if table.essential}
+    return always, {path: table for path, table in declared.items() if not table.essential}
+
+
+def energy_tables() -> dict[str, Growing]:
+    """The tables of the energies by path, the clock first."""
+    return {
+        f"energy/{channel.name}": Growing(channel.unit, "", channel.essential)
+        for channel in channels.ENERGIES.values()
+    }
 
 
 def line_tables(about: Mapping[str, Any]) -> tuple[dict[str, Growing], dict[str, Growing]]:
     """The line's channels of a file with these root attributes: with the steps, and apart.
 
-    In files of an earlier version they stand with the steps. Small letters are recorded columns.
+    In files of the first format they stand with the steps. Small letters are recorded columns.
     """
-    known = {channels.CHANNELS[name].per: name for name in channels.LINE_CHANNELS}
-    letters = {known[channels.ARM]: "a", known[channels.DROPPER]: "d"}
-    of = {name: Growing(channels.CHANNELS[name].unit, letter) for name, letter in letters.items()}
+
+    def declared(name: str) -> Growing:
+        channel = channels.CHANNELS[name]
+        return Growing(channel.unit, _LETTERS[channel.per], may_be_nan=channel.may_be_nan)
+
     if about.get("format") == _FIRST_FORMAT:
-        return {f"channels/{name}": declared for name, declared in of.items()}, {}
+        return {f"channels/{name}": declared(name) for name in _FIRST_LINE_CHANNELS}, {}
     told = about.get("line_record")
     record = LineRecord() if told is None else from_table(told)
-    gaps = record.window is not None
-    apart = {f"line_channels/{n}": of[n]._replace(may_be_nan=gaps) for n in record.names}
+    apart = {f"line_channels/{name}": declared(name) for name in record.names}
+    if record.window is not None:
+        apart = {path: table._replace(may_be_nan=True) for path, table in apart.items()}
     return {}, {LINE_CLOCK: CLOCK, **apart}

@@ -11,13 +11,12 @@ from catenary.postproc.files.result_file import COMPLETE
 from catenary.postproc.read.attributes import HDF5_ERRORS, is_there
 from catenary.postproc.read.file_schema import (
     CLOCK,
-    ENERGIES,
-    GROWING,
-    LARGEST,
     LINE_CLOCK,
-    OPTIONAL,
     Growing,
+    energy_tables,
+    largest,
     line_tables,
+    step_tables,
 )
 from catenary.postproc.read.tables import damaged_rows
 
@@ -61,7 +60,8 @@ def table_faults(file: h5py.File, about: dict[str, Any], sizes: dict[str, int]) 
     """
     found = []
     with_steps, apart = line_tables(about)
-    for path, declared in {"time": CLOCK, **GROWING, **with_steps}.items():
+    (always, others), energies = step_tables(), _energies(file)
+    for path, declared in {"time": CLOCK, **always, **with_steps}.items():
         fault = _shape_fault(file, path, declared, sizes)
         if fault:
             found.append(TableFault(path, fault, declared.essential))
@@ -69,9 +69,9 @@ def table_faults(file: h5py.File, about: dict[str, Any], sizes: dict[str, int]) 
         fault = _shape_fault(file, path, declared, sizes)
         if fault:
             found.append(TableFault(path, fault, False))
-    for path, declared in {**OPTIONAL, **ENERGIES}.items():
+    for path, declared in {**others, **energies}.items():
         fault = _shape_fault(file, path, declared, sizes)
-        if fault and is_there(file, path.split("/")[0] if path in ENERGIES else path):
+        if fault and is_there(file, path.split("/")[0] if path in energies else path):
             found.append(TableFault(path, fault, False))
     return found
 
@@ -91,15 +91,16 @@ def scan(file: h5py.File, about: dict[str, Any], dt: float, faults: list[TableFa
     with_steps, apart = line_tables(about)
     complete, fault = _complete(file)
     told += [fault] if fault else []
-    of_steps = {path: d for path, d in {**GROWING, **OPTIONAL, **with_steps}.items()}
+    (always, others), energies = step_tables(), _energies(file)
+    of_steps = {**always, **others, **with_steps}
     there = {path: d for path, d in of_steps.items() if is_there(file, path)}
     rows = [0, 0, 0]
-    parts = ({"time": CLOCK, **there}, ENERGIES, apart)
+    parts = ({"time": CLOCK, **there}, energies, apart)
     for number, tables in enumerate(parts):
         clock = next(iter(tables), "")
         if not clock or clock in unusable or not is_there(file, clock):
             continue
-        if tables is ENERGIES and unusable & ENERGIES.keys():
+        if tables is energies and unusable & energies.keys():
             continue
         period = dt if number == 0 else None
         usable = {path: declared for path, declared in tables.items() if path not in unusable}
@@ -108,6 +109,11 @@ def scan(file: h5py.File, about: dict[str, Any], dt: float, faults: list[TableFa
     told += _missing_end(about, rows[0])
     last = float(file["time"][rows[0] - 1]) if rows[0] else float("nan")
     return Records(rows, damaged, told, last)
+
+
+def _energies(file: h5py.File) -> dict[str, Growing]:
+    """The tables of the energies, without those that only some versions record."""
+    return {path: t for path, t in energy_tables().items() if t.essential or is_there(file, path)}
 
 
 def _rows(
@@ -127,7 +133,7 @@ def _rows(
         told.append(f"{short} ends after {n} of {complete} records")
     found: dict[str, list[tuple[int, int]]] = {}
     for path, declared in tables.items():
-        parts = damaged_rows(file[path], n, LARGEST[declared.unit], declared.may_be_nan)
+        parts = damaged_rows(file[path], n, largest(declared.unit), declared.may_be_nan)
         if path == clock:
             parts = parts or _disorder(file[path], n, dt)
         if parts and declared.essential:

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from catenary.postproc.channels import channels
 from catenary.postproc.channels.line_record import LineRecord, from_table
 from catenary.postproc.files import block_reading
 from catenary.postproc.files.result_file import DONE, FORMAT, LINE_TIME, RUNNING, complete_rows
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.sound_file import SoundFile
 from catenary.solver.base.errors import InputError
+from catenary.solver.time_loop import channels
 
 logger = logging.getLogger("catenary.results")
 
@@ -157,14 +157,14 @@ class Results:
 
     def times_of(self, name: str) -> np.ndarray:
         """Times of the rows of a channel [s]."""
-        return self.line_time if name in channels.LINE_CHANNELS else self.time
+        return self.line_time if name in channels.line_channels() else self.time
 
     def n_rows(self, name: str) -> int:
         """Rows of a channel; those of the line may be fewer than the steps."""
-        return self._line_length if name in channels.LINE_CHANNELS else self._length
+        return self._line_length if name in channels.line_channels() else self._length
 
     def channel(self, name: str) -> np.ndarray:
-        """A channel of ``postproc.channels``, shape (n, columns), read anew at each call.
+        """A channel of ``CHANNELS``, shape (n, columns), read anew at each call.
 
         What is not recorded of the line is NaN. Reads all of it into memory: see ``column`` and
         ``blocks``.
@@ -174,7 +174,7 @@ class Results:
     def rows(self, name: str, part: slice) -> np.ndarray:
         """Some rows of a channel, shape (rows, columns), NaN where the line is not recorded."""
         table = self._table(name)
-        if table is None or name not in channels.LINE_CHANNELS:
+        if table is None or name not in channels.line_channels():
             return self._unrecorded(name, part) if table is None else np.asarray(table[part])
         columns = self.recorded_columns(name)
         if columns.size == self._n_places(name):
@@ -188,7 +188,7 @@ class Results:
         NaN where the line is not recorded."""
         table = self._table(name)
         part = slice(0, self.n_rows(name)) if part is None else part
-        if name in channels.LINE_CHANNELS:
+        if name in channels.line_channels():
             place = np.flatnonzero(self.recorded_columns(name) == index)
             if table is None or not place.size:
                 return np.full(part.stop - part.start, np.nan)
@@ -200,7 +200,7 @@ class Results:
         """All rows of a channel in order, by blocks: which rows, and their values as ``rows``."""
         table = self._table(name)
         step = table.chunks[0] if table is not None and table.chunks else 1
-        if table is None or name in channels.LINE_CHANNELS:
+        if table is None or name in channels.line_channels():
             n_columns = self._n_places(name)
         else:
             n_columns = table.shape[1]
@@ -221,26 +221,33 @@ class Results:
 
         Over every step, whatever is recorded of the line; NaN if there are no steps.
         """
-        if name not in channels.LINE_CHANNELS:
+        if name not in channels.line_channels():
             return block_reading.extremes(self._file[f"channels/{name}"], self._length)
-        kept = self._file.extremes(self._length)
-        if kept is not None:
+        kept = self._file.extremes(self._length) or {}
+        if name in kept:
             return kept[name]
         table = self._table(name)
         if table is None or not self.line_record.whole:
             return np.full((2, self._n_places(name)), np.nan)
         return block_reading.extremes(table, self._line_length)
 
+    def has(self, name: str) -> bool:
+        """Whether a channel was recorded."""
+        return self._table(name) is not None
+
     def _table(self, name: str) -> Any:
         """The table of a channel, None if the channel was not recorded."""
-        if name in channels.LINE_CHANNELS and f"line_channels/{name}" in self._file:
+        if name in channels.line_channels() and f"line_channels/{name}" in self._file:
             return self._file[f"line_channels/{name}"]
         return self._file[f"channels/{name}"] if f"channels/{name}" in self._file else None
 
     def _n_places(self, name: str) -> int:
-        """Columns that a channel of the line has if all are recorded."""
+        """Columns that a channel has if all are recorded."""
         of = {channels.ARM: "line/arm_x", channels.DROPPER: "line/dropper_x"}
-        return int(self._file[of[channels.CHANNELS[name].per]].shape[0])
+        channel = channels.CHANNELS[name]
+        if not channel.of_line:
+            return channel.n_columns(channels.Train(tuple(self.n_strips()), False))
+        return int(self._file[of[channel.per]].shape[0])
 
     def _unrecorded(self, name: str, part: slice) -> np.ndarray:
         n = len(range(*part.indices(self.n_rows(name))))
@@ -273,28 +280,26 @@ class Results:
         """
         if not self.several_strips:
             return []
-        whole = self.channel(channels.STRIP_FORCE.name)
+        whole = self.channel("strip_force")
         return [whole[:, columns.start : columns.stop] for columns in self.strip_columns()]
 
     @property
     def has_violations(self) -> bool:
         """Whether a pantograph has joints in the time loop."""
-        return f"channels/{channels.CONSTRAINT_VIOLATION.name}" in self._file
+        return self.has("constraint_violation")
 
     def constraint_violations(self) -> np.ndarray | None:
         """Largest open joint of each pantograph at each record, (n, n_pantographs) [m].
 
         NaN where a pantograph has no joints in the time loop, None if none has.
         """
-        name = channels.CONSTRAINT_VIOLATION.name
-        return self.channel(name) if self.has_violations else None
+        return self.channel("constraint_violation") if self.has_violations else None
 
     def largest_violations(self) -> list[float | None]:
         """The same over the whole run (n_pantographs,) [m], None without joints in the loop."""
-        name = channels.CONSTRAINT_VIOLATION.name
         if not self.has_violations or not self._length:
             return [None] * self.n_pantographs
-        found = self.extremes(name)[1]
+        found = self.extremes("constraint_violation")[1]
         return [None if np.isnan(largest) else float(largest) for largest in found]
 
     def pantograph_words(self) -> list[dict[str, Any]]:
@@ -325,7 +330,11 @@ class Results:
         if "energy" not in self._file:
             return {}
         n = complete_rows(self._file)[1]
-        return {name: np.asarray(self._file[f"energy/{name}"][:n]) for name in channels.ENERGIES}
+        return {
+            name: np.asarray(self._file[f"energy/{name}"][:n])
+            for name in channels.ENERGIES
+            if f"energy/{name}" in self._file
+        }
 
     # ---- constants --------------------------------------------------------------------------
 

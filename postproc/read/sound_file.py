@@ -19,9 +19,9 @@ from catenary.postproc.read.constants import constant_faults
 from catenary.postproc.read.facts import facts_of_earlier, read_facts
 from catenary.postproc.read.file_schema import (
     EARLIER_FORMATS,
-    ENERGIES,
-    OPTIONAL,
+    energy_tables,
     line_tables,
+    step_tables,
 )
 from catenary.postproc.read.records import Records, scan, table_faults
 from catenary.postproc.read.tables import PartialTable
@@ -144,7 +144,7 @@ class SoundFile:
         self.extremes(self.records.rows[0])
 
     def __contains__(self, path: str) -> bool:
-        if path == "energy" and any(fault.path in ENERGIES for fault in self._faults):
+        if path == "energy" and any(fault.path in energy_tables() for fault in self._faults):
             return False
         if path == COMPLETE or path in self.records.damaged:
             return True
@@ -169,7 +169,7 @@ class SoundFile:
 
     def _around(self, path: str) -> PartialTable:
         with_steps, apart = line_tables(self.attrs)
-        columns = {**OPTIONAL, **with_steps, **apart}[path].columns
+        columns = {**step_tables()[1], **with_steps, **apart}[path].columns
         n = self.records.rows[2 if path in apart else 0]
         shape = (n, self._sizes[columns]) if columns else (n,)
         unusable = any(fault.path == path for fault in self._faults)

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catenary.postproc.channels import channels
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.record.column_gather import ColumnGather
 from catenary.postproc.record.extremes import Extremes
+from catenary.solver.time_loop import channels
 from catenary.solver.time_loop.observers import Stage
 
 
@@ -55,7 +55,7 @@ class LineGather:
             channels.DROPPER: (stage.dropper_x, stage.owned_droppers),
         }
         self._parts: dict[str, _Part] = {}
-        for name in channels.LINE_CHANNELS:
+        for name in channels.line_channels():
             x, owned = places[channels.CHANNELS[name].per]
             owned = np.asarray(owned, dtype=np.int64)
             recorded = record.columns(x)

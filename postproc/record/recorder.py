@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from catenary.postproc.channels import channels
 from catenary.postproc.channels.header import Header
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files.disk import Elsewhere, NoRoom, broken_write
@@ -22,11 +21,11 @@ from catenary.postproc.record.column_gather import next_flush
 from catenary.postproc.record.line_rows import LineGather, LineRows
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.base.parallel import on_root
+from catenary.solver.time_loop import channels
 from catenary.solver.time_loop.observers import Stage, StepView
 
 # What a run leaves that breaks before its first step.
 _NOTHING = "nothing was written, and results of an earlier run are as they were"
-_OF_PANTOGRAPHS = ("contact_position", "contact_force", "head_height", "wire_height")
 
 
 class Recorder:
@@ -78,7 +77,7 @@ class Recorder:
         self._extremes: dict[str, np.ndarray] = {}
         self._rows = 0
         self._first_step = 0
-        self._energies: list[tuple[float, float, float]] = []
+        self._energies: list[tuple[float, ...]] = []
 
     @property
     def begun(self) -> bool:
@@ -97,11 +96,7 @@ class Recorder:
         self._last_time = stage.start_time
         self._line = LineGather(self._comm, stage, self._record, rows)
         self._time = np.zeros(rows)
-        self._names = [*_OF_PANTOGRAPHS]
-        if stage.several_strips:
-            self._names.append(channels.STRIP_FORCE.name)
-        if stage.joints_in_loop:
-            self._names.append(channels.CONSTRAINT_VIOLATION.name)
+        self._names = [channel.name for channel in channels.train_channels(stage.train)]
         self._guarded(lambda: self._open(stage))
         if self._resume:
             self._guarded(self._read_extremes)

@@ -7,9 +7,9 @@ from typing import NamedTuple, TextIO
 
 import numpy as np
 
-from catenary.postproc.channels import channels
 from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.read.results import Results
+from catenary.solver.time_loop import channels
 
 # Steps that are written at once.
 _ROWS = 10_000
@@ -77,22 +77,21 @@ def write_pantographs_csv(results: Results, stream: TextIO) -> None:
     """The same into an open text file, by blocks of steps. Not collective."""
     names = results.pantograph_names()
     prefixes = [f"{name} " if len(names) > 1 else "" for name in names]
-    tables = [c for c in channels.CHANNELS.values() if c.per == channels.PANTOGRAPH]
-    if results.has_violations:
-        tables.append(channels.CONSTRAINT_VIOLATION)
+    there = [c for c in channels.train_channels() if results.has(c.name)]
+    tables = [c for c in there if c.per == channels.PANTOGRAPH]
+    by_strip = [c for c in there if c.per == channels.STRIP]
     heads = [channels.TIME.label]
     heads += [prefix + channel.label for channel in tables for prefix in prefixes]
     strips = []
-    if results.several_strips:
-        for prefix, columns in zip(prefixes, results.strip_columns(), strict=True):
-            for number, column in enumerate(columns if len(columns) > 1 else []):
-                heads.append(f"{prefix}strip {number + 1} {channels.STRIP_FORCE.label}")
-                strips.append(column)
+    for prefix, columns in zip(prefixes, results.strip_columns(), strict=True):
+        if len(columns) > 1:
+            heads += [f"{prefix}strip {n + 1} {c.label}" for c in by_strip for n in range(2)]
+            strips.append(slice(columns.start, columns.stop))
     stream.write(csv_text(heads, ()))
     for start in range(0, results.n_rows("time"), _ROWS):
         part = slice(start, min(start + _ROWS, results.n_rows("time")))
         blocks = [results.times(part)[:, None]]
         blocks += [results.rows(channel.name, part) for channel in tables]
-        if strips:
-            blocks.append(results.rows(channels.STRIP_FORCE.name, part)[:, strips])
+        rows = [results.rows(channel.name, part) for channel in by_strip]
+        blocks += [values[:, own] for own in strips for values in rows]
         np.savetxt(stream, np.hstack(blocks), fmt="%.9g", delimiter=",")

@@ -11,7 +11,6 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from catenary.postproc.channels import channels
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.read.results import Results
@@ -61,7 +60,7 @@ def contact_force(results: Results) -> Figure:
     """Contact force of each pantograph along the track: unfiltered light, 20 Hz low-pass bold."""
     names = results.pantograph_names()
     n = results.n_pantographs
-    start, end = _travelled(results)
+    start, end = travelled(results)
     figure, panels = stacked(0.7 + 2.7 * n, n, shared=True)
     for p, axes in enumerate(panels):
         mark_line(axes, results, start, end)
@@ -91,12 +90,12 @@ def strip_forces(results: Results) -> Figure:
     """Share of each strip in the contact force along the track, 20 Hz low-pass, for pantographs
     with more than one."""
     shown = [(p, own) for p, own in enumerate(results.strip_columns()) if len(own) > 1]
-    start, end = _travelled(results)
+    start, end = travelled(results)
     figure, panels = stacked(0.7 + 2.7 * len(shown), len(shown), shared=True)
     for axes, (p, columns) in zip(panels, shown, strict=True):
         mark_line(axes, results, start, end)
         for number, column in enumerate(columns):
-            force = results.column(channels.STRIP_FORCE.name, column)
+            force = results.column("strip_force", column)
             with contextlib.suppress(InputError):  # sampled too slowly; the report says so
                 force = filters.low_pass(force, results.dt)
             label = ("leading strip", "trailing strip")[number]
@@ -348,7 +347,7 @@ def _uprights(axes: Axes, support: np.ndarray, width: float) -> None:
     axes.add_collection(LineCollection(lines, transform=transform, **known), autolim=False)
 
 
-def _travelled(results: Results) -> tuple[float, float]:
+def travelled(results: Results) -> tuple[float, float]:
     """From and to of the stretch on which a pantograph was [m]."""
     low, high = results.extremes("contact_position")
     return float(low.min()), float(high.max())

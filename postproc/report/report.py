@@ -137,7 +137,8 @@ def judge(results: Results, statistics: RunStatistics) -> list[Criterion]:
 
 
 def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
-    from catenary.postproc.report import figures, plots  # a summary alone does without Matplotlib
+    # A summary alone does without Matplotlib.
+    from catenary.postproc.report import channel_pictures, figures, plots
 
     drawn: list[tuple[str, str, Figure | None]] = []
     if results.n_rows("time") > 1:
@@ -171,6 +172,7 @@ def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
             )
         if statistics.droppers.x.size:
             drawn.append(("droppers", "Dropper forces.", plots.dropper_force(results, statistics)))
+    drawn += channel_pictures.channel_pictures(results)
     drawn.append(("static", "Profile and elasticity of the line.", plots.static_line(results)))
     drawn.append(("energy", "Energies of the line.", plots.energies(results)))
     return [_Picture(name, text, figures.png(f)) for name, text, f in drawn if f is not None]

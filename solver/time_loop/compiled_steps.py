@@ -45,7 +45,7 @@ class CompiledSteps:
 
     def __init__(self, scheme: OneSolve, showing: Showing, dt: float, shows: bool) -> None:
         self._scheme, self._showing, self._dt, self._shows = scheme, showing, dt, shows
-        width = showing.width
+        width = showing.layout.width
         self.most = max(1, min(_MOST_ROWS, _BLOCK_BYTES // (8 * width)))
         self.rows = np.zeros((self.most if shows else 0, width))
         self.times = np.zeros(self.most)
@@ -138,6 +138,7 @@ class CompiledSteps:
             of_step=pantographs.of_step,
             told=pantographs.told,
             showing=self._showing.showing,
+            taps=self._showing.layout.taps,
         )
         return steps, self.times, self._drives, self.rows, self._counts, self._shows
 
@@ -157,4 +158,6 @@ def compiled_steps(
         return None
     if scheme.loads(0.0) is not None:
         return None  # loads that change with time
+    if not showing.layout.in_loop:
+        return None  # a channel that is a function
     return CompiledSteps(scheme, showing, dt, shows)

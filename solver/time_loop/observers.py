@@ -3,23 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-# What the pantographs tell comes first, in the order in which they keep it.
-_IN_A_ROW = (
-    "contact_position",
-    "contact_force",
-    "head_height",
-    "wire_height",
-    "strip_force",
-    "constraint_violation",
-    "arm_uplift",
-    "dropper_force",
-)
+from catenary.solver.time_loop.channels import Train
 
 
 @dataclass(frozen=True)
@@ -54,63 +44,53 @@ class Stage:
     joints_in_loop: bool = False
 
     @property
-    def several_strips(self) -> bool:
-        """Whether any pantograph has more than one strip, so that their shares are of interest."""
-        return max(self.n_strips, default=1) > 1
+    def train(self) -> Train:
+        """What decides which channels are recorded."""
+        return Train(self.n_strips or (1,) * self.n_pantographs, self.joints_in_loop)
 
 
 @dataclass
 class StepView:
     """The state after a step; arrays are views that the next step overwrites.
 
-    The arrays it is made of are copied into one, ``row``, whose parts they are from then on, so
-    that keeping all of a step is a single copy.
+    A channel's values are an attribute of its name: those of arms and droppers are the rank's own,
+    those of pantographs and strips rank 0 has, ``contact_position`` all ranks.
 
     Attributes
     ----------
     step, time : number of the step (0 is the initial state) and its time [s]
-    contact_position : (n_pantographs,) along the track [m], all ranks
-    contact_force, head_height, wire_height : (n_pantographs,) [N], [m], [m], rank 0 only
-    dropper_force : (n owned droppers,) tension, negative in compression [N]; of the spring alone
-        where the dampers of slack droppers are kept in action
-    arm_uplift : (n owned arms,) vertical displacement of the contact wire from equilibrium [m]
+    row : (n,) the values of all channels one after another
+    columns : where in the row each channel is, by name
     node_uplift : () -> (n owned nodes,) vertical displacement [m]; not collective
-    energies : () -> (kinetic, elastic) of the line relative to equilibrium [J]; collective
+    energies : () -> the values of ``channels.ENERGIES`` but the time, kinetic and elastic energy of
+        the line relative to equilibrium first [J]; collective
     checkpoint : () -> dict of arrays on rank 0 with which to continue, None elsewhere; collective
-    strip_force : (number of all strips,) share of each strip in the contact force, pantograph by
-        pantograph, the leading strip first [N], rank 0 only
-    constraint_violation : (n_pantographs,) largest open joint [m], NaN for those without joints in
-        the time loop, rank 0 only
-    row : all these arrays one after another
-    columns : where in the row each is, by name
     """
 
     step: int
     time: float
-    contact_position: np.ndarray
-    contact_force: np.ndarray
-    head_height: np.ndarray
-    wire_height: np.ndarray
-    dropper_force: np.ndarray
-    arm_uplift: np.ndarray
+    row: np.ndarray
+    columns: dict[str, slice]
     node_uplift: Callable[[], np.ndarray]
-    energies: Callable[[], tuple[float, float]]
+    energies: Callable[[], tuple[float, ...]]
     checkpoint: Callable[[], dict[str, Any] | None]
-    strip_force: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    constraint_violation: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    row: np.ndarray = field(init=False)
-    columns: dict[str, slice] = field(init=False)
 
-    def __post_init__(self) -> None:
-        arrays = [getattr(self, name) for name in _IN_A_ROW]
-        self.row = np.concatenate(arrays)
-        ends = np.cumsum([0, *(array.size for array in arrays)]).tolist()
-        self.columns = {
-            name: slice(*part)
-            for name, part in zip(_IN_A_ROW, itertools.pairwise(ends), strict=True)
-        }
-        for name, part in self.columns.items():
-            setattr(self, name, self.row[part])
+    def __getattr__(self, name: str) -> np.ndarray:
+        """The values of a channel."""
+        columns = self.__dict__.get("columns", {})
+        if name not in columns:
+            raise AttributeError(f"a step shows no {name}")
+        part: np.ndarray = self.row[columns[name]]
+        return part
+
+
+def row_of(values: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict[str, slice]]:
+    """A row of these values by channel, and where in it each channel is."""
+    ends = np.cumsum([0, *(array.size for array in values.values())]).tolist()
+    columns = {
+        name: slice(*part) for name, part in zip(values, itertools.pairwise(ends), strict=True)
+    }
+    return np.concatenate([np.zeros(0), *values.values()]), columns
 
 
 class Observer(Protocol):

@@ -12,7 +12,7 @@ import numpy as np
 
 from catenary.mbs.head import head_records
 from catenary.solver.base.compiled import compiled
-from catenary.solver.base.pointers import call
+from catenary.solver.base.pointers import call, numbers_at
 from catenary.solver.contact import contact_kernels
 from catenary.solver.contact.line_response import NUMBER
 from catenary.solver.contact_problem import complementarity_kernels
@@ -39,6 +39,7 @@ class Steps(NamedTuple):
     ends : of the contacts of each pantograph, see ``inner_kernels.tell``
     pushed : (m,) int, room for the numbers of slack droppers
     told : what the pantographs tell, of which ``of_step`` is filled by a step
+    taps : (k,) int, addresses of the numbers of further channels, see ``RowLayout``
     """
 
     speed: float
@@ -57,6 +58,7 @@ class Steps(NamedTuple):
     of_step: np.ndarray
     told: np.ndarray
     showing: tuple[Any, ...]
+    taps: np.ndarray
 
 
 @compiled
@@ -118,6 +120,8 @@ def take(steps, times, drives, rows, counts, shows, first, n_steps):
     solution, depth = steps.solving[11], steps.solving[12][0]
     n_told = steps.told.size
     motion, arms, ends, laws, kept = steps.showing
+    n_arms = n_told + arms.size
+    n_shown = n_arms + ends.shape[0]
     for i in range(first, n_steps):
         time = times[i]
         state_kernels.shift(start, places, steps.speed * time)
@@ -142,6 +146,8 @@ def take(steps, times, drives, rows, counts, shows, first, n_steps):
         if shows:
             row = rows[i]
             row[:n_told] = steps.told
-            uplift = row[n_told : n_told + arms.size]
-            state_kernels.show(motion, arms, ends, laws, kept, uplift, row[n_told + arms.size :])
+            uplift, tension = row[n_told:n_arms], row[n_arms:n_shown]
+            state_kernels.show(motion, arms, ends, laws, kept, uplift, tension)
+            for j in range(steps.taps.size):
+                row[n_shown + j] = numbers_at(steps.taps[j], 1)[0]
     return n_steps - first, False

@@ -15,7 +15,9 @@ from catenary.solver.integrators import state_kernels
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.after_incidents import ChangedLine
 from catenary.solver.statics.equilibrium import Equilibrium
+from catenary.solver.time_loop.channels import Energies, Sources, energies_of
 from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.row_layout import RowLayout
 
 # What every state of a line has, and what is kept of the pantographs beside their own states.
 _MOTION = ("displacement", "velocity", "acceleration")
@@ -34,6 +36,7 @@ class Showing:
     Attributes
     ----------
     showing : arguments of ``kernels.show`` before what it fills
+    layout : of a row of a view
     """
 
     def __init__(
@@ -67,20 +70,20 @@ class Showing:
         nodes = np.arange(model.mesh.n_nodes)
         self._owned_nodes = nodes[owned(model.dofs(nodes))]
         self._node_rows = model.dofs(self._owned_nodes) - first
+        n_told, n_arms = pantographs.told.size, self._arm_rows.size
+        n_droppers = interaction.droppers.shown.size
+        self._shown = np.zeros(n_told + n_arms + n_droppers)
+        _, uplift, tension = np.split(self._shown, [n_told, n_told + n_arms])
+        self._sources = Sources(pantographs, interaction, scheme, uplift, tension)
+        self.layout = RowLayout(self._sources, self._shown)
         self._view = StepView(
             step=0,
             time=0.0,
-            contact_position=pantographs.position,
-            contact_force=pantographs.contact_force,
-            head_height=pantographs.head_height,
-            wire_height=pantographs.wire_height,
-            dropper_force=np.zeros(interaction.droppers.shown.size),
-            arm_uplift=np.zeros(self._arm_rows.size),
+            row=np.zeros(self.layout.width),
+            columns=self.layout.columns,
             node_uplift=lambda: self._line.displacement[self._node_rows],
             energies=self._energies,
             checkpoint=self._checkpoint,
-            strip_force=pantographs.strip_force,
-            constraint_violation=pantographs.constraint_violation,
         )
 
         self.showing = (
@@ -90,8 +93,7 @@ class Showing:
             interaction.droppers.shown_laws,
             self._pushed_share,
         )
-        view = self._view
-        self._show = bound(state_kernels.show, *self.showing, view.arm_uplift, view.dropper_force)
+        self._show = bound(state_kernels.show, *self.showing, uplift, tension)
 
     def stage(self, dt: float, start_time: float, n_steps: int) -> Stage:
         """What stays the same for the whole run."""
@@ -117,8 +119,10 @@ class Showing:
         """The state after a step; the same object each time."""
         view, told = self._view, self._pantographs.told
         view.step, view.time = step, time
-        view.row[: told.size] = told
+        self._shown[: told.size] = told
         self._show()
+        view.row[: self._shown.size] = self._shown
+        self.layout.fill(view.row)
         return view
 
     def view_of(self, step: int, time: float, row: np.ndarray) -> StepView:
@@ -126,12 +130,8 @@ class Showing:
         view = self._view
         view.step, view.time = step, time
         view.row[:] = row
+        self._shown[:] = row[: self._shown.size]
         return view
-
-    @property
-    def width(self) -> int:
-        """Numbers of a row of a view."""
-        return int(self._view.row.size)
 
     def restore(self, checkpoint: dict[str, Any]) -> None:
         """Continue from a checkpoint, which all ranks pass. Collective.
@@ -182,7 +182,11 @@ class Showing:
         for i, pantograph in enumerate(self._pantographs.models):
             _like(checkpoint, f"pantograph_{i}", pantograph.state())
 
-    def _energies(self) -> tuple[float, float]:
+    def _energies(self) -> tuple[float, ...]:
+        """The energies that are recorded, in the order of their table. Collective."""
+        return energies_of(Energies(*self._line_energies(), self._sources))
+
+    def _line_energies(self) -> tuple[float, float]:
         """Kinetic and elastic energy relative to the first rest, slack droppers as they are [J].
 
         Collective. After an incident it is that of what is left of the line; see `changed_line`.

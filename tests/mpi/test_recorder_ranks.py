@@ -25,7 +25,7 @@ from catenary.postproc.read.results import Results
 from catenary.postproc.record.fields import FieldRecorder
 from catenary.postproc.record.recorder import Recorder
 from catenary.solver.base.errors import RunBroken
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.observers import Stage, StepView, row_of
 
 COMM = MPI.COMM_WORLD
 N_STEPS, DT = 130, 1e-3
@@ -88,15 +88,21 @@ def make_stage(share: Share) -> Stage:
 def make_view(step: int, share: Share) -> StepView:
     on_root = COMM.rank == 0
     two = np.array([1.0, 2.0]) + step
+    row, columns = row_of(
+        {
+            "contact_position": two,
+            "contact_force": 10 * two if on_root else np.zeros(0),
+            "head_height": 0.02 * two if on_root else np.zeros(0),
+            "wire_height": 0.03 * two if on_root else np.zeros(0),
+            "dropper_force": 1000.0 * step + share(N_DROPPERS),
+            "arm_uplift": -0.01 * step - share(N_ARMS),
+        }
+    )
     return StepView(
         step=step,
         time=step * DT,
-        contact_position=two,
-        contact_force=10 * two if on_root else np.zeros(0),
-        head_height=0.02 * two if on_root else np.zeros(0),
-        wire_height=0.03 * two if on_root else np.zeros(0),
-        dropper_force=1000.0 * step + share(N_DROPPERS),
-        arm_uplift=-0.01 * step - share(N_ARMS),
+        row=row,
+        columns=columns,
         node_uplift=lambda: 1e-3 * step + share(N_NODES),
         energies=lambda: (COMM.allreduce(1.0), float(step)),
         checkpoint=lambda: checkpoint(step),

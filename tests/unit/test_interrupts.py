@@ -171,7 +171,6 @@ def test_libraries_leave_the_handlers_as_they_are(tmp_path: Path) -> None:
     """PETSc and Gmsh set handlers of their own when they start."""
     script = """
 import os, signal
-from catenary.cases.process import interrupts
 interrupts.install(several_ranks=False)
 def check(what):
     for number in interrupts.STOPPING:
@@ -184,7 +183,6 @@ from catenary.cases.process.petsc_options import start_petsc
 start_petsc([])
 check("petsc")
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.load import load_scene
 mesh_of(load_scene("en50318_2002"))
 check("gmsh")
 os._exit(0)

@@ -20,6 +20,10 @@ from catenary.solver.problem.integrator_parameters import (
     LEAST_RADIUS_OF_HHT,
     NEWMARK,
 )
+from catenary.solver.time_loop.channels import line_channels
+
+# Channels of the line, which may be recorded in part.
+_RECORDED = line_channels()
 
 # Statistics are taken below 20 Hz (EN 50317); its Nyquist limit is the longest step that can do so.
 MAX_DT = 1.0 / 40.0
@@ -279,11 +283,11 @@ class OutputTable(Table):
         description="steps after which the result file is brought up to date; about half a "
         "second's worth if absent",
     )
-    line_channels: list[Literal["arm_uplift", "dropper_force"]] | None = Field(
+    line_channels: list[Literal[_RECORDED]] | None = Field(  # type: ignore[valid-type]
         None,
-        max_length=2,
-        description="channels of the line that are recorded, of arm_uplift and dropper_force; both "
-        "if absent. Their extremes are kept of every step, whatever is recorded",
+        max_length=len(_RECORDED),
+        description=f"channels of the line that are recorded, of {' and '.join(_RECORDED)}; "
+        "all if absent. Their extremes are kept of every step, whatever is recorded",
     )
     line_channels_every_s: float | None = Field(
         None,

@@ -20,7 +20,7 @@ from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Numerics, Placement, Problem, Train
 from catenary.solver.statics.elasticity import Elasticity
 from catenary.solver.statics.equilibrium import Equilibrium
-from catenary.solver.time_loop.observers import Observer, Stage, StepView
+from catenary.solver.time_loop.observers import Observer, Stage, StepView, row_of
 
 N_SPANS, SPAN = 16, 50.0
 DROPPERS = tuple(5.0 + 5.0 * k for k in range(9))
@@ -207,19 +207,28 @@ class March:
         nodes = self.mesh.points[self.own(self.mesh.n_nodes), 0]
         wire = 5.3 - 0.02 + 0.015 * np.sin(2 * np.pi * position / SPAN)
         slack = 90.0 / 0.06 * np.maximum(self.wave(t, droppers), 0.0)
+        values = {
+            "contact_position": position,
+            "contact_force": self.force(t),
+            "head_height": wire - 0.002,
+            "wire_height": wire,
+            "dropper_force": np.maximum(65.0 + 8.0 * np.cos(droppers) - slack, -0.5),
+            "arm_uplift": self.wave(t, arms),
+        }
+        row, columns = row_of(values | self.more(step))
         return StepView(
             step=step,
             time=t,
-            contact_position=position,
-            contact_force=self.force(t),
-            head_height=wire - 0.002,
-            wire_height=wire,
-            dropper_force=np.maximum(65.0 + 8.0 * np.cos(droppers) - slack, -0.5),
-            arm_uplift=self.wave(t, arms),
+            row=row,
+            columns=columns,
             node_uplift=lambda: self.wave(t, nodes),
             energies=lambda: (2.0 + np.sin(t), 3.0 + np.cos(t)),
             checkpoint=lambda: {"step": step, "state": np.full(50, float(step)), "kind": "made up"},
         )
+
+    def more(self, step: int) -> dict[str, np.ndarray]:
+        """Values of further channels at a step."""
+        return {}
 
     def drive(
         self,

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from catenary.postproc.channels.channels import RUN
 from catenary.postproc.channels.facts import FACTS
+from catenary.solver.time_loop.channels import RUN
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "architecture.md"
 

@@ -20,13 +20,13 @@ from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.tables.units import unit_of
 from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.lumped_data import LumpedData
-from catenary.postproc.channels.channels import RUN
 from catenary.postproc.channels.facts import FACTS, facts_of
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.report import write_report
 from catenary.solver.base.errors import InputError
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw
 from catenary.solver.problem.problem import Damping, Placement, Problem
+from catenary.solver.time_loop.channels import RUN
 
 ROOT = Path(__file__).parents[3]
 # Keys of tables that the head of a result file has itself: when an incident happens.

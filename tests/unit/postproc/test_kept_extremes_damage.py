@@ -8,9 +8,9 @@ import h5py
 import numpy as np
 import pytest
 
-from catenary.postproc.channels import channels
 from catenary.postproc.files.checked import ARRAYS_SUM, seal_arrays, sum_is_kept
 from catenary.postproc.files.kept_extremes import ROWS, drop_extremes, extremes_at, store_extremes
+from catenary.solver.time_loop import channels
 
 
 @pytest.fixture

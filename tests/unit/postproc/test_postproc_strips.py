@@ -25,10 +25,9 @@ def with_strips(make_march: Any) -> Any:
         def stage(self, first_step: int = 0) -> Any:
             return replace(super().stage(first_step), n_strips=(1, 2))
 
-        def view(self, step: int) -> Any:
-            view = super().view(step)
-            leading, trailing = view.contact_force
-            return replace(view, strip_force=np.array([leading, 0.6 * trailing, 0.4 * trailing]))
+        def more(self, step: int) -> Any:
+            leading, trailing = self.force(step * self.dt)
+            return {"strip_force": np.array([leading, 0.6 * trailing, 0.4 * trailing])}
 
     return Striped(n_steps=600)
 

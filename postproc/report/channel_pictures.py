@@ -1,0 +1,86 @@
+"""Pictures of channels without one made for them: histories along the track, ranges on the line."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from catenary.postproc.read.results import Results
+from catenary.postproc.report.envelope import thinned
+from catenary.postproc.report.figures import COLOURS, colour, legend_above, stacked, tidy
+from catenary.postproc.report.plots import mark_line, travelled
+from catenary.solver.time_loop.channels import ARM, CHANNELS, ENERGIES, STRIP, Channel
+
+
+def channel_pictures(results: Results) -> list[tuple[str, str, Figure]]:
+    """Name of the file without its end, caption and picture of each such channel."""
+    drawn = []
+    for channel in CHANNELS.values():
+        if not channel.own_picture and results.has(channel.name) and results.n_rows("time") > 1:
+            figure = _on_line(results, channel) if channel.of_line else _of_train(results, channel)
+            drawn.append((picture_name(channel), f"{_sentence(channel)}.", figure))
+    recorded = results.energies()
+    for channel in ENERGIES.values():
+        if channel.energy is not None and not channel.own_picture and channel.name in recorded:
+            figure = _of_energy(recorded["time"], recorded[channel.name], channel)
+            drawn.append((picture_name(channel), f"{_sentence(channel)}.", figure))
+    return drawn
+
+
+def picture_name(channel: Channel) -> str:
+    """Name of a channel's picture without its end."""
+    return f"channel_{channel.name}"
+
+
+def _sentence(channel: Channel) -> str:
+    return channel.meaning[:1].upper() + channel.meaning[1:]
+
+
+def _label(channel: Channel) -> str:
+    return f"{channel.name.replace('_', ' ')} [{channel.unit}]"
+
+
+def _of_train(results: Results, channel: Channel) -> Figure:
+    """A panel for each pantograph, a curve for each of its columns."""
+    names = results.pantograph_names()
+    columns = results.strip_columns()
+    if channel.per != STRIP:
+        columns = [range(p, p + 1) for p in range(len(names))]
+    start, end = travelled(results)
+    figure, panels = stacked(0.7 + 2.7 * len(names), len(names), shared=True)
+    for p, axes in enumerate(panels):
+        mark_line(axes, results, start, end)
+        position = results.column("contact_position", p)
+        for number, column in enumerate(columns[p]):
+            values = results.column(channel.name, column)
+            chosen = thinned(values)
+            several = len(columns[p]) > 1
+            label = f"strip {number + 1}" if several else channel.name.replace("_", " ")
+            own = colour(number if several else p)
+            axes.plot(position[chosen], values[chosen], color=own, linewidth=1.2, label=label)
+        tidy(axes, "", _label(channel), names[p].capitalize())
+        legend_above(axes)
+    panels[-1].set_xlabel("position along the track [m]")
+    return figure
+
+
+def _on_line(results: Results, channel: Channel) -> Figure:
+    """The range of each column over the run."""
+    x = results.line("arm_x" if channel.per == ARM else "dropper_x")
+    low, high = results.extremes(channel.name)
+    figure, (axes,) = stacked(3.4, 1)
+    mark_line(axes, results, float(np.min(x, initial=0.0)), float(np.max(x, initial=1.0)))
+    axes.vlines(x, low, high, color=COLOURS[0], linewidth=1.6, label="range over the run")
+    tidy(axes, "position along the track [m]", _label(channel))
+    legend_above(axes)
+    return figure
+
+
+def _of_energy(time: np.ndarray, values: np.ndarray, channel: Channel) -> Figure:
+    figure, (axes,) = stacked(3.0, 1)
+    chosen = thinned(values)
+    axes.plot(time[chosen], values[chosen], color=COLOURS[0], label=channel.name.replace("_", " "))
+    axes.margins(x=0.0)
+    tidy(axes, "time [s]", _label(channel))
+    legend_above(axes)
+    return figure

@@ -1,0 +1,231 @@
+"""The channels of a run: one table of what is recorded, and where its values come from.
+
+Time loop, recorder, result file, its reader and checks, CSV, report and documents all read
+``CHANNELS``. To add a channel, add a row. Its ``values`` names an array that every step keeps up to
+date; a step in the compiled loop copies it as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from catenary.solver.contact.forces_on_line import Interaction
+    from catenary.solver.contact.pantographs import Pantographs
+    from catenary.solver.schemes.scheme import Scheme
+
+PANTOGRAPH = "pantograph"
+ARM = "steady arm"
+DROPPER = "dropper"
+STRIP = "strip"
+RUN = "run"
+
+
+class Sources(NamedTuple):
+    """What channels take their values from, as it is for one part of a march.
+
+    ``arm_uplift`` [m] and ``dropper_force`` [N] are those of this rank; models of pantographs are
+    on rank 0 only.
+    """
+
+    pantographs: Pantographs
+    interaction: Interaction
+    scheme: Scheme
+    arm_uplift: np.ndarray
+    dropper_force: np.ndarray
+
+
+class Energies(NamedTuple):
+    """What energies are taken from: ``kinetic`` and ``elastic`` energy of the line [J]."""
+
+    kinetic: float
+    elastic: float
+    sources: Sources
+
+
+class Train(NamedTuple):
+    """What decides which channels a run has: strips of each pantograph in running order, and
+    whether a pantograph has joints that may open."""
+
+    n_strips: tuple[int, ...]
+    joints_in_loop: bool
+
+    @property
+    def several_strips(self) -> bool:
+        """Whether any pantograph has more than one strip."""
+        return max(self.n_strips, default=1) > 1
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A recorded quantity.
+
+    Attributes
+    ----------
+    name : name of the dataset in the result file
+    unit : SI unit, "-" if none
+    meaning : what it is and which sign it has, in words
+    per : what a column stands for: ``PANTOGRAPH``, ``STRIP``, ``ARM`` or ``DROPPER``; ``RUN`` for
+        one value a row
+    values : which array (columns,) of contiguous doubles holds the values after a step. Of arms and
+        droppers these are the rank's own; of pantographs and strips rank 0 has them, and the array
+        may be empty elsewhere. A function () -> (columns,) is called after each step, which then
+        are taken one by one. None for clocks
+    energy : for one of ``ENERGIES``: the value of this rank's, collective
+    when : whether a run with this train has it
+    essential : whether a result file without it, or from its first damaged row on, is of no use
+    may_be_nan : whether NaN is a value
+    own_picture : whether the report draws it in a picture made for it; others get one of their own
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    per: str
+    values: Callable[[Sources], np.ndarray | Callable[[], np.ndarray]] | None = None
+    energy: Callable[[Energies], float] | None = None
+    when: Callable[[Train], bool] = lambda train: True
+    essential: bool = False
+    may_be_nan: bool = False
+    own_picture: bool = False
+
+    @property
+    def label(self) -> str:
+        """Name and unit for a table head, for instance ``contact_force [N]``."""
+        return f"{self.name} [{self.unit}]"
+
+    @property
+    def of_line(self) -> bool:
+        """Whether it has a column for each place on the line, which may be recorded in part."""
+        return self.per in (ARM, DROPPER)
+
+    def n_columns(self, train: Train) -> int:
+        """Columns of a channel of pantographs or strips."""
+        return sum(train.n_strips) if self.per == STRIP else len(train.n_strips)
+
+
+TIME = Channel("time", "s", "time since the start of the run", RUN)
+
+CHANNELS: dict[str, Channel] = {
+    channel.name: channel
+    for channel in (
+        Channel(
+            "contact_position",
+            "m",
+            "position of the contact along the track",
+            PANTOGRAPH,
+            lambda sources: sources.pantographs.position,
+            essential=True,
+            own_picture=True,
+        ),
+        Channel(
+            "contact_force",
+            "N",
+            "contact force, >= 0 in compression",
+            PANTOGRAPH,
+            lambda sources: sources.pantographs.contact_force,
+            essential=True,
+            own_picture=True,
+        ),
+        Channel(
+            "head_height",
+            "m",
+            "height of the pan head above top of rail",
+            PANTOGRAPH,
+            lambda sources: sources.pantographs.head_height,
+            essential=True,
+            own_picture=True,
+        ),
+        Channel(
+            "wire_height",
+            "m",
+            "height of the contact wire above top of rail where the pan head is",
+            PANTOGRAPH,
+            lambda sources: sources.pantographs.wire_height,
+            essential=True,
+            own_picture=True,
+        ),
+        Channel(
+            "strip_force",
+            "N",
+            "share of a strip in the contact force, pantograph by pantograph, the leading strip "
+            "first",
+            STRIP,
+            lambda sources: sources.pantographs.strip_force,
+            when=lambda train: train.several_strips,
+            own_picture=True,
+        ),
+        Channel(
+            "constraint_violation",
+            "m",
+            "largest open joint of a pantograph whose bodies are all moved, NaN for any other",
+            PANTOGRAPH,
+            lambda sources: sources.pantographs.constraint_violation,
+            when=lambda train: train.joints_in_loop,
+            may_be_nan=True,
+            own_picture=True,
+        ),
+        Channel(
+            "arm_uplift",
+            "m",
+            "uplift of the contact wire at a steady arm from equilibrium",
+            ARM,
+            lambda sources: sources.arm_uplift,
+            own_picture=True,
+        ),
+        Channel(
+            "dropper_force",
+            "N",
+            "tension of a dropper, negative in compression; of its spring alone where "
+            "line.dropper.slack_damping keeps dampers in action",
+            DROPPER,
+            lambda sources: sources.dropper_force,
+            own_picture=True,
+        ),
+    )
+}
+
+ENERGIES: dict[str, Channel] = {
+    channel.name: channel
+    for channel in (
+        Channel("time", "s", "time of the energies", RUN, essential=True),
+        Channel(
+            "kinetic",
+            "J",
+            "kinetic energy of the line",
+            RUN,
+            energy=lambda now: now.kinetic,
+            essential=True,
+            own_picture=True,
+        ),
+        Channel(
+            "elastic",
+            "J",
+            "elastic energy of the line relative to its equilibrium at the start",
+            RUN,
+            energy=lambda now: now.elastic,
+            essential=True,
+            own_picture=True,
+        ),
+    )
+}
+
+
+def line_channels() -> tuple[str, ...]:
+    """Names of the channels with a column for each place on the line."""
+    return tuple(channel.name for channel in CHANNELS.values() if channel.of_line)
+
+
+def train_channels(train: Train | None = None) -> tuple[Channel, ...]:
+    """Channels of pantographs and strips: all, or those that a run with this train has."""
+    own = (channel for channel in CHANNELS.values() if not channel.of_line)
+    return tuple(channel for channel in own if train is None or channel.when(train))
+
+
+def energies_of(now: Energies) -> tuple[float, ...]:
+    """The values of ``ENERGIES`` but the time. Collective."""
+    return tuple(c.energy(now) for c in ENERGIES.values() if c.energy is not None)

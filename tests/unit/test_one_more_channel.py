@@ -1,0 +1,144 @@
+"""A channel is one row of a table: runs record, check, export and draw it without another edit.
+
+Three rows are added here for the time of a test: of pantographs, from an array that steps keep up
+to date, which a compiled loop copies; of droppers, from a function; and an energy.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from mpi4py import MPI
+from program import SHORT_SCENE
+
+from catenary.cases.run.runner import run_case
+from catenary.cases.scene.scene import load_scene
+from catenary.postproc.files.result_file import FORMAT
+from catenary.postproc.read.results import Results
+from catenary.postproc.report import csv_tables
+from catenary.solver.time_loop import march as time_loop
+from catenary.solver.time_loop.channels import (
+    CHANNELS,
+    DROPPER,
+    ENERGIES,
+    PANTOGRAPH,
+    RUN,
+    Channel,
+    Energies,
+    Sources,
+)
+
+PLACE = Channel(
+    "strip_place", "m", "place of the strip", PANTOGRAPH, lambda now: now.pantographs.contact_place
+)
+
+
+def slack(now: Sources) -> object:
+    return lambda: (now.dropper_force <= 0.0).astype(float)
+
+
+SLACK = Channel("slackness", "-", "1 where a dropper is slack", DROPPER, slack)  # type: ignore[arg-type]
+
+
+def total(now: Energies) -> float:
+    return now.kinetic + now.elastic
+
+
+TOTAL = Channel("total", "J", "all energy of the line", RUN, energy=total)
+SCENE = (*SHORT_SCENE, "train.end_m=155", "evaluation.from_m=140", "evaluation.to_m=150")
+
+
+def run(out: Path) -> None:
+    scene = load_scene("en50318_2002", [*SCENE, "output.field_every_s=0"])
+    assert run_case(scene, out, MPI.COMM_SELF).outcome == "done"
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The run without further channels."""
+    out = tmp_path_factory.mktemp("plain")
+    run(out)
+    return out
+
+
+@pytest.fixture
+def blocks(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
+    """For each march whether steps were taken in a compiled loop."""
+    found: list[bool] = []
+    make = time_loop.compiled_steps
+
+    def watched(*arguments: object) -> object:
+        loop = make(*arguments)  # type: ignore[arg-type]
+        found.append(loop is not None)
+        return loop
+
+    monkeypatch.setattr(time_loop, "compiled_steps", watched)
+    return found
+
+
+def assert_the_rest_is_the_same(out: Path, plain: Path) -> None:
+    with Results(out) as results, Results(plain) as before:
+        for name in filter(before.has, set(CHANNELS) - {PLACE.name, SLACK.name}):
+            np.testing.assert_array_equal(results.channel(name), before.channel(name))
+
+
+def test_a_channel_of_pantographs_is_recorded_read_exported_drawn_and_checked(
+    tmp_path: Path, plain: Path, monkeypatch: pytest.MonkeyPatch, blocks: list[bool]
+) -> None:
+    monkeypatch.setitem(CHANNELS, PLACE.name, PLACE)
+    run(tmp_path)
+    assert blocks == [True]
+    assert_the_rest_is_the_same(tmp_path, plain)
+    with Results(tmp_path) as results:
+        # The only strip stands where its pantograph is.
+        place = results.channel("strip_place")
+        np.testing.assert_array_equal(place, results.channel("contact_position"))
+        assert np.ptp(place) == pytest.approx(35.0, abs=0.1)
+        rows = list(csv.reader(io.StringIO(csv_tables.pantographs_csv(results))))
+        column = rows[0].index("strip_place [m]")
+        assert float(rows[101][column]) == pytest.approx(place[100, 0], rel=1e-8)
+    with h5py.File(tmp_path / "run.h5", "r+") as file:
+        assert file.attrs["format"].decode() == FORMAT
+        table = file["channels/strip_place"]
+        assert (table.attrs["unit"], table.attrs["meaning"]) == (b"m", b"place of the strip")
+        table[7] = np.nan
+    with Results(tmp_path) as results:
+        assert "channels/strip_place is damaged in 1 of" in results.damage[0]
+    assert (tmp_path / "channel_strip_place.png").stat().st_size > 5000
+    assert "Place of the strip." in (tmp_path / "report.html").read_text()
+
+
+def test_a_channel_of_droppers_may_be_a_function_of_the_step(
+    tmp_path: Path, plain: Path, monkeypatch: pytest.MonkeyPatch, blocks: list[bool]
+) -> None:
+    """Steps are then taken one by one, with the same result."""
+    monkeypatch.setitem(CHANNELS, SLACK.name, SLACK)
+    run(tmp_path)
+    assert blocks == [False]
+    assert_the_rest_is_the_same(tmp_path, plain)
+    with Results(tmp_path) as results:
+        slackness = results.channel("slackness")
+        np.testing.assert_array_equal(slackness, results.channel("dropper_force") <= 0.0)
+        assert slackness.any() and not slackness.all()
+        np.testing.assert_array_equal(results.extremes("slackness")[1], slackness.max(axis=0))
+        assert results.line_record.names == ("arm_uplift", "dropper_force", "slackness")
+    assert (tmp_path / "channel_slackness.png").stat().st_size > 5000
+
+
+def test_an_energy_is_recorded_read_and_drawn(
+    tmp_path: Path, plain: Path, monkeypatch: pytest.MonkeyPatch, blocks: list[bool]
+) -> None:
+    monkeypatch.setitem(ENERGIES, TOTAL.name, TOTAL)
+    run(tmp_path)
+    assert blocks == [True]
+    with Results(tmp_path) as results, Results(plain) as before:
+        found = results.energies()
+        np.testing.assert_array_equal(found["total"], found["kinetic"] + found["elastic"])
+        # A file that was written without it lacks nothing.
+        assert "total" not in before.energies() and before.damage == []
+    assert (tmp_path / "channel_total.png").stat().st_size > 5000
