@@ -1,1 +1,1 @@
-"""What is recorded of a run: facts, choice of the line's channels, and the head of the result file."""
+"""What is recorded of a run: facts, choice of line channels, and the head of the result file."""

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from program import SHORT_SCENE
 
 from catenary.cases.run.runner import run_case
-from catenary.cases.scene.scene import load_scene
+from catenary.cases.scene.load import load_scene
 from catenary.postproc.files.result_file import FORMAT
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables

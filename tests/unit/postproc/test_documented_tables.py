@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from catenary.postproc.channels.facts import FACTS
-from catenary.solver.time_loop.channels import RUN
+from catenary.solver.time_loop.channels import CHANNELS, ENERGIES, RUN
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "architecture.md"
 
@@ -18,7 +18,15 @@ def tables() -> dict[str, list[str]]:
         f"| `{name}` | {fact.unit} | {fact.per if fact.per != RUN else ''} | {fact.meaning} |"
         for name, fact in FACTS.items()
     ]
-    return {"facts": ["| fact | unit | of each | |", "|---|---|---|---|", *facts]}
+    channels = [
+        f"| `{channel.name}` | {channel.unit} | {channel.per} | {channel.meaning} |"
+        for channel in (*CHANNELS.values(), *ENERGIES.values())
+        if channel.values or channel.energy
+    ]
+    return {
+        "facts": ["| fact | unit | of each | |", "|---|---|---|---|", *facts],
+        "channels": ["| channel | unit | per | |", "|---|---|---|---|", *channels],
+    }
 
 
 @pytest.mark.parametrize("name", tables())
