@@ -297,7 +297,7 @@ def superpose(force, answers, touches, motion, gains):
             low, high = touches[i].filled
             for j in range(low, high):
                 change = f * answers[i, j]
-                z[j] += change
+                z[j] += gains[2] * change
                 x[j] += gains[0] * change
                 y[j] += gains[1] * change
 
@@ -316,7 +316,7 @@ def compensate(numbers, compensation, start, offset, data, motion, gains):
         if f != 0.0:
             for j in range(offset[d], offset[d + 1]):
                 change = f * data[j]
-                z[begin + j] -= change
+                z[begin + j] -= gains[2] * change
                 x[begin + j] -= gains[0] * change
                 y[begin + j] -= gains[1] * change
 

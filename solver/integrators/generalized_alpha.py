@@ -19,11 +19,16 @@ from typing import Any
 
 import numpy as np
 
+from catenary.solver.base import aligned_arrays
 from catenary.solver.integrators import alpha_kernels
 from catenary.solver.integrators.line_integrator import LineMotion
+from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.problem.integrator_parameters import Integration
+
+# Share of dt^2 below which the acceleration cannot be found from what a prediction takes from it.
+_LEAST_SHARE = 1e-3
 
 
 class GeneralizedAlphaLine(LineMotion):
@@ -39,7 +44,7 @@ class GeneralizedAlphaLine(LineMotion):
         beta, gamma, mass_weight, force_weight = integration
         ratio = (1.0 - force_weight) / (1.0 - mass_weight)
         super().__init__(comm, model, ownership, ratio * beta * dt**2, ratio * gamma * dt)
-        self._known = np.zeros(ownership.n_local)
+        self._known = aligned_arrays.zeros(ownership.n_local, 3)
         self._coefficients = np.array(
             [
                 dt,
@@ -53,6 +58,39 @@ class GeneralizedAlphaLine(LineMotion):
                 self._alpha_share,
             ]
         )
+
+    def _ahead(self) -> tuple[AlphaAhead, AlphaSteps] | None:
+        dt, ratio, from_balanced, from_own = map(float, self._coefficients[:4])
+        own_position, known_position, own_velocity, known_velocity, work = map(
+            float, self._coefficients[4:]
+        )
+        known = from_balanced + from_own * ratio, from_own
+        # What b and p before a step do to displacement and velocity until its end.
+        position = tuple(
+            own_position * own + known_position * share
+            for own, share in zip((ratio, 1.0), known, strict=True)
+        )
+        velocity = tuple(
+            own_velocity * own + known_velocity * share
+            for own, share in zip((ratio, 1.0), known, strict=True)
+        )
+        balance = position[0] + work * velocity[0], position[1] + work * velocity[1]
+        if not self._proportional or abs(balance[0]) < _LEAST_SHARE * dt**2:
+            return None
+        steps = AlphaSteps(
+            known,
+            (velocity[0], velocity[1]),
+            balance,
+            self.position_factor,
+            self.velocity_factor,
+            dt,
+            work,
+            self._beta_share,
+        )
+        operators, (shown, rate, _, _) = self.operators, self.motion.read
+        total = aligned_arrays.zeros(shown.size, 1)
+        motion = AlphaAhead(operators.factor, rate, total, self._known, shown, steps)
+        return motion, steps
 
     def predict(self) -> None:
         """Turn displacement and velocity into what they are at the end of the step if b is zero."""
@@ -72,8 +110,8 @@ class GeneralizedAlphaLine(LineMotion):
 
         The algorithm's acceleration is the same there.
         """
-        super().start(displacement, velocity, acceleration)
         self._known[:] = (1.0 - self._coefficients[1]) * acceleration
+        super().start(displacement, velocity, acceleration)
 
     def state(self) -> Mapping[str, np.ndarray]:
         """All that the next step starts from, by name; to be read before that."""
@@ -85,5 +123,5 @@ class GeneralizedAlphaLine(LineMotion):
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """Continue from what ``state`` returned, here or elsewhere."""
-        super().restore(state)
         self._known[:] = state["known_acceleration"]
+        super().restore(state)

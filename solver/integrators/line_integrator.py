@@ -12,11 +12,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from catenary.solver.base import aligned_arrays
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.integrators import state_kernels
-from catenary.solver.integrators.line_state import Motion
+from catenary.solver.integrators.line_loads import LineLoads
+from catenary.solver.integrators.line_state import AlphaSteps, Motion, MotionAhead, Steps
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.step_operators import LineOperators, Loads
@@ -67,6 +69,9 @@ class LineMotion(ABC):
             self._alpha_share = alpha - self._beta_share * stiffness_share
         n = ownership.n_local
         gains = self.position_factor, self.velocity_factor
+        self._passes: StationPasses | None = None
+        self._loads: LineLoads | None = None
+        self._lost: np.ndarray | None = None
         self.motion = Motion(
             aligned_arrays.zeros(n, 2), aligned_arrays.zeros(n, 3), self.operators.answer, gains
         )
@@ -76,8 +81,49 @@ class LineMotion(ABC):
 
     @property
     def passes(self) -> StationPasses | None:
-        """What takes free steps without loads in compiled code, None if these are taken in
-        parts."""
+        """What takes free steps in compiled code, None if these are taken in parts."""
+        return self._passes
+
+    def lose(self, load: np.ndarray) -> None:
+        """Step under a constant ``load`` (n_dofs,) [N], [N m], which all ranks pass, from now on:
+        the balance that incidents have taken from the line. Before ``keep_ahead``."""
+        self._lost = load
+
+    def keep_ahead(self, loaded: bool = False) -> None:
+        """Keep the state one prediction ahead from now on, if method and operators allow it.
+
+        Of steps there are then only free ones, in two passes over the state. ``loaded`` tells
+        whether they will have loads. Collective.
+        """
+        ahead = self._ahead()
+        if ahead is None:
+            return
+        motion, steps = ahead
+        loads = None
+        if loaded or self._lost is not None:
+            loads = LineLoads(self._comm, self.ownership, self.operators.domain, self._lost)
+        values = np.zeros(0) if loads is None else loads.values
+        parts, passes = self.operators.by_stations(not self._proportional), None
+        if parts is not None:
+            product, factors, read, rates, answer = parts
+            passes = StationPasses(product, factors, read, rates, values, answer, motion, steps)
+        # A rank without stations has no passes; it keeps its state like the others.
+        can = passes is not None or self.ownership.n_local == 0
+        if not self._comm.allreduce(int(can), op=MPI.MIN):
+            if loads is not None:
+                loads.destroy()
+            return
+        self._passes, self._loads = passes, loads
+        if passes is not None:
+            passes.look_at(*self._droppers)
+        motion.put(self.displacement, self.velocity, self.acceleration)
+        self.motion = motion
+
+    def _ahead(self) -> tuple[MotionAhead, Steps | AlphaSteps] | None:
+        """A motion to keep ahead, in the arrays of this one, and the steps it is kept for.
+
+        None if the method cannot.
+        """
         return None
 
     @property
@@ -136,10 +182,20 @@ class LineMotion(ABC):
         collective.
         """
         self._droppers = ends, laws, tension
+        if self._passes is not None:
+            self._passes.look_at(ends, laws, tension)
 
     def free_step(self, loads: Loads | None = None) -> None:
-        """Take the step without contacts and slack droppers: ``predict``, ``free_acceleration``
-        and ``correct``. Collective."""
+        """Take the step without contacts and slack droppers: in two passes, or by ``predict``,
+        ``free_acceleration`` and ``correct``. Collective; see there for ``loads``."""
+        if self._passes is not None:
+            if loads is not None:
+                assert self._loads is not None
+                self._loads.change(loads)
+            if self._comm.size > 1:
+                self.operators.exchange()
+            self._passes.step()
+            return
         self.predict()
         self.free_acceleration(loads)
         self.correct()
@@ -155,7 +211,10 @@ class LineMotion(ABC):
         self.solve(loads)
 
     def internal_forces(self) -> None:
-        """Right-hand side -C v - K d of the step; only right after ``predict``. Collective."""
+        """Right-hand side -C v - K d of the step, and constant loads; only right after ``predict``.
+
+        Collective.
+        """
         operators = self.operators
         operators.exchange()
         operators.multiply_stiffness()
@@ -163,6 +222,9 @@ class LineMotion(ABC):
             np.negative(self.velocity, out=operators.factor)
             operators.exchange()
             operators.add_damping()
+        if self._lost is not None:
+            domain = operators.domain
+            operators.add_force(self._lost[domain.low : domain.high])
 
     def solve(self, loads: Loads | None = None) -> None:
         """Acceleration for the internal forces plus ``loads``, but for its part by damping on mass,
@@ -187,12 +249,17 @@ class LineMotion(ABC):
     def energies(self) -> tuple[float, float]:
         """Kinetic and elastic energy relative to equilibrium, all droppers taut [J]. Collective."""
         operators, displacement, velocity = self.operators, self.displacement, self.velocity
+        ahead = operators.factor.copy()
         np.copyto(operators.factor, velocity)
         kinetic = 0.5 * operators.square("mass")
         np.copyto(operators.factor, displacement)
-        return kinetic, 0.5 * operators.square("stiffness")
+        elastic = 0.5 * operators.square("stiffness")
+        np.copyto(operators.factor, ahead)
+        return kinetic, elastic
 
     def destroy(self) -> None:
         """Free all PETSc objects. Collective."""
         self.operators.destroy()
+        if self._loads is not None:
+            self._loads.destroy()
         self.solution.destroy()

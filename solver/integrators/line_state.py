@@ -35,8 +35,7 @@ class Motion:
     Attributes
     ----------
     read : x, y and z (n_local,) each, and their shares (5,), as kernels read the motion
-    gains : (2,) what x and y gain from a unit of acceleration that is found later in the step; z
-        gains the unit
+    gains : (3,) what x, y and z gain from a unit of acceleration that is found later in the step
 
     Parameters
     ----------
@@ -53,7 +52,7 @@ class Motion:
     ) -> None:
         shares = np.array([1.0, 0.0, 0.0, 1.0, 0.0])
         self.read = displacement, velocity, acceleration, shares
-        self.gains = np.array(gains)
+        self.gains = np.array([*gains, 1.0])
 
     @property
     def displacement(self) -> np.ndarray:
@@ -146,3 +145,73 @@ class MotionAhead(Motion):
         super().take(state)
         for name, array in self.carried().items():
             array[:] = state.get(name, array)
+
+
+class AlphaSteps(NamedTuple):
+    """What a step of the generalized-alpha method is made of, from one state ahead to the next.
+
+    With b the acceleration that balances the forces, p the known one and a = p + r b: shares of b
+    and of p before a step in what is ``known`` in it, and in what ``velocity`` and ``balance``,
+    which is z, get from both after it; by how much displacement and velocity change with b within
+    a step; dt, c, and the part of damping on mass.
+    """
+
+    known: tuple[float, float]
+    velocity: tuple[float, float]
+    balance: tuple[float, float]
+    position_factor: float
+    velocity_factor: float
+    dt: float
+    work_velocity: float
+    damping_share: float
+
+
+class AlphaAhead(MotionAhead):
+    """The same for the generalized-alpha method, whose steps need an acceleration p known before.
+
+    Kept are x = -(d* + c v*) of the coming step, y = v, and z = k b + l p, which is what d* + c v*
+    takes from accelerations: d = -(x + (dt + c) y + z).
+
+    Parameters
+    ----------
+    ahead, velocity, balance : arrays (n_local,) for x, y and z
+    known : array (n_local,) of p in the latest step
+    shown : array (n_local,) that is filled when displacements are asked for
+    steps : of the steps to come, all alike; ``balance[0]`` is not zero
+    """
+
+    def __init__(
+        self,
+        ahead: np.ndarray,
+        velocity: np.ndarray,
+        balance: np.ndarray,
+        known: np.ndarray,
+        shown: np.ndarray,
+        steps: AlphaSteps,
+    ) -> None:
+        way = steps.dt + steps.work_velocity
+        by_position = steps.position_factor + way * steps.velocity_factor + steps.balance[0]
+        gains = -by_position, steps.velocity_factor
+        Motion.__init__(self, ahead, velocity, balance, gains)
+        self.gains[2] = steps.balance[0]
+        self.read[3][:] = [-1.0, -way, -1.0, 1.0, 0.0]
+        self._way, self._balance, self._shown, self.known = way, steps.balance, shown, known
+
+    @property
+    def acceleration(self) -> np.ndarray:
+        """The one that balances the forces at the end of the latest step (n_local,) [m/s2]; a new
+        array."""
+        of_balanced, of_known = self._balance
+        return np.asarray((self.read[2] - of_known * self.known) / of_balanced)
+
+    def put(self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:
+        """Take a state, (n_local,) each, after ``known``."""
+        x, y, z, _ = self.read
+        of_balanced, of_known = self._balance
+        total = of_balanced * acceleration + of_known * self.known
+        x[:] = -(displacement + self._way * velocity + total)
+        y[:], z[:] = velocity, total
+
+    def carried(self) -> Mapping[str, np.ndarray]:
+        """Predictions and what accelerations do to them, by name: the arrays themselves."""
+        return {"ahead": self.read[0], "balance_ahead": self.read[2]}

@@ -1,4 +1,4 @@
-"""A line's step without contacts in two passes over its state, for Newmark's method.
+"""A line's step without contacts in two passes over its state, for Newmark's family.
 
 Forth, from both ends of the line to its middle: product with K and elimination. Back:
 substitution, correction, and the prediction of the step to come. A step that does these one after
@@ -8,12 +8,14 @@ for; here a stretch of the line is in the nearest cache until a pass is through 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from catenary.solver.base.bound import bound
-from catenary.solver.integrators.line_state import MotionAhead, Steps
+from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps, MotionAhead, Steps
 from catenary.solver.integrators.state_kernels import compiled, in_line, tension_of
-from catenary.solver.linear.lanes import add_scaled, load, pitch, store, zero
+from catenary.solver.linear.lanes import Layout, add_scaled, load, pitch, remembers, store, zero
 from catenary.solver.linear.station_factors import (
     StationFactors,
     eliminate,
@@ -57,17 +59,18 @@ class StationPasses:
         loads: np.ndarray,
         answer: np.ndarray,
         motion: MotionAhead,
-        steps: Steps,
+        steps: Steps | AlphaSteps,
     ) -> None:
         low, high = factors.low, factors.high
         layout = factors.layout
+        if isinstance(steps, AlphaSteps):
+            layout = Layout(layout.widths, layout.paired, remembers=True)
         factored = layout, factors.kinds, factors.blocks, low, high
-        multiplied = layout, product.kinds, product.blocks, product.first, read, velocity
-        by_position, by_velocity = map(float, motion.gains)
-        changes = steps.dt, by_position, by_velocity, steps.damping_share
+        multiplied = product.layout, product.kinds, product.blocks, product.first, read, velocity
+        changes, known = changes_of(motion, steps)
         self._stretch = max(1, _STRETCH // layout.pitch)
         self._place = low, high, self._stretch, layout.pitch
-        self._parts = multiplied, factored, loads, answer, motion.read, changes
+        self._parts = multiplied, factored, loads, answer, (*motion.read, known), changes
         self.look_at(np.zeros((0, 2), np.int64), np.zeros((0, 4)), np.zeros(0))
 
     def look_at(self, ends: np.ndarray, laws: np.ndarray, tension: np.ndarray) -> None:
@@ -81,6 +84,26 @@ class StationPasses:
         self._step()
 
 
+def changes_of(motion: MotionAhead, steps: Steps | AlphaSteps) -> tuple[tuple[float, ...], Any]:
+    """Numbers that take a state from one prediction to the next, and the known acceleration."""
+    by_position, by_velocity, _ = map(float, motion.gains)
+    if isinstance(steps, Steps):
+        newmark = steps.dt, by_position, by_velocity, steps.damping_share
+        return (*newmark, *[0.0] * 6), np.zeros(0)
+    assert isinstance(motion, AlphaAhead)
+    of_balanced, of_known = steps.balance
+
+    def from_kept(shares: tuple[float, float]) -> tuple[float, float]:
+        """Shares of b and p as those of z and p."""
+        return shares[0] / of_balanced, shares[1] - shares[0] * of_known / of_balanced
+
+    # z of the end of the step stands for its part of the coming prediction.
+    by_position += of_balanced
+    step = steps.dt, by_position, by_velocity, steps.damping_share
+    more = *from_kept(steps.known), *from_kept(steps.velocity), *steps.balance
+    return tuple(map(float, (*step, *more))), motion.known
+
+
 # Kernels take what belongs together as tuples, named as in ``StationPasses``.
 
 
@@ -88,15 +111,34 @@ class StationPasses:
 def go_on(layout, station, solution, motion, changes):
     """Take the rank's own station from one prediction to the next: ``kernels.correct`` and
     ``predict`` at once. What was solved for is its acceleration but for damping on mass."""
-    x, y, z, _ = motion
-    dt, by_position, by_velocity, damping_share = changes
+    x, y, z, _, known = motion
     at = pitch(layout) * np.uint64(station)
+    if remembers(layout):
+        go_on_by_alpha(layout, at, solution, motion, changes)
+        return
+    dt, by_position, by_velocity, damping_share = changes[:4]
     v = load(layout, y, at)
     a = add_scaled(solution, -damping_share, v)
     store(layout, z, at, a)
     ahead = add_scaled(add_scaled(load(layout, x, at), -dt, v), by_position, a)
     store(layout, x, at, ahead)
     store(layout, y, at, add_scaled(v, by_velocity, a))
+
+
+@in_line
+def go_on_by_alpha(layout, at, solution, motion, changes):
+    """The same for the generalized-alpha method; see ``AlphaAhead``."""
+    x, y, z, _, known = motion
+    before, then = load(layout, z, at), load(layout, known, at)
+    known_now = add_scaled(add_scaled(zero(layout), changes[4], before), changes[5], then)
+    v = add_scaled(add_scaled(load(layout, y, at), changes[6], before), changes[7], then)
+    b = add_scaled(solution, -changes[3], v)
+    total = add_scaled(add_scaled(zero(layout), changes[8], b), changes[9], known_now)
+    ahead = add_scaled(add_scaled(load(layout, x, at), -changes[0], v), changes[1], b)
+    store(layout, known, at, known_now)
+    store(layout, x, at, add_scaled(ahead, -1.0, total))
+    store(layout, y, at, add_scaled(v, changes[2], b))
+    store(layout, z, at, total)
 
 
 @in_line
@@ -164,9 +206,9 @@ def pull(number, motion, droppers):
     ends, laws, tension, ranges, _ = droppers
     before, now = ranges[number - 1], ranges[number]
     for dropper in range(now[0], before[0]):
-        tension[dropper] = tension_of(dropper, motion, ends, laws)
+        tension[dropper] = tension_of(dropper, motion[:4], ends, laws)
     for dropper in range(before[1], now[1]):
-        tension[dropper] = tension_of(dropper, motion, ends, laws)
+        tension[dropper] = tension_of(dropper, motion[:4], ends, laws)
 
 
 @compiled

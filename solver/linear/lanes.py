@@ -49,6 +49,7 @@ class Layout:
     paired : whether K and C join a station to those beside it in pairs of unknowns only: 0 and 1,
         2 and 3 and so on, as a beam's deflection and slope
     damped : whether a product with K is one with C as well
+    remembers : whether steps need an acceleration known before, as the generalized-alpha method's
 
     Attributes
     ----------
@@ -56,8 +57,15 @@ class Layout:
     n_lanes : lanes that they take, those without an unknown included
     """
 
-    def __init__(self, widths: tuple[int, ...], paired: bool = False, damped: bool = False) -> None:
-        self.widths, self.paired, self.damped = tuple(widths), bool(paired), bool(damped)
+    def __init__(
+        self,
+        widths: tuple[int, ...],
+        paired: bool = False,
+        damped: bool = False,
+        remembers: bool = False,
+    ) -> None:
+        self.widths, self.paired = tuple(widths), bool(paired)
+        self.damped, self.remembers = bool(damped), bool(remembers)
         self.pitch = sum(self.widths)
         self._plane = min(lanes for lanes in LANES if lanes >= max(self.widths))
         self.n_lanes = self._plane * len(self.widths)
@@ -103,9 +111,11 @@ class Layout:
 class LayoutType(types.Type):
     """Numba's type of a layout, which is all of it."""
 
-    def __init__(self, widths: tuple[int, ...], paired: bool, damped: bool) -> None:
-        self.layout = Layout(widths, paired, damped)
-        super().__init__(name=f"Layout({widths}, {paired}, {damped})")
+    def __init__(
+        self, widths: tuple[int, ...], paired: bool, damped: bool, remembers: bool
+    ) -> None:
+        self.layout = Layout(widths, paired, damped, remembers)
+        super().__init__(name=f"Layout({widths}, {paired}, {damped}, {remembers})")
 
 
 class Lanes(types.Type):
@@ -131,7 +141,7 @@ class _LanesModel(models.PrimitiveModel):
 
 @typeof_impl.register(Layout)
 def _type_of(layout: Layout, context: Any) -> LayoutType:
-    return LayoutType(layout.widths, layout.paired, layout.damped)
+    return LayoutType(layout.widths, layout.paired, layout.damped, layout.remembers)
 
 
 @unbox(LayoutType)
@@ -158,6 +168,9 @@ pitch = _constant(lambda layout: layout.pitch, "Unknowns of a station.")
 block_size = _constant(lambda layout: layout.partners.size, "Numbers of a packed block.")
 beside_size = _constant(
     lambda layout: layout.partners_beside.size, "Numbers of a packed block beside that of K or C."
+)
+remembers = _constant(
+    lambda layout: layout.remembers, "Whether steps need an acceleration known before."
 )
 is_damped = _constant(lambda layout: layout.damped, "Whether a product with K is one with C too.")
 

@@ -49,25 +49,29 @@ def neighbours(matrix: sparse.bsr_matrix, first: int = 0) -> np.ndarray | None:
     return blocks
 
 
-def layout_of(
-    operator: np.ndarray, stiffness: np.ndarray, damping: np.ndarray | None = None
-) -> Layout | None:
-    """Layout of a line by its blocks of A, K, and C if that is not proportional.
+def layout_of(operator: np.ndarray, stiffness: np.ndarray) -> Layout | None:
+    """Layout of a line by its blocks of A and K, see ``neighbours``.
 
-    All are those of ``neighbours``. None if a plane is wider than kernels are.
+    None if a plane is wider than kernels are.
     """
-    products = [stiffness] if damping is None else [stiffness, damping]
-    joined = (operator != 0).any(axis=(0, 1))
-    beside = np.zeros_like(joined)
-    for blocks in products:
-        joined |= (blocks != 0).any(axis=(0, 1))
-        beside |= (blocks[0::2] != 0).any(axis=(0, 1))
+    joined = (operator != 0).any(axis=(0, 1)) | (stiffness != 0).any(axis=(0, 1))
     widths = _planes(joined)
     if max(widths) > WIDEST:
         return None
-    rows, columns = np.nonzero(beside)
-    paired = all(width % 2 == 0 for width in widths) and bool((rows // 2 == columns // 2).all())
-    return Layout(widths, paired, damping is not None)
+    even = all(width % 2 == 0 for width in widths)
+    return Layout(widths, even and _in_pairs((stiffness[0::2] != 0).any(axis=(0, 1))))
+
+
+def with_damping(layout: Layout, damping: np.ndarray | None) -> Layout:
+    """The same for products with C, by its blocks, as well."""
+    paired = layout.paired and damping is not None and _in_pairs((damping[0::2] != 0).any((0, 1)))
+    return Layout(layout.widths, paired, damped=True)
+
+
+def _in_pairs(joined: np.ndarray) -> bool:
+    """Whether ``joined`` (b, b) joins the unknowns 0 and 1, 2 and 3 and so on at most."""
+    rows, columns = np.nonzero(joined)
+    return bool((rows // 2 == columns // 2).all())
 
 
 def _planes(joined: np.ndarray) -> tuple[int, ...]:

@@ -35,6 +35,7 @@ from catenary.solver.linear.station_products import (
     layout_of,
     neighbours,
     station_product,
+    with_damping,
 )
 from catenary.solver.linear.unit_responses import Windows
 from catenary.solver.model.matrices import as_petsc, columns_of, part_of
@@ -54,12 +55,14 @@ _COEFFICIENTS = {
 class ByStations(NamedTuple):
     """A product with K and factors of A by stations, and the arrays that both work on.
 
-    ``read`` is what the product reads, ``answer`` what the solve fills, of all that is solved for.
+    ``read`` is what the product reads, ``rates`` what a product with C does, ``answer`` what the
+    solve fills, of all that is solved for.
     """
 
     product: StationProduct
     factors: StationFactors
     read: np.ndarray
+    rates: np.ndarray
     answer: np.ndarray
 
 
@@ -85,6 +88,7 @@ class LineOperators:
     _solver: PartSolver | SchwarzSolver | None = None
     _is_direct = True
     _layout: Layout | None = None
+    _rate_halo: Halo | None = None
 
     def __init__(
         self,
@@ -131,21 +135,29 @@ class LineOperators:
             self._solver.hurry()
         self._station_product("stiffness")  # that no step has to wait for them
 
-    def by_stations(self) -> ByStations | None:
+    def by_stations(self, damped: bool) -> ByStations | None:
         """What a step in two passes works on, None unless all goes by stations. Not collective.
 
         The operator is then factored and multiplied by stations, and solved for in one application.
+        ``damped`` steps need a product with C, of ``rate``, too.
         """
-        stiffness, solver = self._station_product("stiffness"), self._solver
-        if stiffness is None or not isinstance(solver, PartSolver):
+        product, solver = self._station_product("stiffness", damped), self._solver
+        if product is None or not isinstance(solver, PartSolver):
             return None
         if solver.factors is None or not self._is_direct:
             return None
-        return ByStations(stiffness, solver.factors, self._read_padded, self._solution.array)
+        read = self._read_padded
+        rates = self._rate_padded if damped else read
+        return ByStations(product, solver.factors, read, rates, self._solution.array)
 
     def exchange(self) -> None:
-        """Bring ``factor`` up to date where it is others'. Collective."""
+        """Bring ``factor``, and ``rate`` if it is used, up to date where they are others'.
+
+        Collective.
+        """
         self._halo.exchange()
+        if self._rate_halo is not None:
+            self._rate_halo.exchange()
 
     def multiply_stiffness(self) -> None:
         """Make K ``factor`` the internal force. Right after ``exchange``. Not collective."""
@@ -228,14 +240,27 @@ class LineOperators:
         return float(np.sqrt(squares[0] / squares[1]))
 
     @property
+    def rate(self) -> np.ndarray:
+        """(n_local,) what products with C multiply in two passes: this rank's part, to be filled
+        in. Collective when first asked for."""
+        block, domain = self._block, self.domain
+        if self._rate_halo is None:
+            self._rate_padded = aligned_arrays.zeros(self._read_padded.size, 3)
+            read = self._rate_padded[block : self._rate_padded.size - block]
+            self._rate_halo = Halo(self._comm, self._ownership, domain.read_low, read)
+        read = self._rate_padded[block : self._rate_padded.size - block]
+        return read[domain.owned_of_read]
+
+    @property
     def traffic(self) -> tuple[int, int]:
         """Messages and bytes that this rank sends at an exchange."""
         return self._halo.messages, self._halo.bytes_sent
 
     def destroy(self) -> None:
         """Free all PETSc objects and messages. Collective."""
-        for halo in (self._halo, self._loaded_halo):
-            halo.destroy()
+        for halo in (self._halo, self._loaded_halo, self._rate_halo):
+            if halo is not None:
+                halo.destroy()
         for held in (self._solver, *self._products.values(), *self._vectors):
             if held is not None:
                 held.destroy()
@@ -315,6 +340,7 @@ class LineOperators:
         self.factor, self.answer = read[domain.owned_of_read], answer[domain.owned]
         self._halo = Halo(self._comm, own, read_low, read)
         self._loaded_halo = Halo(self._comm, own, low, loaded)
+        self._rate_halo = None
 
     def _product(self, name: str) -> PETSc.Mat:
         """M, K or C for the rows of the subdomain, made when it is first asked for."""
@@ -331,16 +357,21 @@ class LineOperators:
         elif self.domain.size:
             self._product(name).mult(self._read, wrapped)
 
-    def _station_product(self, name: str) -> StationProduct | None:
+    def _station_product(self, name: str, damped: bool = False) -> StationProduct | None:
         """Products with M, K or C by stations, made when they are first asked for; None if they
-        cannot be."""
-        if name not in self._by_stations:
+        cannot be. ``damped`` ones subtract a product with C."""
+        key = f"damped {name}" if damped else name
+        if key not in self._by_stations:
             domain, product = self.domain, None
             if self._layout is not None and domain.size:
                 first = (domain.low - domain.read_low) // self._block
-                product = station_product(self._rows_of(name), first, self._layout)
-            self._by_stations[name] = product
-        return self._by_stations[name]
+                layout, damping = self._layout, None
+                if damped:
+                    damping = self._rows_of("damping")
+                    layout = with_damping(layout, neighbours(damping, first))
+                product = station_product(self._rows_of(name), first, layout, damping)
+            self._by_stations[key] = product
+        return self._by_stations[key]
 
     def _find_layout(self, part: sparse.bsr_matrix) -> Layout | None:
         """How unknowns of a station stand in lanes; None if they cannot, or nodes do not pair."""

@@ -66,8 +66,8 @@ class SetUp:
         comm, model, train = self.comm, changed.model, problem.train
         numerics = problem.numerics
         in_parts = numerics.scheme != "one_solve" or numerics.coupling == "explicit"
-        only_free = not (in_parts or model.step_loads)
-        line = make_line(comm, model, self.ownership, numerics, changed.load, only_free)
+        loaded = bool(model.step_loads)
+        line = make_line(comm, model, self.ownership, numerics, changed.load, not in_parts, loaded)
         on = model.terms_of
         trailing = max(placement.behind for placement in train.placements)
         offsets = [x for placement in train.placements for x in placement.data.strip_offsets]
@@ -135,8 +135,8 @@ class SetUp:
         free = ~np.isin(np.arange(model.n_dofs), model.constrained)
         parts = []
         for load in model.step_loads:
-            mine = self.ownership.owned(load.dofs) & free[load.dofs]
-            if mine.any():
+            mine = np.flatnonzero(self.ownership.owned(load.dofs) & free[load.dofs])
+            if mine.size:
                 parts.append((load, mine, load.dofs[mine] - self.ownership.first))
         if not model.step_loads:
             return lambda time: None

@@ -42,10 +42,10 @@ def line(
     return sparse.bsr_matrix((np.array(data), indices, indptr), shape=shape)
 
 
-def layout(matrix: sparse.bsr_matrix, damping: sparse.bsr_matrix | None = None) -> Layout:
-    """Layout for products with a matrix, and with another for velocities, and for its factors."""
+def layout(matrix: sparse.bsr_matrix) -> Layout:
+    """Layout for products with a matrix and for its factors."""
     blocks = neighbours(matrix)
     assert blocks is not None
-    found = layout_of(blocks, blocks, None if damping is None else neighbours(damping))
+    found = layout_of(blocks, blocks)
     assert found is not None
     return found

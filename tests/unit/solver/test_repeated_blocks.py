@@ -97,7 +97,6 @@ def test_planes_are_what_no_matrix_joins() -> None:
         joined = apart.copy()
         joined[place] = 0.1
         assert layout_of(joined, apart).widths == layout_of(apart, joined).widths == (6,)
-        assert layout_of(apart, apart, joined).widths == (6,)
     assert layout_of(*[np.ones((3, 2, WIDEST + 1, WIDEST + 1))] * 2) is None
 
 

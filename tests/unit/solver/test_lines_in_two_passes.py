@@ -1,0 +1,101 @@
+"""Free steps in two passes against prediction, product, solve and correction, one by one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from measuring import COMM
+from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of
+
+from catenary.solver.integrators.line_integrator import LineMotion
+from catenary.solver.integrators.make_line import make_line
+from catenary.solver.model.model import Model
+from catenary.solver.model.partition import distribute
+from catenary.solver.problem.problem import Damping, Numerics
+from catenary.solver.statics.equilibrium import find_form
+
+STEPS = 40
+# Round-off of a step, which 40 steps add up; forces of accelerations differ most.
+ROUND_OFF = 1e-11
+NEWMARK = numerics(1e-3)
+HHT = replace(NEWMARK, integrator="hht", spectral_radius=0.7)
+ALPHA = replace(NEWMARK, integrator="generalized_alpha", spectral_radius=0.8)
+ONE = Damping(1e-4, 0.0125)
+OF_COMPONENTS = Damping(1e-4, 0.0125, {"contact_wire": (2e-3, 0.3), "droppers": (1e-2, 0.0)})
+
+
+@cache
+def model(by_component: bool) -> Model:
+    damping = OF_COMPONENTS if by_component else ONE
+    problem = problem_of(en50318_line(3), WHOLE, damping=damping)
+    return find_form(problem, mesh_of(en50318_line(3), 3))[0]
+
+
+def line(
+    found: Model, method: Numerics, in_passes: bool, lost: np.ndarray | None, loaded: bool
+) -> LineMotion:
+    made = make_line(COMM, found, distribute(found, 1, 0), method, lost, in_passes, loaded)
+    assert (made.passes is not None) is in_passes
+    return made
+
+
+@pytest.mark.parametrize("loaded", [False, True])
+@pytest.mark.parametrize("lossy", [False, True])
+@pytest.mark.parametrize(
+    ("method", "by_component"), [(NEWMARK, False), (NEWMARK, True), (HHT, False), (ALPHA, False)]
+)
+def test_two_passes_take_the_steps_of_their_parts(
+    method: Numerics, by_component: bool, lossy: bool, loaded: bool
+) -> None:
+    found = model(by_component)
+    rng = np.random.default_rng(5)
+    free = np.ones(found.n_dofs)
+    free[found.constrained] = 0.0
+    start = [rng.standard_normal(found.n_dofs) * free * scale for scale in (1e-3, 0.1, 10.0)]
+    lost = 50.0 * rng.standard_normal(found.n_dofs) * free if lossy else None
+    pulled = np.flatnonzero(free)[::5]
+    states = []
+    for in_passes in (True, False):
+        made = line(found, method, in_passes, lost, loaded)
+        made.start(*start)
+        for number in range(STEPS):
+            force = np.full(pulled.size, 30.0 * (number // 3))
+            made.free_step([(pulled, force)] if loaded else None)
+        states.append({name: values.copy() for name, values in made.state().items()})
+        made.destroy()
+    for name, values in states[0].items():
+        difference = np.abs(values - states[1][name]).max()
+        assert difference < ROUND_OFF * np.abs(states[1][name]).max(), name
+
+
+@pytest.mark.parametrize(
+    ("method", "by_component"), [(NEWMARK, True), (HHT, False), (ALPHA, False)]
+)
+def test_a_line_kept_ahead_goes_on_bit_for_bit(method: Numerics, by_component: bool) -> None:
+    found = model(by_component)
+    rng = np.random.default_rng(6)
+    free = np.ones(found.n_dofs)
+    free[found.constrained] = 0.0
+    one, other = (line(found, method, True, None, False) for _ in range(2))
+    one.start(*(rng.standard_normal(found.n_dofs) * free for _ in range(3)))
+    for _ in range(5):
+        one.free_step()
+    other.restore({name: values.copy() for name, values in one.exact_state().items()})
+    for made in (one, other):
+        for _ in range(5):
+            made.free_step()
+    for name, values in one.exact_state().items():
+        assert np.array_equal(values, other.exact_state()[name]), name
+    one.destroy()
+    other.destroy()
+
+
+def test_damping_by_component_under_generalized_alpha_is_stepped_in_parts() -> None:
+    """Its product with C reads a velocity that the state kept ahead does not hold."""
+    found = model(True)
+    made = make_line(COMM, found, distribute(found, 1, 0), HHT)
+    assert made.passes is None
+    made.destroy()
