@@ -59,7 +59,7 @@ def conclude(runs: Mapping[str, StudyRun], table: Mapping[str, Any]) -> Study:
         "Statistics of the 20 Hz force from 400 to 800 m; 'light' and 'average' are the dampings "
         "alpha = 0.00275 s and 0.0275 s.",
         readings=[
-            Reading(one["name"], one["title"], one["set"],
+            Reading(one["name"], one["title"], changes_of(one),
                     explained if one is first else found[one["name"]])
             for one in readings
         ],  # fmt: skip
@@ -228,6 +228,12 @@ def _explained(
     return replace(finding, reason=" ".join(parts))
 
 
+def changes_of(reading: Mapping[str, Any]) -> list[str]:
+    """What a reading changes of the case, its kind of pantograph included, as assignments."""
+    kind = [f"train.pantographs.0.name={reading['kind']}"] if "kind" in reading else []
+    return [*kind, *reading["set"]]
+
+
 def _table_of(reading: Mapping[str, Any], runs: Runs) -> StudyTable:
     head = ["train", "damping", "pantograph", "mean [N]", "std [N]", "std / mean [%]", "max [N]",
             "min [N]", "loss [%]", "arm uplift [mm]", "slack at mid-span"]  # fmt: skip
@@ -246,7 +252,7 @@ def _table_of(reading: Mapping[str, Any], runs: Runs) -> StudyTable:
                     f"{force.minimum:.0f}", f"{force.loss_percent:.1f}", f"{1e3 * run.uplift:.1f}",
                     f"{slack.trailing if name == 'trailing' else slack.leading} of {slack.of}",
                 ])  # fmt: skip
-    changes = " ".join(reading["set"])
+    changes = " ".join(changes_of(reading))
     return StudyTable(
         f"All configurations: {reading['title']}",
         f"Changes: {changes}." if changes else "No changes.",

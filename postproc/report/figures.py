@@ -127,7 +127,8 @@ def png(figure: Figure) -> bytes:
         if "$" in text.get_text():
             text.set_parse_math(False)
     canvas = figure.canvas
-    assert isinstance(canvas, FigureCanvasAgg)
+    if not isinstance(canvas, FigureCanvasAgg):  # a figure that `new_figure` has not made
+        canvas = FigureCanvasAgg(figure)
     with warnings.catch_warnings():
         # Names may be written in letters that the font has not; boxes stand for them.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")

@@ -13,6 +13,7 @@ import pytest
 from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
+from catenary.cases.ambrosio2012.conclusion import changes_of
 from catenary.cases.ambrosio2012.study import read_table, searched, variants
 from catenary.cases.cli.main import app
 from catenary.cases.scene.convert.course import resolved
@@ -129,6 +130,16 @@ def test_the_kind_of_pantograph_is_the_cases_own_or_the_readings(
         reading, train = (one.variant.varied[key] for key in ("reading", "train"))
         if reading in kinds and train in ("single", "200m"):
             assert {place.name for place in scene_of(one).train.pantographs} == {kinds[reading]}
+
+
+def test_the_changes_of_a_reading_name_its_kind_of_pantograph() -> None:
+    told = {reading["name"]: changes_of(reading) for reading in read_table()["readings"]}
+    assert told["case"] == []
+    assert told["two_masses"] == ["train.pantographs.0.name=lumped"]
+    assert told["two_masses_50"] == ["train.pantographs.0.name=lumped", "line.span_m=50"]
+    assert {"train.pantographs.0.name=lumped", "line.dropper.slack_damping=kept"} < set(
+        told["best"]
+    )
 
 
 def test_the_search_takes_each_option_in_the_place_of_the_best_readings(
