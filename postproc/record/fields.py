@@ -26,11 +26,11 @@ from catenary.postproc.files.disk import (
     opened,
     reserve,
     write_at,
-    write_whole,
 )
 from catenary.postproc.files.own_files import part_of
 from catenary.postproc.read.guard import survives
 from catenary.postproc.record.column_gather import ColumnGather, next_flush
+from catenary.postproc.record.growing_xdmf import GrowingXdmf, snapshot_name
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.base.parallel import on_root
 from catenary.solver.time_loop.observers import Stage, StepView
@@ -87,6 +87,7 @@ class FieldRecorder:
         self._resume = resume
         self._buffered: list[float] = []
         self._written: list[float] = []
+        self._xdmf_text: GrowingXdmf | None = None
         self._broken = False
         self._handle = -1
         self._wait = wait
@@ -174,9 +175,14 @@ class FieldRecorder:
     def _open(self, stage: Stage) -> None:
         self._h5.parent.mkdir(parents=True, exist_ok=True)
         self._made_as = part_of(self._h5, os.getpid())
+        first = -(-self._first_step // self._every)
+        numbers = np.arange(first, stage.n_steps // self._every + 1)
+        # Times of the snapshots to come.
+        self._planned: list[float] = (self._every * numbers * stage.dt).tolist()
         if self._resume and self._h5.exists() and self._cut(stage):
             self._handle = os.open(self._h5, os.O_RDWR)
             self._published = True
+            self._planned = [*self._written, *self._planned][: self._n_snapshots]
             self._describe()
             return
         try:
@@ -206,6 +212,8 @@ class FieldRecorder:
             return
         os.close(self._handle)
         self._handle = -1
+        if self._xdmf_text is not None:
+            self._xdmf_text.close()
         if not self._published:
             with contextlib.suppress(OSError):
                 self._made_as.unlink(missing_ok=True)
@@ -226,14 +234,14 @@ class FieldRecorder:
         ]
         for number in range(self._n_snapshots):
             for group, space in kinds:
-                h5d.create(group, _name(number).encode(), h5t.IEEE_F32LE, space, how)
+                h5d.create(group, snapshot_name(number).encode(), h5t.IEEE_F32LE, space, how)
 
     def _find_places(self, file: h5py.File) -> None:
         """Where in the file the times and the snapshots are [bytes]; KeyError without one."""
         self._times_at = file["times"].id.get_offset()
         kinds = [file[name].id for name in ("uplift", "displacement")]
         self._places = [
-            [h5d.open(group, _name(number).encode()).get_offset() for group in kinds]
+            [h5d.open(group, snapshot_name(number).encode()).get_offset() for group in kinds]
             for number in range(self._n_snapshots)
         ]
 
@@ -297,10 +305,12 @@ class FieldRecorder:
             self._describe()
 
     def _describe(self) -> None:
-        write_whole(
-            self._xdmf,
-            xdmf(self._h5.name, self._n_nodes, self._cells.shape[0], self._written),
-        )
+        """Say in the XDMF file which snapshots are there."""
+        if self._xdmf_text is None:
+            size = self._n_nodes, self._cells.shape[0]
+            of = self._xdmf, self._h5.name, *size, self._planned
+            self._xdmf_text = GrowingXdmf(*of, len(self._written))
+        self._xdmf_text.show(len(self._written))
 
 
 def _film_bytes(n_nodes: int, n_cells: int, n_snapshots: int) -> int:
@@ -326,55 +336,3 @@ def line_cells(
         np.concatenate([cells for _, cells in parts]).astype(np.int32),
         np.concatenate(component).astype(np.int32),
     )
-
-
-def xdmf(h5_name: str, n_nodes: int, n_cells: int, times: list[float]) -> str:
-    """Text of an XDMF 3 file with a grid for each snapshot. Not collective.
-
-    Parameters
-    ----------
-    h5_name : file of the numbers, relative to the XDMF file
-    times : times of the snapshots [s]
-    """
-    mesh = f"""\
-        <Topology TopologyType="Polyline" NodesPerElement="2" NumberOfElements="{n_cells}">
-          <DataItem Dimensions="{n_cells} 2" NumberType="Int" Precision="4" Format="HDF">\
-{h5_name}:/mesh/cells</DataItem>
-        </Topology>
-        <Geometry GeometryType="XYZ">
-          <DataItem Dimensions="{n_nodes} 3" NumberType="Float" Precision="8" Format="HDF">\
-{h5_name}:/mesh/points</DataItem>
-        </Geometry>
-        <Attribute Name="component" AttributeType="Scalar" Center="Cell">
-          <DataItem Dimensions="{n_cells}" NumberType="Int" Precision="4" Format="HDF">\
-{h5_name}:/mesh/component</DataItem>
-        </Attribute>
-"""
-    lines = [
-        '<?xml version="1.0" encoding="UTF-8"?>\n',
-        '<Xdmf Version="3.0">\n  <Domain>\n',
-        '    <Grid Name="line" GridType="Collection" CollectionType="Temporal">\n',
-    ]
-    for number, time in enumerate(times):
-        lines += [
-            f'      <Grid Name="line" GridType="Uniform">\n        <Time Value="{time!r}"/>\n',
-            mesh,
-            _node_attribute("uplift", "Scalar", f"{n_nodes}", h5_name, number),
-            _node_attribute("displacement", "Vector", f"{n_nodes} 3", h5_name, number),
-            "      </Grid>\n",
-        ]
-    lines.append("    </Grid>\n  </Domain>\n</Xdmf>\n")
-    return "".join(lines)
-
-
-def _node_attribute(name: str, kind: str, dimensions: str, h5_name: str, number: int) -> str:
-    return f"""\
-        <Attribute Name="{name}" AttributeType="{kind}" Center="Node">
-          <DataItem Dimensions="{dimensions}" NumberType="Float" Precision="4" Format="HDF">\
-{h5_name}:/{name}/{_name(number)}</DataItem>
-        </Attribute>
-"""
-
-
-def _name(number: int) -> str:
-    return f"{number:06d}"

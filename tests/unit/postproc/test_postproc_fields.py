@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import pyvista
 
-from catenary.postproc.record import fields
+from catenary.postproc.record import fields, growing_xdmf
 from catenary.postproc.record.fields import FieldRecorder
 from catenary.solver.base.errors import RunBroken
 
@@ -79,6 +79,49 @@ def test_xdmf_names_the_numbers_beside_it(tmp_path: Path, make_march: Any) -> No
     with h5py.File(tmp_path / "run_7.h5") as file:
         assert all(text.split(":")[1] in file for text in items if text)
         assert len(file["uplift"]) == len(file["times"]) == 3
+
+
+def test_the_text_is_well_formed_after_each_write_of_a_flush(
+    tmp_path: Path, make_march: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a kill finds it: what was there before the flush, or some of what it adds."""
+    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
+    write, found = growing_xdmf.write_at, []
+
+    def watched(*words: Any) -> None:
+        write(*words)
+        found.append(len(times_in(path)))
+
+    monkeypatch.setattr(growing_xdmf, "write_at", watched)
+    watcher = watch(march, path, snapshots_per_flush=3)
+    watcher.start(march.stage())
+    for step in range(420):
+        watcher.observe(march.view(step))
+    # The first snapshot, then three and three of a full buffer; two writes each.
+    assert found == [0, 1, 1, 4, 4, 7]
+    assert pyvista.get_reader(path).time_values == pytest.approx(0.05 * np.arange(7))
+    watcher.finish("interrupted")
+    assert times_in(path) == pytest.approx(0.05 * np.arange(9))
+    assert "CDATA" not in path.read_text()
+
+
+def test_a_flush_writes_as_much_of_the_text_however_long_it_is(
+    tmp_path: Path, make_march: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write, sizes = growing_xdmf.write_at, []
+    monkeypatch.setattr(
+        growing_xdmf, "write_at", lambda *words: (sizes.append(words[2].nbytes), write(*words))
+    )
+    for n_steps in (200, 1000):
+        march = make_march(n_steps=n_steps)
+        march.drive(watch(march, tmp_path / f"{n_steps}.xdmf", every=10, snapshots_per_flush=5))
+    # Two writes for each of 1 + 20 / 5 flushes, and of 1 + 9 + 1 + 10 + 1 with one at step 499.
+    assert set(sizes) == {9} and len(sizes) == 2 * (5 + 22)
+
+
+def times_in(path: Path) -> list[float]:
+    """Times of the snapshots that a reader of XML finds."""
+    return [float(item.attrib["Value"]) for item in ElementTree.parse(path).iter("Time")]
 
 
 @pytest.mark.process
