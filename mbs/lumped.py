@@ -120,7 +120,12 @@ class LumpedPantograph(SteppedHead):
 
     def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
         """Fill in the force on the last mass, and where the wire crosses; see `SteppedHead`."""
-        drives[:, 0] = [self._drive(time) for time in times]
+        if self._base is None:
+            constant = self._base_stiffness * self._base_height
+            part = np.array([self._part(time) for time in times])
+            drives[:, 0] = self._lift_full * part + constant
+        else:
+            drives[:, 0] = [self._drive(time) for time in times]
         self._fill_lateral(times, drives)
 
     def record(self) -> dict[str, Any]:

@@ -72,7 +72,8 @@ class Recorder:
         self._file: ResultFile | None = None
         self._broken = False
         self._view: StepView | None = None
-        self._where: dict[str, slice] = {}
+        # Parts of a row of a view by channel, and the buffers that they go to.
+        self._kept: dict[str, tuple[slice, np.ndarray]] = {}
         self._flushed_once = False
         self._extremes: dict[str, np.ndarray] = {}
         self._rows = 0
@@ -107,11 +108,11 @@ class Recorder:
         row = self._rows
         if row == 0:
             self._first_step = view.step
-        if not self._where:
-            self._where = view.columns
-            self._kept = np.zeros((self._flush_every, view.row.size))
+        if not self._kept:
+            self._make_room(view.columns)
         self._time[row] = view.time
-        self._kept[row] = view.row
+        for part, kept in self._kept.values():
+            kept[row] = view.row[part]
         self._rows = row + 1
         self._view = view
         self._last_time = view.time
@@ -139,7 +140,8 @@ class Recorder:
             self._first_step = first_step
         end = self._rows = begin + times.size
         self._time[begin:end] = times
-        self._kept[begin:end] = rows
+        for part, kept in self._kept.values():
+            kept[begin:end] = rows[:, part]
         self._last_time = float(times[-1])
 
     def finish(self, outcome: str) -> None:
@@ -149,7 +151,7 @@ class Recorder:
         """
         if self._broken:
             return
-        if self._where:
+        if self._kept:
             self._flush(self._view if outcome in (DONE, INTERRUPTED) else None)
         self._guarded(lambda: self._open_file.conclude(outcome))
 
@@ -173,9 +175,14 @@ class Recorder:
         self._energies.clear()
         self._flushed_once = True
 
+    def _make_room(self, columns: Mapping[str, slice]) -> None:
+        """Make a buffer for each channel, so that a flush copies nothing."""
+        for name, part in columns.items():
+            self._kept[name] = part, np.zeros((self._flush_every, part.stop - part.start))
+
     def _columns(self, name: str) -> np.ndarray:
-        """What is kept of a channel here, shape (rows, columns)."""
-        return np.ascontiguousarray(self._kept[: self._rows, self._where[name]])
+        """What is kept of a channel here, shape (rows, columns); the buffer itself."""
+        return self._kept[name][1][: self._rows]
 
     # ---- rank 0 ------------------------------------------------------------------------------
 
@@ -235,7 +242,7 @@ class Recorder:
 
     def _block(self, line: LineRows) -> LineBlock:
         """The rows of the line's channels with their times and positions of the train."""
-        position = self._kept[line.chosen, self._where["contact_position"]]
+        position = self._columns("contact_position")[line.chosen]
         return LineBlock(self._time[line.chosen], position, line.values, line.extremes)
 
     def _blocks(self) -> dict[str, np.ndarray]:

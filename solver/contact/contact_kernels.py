@@ -90,6 +90,13 @@ def add_columns(node, data, by_height, by_slope, answer):
         answer[begin + j] += by_height * data[at + j] + by_slope * data[at + width + j]
 
 
+@in_line
+def clear(answer, low, high):
+    """Make the numbers from ``low`` to ``high`` zero."""
+    for j in range(low, high):
+        answer[j] = 0.0
+
+
 @compiled
 def place(x, nodes, data, touches, answers, slope_answers):
     """Make ``touches`` those at places ``x`` (n,) [m], and ``answers`` (n, n_local) the line's
@@ -100,9 +107,9 @@ def place(x, nodes, data, touches, answers, slope_answers):
     """
     for i in range(x.size):
         low, high = touches[i].filled
-        answers[i, low:high] = 0.0
+        clear(answers[i], low, high)
         if slope_answers.shape[1] > 0:
-            slope_answers[i, low:high] = 0.0
+            clear(slope_answers[i], low, high)
     locate(x, nodes, touches)
     for i in range(x.size):
         touch = touches[i]
@@ -182,6 +189,15 @@ def meet(
     return np.isfinite(total)
 
 
+@in_line
+def n_beyond(force, margin):
+    """How many forces are below a margin, or no numbers."""
+    count = 0
+    for d in range(force.size):
+        count += not (margin <= force[d] < np.inf)
+    return count
+
+
 @compiled
 def watch(
     force,
@@ -211,7 +227,11 @@ def watch(
         low, high = min(low, touches[i].x), max(high, touches[i].x)
     first = np.searchsorted(laws[:, 3], low - reach)
     last = np.searchsorted(laws[:, 3], high + reach, side="right")
-    for d in range(force.size):
+    # Mostly none is near its margin by itself: then those beyond reach are not looked at.
+    begin, end = first, last
+    if n_beyond(force, margin):
+        begin, end = 0, force.size
+    for d in range(begin, end):
         # Also true for what is no number.
         candidate = not (margin <= force[d] < np.inf)
         if not (candidate or first <= d < last):

@@ -105,8 +105,17 @@ def solve_on(matrix, right, acts, solution):
     droppers do: elimination leaves the round-off of the largest in all. One refinement makes what
     is left small beside the terms of each row (R. D. Skeel, Math. Comp. 35 (1980) 817-832).
     """
+    m, last = 0, 0
+    for i in range(acts.size):
+        solution[i] = 0.0
+        if acts[i]:
+            m, last = m + 1, i
+    if m < 2:
+        # One contact and taut droppers, mostly.
+        if m:
+            solution[last] = right[last] / matrix[last, last]
+        return
     index = np.flatnonzero(acts)
-    m = index.size
     a, order = np.empty((m, m)), np.arange(m)
     for i in range(m):
         for j in range(m):
@@ -124,9 +133,8 @@ def solve_on(matrix, right, acts, solution):
             a[i, k] /= a[k, k]
             for j in range(k + 1, m):
                 a[i, j] -= a[i, k] * a[k, j]
-    solution[:] = 0.0
     left, change = np.empty(m), np.empty(m)
-    for _ in range(1 if m == 1 else 2):
+    for _ in range(2):
         for i in range(m):
             value = right[index[i]]
             for j in range(m):

@@ -133,7 +133,8 @@ class LineOperators:
             if comm.size > 1 and comm.rank == 0 and wants_view():
                 self._solver.view()  # one for all; on one rank PETSc shows it at its first solve
             self._solver.hurry()
-        self._station_product("stiffness")  # that no step has to wait for them
+        for name in ("stiffness", "mass"):
+            self._station_product(name)  # that no step, and no energy, has to wait for them
 
     def by_stations(self, damped: bool) -> ByStations | None:
         """What a step in two passes works on, None unless all goes by stations. Not collective.

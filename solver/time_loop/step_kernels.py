@@ -12,7 +12,7 @@ import numpy as np
 
 from catenary.mbs.head import head_records
 from catenary.solver.base.compiled import compiled
-from catenary.solver.base.pointers import call, numbers_at
+from catenary.solver.base.pointers import borrowed, call, numbers_at
 from catenary.solver.contact import contact_kernels
 from catenary.solver.contact.line_response import NUMBER
 from catenary.solver.contact_problem import complementarity_kernels
@@ -83,24 +83,20 @@ def report(time, force, law):
 
 
 @compiled
-def find_forces(time, steps, response, counts):
-    """Contact forces and compensations into the arrays of ``steps.solving``.
+def find_forces(time, solving, law, pushed, n, counts):
+    """Contact forces and compensations into arrays of ``solving``.
 
     Returns the number of droppers with a compensation, -1 if that is left to others.
     """
-    summed, rows, room = response
-    solution = steps.solving[11]
-    n = steps.ends[-1]
-    if summed[2] or summed[3] or n + int(summed[0]) > room:
+    _, summed, rows, _, _, _, _, _, _, matrix, _, solution, _, _, _ = solving
+    if summed[2] or summed[3] or n + int(summed[0]) > matrix.shape[0]:
         return -1
-    rounds, size, finite, complete = complementarity_kernels.solve(*steps.solving)
-    if rounds <= 0 or not finite or not complete:
-        return -1
-    if not report(time, solution[:n], steps.law):
+    rounds, size, finite, complete = complementarity_kernels.solve(*solving)
+    if rounds <= 0 or not finite or not complete or not report(time, solution[:n], law):
         return -1
     counts[ROUNDS] += rounds
     for k in range(size - n):
-        steps.pushed[k] = int(rows[k, NUMBER])
+        pushed[k] = int(rows[k, NUMBER])
         counts[SLACK] += solution[n + k] != 0.0
     return size - n
 
@@ -112,42 +108,42 @@ def take(steps, times, drives, rows, counts, shows, first, n_steps):
     If ``shows``, ``rows`` take what each shows. Returns how many were taken, and whether the next
     one is begun: up to its free step, as its forces are left to others.
     """
-    n = steps.ends[-1]
-    start, places = steps.moving
-    address, arguments = steps.free
-    summed, table = steps.responding[13], steps.responding[14]
-    response = summed, table, steps.solving[9].shape[0]
-    solution, depth = steps.solving[11], steps.solving[12][0]
-    n_told = steps.told.size
-    motion, arms, ends, laws, kept = steps.showing
+    steps, times, drives, rows = borrowed((steps, times, drives, rows))
+    speed, moving, placing, free, records, heads = steps[:6]
+    responding, solving, law, superposing, compensating = steps[6:11]
+    pushed, ends, of_step, told, showing, taps = steps[11:]
+    start, places = moving
+    address, arguments = free
+    solution, depth, reported = solving[11], solving[12][0], law[3]
+    motion, arms, shown, laws, kept = showing
+    n, n_told = ends[-1], told.size
     n_arms = n_told + arms.size
-    n_shown = n_arms + ends.shape[0]
+    n_shown = n_arms + shown.shape[0]
+    force = solution[:n]
     for i in range(first, n_steps):
         time = times[i]
-        state_kernels.shift(start, places, steps.speed * time)
-        contact_kernels.place(*steps.placing)
+        state_kernels.shift(start, places, speed * time)
+        contact_kernels.place(*placing)
         call(address, arguments)
         within = True
-        for h in range(steps.records.size):
-            within &= head_records.predict(steps.records[h], drives[i, h], steps.heads, n)
-        contact_kernels.respond(*steps.responding)
-        n_slack = find_forces(time, steps, response, counts) if within else -1
+        for h in range(records.size):
+            within &= head_records.predict(records[h], drives[i, h], heads, n)
+        contact_kernels.respond(*responding)
+        n_slack = find_forces(time, solving, law, pushed, n, counts) if within else -1
         if n_slack < 0:
             return i - first, True
-        force = solution[:n]
-        contact_kernels.superpose(force, *steps.superposing)
+        contact_kernels.superpose(force, *superposing)
         if n_slack:
             slack = solution[n : n + n_slack]
-            contact_kernels.compensate(steps.pushed[:n_slack], slack, *steps.compensating)
-        for h in range(steps.records.size):
-            head_records.move(steps.records[h], force)
-        reported = steps.law[3]
-        contact_kernels.tell(force, reported, steps.heads, depth, steps.ends, steps.of_step)
+            contact_kernels.compensate(pushed[:n_slack], slack, *compensating)
+        for h in range(records.size):
+            head_records.move(records[h], force)
+        contact_kernels.tell(force, reported, heads, depth, ends, of_step)
         if shows:
             row = rows[i]
-            row[:n_told] = steps.told
+            row[:n_told] = told
             uplift, tension = row[n_told:n_arms], row[n_arms:n_shown]
-            state_kernels.show(motion, arms, ends, laws, kept, uplift, tension)
-            for j in range(steps.taps.size):
-                row[n_shown + j] = numbers_at(steps.taps[j], 1)[0]
+            state_kernels.show(motion, arms, shown, laws, kept, uplift, tension)
+            for j in range(taps.size):
+                row[n_shown + j] = numbers_at(taps[j], 1)[0]
     return n_steps - first, False
