@@ -9,8 +9,8 @@ import h5py
 import numpy as np
 import pytest
 
-from catenary.postproc.files.fields import FieldRecorder
-from catenary.postproc.record.line_record import GZIP, LineRecord
+from catenary.postproc.channels.line_record import GZIP, LineRecord
+from catenary.postproc.record.fields import FieldRecorder
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
 from catenary.solver.time_loop.observers import BlockObserver
