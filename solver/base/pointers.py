@@ -74,7 +74,7 @@ def borrowed(typing_context, value):
     return value(value), generate
 
 
-def _borrow(context: Any, builder: Any, kind: types.Type, value: Any) -> Any:
+def _borrow(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     """LLVM's value of an array or tuple without owners."""
     if isinstance(kind, types.Array):
         array = context.make_array(kind)(context, builder, value)
