@@ -81,8 +81,9 @@ def _borrow(context: Any, builder: Any, kind: Any, value: Any) -> Any:
         array.meminfo = ir.Constant(array.meminfo.type, None)
         array.parent = ir.Constant(array.parent.type, None)
         return array._getvalue()
+    parts: Any = getattr(kind, "types", ())
     if isinstance(kind, types.BaseTuple):
-        for number, part in enumerate(kind.types):
+        for number, part in enumerate(parts):
             held = _borrow(context, builder, part, builder.extract_value(value, number))
             value = builder.insert_value(value, held, number)
     return value
