@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from catenary.postproc.channels.header import Header
+from catenary.postproc.files.result_file import fault_to_continue
+from catenary.postproc.read.guard import survives
 from catenary.postproc.read.results import Results
 from catenary.solver.base.errors import InputError
 
@@ -32,7 +34,15 @@ def state_to_continue(result: Path) -> dict[str, Any]:
     with Results(result) as results:
         if results.complete:
             raise InputError(f"the run in {result} is done; there is nothing to continue")
-        return results.checkpoint
+        state = results.checkpoint
+        half_before = (state["step"] - 0.5) * results.dt
+    # A table that is written to may be damaged where the report does not read it.
+    fault = "HDF5 cannot open all of it"
+    if survives(result):
+        fault = fault_to_continue(result, half_before)
+    if fault:
+        raise _refusal(result, f"{fault}; what is sound can be reported")
+    return state
 
 
 def refuse_other_run(result: Path, header: Header, n_strips: tuple[int, ...]) -> None:

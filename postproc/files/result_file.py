@@ -8,6 +8,7 @@ have got longer, and its rows not be there yet. Hence ``COMPLETE``, which is tol
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Callable, Mapping
 from datetime import datetime, timezone
@@ -31,11 +32,14 @@ from catenary.postproc.files.chunk_shapes import Chunk, chunks_of, room_of
 from catenary.postproc.files.disk import MARGIN, abandon, as_attribute, check_in_place, reserve
 from catenary.postproc.files.kept_extremes import drop_extremes, extremes_at, store_extremes
 from catenary.postproc.files.own_files import part_of
+from catenary.postproc.files.shortening import DamagedClock, rows_before, shorten
 from catenary.postproc.files.trimming import trimmed
 from catenary.postproc.files.windowed_rows import write_window
 from catenary.solver.time_loop import channels
 from catenary.solver.time_loop.channels import Channel
 from catenary.solver.time_loop.observers import Stage
+
+logger = logging.getLogger("catenary.results")
 
 FORMAT = "catenary-run-3"
 # Rows that are whole, of the channels, of the energies and of the line's channels; a table may be
@@ -333,33 +337,45 @@ def complete_rows(file: h5py.File) -> list[int]:
     return [*found, *_rows(file)[len(found) :]]
 
 
+def fault_to_continue(path: Path, time: float) -> str:
+    """Why a run cannot go on from ``time`` [s] in a result file, as a clause; empty if it can.
+
+    Not collective.
+    """
+    with h5py.File(path, "r", locking=False) as file:
+        try:
+            _rows_to_keep(file, time)
+        except DamagedClock as error:
+            return str(error)
+    return ""
+
+
+def _tables_by_clock(file: h5py.File) -> list[list[str]]:
+    """Paths of the growing tables that share each of ``_CLOCKS``."""
+    groups = ("channels", "energy", "line_channels")
+    found = [[f"{group}/{name}" for name in file.get(group, ())] for group in groups]
+    return [["time", *found[0]], *found[1:]]
+
+
+def _rows_to_keep(file: h5py.File, time: float) -> list[int]:
+    """Records before ``time`` [s] of each clock."""
+    return [
+        rows_before(file[clock], complete, time) if clock in file else 0
+        for clock, complete in zip(_CLOCKS, complete_rows(file), strict=True)
+    ]
+
+
 def _cut(file: h5py.File, time: float) -> None:
     """Drop the records from ``time`` [s] on."""
-    parts = [
-        [file["time"], *file["channels"].values()],
-        list(file["energy"].values()) if "energy" in file else [],
-        list(file["line_channels"].values()),
-    ]
-    for clock, datasets, complete in zip(_CLOCKS, parts, complete_rows(file), strict=True):
-        keep = rows_before(file[clock], complete, time) if clock in file else 0
-        for dataset in datasets:
-            dataset.resize(keep, axis=0)
+    for keep, paths in zip(_rows_to_keep(file, time), _tables_by_clock(file), strict=True):
+        for path in paths:
+            lost = shorten(file, path, keep)
+            if lost:
+                told = "%s is damaged: its records %d to %d are lost"
+                logger.warning(told, path, keep - lost, keep - 1)
     counted = _rows(file)
     _replace(file, COMPLETE, counted)
     drop_extremes(file, counted[0])
-
-
-def rows_before(clock: h5py.Dataset, n: int, time: float) -> int:
-    """How many of the first ``n`` ascending times of a dataset are before ``time``, by bisection:
-    nothing that grows with the run is read."""
-    low, high = 0, n
-    while low < high:
-        middle = (low + high) // 2
-        if clock[middle] < time:
-            low = middle + 1
-        else:
-            high = middle
-    return low
 
 
 def _replace(group: h5py.Group, name: str, value: Any) -> None:

@@ -18,7 +18,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from damaging import as_json, flip, raw_ranges, unseal
+from damaging import as_json, flip, raw_ranges, spoil_chunk, unseal
 from program import catenary, short_run
 
 from catenary.postproc.evaluate import statistics as stats
@@ -39,12 +39,12 @@ LIMIT = 60.0
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """A run that is done and one that was interrupted after a thousand steps."""
+    """A run that is done and one that was interrupted in the middle of a chunk."""
     folder = tmp_path_factory.mktemp("runs")
     flush = "output.flush_every_steps=100"
     done = catenary(*short_run(folder / "finished", flush), cwd=folder)
     assert done.code == 0, done.stderr
-    words = [*short_run(folder / "interrupted", flush), "--", "-march_ts_max_steps", "1000"]
+    words = [*short_run(folder / "interrupted", flush), "--", "-march_ts_max_steps", "1050"]
     assert catenary(*words, cwd=folder).code == 1
     return {name: folder / name for name in ("finished", "interrupted")}
 
@@ -163,6 +163,51 @@ def test_what_cannot_be_is_not_continued(how: str, runs: dict[str, Path], tmp_pa
     done = catenary("restart", str(out), cwd=tmp_path)
     assert done.code == 2, done
     assert words in done.sentences[-1] and "Traceback" not in done.stderr
+    assert (out / "run.h5").read_bytes() == before
+
+
+LINE = "line_channels/dropper_force"
+
+
+def end_of(path: Path, table: str) -> tuple[int, ...]:
+    """Where the last chunk of a table begins."""
+    with h5py.File(path) as file:
+        rows, chunks = file[table].shape[0], file[table].chunks
+    return (rows - 1 - (rows - 1) % chunks[0], *[0] * (len(chunks) - 1))
+
+
+def test_a_run_goes_on_behind_a_damaged_end_of_a_line_channel(
+    runs: dict[str, Path], tmp_path: Path
+) -> None:
+    """Its records there are lost, and that is told; all others are those of a run in one piece."""
+    out = tmp_path / "out"
+    shutil.copytree(runs["interrupted"], out)
+    first = end_of(out / "run.h5", LINE)
+    spoil_chunk(out / "run.h5", LINE, first)
+    done = catenary("restart", str(out), cwd=tmp_path)
+    assert done.code == 0, done.stderr
+    assert f"{LINE} is damaged: its records {first[0]} to " in done.stderr
+    with h5py.File(out / "run.h5") as found, h5py.File(runs["finished"] / "run.h5") as whole:
+        lost = np.isnan(found[LINE][...])
+        rows = np.flatnonzero(lost.any(axis=1))
+        assert rows[0] == first[0] and rows.size < found[LINE].chunks[0]
+        assert np.allclose(found[LINE][...][~lost], whole[LINE][...][~lost], rtol=1e-9, atol=1e-9)
+        force = "channels/contact_force"
+        assert np.allclose(found[force][...], whole[force][...], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("clock", ["line_channels/time", "energy/time"])
+def test_a_run_does_not_go_on_behind_times_that_are_lost(
+    clock: str, runs: dict[str, Path], tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(runs["interrupted"], out)
+    spoil_chunk(out / "run.h5", clock, end_of(out / "run.h5", clock))
+    before = (out / "run.h5").read_bytes()
+    done = catenary("restart", str(out), cwd=tmp_path)
+    assert done.code == 2
+    (sentence,) = done.stderr.splitlines()
+    assert f"run.h5 cannot be continued: {clock} is damaged from record " in sentence
     assert (out / "run.h5").read_bytes() == before
 
 

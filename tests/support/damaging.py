@@ -151,3 +151,14 @@ def flip(path: Path, rng: random.Random, *, tables: bool) -> int:
 def as_json(value: Any) -> str:
     """For comparing what two readers made of a file."""
     return json.dumps(value, sort_keys=True, default=str)
+
+
+def spoil_chunk(path: Path, table: str, offset: tuple[int, ...]) -> None:
+    """Flip a bit in the chunk of a table that begins at ``offset``."""
+    with h5py.File(path) as file:
+        place = file[table].id.get_chunk_info_by_coord(offset).byte_offset
+    with path.open("r+b") as file:
+        file.seek(place + 40)
+        (byte,) = file.read(1)
+        file.seek(place + 40)
+        file.write(bytes([byte ^ 0x10]))
