@@ -90,9 +90,10 @@ def solve_free(matrix: sparse.csc_matrix, model: Model, right: np.ndarray) -> np
 
 
 @contextmanager
-def line_alone(model: Model, numerics: Numerics) -> Iterator[LineMotion]:
-    """The time stepper of a line alone, all droppers taut."""
-    line = make_line(COMM, model, distribute(model, COMM.size, COMM.rank), numerics)
+def line_alone(model: Model, numerics: Numerics, loaded: bool = False) -> Iterator[LineMotion]:
+    """The time stepper of a line alone, all droppers taut; perhaps its steps have loads."""
+    ownership = distribute(model, COMM.size, COMM.rank)
+    line = make_line(COMM, model, ownership, numerics, loaded=loaded)
     try:
         yield line
     finally:

@@ -111,13 +111,14 @@ def test_steps_are_those_of_the_definition(method: tuple[str, float], damping: D
     shape[free] = linalg.solve(matrices[2], loads[1, free])
     zero = np.zeros(free.size)
     worst = scale = np.zeros(2)
-    with line_alone(model, settings(method, dt)) as stepper:
+    with line_alone(model, settings(method, dt), loaded=True) as stepper:
+        # In two passes, but with products with C; a prediction may have no share of b at radius 0.
+        in_passes = stepper.passes is not None
+        assert in_passes == model.damping_is_proportional or method[1] == 0.0
         release(stepper, shape, np.zeros(model.n_dofs), model)
         expected = textbook(method, dt, matrices, (shape[free], zero), loads[:, free])
         for number, (d, v) in enumerate(expected, start=1):
-            stepper.predict()
-            stepper.free_acceleration([(pulled, np.array([force[number]]))])
-            stepper.correct()
+            stepper.free_step([(pulled, np.array([force[number]]))])
             apart = stepper.displacement[free] - d, stepper.velocity[free] - v
             worst = np.maximum(worst, [np.abs(part).max() for part in apart])
             scale = np.maximum(scale, [np.abs(part).max() for part in (d, v)])
@@ -151,14 +152,14 @@ def amplification(model: Model, mode: np.ndarray, method: tuple[str, float], dt:
     units = np.array([1.0, 1.0 / dt, 1.0 / dt**2, 1.0 / dt**2])
     result = np.zeros((4, 4))
     with line_alone(model, settings(method, dt)) as stepper:
-        state = list(stepper.state().values())
-        assert len(state) == 4
+        names = list(stepper.state())
+        assert len(names) == 4
         for column in range(4):
-            for values in state:
-                values[:] = 0.0
-            state[column][:] = units[column] * mode
+            start = {name: np.zeros(mode.size) for name in names}
+            start[names[column]] = units[column] * mode
+            stepper.restore(start)
             step(stepper)
-            result[:, column] = [weight @ values for values in state] / units
+            result[:, column] = [weight @ values for values in stepper.state().values()] / units
     return result
 
 

@@ -1,0 +1,93 @@
+"""A free step of the line by unknowns a station, beside the floor of a step. Run by ``make bench``.
+
+Stations as many as the case ambrosio2012 has, in blocks that repeat from span to span and are full
+at every fifth station, as at droppers. All are measured in turns in one process, and the least of
+many short rounds counts, so that ratios hold on a machine that others use, too.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from floor import LIBRARIES
+from mpi4py import MPI
+from repeating_line import layout, line
+
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
+from catenary.solver.base import aligned_arrays
+from catenary.solver.integrators.line_state import MotionAhead, Steps
+from catenary.solver.integrators.newmark import NewmarkLine
+from catenary.solver.integrators.two_pass_step import StationPasses
+from catenary.solver.linear.station_factors import station_factors
+from catenary.solver.linear.station_products import station_product
+from catenary.solver.model.partition import distribute
+from catenary.solver.statics.equilibrium import find_form
+
+N_STATIONS, PERIOD = 1126, 45
+STEPS = Steps(1e-3, 2.5e-7, 5e-4, 0.003, 2.5e-7, 5e-4, 0.0)
+ROUNDS, CALLS = 300, 20
+FLOOR = "floor"
+# Planes of a station, and the most that a step may take in terms of the floor: 1.3 times what
+# prototypes in C took beside the same floor. Planes side by side are to gain over one of both.
+MOST = {
+    (4,): 1.3 * 8.5 / 21.4,
+    (6,): 1.3 * 30.0 / 21.4,
+    (8,): 1.3 * 37.0 / 21.4,
+    (10,): 1.3 * 70.0 / 21.4,
+    (12,): 1.3 * 77.0 / 21.4,
+    (4, 4): 37.0 / 21.4,
+    (6, 4): 70.0 / 21.4,
+}
+
+
+def passes(widths: tuple[int, ...]) -> Callable[[], None]:
+    """A free step of a line of such stations."""
+    matrix = line(N_STATIONS, PERIOD, widths)
+    lanes = layout(matrix)
+    product, factors = station_product(matrix, 0, lanes), station_factors(matrix, lanes)
+    assert product is not None and factors is not None and lanes.widths == widths
+    n, b = matrix.shape[0], lanes.pitch
+    read = aligned_arrays.zeros(n + 2 * b, 0)
+    answer, velocity = aligned_arrays.zeros(n, 1), aligned_arrays.zeros(n, 2)
+    motion = MotionAhead(read[b:-b], velocity, answer, np.zeros(n), STEPS)
+    motion.put(*np.full((3, n), 1e-3))
+    return StationPasses(product, factors, read, read, np.zeros(0), answer, motion, STEPS).step
+
+
+@pytest.fixture(scope="module")
+def times() -> dict[str, float]:
+    """Least time of each [us]; that of the floor is a library's solve and a product with K."""
+    scene = load_scene("ambrosio2012", [])
+    problem = problem_of(scene)
+    model, _ = find_form(problem, mesh_of(scene))
+    whole = NewmarkLine(MPI.COMM_SELF, model, distribute(model, 1, 0), problem.numerics)
+    calls: dict[str, Callable] = {name: make(whole, model) for name, make in LIBRARIES.items()}
+    calls["product"] = whole.internal_forces
+    calls |= {str(widths): passes(widths) for widths in MOST}
+    least = dict.fromkeys(calls, np.inf)
+    for _ in range(ROUNDS):
+        for name, call in calls.items():
+            begin = time.perf_counter()
+            for _ in range(CALLS):
+                call()
+            least[name] = min(least[name], 1e6 * (time.perf_counter() - begin) / CALLS)
+    whole.destroy()
+    least[FLOOR] = min(least[name] for name in LIBRARIES) + least["product"]
+    print(f"\nfree step of {N_STATIONS} stations\n{'':44}{'us':>8}{'x floor':>9}{'at most':>9}")
+    for name, value in least.items():
+        bound = {str(widths): most for widths, most in MOST.items()}.get(name)
+        at_most = "" if bound is None else f"{bound:9.2f}"
+        print(f"{name:44}{value:8.1f}{value / least[FLOOR]:9.2f}{at_most}")
+    return least
+
+
+@pytest.mark.parametrize("widths", MOST, ids=str)
+def test_a_step_of_wider_stations_keeps_to_what_is_possible(
+    times: dict[str, float], widths: tuple[int, ...]
+) -> None:
+    assert times[str(widths)] < MOST[widths] * times[FLOOR]
