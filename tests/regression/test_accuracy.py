@@ -25,7 +25,7 @@ def words(out: Path, axes: str = AXES) -> list[str]:
 def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """The folder of a study with two levels of each setting and what was said."""
     out = tmp_path_factory.mktemp("accuracy") / "out"
-    ran = catenary(*words(out), cwd=out.parent)
+    ran = catenary(*words(out), cwd=out.parent, pictures=True)
     assert ran.code == 0, ran.stderr
     return out, ran.stdout
 

@@ -82,7 +82,7 @@ def table(path: Path) -> list[dict[str, str]]:
 def run(folder: Path, *words: str) -> dict[str, Any]:
     """Summary of a run into a folder."""
     # A phase that takes long leaves a line on standard error otherwise.
-    done = catenary("run", *words, "-o", str(folder), "--quiet", cwd=folder.parent)
+    done = catenary("run", *words, "-o", str(folder), "--quiet", cwd=folder.parent, pictures=True)
     assert done.code == 0, done.stderr
     assert done.stderr == ""
     return dict(json.loads((folder / "summary.json").read_text()))

@@ -29,9 +29,14 @@ class Forks:
         atexit.register(self.close)
 
     def run(
-        self, words: list[str], folder: Path, environment: dict[str, str], limit: float
+        self,
+        words: list[str],
+        folder: Path,
+        environment: dict[str, str],
+        limit: float,
+        pictures: bool,
     ) -> tuple[int, str, str]:
-        """Exit code and output of a command line.
+        """Exit code and output of a command line; its pictures are painted if they are wanted.
 
         Raises
         ------
@@ -46,6 +51,7 @@ class Forks:
                 "words": words,
                 "folder": str(folder),
                 "environment": environment,
+                "pictures": pictures,
                 **{name: str(file) for name, file in files.items()},
             }
             assert self._server.stdin is not None and self._server.stdout is not None

@@ -1,13 +1,15 @@
 """Runs command lines of the program, each in a process that is forked from this one.
 
 Packages that are imported here, none of which starts MPI, are not imported again by every process:
-that is most of what a short run costs. The program's own modules, PETSc, MPI and HDF5 are.
+that is most of what a short run costs. The program's own modules, PETSc, MPI and HDF5 are. Pictures
+of reports are laid out, but not painted unless ``pictures`` is true.
 
-A request is a line of JSON on standard input: ``words``, ``folder``, ``environment`` and the files
-``stdout`` and ``stderr``. It is answered with the number of the process, and with its exit code
-when it has ended, negative for a signal.
+A request is a line of JSON on standard input: ``words``, ``folder``, ``environment``, ``pictures``
+and the files ``stdout`` and ``stderr``. It is answered with the number of the process, and with its
+exit code when it has ended, negative for a signal.
 """
 
+import base64
 import gc
 import importlib
 import json
@@ -19,6 +21,11 @@ PACKAGES = (
     "pydantic", "scipy.integrate", "scipy.interpolate", "scipy.optimize", "scipy.signal",
     "scipy.sparse.linalg", "tqdm", "typer",
 )  # fmt: skip
+
+# A PNG file of one pixel.
+PIXEL = base64.b64decode(
+    b"iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGP4DwABAQEAsTj2FAAAAABJRU5ErkJggg=="
+)
 
 
 def answer(number: int) -> None:
@@ -41,6 +48,7 @@ def become(words: list[str], folder: str, environment: dict[str, str], files: li
 
 for name in PACKAGES:
     importlib.import_module(name)
+sys.modules["numba"].njit(lambda number: number + 1)(1)  # loads what all compiled loops need
 gc.freeze()
 for line in sys.stdin:
     request = json.loads(line)
@@ -57,4 +65,8 @@ else:
 # As in a process of its own, the program is the last that runs: what ends Python comes after it.
 from catenary.cases.cli.main import main  # noqa: E402
 
+if not request["pictures"]:
+    from catenary.postproc.report import figures
+
+    figures.png = lambda figure: PIXEL
 main()

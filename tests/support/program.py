@@ -145,12 +145,15 @@ def python(*words: str) -> list[str]:
     return [sys.executable, "-W", "error", *words]
 
 
-def catenary(*words: str, cwd: Path, ranks: int = 1) -> Done:
-    """Run the command line to its end; on one rank forked from ``forking_server.py``."""
+def catenary(*words: str, cwd: Path, ranks: int = 1, pictures: bool = False) -> Done:
+    """Run the command line to its end; on one rank forked from ``forking_server.py``.
+
+    It then paints pictures only if they are looked at.
+    """
     if ranks == 1:
         mark = uuid.uuid4().hex
         environment = {**os.environ, **RANKS_ENVIRONMENT, _MARK: mark}
-        return _ended(*forks().run(list(words), cwd, environment, LIMIT), mark)
+        return _ended(*forks().run(list(words), cwd, environment, LIMIT, pictures), mark)
     with started(python("-c", _ENTRY, *words), cwd, ranks) as program:
         return program.end()
 
