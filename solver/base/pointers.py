@@ -17,6 +17,8 @@ from numba.extending import intrinsic
 from catenary.solver.base.compiled import compiled
 
 _inlined: Any = intrinsic
+# Integers that a tuple of arguments takes at most; an array of two dimensions takes nine.
+_MOST_HELD = 512
 
 
 def address_of(array: np.ndarray) -> int:
@@ -26,10 +28,34 @@ def address_of(array: np.ndarray) -> int:
     return int(array.ctypes.data)
 
 
-def address_of_function(kernel: Any, arguments: tuple[Any, ...]) -> int:
-    """Where the machine code of a compiled function is, for arguments like these; for ``call``."""
-    kinds = tuple(typeof(argument) for argument in arguments)
-    kernel.compile(kinds)
+class HeldCall:
+    """A compiled function with its arguments, which a compiled loop calls by ``address``.
+
+    The loop's own machine code depends on neither. Arrays are kept alive as long as this is.
+
+    Attributes
+    ----------
+    address : (3,) int, what ``call_held`` takes
+    """
+
+    def __init__(self, kernel: Any, arguments: tuple[Any, ...]) -> None:
+        self._arguments = arguments
+        kinds = tuple(typeof(argument) for argument in arguments)
+        kernel.compile(kinds)
+        self._held = np.zeros(_MOST_HELD, dtype=np.int64)
+        if not _hold(arguments, self._held):
+            raise ValueError("too many arguments to be held")
+        pointed = types.CPointer(types.Tuple(kinds))
+        _go.compile((types.int64, pointed))
+        self.address = (
+            _function_at(_go, (types.int64, pointed)),
+            _function_at(kernel, kinds),
+            int(self._held.ctypes.data),
+        )
+
+
+def _function_at(kernel: Any, kinds: tuple[Any, ...]) -> int:
+    """Where the machine code of a compiled function is, for arguments of these types."""
     kind = types.FunctionType(types.none(*kinds))
     _own_address.compile((kind,))
     return int(_own_address.overloads[(kind,)].entry_point(kernel))
@@ -47,7 +73,7 @@ def pointer(typing_context, address):
 
 @_inlined
 def call(typing_context, address, arguments):
-    """Call the compiled function at an ``address_of_function`` with a tuple of arguments."""
+    """Call the compiled function at an address with a tuple of arguments."""
 
     def generate(context, builder, signature, given):
         place, packed = given
@@ -90,6 +116,35 @@ def _borrow(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 
 
 @_inlined
+def _store(typing_context, value, place):
+    """Write a tuple to an array of integers as it is in memory; whether there is room."""
+
+    def generate(context, builder, signature, arguments):
+        kind, into = signature.args
+        pointer = context.make_array(into)(context, builder, arguments[1]).data
+        size = context.get_abi_sizeof(context.get_value_type(kind))
+        if size > 8 * _MOST_HELD:
+            return ir.Constant(ir.IntType(1), 0)
+        there = builder.bitcast(pointer, context.get_value_type(kind).as_pointer())
+        builder.store(arguments[0], there, align=8)
+        return ir.Constant(ir.IntType(1), 1)
+
+    return types.boolean(value, place), generate
+
+
+@_inlined
+def _loaded(typing_context, place):
+    """The tuple that ``_store`` has written to a place, without owners."""
+
+    def generate(context, builder, signature, arguments):
+        kind = context.get_value_type(signature.return_type)
+        there = builder.bitcast(arguments[0], kind.as_pointer())
+        return builder.load(there, align=8)
+
+    return place.dtype(place), generate
+
+
+@_inlined
 def _address_in(typing_context, function):
     """The address that a compiled function is called at."""
 
@@ -97,6 +152,22 @@ def _address_in(typing_context, function):
         return builder.ptrtoint(builder.extract_value(arguments[0], 0), ir.IntType(64))
 
     return types.int64(function), generate
+
+
+@compiled
+def _hold(arguments, held):
+    return _store(borrowed(arguments), held)
+
+
+@compiled
+def _go(kernel, place):
+    call(kernel, _loaded(place))
+
+
+@compiled
+def call_held(address):
+    """Call what a ``HeldCall`` holds; ``address`` is its own."""
+    call(address[0], (address[1], address[2]))
 
 
 @compiled

@@ -14,7 +14,7 @@ import numpy as np
 from catenary.mbs.head.head_records import drive_width
 from catenary.solver.base.bound import bound
 from catenary.solver.base.petsc_events import event
-from catenary.solver.base.pointers import address_of_function
+from catenary.solver.base.pointers import HeldCall
 from catenary.solver.contact_problem.coupling import Implicit
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
@@ -55,7 +55,7 @@ class CompiledSteps:
         records, passes = pantographs.records(), interaction.line.passes
         law = scheme.coupling.law.in_loop()
         assert records is not None and passes is not None and law is not None
-        self._free = address_of_function(passes.kernel, passes.arguments), passes.arguments
+        self._free = HeldCall(passes.kernel, passes.arguments)
         self._records, self._law = records, law
         self._heads = np.zeros(2 * n * (1 + n))
         self._drives = np.zeros((self.most, pantographs.n, drive_width(max(pantographs.n_strips))))
@@ -125,7 +125,7 @@ class CompiledSteps:
             speed=float(pantographs.speed),
             moving=pantographs.moving,
             placing=interaction.placing,
-            free=self._free,
+            free=self._free.address,
             records=self._records,
             heads=self._heads,
             responding=interaction.responding(scheme.share),

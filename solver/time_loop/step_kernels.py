@@ -12,7 +12,7 @@ import numpy as np
 
 from catenary.mbs.head import head_records
 from catenary.solver.base.compiled import compiled
-from catenary.solver.base.pointers import borrowed, call, numbers_at
+from catenary.solver.base.pointers import borrowed, call_held, numbers_at
 from catenary.solver.contact import contact_kernels
 from catenary.solver.contact.line_response import NUMBER
 from catenary.solver.contact_problem import complementarity_kernels
@@ -32,7 +32,7 @@ class Steps(NamedTuple):
     placing, responding, solving : arguments of ``place``, ``respond`` and ``solve``
     superposing, compensating : of ``superpose`` and ``compensate`` after the forces
     showing : of ``kernels.show`` before what it fills
-    free : address and arguments of the line's free step, see ``pointers.call``
+    free : address of the line's free step, see ``pointers.call_held``
     records : of all heads, ``head_records.HEAD``
     heads : (2 n + 2 n^2,) all strips as functions of the forces, see ``HeadState``
     law : numbers of the contact law, see ``report``
@@ -45,7 +45,7 @@ class Steps(NamedTuple):
     speed: float
     moving: tuple[Any, ...]
     placing: tuple[Any, ...]
-    free: tuple[int, tuple[Any, ...]]
+    free: tuple[int, int, int]
     records: np.ndarray
     heads: np.ndarray
     responding: tuple[Any, ...]
@@ -113,7 +113,6 @@ def take(steps, times, drives, rows, counts, shows, first, n_steps):
     responding, solving, law, superposing, compensating = steps[6:11]
     pushed, ends, of_step, told, showing, taps = steps[11:]
     start, places = moving
-    address, arguments = free
     solution, depth, reported = solving[11], solving[12][0], law[3]
     motion, arms, shown, laws, kept = showing
     n, n_told = ends[-1], told.size
@@ -124,7 +123,7 @@ def take(steps, times, drives, rows, counts, shows, first, n_steps):
         time = times[i]
         state_kernels.shift(start, places, speed * time)
         contact_kernels.place(*placing)
-        call(address, arguments)
+        call_held(free)
         within = True
         for h in range(records.size):
             within &= head_records.predict(records[h], drives[i, h], heads, n)
