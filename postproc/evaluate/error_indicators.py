@@ -38,6 +38,11 @@ _WAVE_NUMBERS = 400
 _SPECTRUM, _SAMPLED_HZ = 100_000, 1000.0
 # Waves of two elements belong to the lower branch, whatever rounding says.
 _ZONE = np.pi * (1.0 + 1e-9)
+_NEEDED = (
+    "contact_wire_stiffness_damping", "contact_wire_mass_damping", "newmark_beta", "newmark_gamma",
+    "mass_weight", "force_weight", "longest_element", "contact_wire_tension",
+    "contact_wire_bending_stiffness", "contact_wire_mass",
+)  # fmt: skip
 _EARLIER = (
     "The result file is of an earlier version of Catenary and lacks the facts that error "
     "indicators and remarks on settings need: for these run the case again."
@@ -80,7 +85,7 @@ def indicate(results: Results) -> Indicators:
     """The indicators of a run, as far as its record goes. Not collective."""
     n = results.n_pantographs
     error, deviation = np.full(n, np.nan), np.full(n, np.nan)
-    if results.of_earlier_format:
+    if any(np.isnan(results.fact(name)) for name in _NEEDED):
         return Indicators(error, error, np.nan, np.nan, (_EARLIER,))
     method = _method(results)
     start, end = results.evaluation

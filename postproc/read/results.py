@@ -93,17 +93,12 @@ class Results:
         return self.fact("time_step")
 
     def fact(self, name: str) -> float:
-        """A fact of ``postproc.record.facts``, NaN if a file of an earlier format lacks it."""
+        """A fact of ``postproc.channels.facts``, NaN if the file was written without it."""
         return float(self._file.facts[name])
 
     def facts_of(self, name: str) -> np.ndarray:
         """A fact of each pantograph, shape (n_pantographs,), NaN likewise."""
         return np.broadcast_to(self._file.facts[name], self.n_pantographs)
-
-    @property
-    def of_earlier_format(self) -> bool:
-        """Whether an earlier version of the program wrote the file, with fewer facts."""
-        return self._file.of_earlier_format
 
     @property
     def n_steps(self) -> int:

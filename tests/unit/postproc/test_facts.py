@@ -21,6 +21,8 @@ from catenary.cases.scene.tables.units import unit_of
 from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.lumped_data import LumpedData
 from catenary.postproc.channels.facts import FACTS, facts_of
+from catenary.postproc.evaluate.error_indicators import as_table, indicate
+from catenary.postproc.files.checked import seal_arrays
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.report import write_report
 from catenary.solver.base.errors import InputError
@@ -172,6 +174,25 @@ def test_an_earlier_file_with_an_impossible_step_is_refused(
         file.attrs["dt_s"] = 0.0
     with pytest.raises(InputError, match=r'attribute "dt_s" holds 0 in place of 1e-12 to 1000 s'):
         Results(path)
+
+
+@pytest.mark.parametrize("name", ["stiffest_dropper", "mass_weight"])
+def test_a_file_from_before_a_fact_was_declared_is_read_without_it(
+    name: str, run_folder: Path, tmp_path: Path
+) -> None:
+    """Its checksum covers what was there. Only what needs the fact is missing."""
+    path = Path(shutil.copy(run_folder / "run.h5", tmp_path))
+    with h5py.File(path, "r+") as file:
+        del file["facts"][name]
+        seal_arrays(file["facts"], {own: values[()] for own, values in file["facts"].items()})
+    with Results(path) as results, Results(run_folder) as before:
+        assert results.damage == [] and np.isnan(results.fact(name))
+        found, known = indicate(results), indicate(before)
+        if name == "stiffest_dropper":
+            assert as_table(found)["warnings"] == as_table(known)["warnings"]
+            assert found.resolved_frequency == known.resolved_frequency
+        else:
+            assert np.isnan(found.resolved_frequency) and "run the case again" in found.warnings[0]
 
 
 def test_a_flipped_fact_is_told(run_folder: Path, tmp_path: Path) -> None:
