@@ -11,9 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
 if TYPE_CHECKING:
+    import numpy as np
+
     from catenary.solver.contact.forces_on_line import Interaction
     from catenary.solver.contact.pantographs import Pantographs
     from catenary.solver.schemes.scheme import Scheme
