@@ -16,7 +16,7 @@ from catenary.solver.integrators.state_kernels import (
     in_line,
     velocity_at,
 )
-from catenary.solver.model.elements import shape_slopes, shape_values
+from catenary.solver.model.shape_functions import shape_slopes, shape_values
 
 # A node of the contact wire: where it is along the track [m]; of its unknowns (w, theta_y) the
 # numbers on this rank, 0 where another rank owns them, whether this one does, and what they are at

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.base.compiled import compiled
-
 
 def stiffness(length: np.ndarray, bending_stiffness: float, tension: float) -> np.ndarray:
     """Element matrices K = EI K_L + F K_G of eq. (2.1).
@@ -59,34 +57,6 @@ def uniform_load(length: np.ndarray) -> np.ndarray:
     half = length / 2
     moment = length**2 / 12
     return np.stack([half, moment, half, -moment], axis=1)
-
-
-@compiled
-def shape_values(xi, length):  # type: ignore[no-untyped-def]
-    """Hermite functions N at ``xi`` in [0, 1], shape (4,): w(x) = N @ unknowns [m]."""
-    square, cube = xi * xi, xi * xi * xi
-    return np.array(
-        [
-            1 - 3 * square + 2 * cube,
-            length * (xi - 2 * square + cube),
-            3 * square - 2 * cube,
-            length * (cube - square),
-        ]
-    )
-
-
-@compiled
-def shape_slopes(xi, length):  # type: ignore[no-untyped-def]
-    """Derivatives N' of the Hermite functions along x, shape (4,): dw/dx = N' @ unknowns [-]."""
-    square = xi * xi
-    return np.array(
-        [
-            6 * (square - xi) / length,
-            1 - 4 * xi + 3 * square,
-            6 * (xi - square) / length,
-            3 * square - 2 * xi,
-        ]
-    )
 
 
 def _matrix(*upper_rows: list[np.ndarray]) -> np.ndarray:

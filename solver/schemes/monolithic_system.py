@@ -19,9 +19,9 @@ from scipy import sparse
 from catenary.mbs.head.newmark_head import raised
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.solver.model.elements import shape_slopes, shape_values
 from catenary.solver.model.matrices import iterate_entries
 from catenary.solver.model.model import Model
+from catenary.solver.model.shape_functions import shape_slopes, shape_values
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Placement, Problem
 from catenary.solver.schemes.scheme import LoadSource

@@ -9,6 +9,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -66,7 +67,56 @@ def test_no_backend_is_loaded_for_an_answer_or_a_refusal() -> None:
         assert not BACKENDS & set(loaded), line
 
 
-def test_a_sound_case_loads_them() -> None:
-    """So that the names above are those of modules."""
-    _, loaded = run_all(["check en50318_2002"])[0]
-    assert {"gmsh", "meshio", "numba", "scipy"} <= set(loaded)
+def test_help_loads_no_arrays() -> None:
+    lines = ["--help", "run --help", "sweep --help"]
+    for line, (code, loaded) in zip(lines, run_all(lines), strict=True):
+        assert code == 0, line
+        assert "numpy" not in loaded, line
+
+
+def test_a_sound_case_loads_what_it_is_checked_with() -> None:
+    """So that the names above are those of modules; a lumped pantograph needs no compiled loop."""
+    (_, lumped), (_, mechanism) = run_all(["check en50318_2002", "check ambrosio2012"])
+    assert {"gmsh", "meshio", "scipy"} <= set(lumped)
+    unused = BACKENDS - {"gmsh", "meshio", "scipy"}
+    assert not unused & set(lumped)
+    assert not (unused - {"numba"}) & set(mechanism)
+
+
+# Prints the modules that are loaded when the march of a run begins, and at the end of the run.
+OF_A_RUN = """
+import json, sys
+from catenary.cases.cli.main import main
+from catenary.solver.time_loop.march import March
+begun, run = [], March.run
+def shown(self, *args, **kwargs):
+    begun.extend(sys.modules)
+    return run(self, *args, **kwargs)
+March.run = shown
+sys.argv = ["catenary", "run", *sys.argv[1:]]
+try:
+    main()
+except SystemExit as end:
+    print(json.dumps([end.code, begun, list(sys.modules)]))
+"""
+# What only a report needs, and what nothing of a run does.
+REPORTED = {"matplotlib", "PIL", "jinja2"}
+NEVER = {"scipy.signal", "scipy.stats", "scipy.ndimage", "matplotlib.pyplot"}
+
+
+def test_a_run_loads_pictures_after_its_march_and_no_statistics(tmp_path: Path) -> None:
+    out = str(tmp_path / "out")
+    done = subprocess.run(
+        [sys.executable, "-c", OF_A_RUN, "en50318_2002", "-o", out, "--short"],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=True,
+        env=dict(os.environ),
+    )
+    code, begun, ended = json.loads(done.stdout.splitlines()[-1])
+    assert code == 0, done.stderr
+    assert {"numba", "petsc4py", "h5py"} <= set(begun)
+    assert not (REPORTED | NEVER) & set(begun)
+    assert REPORTED <= set(ended)
+    assert not NEVER & set(ended)

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catenary.solver.model import elements
+from catenary.solver.model.shape_functions import shape_slopes, shape_values
 
 EPS = np.finfo(float).eps
 lengths = st.floats(0.05, 20.0)
@@ -65,7 +66,10 @@ def test_shape_functions_interpolate_cubics_and_their_slopes(
 ) -> None:
     w = np.polynomial.Polynomial(coefficients)
     unknowns = shape_of(w, length)
-    value, slope = elements.shape_values(xi, length), elements.shape_slopes(xi, length)
+    value, slope = (
+        shape_values(xi, length),
+        shape_slopes(xi, length),
+    )
     round_off = 32 * EPS * max(1.0, length) ** 3
     assert value @ unknowns == pytest.approx(w(xi * length), abs=round_off * 4)
     assert slope @ unknowns == pytest.approx(w.deriv()(xi * length), abs=round_off * 12 / length)
@@ -73,10 +77,10 @@ def test_shape_functions_interpolate_cubics_and_their_slopes(
 
 def test_shape_functions_are_one_at_their_own_unknown() -> None:
     length = 2.5
-    assert np.array_equal(elements.shape_values(0.0, length), [1, 0, 0, 0])
-    assert np.array_equal(elements.shape_values(1.0, length), [0, 0, 1, 0])
-    assert np.array_equal(elements.shape_slopes(0.0, length), [0, 1, 0, 0])
-    assert np.array_equal(elements.shape_slopes(1.0, length), [0, 0, 0, 1])
+    assert np.array_equal(shape_values(0.0, length), [1, 0, 0, 0])
+    assert np.array_equal(shape_values(1.0, length), [0, 0, 1, 0])
+    assert np.array_equal(shape_slopes(0.0, length), [0, 1, 0, 0])
+    assert np.array_equal(shape_slopes(1.0, length), [0, 0, 0, 1])
 
 
 @given(lengths)
