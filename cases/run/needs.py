@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from catenary.cases.result_folder.output_folder import RunSize
 from catenary.cases.run.file_sizes import FileSizes, estimate_files
 from catenary.cases.run.recording import (
@@ -22,6 +24,8 @@ from catenary.cases.scene.scene import Scene
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.effects import all_effects as effects
+from catenary.solver.integrators.detour import Detour, detour_of
+from catenary.solver.model.unknowns import number_unknowns
 from catenary.solver.problem.problem import Problem
 
 # Cost model of the march on one rank, records included: overhead of a step, and time per unknown.
@@ -30,6 +34,8 @@ from catenary.solver.problem.problem import Problem
 # two; the plan calls it an estimate.
 STEP_OVERHEAD = 4.5e-5  # [s]
 STEP_PER_UNKNOWN = 4.8e-9  # [s]
+# Time of a station by its unknowns in a plane, in terms of four; as in the benchmark of widths.
+STATION_COST = {2: 0.6, 4: 1.0, 6: 1.8, 8: 2.2, 10: 4.8, 12: 5.6, 16: 8.0}
 # The fixed-point scheme repeats the solve; 3 times the time of one_solve was measured.
 # PETSc's TSALPHA2 factors anew in every iteration; 26 times was measured.
 SCHEME_FACTOR = {"one_solve": 1.0, "fixed_point": 3.0, "ts_alpha2": 26.0}
@@ -59,6 +65,7 @@ class Needs:
     march : wall time of the time loop on one rank [s]
     files : sizes of the files
     recording : what is recorded
+    detour : why steps of the line take longer than they could, None if they do not
     """
 
     n_steps: int
@@ -66,6 +73,7 @@ class Needs:
     march: float
     files: FileSizes
     recording: Recording
+    detour: Detour | None = None
 
 
 class Kept(NamedTuple):
@@ -76,7 +84,14 @@ class Kept(NamedTuple):
     report: bool
 
 
-def needs_of(scene: Scene, problem: Problem, extent: Extent, n_dofs: int) -> Needs:
+def needs_of(
+    scene: Scene,
+    problem: Problem,
+    extent: Extent,
+    n_dofs: int,
+    widths: tuple[int, ...] = (),
+    detour: Detour | None = None,
+) -> Needs:
     """What a run of a scene needs. Not collective.
 
     Parameters
@@ -84,7 +99,11 @@ def needs_of(scene: Scene, problem: Problem, extent: Extent, n_dofs: int) -> Nee
     problem : of the scene
     extent : of its mesh
     n_dofs : unknowns of the line
+    widths : unknowns of a station in each plane; two nodes' by default
+    detour : why steps take longer than they could
     """
+    active = effects.active(problem)
+    widths = widths or tuple(2 * len(group) for group in effects.unknown_groups(active))
     scheme = problem.numerics.scheme
     n_steps = max(1, math.floor(simulated_time(problem) / problem.numerics.dt + 1e-9))
     recording = recording_of(scene.output, problem, extent, n_steps)
@@ -92,9 +111,11 @@ def needs_of(scene: Scene, problem: Problem, extent: Extent, n_dofs: int) -> Nee
     return Needs(
         n_steps=n_steps,
         memory=estimate_memory(n_dofs, n_steps),
-        march=estimate_march(n_dofs, n_steps, scheme, _substeps(problem)),
+        march=(1.0 if detour is None else detour.factor)
+        * estimate_march(n_dofs, n_steps, scheme, _substeps(problem), widths),
         files=estimate_files(scene, problem, recording, n_dofs, flush_every),
         recording=recording,
+        detour=detour,
     )
 
 
@@ -120,8 +141,12 @@ def needs_before_meshing(scene: Scene) -> Needs | None:
 def needs_with_mesh(scene: Scene, mesh: LineMesh) -> Needs:
     """What a run on a mesh needs. Not collective."""
     problem = problem_of(scene)
-    n_unknowns = len(effects.unknowns_per_node(effects.active(problem)))
-    return needs_of(scene, problem, extent_of(mesh), n_unknowns * mesh.n_nodes)
+    groups = effects.unknown_groups(effects.active(problem))
+    numbering = number_unknowns(mesh, groups)
+    n_names = len(numbering.names)
+    widths = tuple(numbering.width * len(group) // n_names for group in groups)
+    detour = detour_of(problem, numbering)
+    return needs_of(scene, problem, extent_of(mesh), n_names * mesh.n_nodes, widths, detour)
 
 
 def run_size(needs: Needs) -> RunSize:
@@ -150,14 +175,29 @@ def total_size(runs: Iterable[Kept]) -> RunSize:
     return RunSize(left + largest, seconds, n_steps)
 
 
-def estimate_march(n_dofs: int, n_steps: int, scheme: str, n_substeps: int = 0) -> float:
+def estimate_march(
+    n_dofs: int,
+    n_steps: int,
+    scheme: str,
+    n_substeps: int = 0,
+    widths: tuple[int, ...] = (4,),
+) -> float:
     """Wall time of the time loop on one rank [s].
 
-    ``n_substeps`` are those of a step that pantographs with all their bodies take, all together.
+    ``n_substeps`` are those of a step that pantographs with all their bodies take, all together;
+    ``widths`` the unknowns of a station in each plane.
     """
-    step = STEP_OVERHEAD + STEP_PER_UNKNOWN * n_dofs
+    step = STEP_OVERHEAD + STEP_PER_UNKNOWN * n_dofs * cost_of_widths(widths)
     step *= SCHEME_FACTOR[scheme]
     return n_steps * (step + ALL_BODIES_SUBSTEP * n_substeps)
+
+
+def cost_of_widths(widths: tuple[int, ...]) -> float:
+    """Time per unknown of stations with planes of these widths, in terms of one plane of four."""
+    station = sum(
+        np.interp(width, list(STATION_COST), list(STATION_COST.values())) for width in widths
+    )
+    return float(station / sum(widths) * 4.0)
 
 
 def _substeps(problem: Problem) -> int:

@@ -10,7 +10,7 @@ from catenary.cases.run.describe_arrivals import arrival_facts
 from catenary.cases.run.describe_incidents import incident_facts
 from catenary.cases.run.describe_pantographs import kind_lines
 from catenary.cases.run.file_sizes import FileSizes
-from catenary.cases.run.needs import needs_of, simulated_time
+from catenary.cases.run.needs import needs_with_mesh, simulated_time
 from catenary.cases.run.recording import extent_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
@@ -82,6 +82,7 @@ class Plan:
     warnings: tuple[str, ...]
     dt: float
     scheme: str
+    detour: str
     halved: str
     slack: str
     simulated: float
@@ -125,7 +126,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
     unknowns = effects.unknowns_per_node(effects.active(problem))
     n_dofs = mesh.n_nodes * len(unknowns)
     train, dt = problem.train, problem.numerics.dt
-    needs = needs_of(scene, problem, extent, n_dofs)
+    needs = needs_with_mesh(scene, mesh)
     length = np.diff(mesh.x(mesh.wires[CONTACT_WIRE]))
     waves = arrival_facts(scene, problem)
     return Plan(
@@ -153,6 +154,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
         warnings=tuple(waves["warnings"]),
         dt=dt,
         scheme=problem.numerics.scheme,
+        detour="" if needs.detour is None else str(needs.detour),
         halved=_halved(problem.numerics),
         slack=_slack(problem),
         simulated=simulated_time(problem),
@@ -219,6 +221,7 @@ def plan_text(plan: Plan) -> str:
             f"{plan.simulated:.2f} s in {counted(plan.n_steps, 'step')} of {1e3 * plan.dt:g} ms, "
             f"scheme {plan.scheme}",
         ),
+        *([("slower", plan.detour)] if plan.detour else []),
         *([("slack", f"of a slack dropper, {plan.slack}")] if plan.slack else []),
         *([("adapted", plan.halved)] if plan.halved else []),
         ("memory", f"about {plan.memory / 1e6:.0f} MB on one rank (estimate)"),

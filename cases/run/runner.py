@@ -400,6 +400,7 @@ def _performance(outcome: Outcome, phases: Phases, n_ranks: int) -> dict[str, An
         "march_wall_s": outcome.wall,
         "phase_wall_s": phases.wall,
         "inner_iterations": counted,
+        "detour": outcome.detour,
     }
 
 

@@ -53,6 +53,7 @@ def summary_text(summary: Mapping[str, Any], folder: Path) -> str:
         f"  {counted(summary['n_steps'], 'step')}, {counted(summary['n_dofs'], 'unknown')}, "
         f"{counted(summary['n_ranks'], 'rank')}, "
         f"real-time factor {_number(summary['real_time_factor'], 2)}",
+        *([f"  {summary['detour']}"] if summary.get("detour") else []),
         *_sizes_of_steps(summary.get("inner_iterations", {})),
         "",
     ]

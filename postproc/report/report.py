@@ -287,6 +287,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
         ("mesh", f"{results.line('node_points').shape[0]} nodes, {n_cells} wire elements"),
         ("unknowns", f"{about['n_dofs']}"),
         ("ranks", f"{about['n_ranks']}"),
+        *([("speed of steps", about["detour"])] if about.get("detour") else []),
         *(
             (f"incident at {fact['time_s']:.4g} s", fact["says"])
             for fact in about.get("incidents", [])

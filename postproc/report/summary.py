@@ -39,6 +39,7 @@ def summarise(
         "real_time_factor": real_time_factor(results),
         "phase_wall_s": attributes.get("phase_wall_s", {}),
         "inner_iterations": attributes.get("inner_iterations", {}),
+        "detour": attributes.get("detour") or None,
         "evaluation_m": [start, end],
         "pantographs": [
             _pantograph(*row)

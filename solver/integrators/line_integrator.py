@@ -17,6 +17,7 @@ from mpi4py import MPI
 from catenary.solver.base import aligned_arrays
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.integrators import state_kernels
+from catenary.solver.integrators.detour import LIBRARY, PARTS, Detour
 from catenary.solver.integrators.line_loads import LineLoads
 from catenary.solver.integrators.line_state import AlphaSteps, Motion, MotionAhead, Steps
 from catenary.solver.integrators.two_pass_step import StationPasses
@@ -40,6 +41,7 @@ class LineMotion(ABC):
     position_factor, velocity_factor : sigma [s2] and tau [s]
     operators : LineOperators
     solution : the displacement as a PETSc vector, once ``fill_solution`` has filled it
+    detour : why ``keep_ahead`` could not, None if it could; the same on all ranks
     """
 
     def __init__(
@@ -72,6 +74,7 @@ class LineMotion(ABC):
         self._passes: StationPasses | None = None
         self._loads: LineLoads | None = None
         self._lost: np.ndarray | None = None
+        self.detour: Detour | None = None
         self.motion = Motion(
             aligned_arrays.zeros(n, 2), aligned_arrays.zeros(n, 3), self.operators.answer, gains
         )
@@ -97,6 +100,7 @@ class LineMotion(ABC):
         """
         ahead = self._ahead()
         if ahead is None:
+            self.detour = Detour("the method does not keep its state one prediction ahead", PARTS)
             return
         motion, steps = ahead
         loads = None
@@ -110,6 +114,7 @@ class LineMotion(ABC):
         # A rank without stations has no passes; it keeps its state like the others.
         can = passes is not None or self.ownership.n_local == 0
         if not self._comm.allreduce(int(can), op=MPI.MIN):
+            self.detour = Detour(self.operators.why_not_by_stations(), LIBRARY)
             if loads is not None:
                 loads.destroy()
             return

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Any
 
 import numpy as np
 
+from catenary.solver.integrators.detour import PARTS, Detour, method_detour
 from catenary.solver.integrators.generalized_alpha import GeneralizedAlphaLine
 from catenary.solver.integrators.line_integrator import LineMotion
 from catenary.solver.integrators.newmark import NewmarkLine
@@ -13,6 +15,8 @@ from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.problem.integrator_parameters import NEWMARK, integration_of
 from catenary.solver.problem.problem import Numerics
+
+logger = logging.getLogger(__name__)
 
 
 def make_line(
@@ -41,4 +45,9 @@ def make_line(
         line.lose(lost)
     if only_free:
         line.keep_ahead(loaded)
+    reason = method_detour(numerics, not model.damping_is_proportional)
+    if reason and numerics.scheme == "one_solve":
+        line.detour = Detour(reason, PARTS)
+    if line.detour is not None and comm.rank == 0:
+        logger.warning("%s", line.detour)
     return line

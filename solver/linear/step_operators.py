@@ -19,7 +19,7 @@ from catenary.solver.base.errors import NotConverged, RunBroken
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.base.petsc_events import event
 from catenary.solver.linear.halo import Halo, Subdomain
-from catenary.solver.linear.lanes import Layout
+from catenary.solver.linear.lanes import WIDEST, Layout
 from catenary.solver.linear.petsc_solvers import (
     DIRECT,
     PREFIX,
@@ -150,6 +150,21 @@ class LineOperators:
         read = self._read_padded
         rates = self._rate_padded if damped else read
         return ByStations(product, solver.factors, read, rates, self._solution.array)
+
+    def why_not_by_stations(self) -> str:
+        """Why ``by_stations`` is None on some rank, the same on all. Collective."""
+        reasons = {
+            1: "the options of PETSc choose another solver",
+            2: "the nodes of the wires are too many or too few to form stations",
+            3: f"the model joins stations further apart, or has more than {WIDEST} unknowns a "
+            "station in a plane",
+        }
+        found = 1
+        if not self._in_stations:
+            found = 2
+        elif self._layout is None and isinstance(self._solver, PartSolver):
+            found = 3
+        return reasons[self._comm.allreduce(found, op=MPI.MAX)]
 
     def exchange(self) -> None:
         """Bring ``factor``, and ``rate`` if it is used, up to date where they are others'.

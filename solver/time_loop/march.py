@@ -62,7 +62,8 @@ class Outcome:
     the time loop alone, changes of the line on the way included; ``simulated`` [s]; ``n_steps``
     taken; ``counters`` of the scheme; ``traffic`` is how many messages and bytes a rank sent a
     step since the line changed last, the one that sent most: to its neighbours, and each sum and
-    broadcast as one; None on one rank, or if not counted.
+    broadcast as one; None on one rank, or if not counted; ``detour`` says why steps of the line
+    took longer than they could, empty if they did not.
     """
 
     outcome: str
@@ -71,6 +72,7 @@ class Outcome:
     n_steps: int
     counters: dict[str, int] = field(default_factory=dict)
     traffic: tuple[float, float] | None = None
+    detour: str = ""
 
 
 class March:
@@ -276,6 +278,7 @@ class March:
             n_steps,
             self._scheme.counters.as_dict(),
             self._traffic(max(1, self._stepper.step_number - since)),
+            "" if self._line.detour is None else str(self._line.detour),
         )
 
     def destroy(self) -> None:

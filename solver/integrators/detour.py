@@ -1,0 +1,54 @@
+"""Why free steps of a line are not taken in two passes, and what that costs."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from catenary.solver.model.unknowns import Unknowns
+from catenary.solver.problem.integrator_parameters import NEWMARK
+from catenary.solver.problem.problem import Numerics, Problem
+
+# Time of a step in terms of one in two passes, as measured with the case ambrosio2012: part by
+# part with products and solves by stations, and with factors of PETSc.
+PARTS, LIBRARY = 2.4, 3.0
+
+
+class Detour(NamedTuple):
+    """A slower way through a step: the reason, and its time in terms of two passes, about."""
+
+    reason: str
+    factor: float
+
+    def __str__(self) -> str:
+        return f"steps take about {self.factor:g} times as long as they could: {self.reason}"
+
+
+def detour_of(problem: Problem, numbering: Unknowns) -> Detour | None:
+    """The detour that a problem calls for by itself, None if it calls for none. Not collective.
+
+    A scheme other than ``one_solve`` steps in its own way, which is no detour.
+    """
+    if problem.numerics.scheme != "one_solve":
+        return None
+    if not numbering.in_stations:
+        return Detour("the nodes of the wires are too many or too few to form stations", LIBRARY)
+    reason = method_detour(problem.numerics, _is_damped_by_component(problem))
+    return Detour(reason, PARTS) if reason else None
+
+
+def method_detour(numerics: Numerics, damped_by_component: bool) -> str:
+    """Why a method cannot take steps in two passes, empty if it can."""
+    if numerics.coupling == "explicit":
+        return 'numerics.coupling = "explicit" needs heights of the wire within a step'
+    if damped_by_component and numerics.integrator != NEWMARK:
+        return (
+            f'numerics.integrator = "{numerics.integrator}" with line.damping.per_component needs '
+            "velocities within a step"
+        )
+    return ""
+
+
+def _is_damped_by_component(problem: Problem) -> bool:
+    damping = problem.damping
+    own = {damping.per_component[name] for name in damping.per_component}
+    return "structural_damping" in problem.effects and bool(own - {(damping.alpha, damping.beta)})
