@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,43 @@ from catenary.solver.base import aligned_arrays
 from catenary.solver.base.compiled import compiled
 from catenary.solver.linear.halo import Halo, Subdomain
 from catenary.solver.linear.step_operators import Loads
+from catenary.solver.model.model import Model, StepLoad
 from catenary.solver.model.partition import Ownership
+
+
+class StepLoads:
+    """A rank's part of the loads of a model that change with time. Not collective.
+
+    Forces on held unknowns are left out.
+    """
+
+    def __init__(self, model: Model, ownership: Ownership) -> None:
+        free = ~np.isin(np.arange(model.n_dofs), model.constrained)
+        self._parts: list[_Part] = []
+        for load in model.step_loads:
+            mine = np.flatnonzero(ownership.owned(load.dofs) & free[load.dofs])
+            if mine.size:
+                dofs = load.dofs[mine] - ownership.first
+                self._parts.append(_Part(load, mine, dofs, np.zeros(0), np.zeros(0)))
+
+    def __call__(self, time: float) -> Loads:
+        """Local unknowns and forces at a time [s]; the arrays of before where none changed."""
+        for part in self._parts:
+            values = np.ascontiguousarray(part.load.values(time), dtype=float)
+            if not same(values, part.latest):
+                part.latest, part.forces = values.copy(), values[part.mine]
+        return [(part.dofs, part.forces) for part in self._parts]
+
+
+@dataclass
+class _Part:
+    """A load, the rank's own among its unknowns, all its forces at last, and the rank's own."""
+
+    load: StepLoad
+    mine: np.ndarray
+    dofs: np.ndarray
+    latest: np.ndarray
+    forces: np.ndarray
 
 
 class LineLoads:
@@ -40,13 +77,16 @@ class LineLoads:
         self._halo = Halo(comm, ownership, domain.low, self.values)
 
     def change(self, loads: Loads) -> None:
-        """Make ``values`` the constant forces and ``loads``, see ``LineMotion.free_step``."""
+        """Make ``values`` the constant forces and ``loads``, see ``LineMotion.free_step``.
+
+        The very arrays of the step before stand for forces that have not changed.
+        """
         if self._alone and len(loads) == len(self._latest):
-            if all(same(v, kept) for (_, v), kept in zip(loads, self._latest, strict=True)):
+            if all(v is kept for (_, v), kept in zip(loads, self._latest, strict=True)):
                 return
-        self._latest = [np.array(values, dtype=float) for _, values in loads]
+        self._latest = [values for _, values in loads]
         self.values[:] = self._constant
-        for (dofs, _), values in zip(loads, self._latest, strict=True):
+        for dofs, values in loads:
             add_at(self.values[self._owned], dofs, values)
         self._halo.exchange()
 

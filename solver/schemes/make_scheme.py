@@ -13,6 +13,7 @@ from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.contact_problem.coupling import make_coupling
 from catenary.solver.contact_problem.law_tangents import law_in_steps
 from catenary.solver.integrators.line_integrator import LineMotion
+from catenary.solver.integrators.line_loads import StepLoads
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
@@ -132,15 +133,7 @@ class SetUp:
 
     def _loads(self, model: Model) -> LoadSource:
         """This rank's part of the loads that change with time; without any, no calls are made."""
-        free = ~np.isin(np.arange(model.n_dofs), model.constrained)
-        parts = []
-        for load in model.step_loads:
-            mine = np.flatnonzero(self.ownership.owned(load.dofs) & free[load.dofs])
-            if mine.size:
-                parts.append((load, mine, load.dofs[mine] - self.ownership.first))
-        if not model.step_loads:
-            return lambda time: None
-        return lambda time: [(dofs, load.values(time)[mine]) for load, mine, dofs in parts]
+        return StepLoads(model, self.ownership) if model.step_loads else lambda time: None
 
 
 def kept_ratio(problem: Problem, model: Model) -> float:
