@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -22,6 +23,7 @@ from catenary.postproc.files.result_file import FORMAT
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
 from catenary.solver.time_loop import march as time_loop
+from catenary.solver.time_loop import row_layout
 from catenary.solver.time_loop.channels import (
     CHANNELS,
     DROPPER,
@@ -142,3 +144,36 @@ def test_an_energy_is_recorded_read_and_drawn(
         # A file that was written without it lacks nothing.
         assert "total" not in before.energies() and before.damage == []
     assert (tmp_path / "channel_total.png").stat().st_size > 5000
+
+
+def layout_of(array: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> row_layout.RowLayout:
+    """Of a row with one channel more than four numbers that are shown anyway, two of them its."""
+    shown = np.arange(4.0)
+    channels = (
+        Channel("two", "m", "in what is shown", DROPPER, lambda now: now.dropper_force),
+        Channel("more", "m", "from elsewhere", DROPPER, lambda now: array),
+    )
+    monkeypatch.setattr(row_layout, "CHANNELS", {channel.name: channel for channel in channels})
+    none = SimpleNamespace(told=np.zeros(0))
+    sources = Sources(none, none, none, shown[:2], shown[2:])  # type: ignore[arg-type]
+    return row_layout.RowLayout(sources, shown)
+
+
+def test_a_row_ends_with_what_stands_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    array = np.array([7.0, 8.0, 9.0])
+    layout = layout_of(array, monkeypatch)
+    assert layout.columns == {"two": slice(2, 4), "more": slice(4, 7)}
+    assert layout.width == 7 and layout.in_loop
+    assert (layout.taps - array.ctypes.data).tolist() == [0, 8, 16]
+    row = np.zeros(7)
+    array += 1.0
+    layout.fill(row)
+    assert row.tolist() == [0.0, 0.0, 0.0, 0.0, 8.0, 9.0, 10.0]
+
+
+@pytest.mark.parametrize("array", [np.zeros(6)[::2], np.zeros(3, dtype=int)])
+def test_a_channel_that_a_loop_cannot_copy_is_refused(
+    array: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(ValueError, match="values of channel more are no contiguous doubles"):
+        layout_of(array, monkeypatch)
