@@ -52,7 +52,7 @@ def test_acceleration_found_later_moves_it_as_it_moves_the_state(state: np.ndarr
     motion.put(*state)
     gained = np.array([STEPS.position_factor, STEPS.velocity_factor, 1.0])
     moved = state + gained[:, None] * change
-    for array, gain in zip(motion.read, (*motion.gains, 1.0), strict=False):
+    for array, gain in zip(motion.read, motion.gains, strict=False):
         array += gain * change
     found = np.array([motion.displacement, motion.velocity, motion.acceleration])
     np.testing.assert_allclose(found, moved, rtol=0, atol=8 * ROUND_OFF)
