@@ -37,6 +37,7 @@ from small_lines import (
 )
 
 from catenary.cases.run.scene_mesh import mesh_of as mesh_of_scene
+from catenary.cases.scene.convert.problem import problem_of as problem_of_scene
 from catenary.cases.scene.load import load_scene
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.postproc.evaluate import filters
@@ -193,7 +194,7 @@ def test_the_reference_model_s_contact_force_is_of_order_2(overrides: tuple[str,
         "train.start_m=330", "train.end_m=470", "evaluation.from_m=390", "evaluation.to_m=460",
     )  # fmt: skip
     scene = load_scene("en50318_2002", [*overrides, *shortened])
-    problem, mesh = problem_of(scene), mesh_of_scene(scene)
+    problem, mesh = problem_of_scene(scene), mesh_of_scene(scene)
 
     def force(dt: float) -> np.ndarray:
         """Contact force below 20 Hz every 2 ms, without the ends that the filter sees past."""
