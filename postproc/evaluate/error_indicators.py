@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import linalg, optimize
+from scipy import linalg, optimize, signal
 
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import covers
@@ -125,7 +125,10 @@ def step_error(force: np.ndarray, dt: float, method: Method) -> float:
     deviation = float(force.std())
     # What is filtered needs few samples; a long record has more than a spectrum has use for.
     every = max(1, min(force.size // _SPECTRUM, int(1.0 / (_SAMPLED_HZ * dt))))
-    omega, power = _spectrum(force[::every], every * dt)
+    frequency, power = signal.periodogram(
+        force[::every], 1.0 / (every * dt), window="hann", detrend="constant", scaling="spectrum"
+    )
+    omega, power = 2.0 * np.pi * frequency[1:], power[1:]
     if deviation == 0.0 or power.sum() == 0.0:
         return 0.0
     power = power * deviation**2 / power.sum()
@@ -138,17 +141,6 @@ def step_error(force: np.ndarray, dt: float, method: Method) -> float:
     phase = memory(omega, method.alpha, method.beta) * np.hypot(shift, decay)
     phase = np.minimum(phase, _LARGEST_PHASE)
     return float(np.sqrt(np.sum(power * (2.0 - 2.0 * np.cos(phase)))))
-
-
-def _spectrum(record: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
-    """Periodogram of a record (n,) in a Hann window, its mean apart: angular frequencies above zero
-    [rad/s], and the power of each, to a common factor."""
-    n = record.size
-    window = 0.5 - 0.5 * np.cos(2.0 * np.pi / n * np.arange(n))
-    power = np.abs(np.fft.rfft(window * (record - record.mean()))[1:]) ** 2
-    if n % 2 == 0:
-        power[-1] *= 0.5  # the others stand for a negative frequency as well
-    return 2.0 * np.pi * np.fft.rfftfreq(n, dt)[1:], power
 
 
 def memory(omega: np.ndarray, alpha: float, beta: float) -> np.ndarray:
