@@ -1,8 +1,8 @@
 """A pantograph with all its bodies in the time loop: the reference for the reduced ones.
 
-Steps are those of `stepping`, so that joints stay closed, and the head's height at a step's end is
-affine in the contact forces of the step. A vehicle that moves carries the base along: in the base's
-axes all bodies weigh more by its acceleration, which is exact for a base that does not turn.
+Steps are those of `implicit_steps`, so that joints stay closed, and the head's height at a step's
+end is affine in the contact forces of the step. A vehicle that moves carries the base along: in the
+base's axes all bodies weigh more by its acceleration, which is exact for a base that does not turn.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The compiled loops of a step where the train is: places on the wire, and what the line answers.
 
 A touch is a record of ``TOUCH``, a node of the contact wire one of ``NODE``: a loop takes them as
-one argument each, and what it reads of one stands together. Not collective; see `kernels` for how
-they are compiled.
+one argument each, and what it reads of one stands together. Not collective; see `base.compiled` for
+how they are compiled.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The compiled loops of the inner problem: contact forces, slack droppers, contact laws.
 
-Not collective; see `inner` for the equations and `kernels` for how they are compiled.
+Not collective; see `complementarity` for the equations, `base.compiled` for how they are compiled.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """How line and pantographs agree on the contact forces of a step: three coupling schemes.
 
-``implicit`` (the default) solves for the forces through both compliances; see `inner`. The two of
-this module are the ways of programs that exchange forces and motions only, kept to be compared:
+``implicit`` (the default) solves for the forces through both compliances; see `complementarity`.
+The two of this module are the ways of programs that exchange forces and motions only, kept to be
+compared:
 
     explicit   the law at what both sides extrapolate to (the paper's, section 4)
     iterated   the law at what both sides answer to the forces before, until these agree

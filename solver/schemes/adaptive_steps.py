@@ -6,7 +6,7 @@ when it is first needed and kept. Level 0 holds the state whenever an interval e
 records, checkpoints and incidents know nothing of the others.
 
 A step is repeated with a shorter one if its estimated error is above the tolerance (`step_error`),
-or if it has no solution; which size is next is up to PETSc's TSAdapt (`step_control`).
+or if it has no solution; which size is next is up to PETSc's TSAdapt (`ts_adapt`).
 """
 
 from __future__ import annotations

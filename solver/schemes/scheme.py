@@ -46,7 +46,7 @@ class Decision(NamedTuple):
 
 
 class Judge(Protocol):
-    """Decides on steps whose forces are found, where steps adapt (`step_levels`)."""
+    """Decides on steps whose forces are found, where steps adapt (`adaptive_steps`)."""
 
     def look(
         self,

@@ -189,7 +189,7 @@ class Showing:
     def _line_energies(self) -> tuple[float, float]:
         """Kinetic and elastic energy relative to the first rest, slack droppers as they are [J].
 
-        Collective. After an incident it is that of what is left of the line; see `changed_line`.
+        Collective. After an incident it is that of what is left of the line; see `after_incidents`.
         """
         kinetic, elastic = self._line.energies()
         if self._unbalanced:
