@@ -60,14 +60,17 @@ class Owner:
 
     @property
     def alive(self) -> bool:
-        """Whether the process is there; only for those of the same process numbers."""
+        """Whether the process is there; only for those of the same process numbers.
+
+        One that has ended and whose parent has not taken its exit code yet (a zombie) is not.
+        """
         try:
             os.kill(self.pid, 0)
         except ProcessLookupError:
             return False
         except OSError:  # of another user
             pass
-        return _started(self.pid) in ("", self.started)
+        return _started(self.pid) in ("", self.started) and not _is_zombie(self.pid)
 
 
 def myself(command: str) -> Owner:
@@ -112,5 +115,14 @@ def _namespace() -> str:
 
 def _started(pid: int) -> str:
     """When a process was started, in the kernel's ticks since the machine's; empty if unknown."""
-    words = _line(_PROC / f"{pid}/stat").rpartition(")")[2].split()
+    words = _stat(pid)
     return words[19] if len(words) > 19 else ""
+
+
+def _is_zombie(pid: int) -> bool:
+    return _stat(pid)[:1] == ["Z"]
+
+
+def _stat(pid: int) -> list[str]:
+    """What the kernel says of a process, from its state on; empty if unknown."""
+    return _line(_PROC / f"{pid}/stat").rpartition(")")[2].split()

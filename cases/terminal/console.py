@@ -1,4 +1,4 @@
-"""How the command line speaks: one sentence for an error, one voice under mpirun, exit codes."""
+"""Terminal output on rank 0, errors of one sentence, exit codes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Least squares and null spaces of small matrices, by methods of LAPACK that do not give up.
+"""Least squares and null spaces of small matrices, by LAPACK's gelsy and gesvd.
 
 SciPy's defaults find singular values by divide and conquer, which fails on a rare matrix however
 well conditioned it is ("SVD did not converge"; seen with 36 equations in 34 unknowns whose singular

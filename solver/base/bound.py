@@ -1,4 +1,4 @@
-"""Compiled loops with their arguments found once.
+"""Bind a Numba kernel to its arguments; a call then skips type dispatch.
 
 At each call Numba determines the type of every argument, to choose among what it has compiled. A
 loop of a step gets the same arrays each time: with types determined once, a step's seven calls cost
@@ -22,7 +22,7 @@ def bound(kernel: Any, *arguments: Any, later: tuple[Any, ...] = ()) -> Callable
     numbers, which are converted as need be.
     """
     if not hasattr(kernel, "overloads"):
-        return partial(kernel, *arguments)  # Numba was told to compile nothing
+        return partial(kernel, *arguments)  # NUMBA_DISABLE_JIT
     types = tuple(typeof(argument) for argument in (*arguments, *later))
     kernel.compile(types)
     chosen = getattr(kernel.overloads.get(types), "entry_point", kernel)

@@ -1,9 +1,7 @@
-"""Numbers that are next to nothing count as nothing while a line marches.
+"""Flush subnormal floats to zero during the time loop (FTZ and DAZ bits of x86).
 
-An implicit step answers a force at all distances at once: ahead of its waves a line holds numbers
-that fall off to 1e-308 m and on to zero. Those below, which are kept with fewer digits
-(subnormal), take some processors of the x86 family far longer: half of the march of a hundred
-spans. The processor is told to take them for zero.
+The response of an implicit step decays along the line to below 1e-308 m. Arithmetic on such
+subnormal numbers is slow on some x86 processors: half of the march of a hundred spans.
 """
 
 from __future__ import annotations
@@ -21,7 +19,7 @@ from numba.extending import intrinsic
 
 from catenary.solver.base.compiled import compiled
 
-# What is told below is understood by this family only.
+# The bits below are those of this family only.
 _UNDERSTOOD = platform.machine().lower() in ("x86_64", "amd64")
 # In the control register of SSE: results that are subnormal, and operands that are.
 _TAKEN_FOR_ZERO = 0x8000 | 0x0040
@@ -58,12 +56,12 @@ def _exchange(kept, added):
 
 
 @contextmanager
-def taken_for_zero() -> Iterator[None]:
+def flushed() -> Iterator[None]:
     """Within it this thread takes subnormal numbers for zero, where that is faster.
 
     A context manager. Not collective.
     """
-    # Numba may have been told to compile nothing.
+    # With NUMBA_DISABLE_JIT there is no intrinsic.
     if not (_UNDERSTOOD and hasattr(_exchange, "overloads")):
         yield
         return

@@ -307,8 +307,8 @@ def respond(
 def superpose(force, answers, touches, motion, gains):
     """Add the answers to contact forces to the state.
 
-    ``answers`` and ``touches`` are those of ``place``; ``motion`` and ``gains`` are ``Motion.read``
-    and ``Motion.gains``.
+    ``answers`` and ``touches`` are those of ``place``; ``motion`` and ``gains`` those of
+    ``LineState``, the former as it is read.
     """
     x, y, z, _ = motion
     for i in range(force.size):
@@ -349,10 +349,10 @@ def parts(numbers, n):
 
 
 @compiled
-def tell(force, reported, heads, depth, ends, told):
+def write_outputs(force, reported, heads, depth, ends, outputs):
     """Contact force, head height and wire height of each pantograph, then the force of each strip.
 
-    These are the 3 n_pantographs + n numbers of ``told``; ``heads`` are those of ``gap``.
+    These are the 3 n_pantographs + n numbers of ``outputs``; ``heads`` are those of ``gap``.
     Pantograph p has the contacts from ``ends[p]`` to ``ends[p + 1]``: the sum of their forces, and
     the means of their heights.
     """
@@ -367,6 +367,6 @@ def tell(force, reported, heads, depth, ends, told):
             total += reported[i]
             mean += height
             mean_of_wire += height - depth[i]
-            told[3 * n + i] = reported[i]
+            outputs[3 * n + i] = reported[i]
         strips = ends[p + 1] - ends[p]
-        told[p], told[n + p], told[2 * n + p] = total, mean / strips, mean_of_wire / strips
+        outputs[p], outputs[n + p], outputs[2 * n + p] = total, mean / strips, mean_of_wire / strips

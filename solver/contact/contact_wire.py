@@ -22,7 +22,7 @@ class ContactWire:
     ----------
     x : (n_nodes,) positions of its nodes [m], ascending
     dofs : (n_nodes, 2) unknowns (w, theta_y) of its nodes
-    nodes : (n_nodes,) records of ``NODE``, of no columns until an ``Interaction`` has some
+    nodes : (n_nodes,) records of ``NODE``, of no columns until an ``ForcesOnLine`` has some
     """
 
     def __init__(self, model: Model, form: Equilibrium, ownership: Ownership) -> None:

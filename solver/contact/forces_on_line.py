@@ -1,4 +1,4 @@
-"""This rank's part of what acts on the line: contacts, droppers, and the answer to their forces."""
+"""Contacts and droppers of this rank, and the line's response to their forces."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from catenary.solver.contact.contact_kernels import TOUCH
 from catenary.solver.contact.contact_wire import ContactWire
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.integrators import state_kernels
-from catenary.solver.integrators.line_integrator import LineMotion
+from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.linear import unit_responses
 from catenary.solver.model.model import Model
 from catenary.solver.statics.equilibrium import Equilibrium
@@ -36,7 +36,7 @@ class Droppers:
     latest_tension : (n,) what was found last, here or by a free step of the line [N]
     """
 
-    def __init__(self, model: Model, form: Equilibrium, line: LineMotion) -> None:
+    def __init__(self, model: Model, form: Equilibrium, line: LineIntegrator) -> None:
         ends = model.dofs(model.mesh.droppers)
         mine = line.ownership.owned(ends[:, 0])
         self.shown = np.flatnonzero(mine)
@@ -59,7 +59,7 @@ class Droppers:
         self.per_acceleration = stiffness * line.position_factor + damping * line.velocity_factor
         self.latest_tension = np.zeros(self.numbers.size)
         self._line = line
-        line.look_at(self.ends, self.laws, self.latest_tension)
+        line.track_droppers(self.ends, self.laws, self.latest_tension)
 
     def tension(self) -> np.ndarray:
         """Tension in the line's present motion [N], shape (n,), overwritten by the next call."""
@@ -82,7 +82,7 @@ class Droppers:
         return slice(int(low), int(high))
 
 
-class Interaction:
+class ForcesOnLine:
     """Contacts and droppers of one rank. Collective to make.
 
     Attributes
@@ -104,7 +104,7 @@ class Interaction:
         comm: Any,
         model: Model,
         form: Equilibrium,
-        line: LineMotion,
+        line: LineIntegrator,
         range_of_run: tuple[float, float],
         contact_place: np.ndarray,
         train_speed: float,
@@ -216,7 +216,7 @@ class Interaction:
     def _columns_of_nodes(
         self, comm: Any, range_of_run: tuple[float, float], free: np.ndarray
     ) -> np.ndarray:
-        """Columns of A^-1 for the nodes in a stretch of the wire, which are told where theirs are.
+        """Columns of A^-1 for the nodes in a stretch of the wire, each with the place of its own.
 
         Collective; ``free`` (n_dofs,) is zero for the unknowns that are held.
         """
@@ -263,7 +263,7 @@ class SlackCoupling:
         model: Model,
         droppers: Droppers,
         columns: unit_responses.ShortColumns,
-        line: LineMotion,
+        line: LineIntegrator,
     ) -> None:
         x = model.mesh.x(model.mesh.droppers[:, 1])
         n = x.size

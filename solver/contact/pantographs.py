@@ -51,8 +51,8 @@ class Pantographs:
     joints_in_loop : whether a pantograph has joints that may open, all ranks
     constraint_violation : (n,) largest open joint after the latest step [m], NaN for pantographs
         without joints in the loop, rank 0 only
-    told : ``position`` and all these of the latest step one after another; ``of_step`` is its part
-        that a step fills after its forces are known
+    outputs : ``position`` and all these of the latest step one after another; ``of_step`` is the
+        part that a step fills after its forces are known
     speed : of the train [m/s]
     moving : start and places of contacts and pantographs, see ``kernels.shift``
     ends : (n + 1,) number of the first contact of each pantograph, and of all
@@ -84,18 +84,18 @@ class Pantographs:
         self.n_contacts = contact_start.size
         self._all_start = np.concatenate([contact_start, self._start])
         sizes = (self.n, 3 * self.n, self.n_contacts, self.n)
-        places_and_told = np.zeros(self.n_contacts + sum(sizes))
-        self._all_places = places_and_told[: self._all_start.size]
+        places_and_outputs = np.zeros(self.n_contacts + sum(sizes))
+        self._all_places = places_and_outputs[: self._all_start.size]
         self.moving = self._all_start, self._all_places
         self._move = bound(state_kernels.shift, *self.moving, later=(0.0,))
-        self.contact_place = places_and_told[: self.n_contacts]
-        self.told = places_and_told[self.n_contacts :]
+        self.contact_place = places_and_outputs[: self.n_contacts]
+        self.outputs = places_and_outputs[self.n_contacts :]
         self.position, forces, self.strip_force, self.constraint_violation = np.split(
-            self.told, np.cumsum(sizes)[:-1]
+            self.outputs, np.cumsum(sizes)[:-1]
         )
         self._all_places[:] = self._all_start
         self.contact_force, self.head_height, self.wire_height = forces.reshape(3, self.n)
-        self.of_step = self.told[self.n : 4 * self.n + self.n_contacts]
+        self.of_step = self.outputs[self.n : 4 * self.n + self.n_contacts]
         self.wire_height[:] = wire.rest_height(self._start)
         self.head_height[:] = self.wire_height - train.start_below
         self._heads = Heads(self.n_contacts)
@@ -146,7 +146,7 @@ class Pantographs:
                 model.advance(contact_force[strips])
         if self.joints_in_loop:
             self.look_at_joints()
-        contact_kernels.tell(
+        contact_kernels.write_outputs(
             contact_force, reported, self._heads.numbers, depth, self.ends, self.of_step
         )
 
@@ -177,7 +177,7 @@ class Pantographs:
 
     def take_over(self, other: Pantographs) -> None:
         """Go on from where ``other`` are, the same train made for another step. Not collective."""
-        self.told[:] = other.told
+        self.outputs[:] = other.outputs
         for mine, theirs in zip(self.models, other.models, strict=True):
             mine.restore(theirs.state())
 

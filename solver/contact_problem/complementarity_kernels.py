@@ -252,8 +252,8 @@ def solve(
     """Contact forces and compensations for a law's tangents: rounds needed, and unknowns used.
 
     ``line`` is ``LineResponse.summed``, ``heads`` and ``numbers`` are those of ``gap``. ``found``
-    (2, n) becomes depths and rates at the contacts; told last are whether all of it are numbers,
-    and whether all droppers that are slack had a row, see ``leaves_out``.
+    (2, n) becomes depths and rates at the contacts; returned last are whether all of them are
+    finite, and whether all droppers that are slack had a row, see ``leaves_out``.
 
     If no contact force pushes a dropper together there are n unknowns, else n + ``count``. Rounds
     are not positive if the active set did not settle; the problem then stands in ``matrix`` and

@@ -123,7 +123,7 @@ class Exchange:
         count = int(answer[1])
         pairs = answer[_HEAD + n : _HEAD + n + 2 * count]
         if count > room:
-            # More slack droppers at once than a rank reports: rare, and told in a second message.
+            # More slack droppers at once than a rank reports: rare, and sent in a second message.
             pairs = np.zeros(2 * count)
             if reply is not None:
                 pairs[:count], pairs[count:] = reply.droppers, reply.compensation

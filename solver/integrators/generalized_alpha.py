@@ -21,7 +21,7 @@ import numpy as np
 
 from catenary.solver.base import aligned_arrays
 from catenary.solver.integrators import alpha_kernels
-from catenary.solver.integrators.line_integrator import LineMotion
+from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
@@ -31,7 +31,7 @@ from catenary.solver.problem.integrator_parameters import Integration
 _LEAST_SHARE = 1e-3
 
 
-class GeneralizedAlphaLine(LineMotion):
+class GeneralizedAlphaLine(LineIntegrator):
     """The line by the generalized-alpha method. Collective to make.
 
     With r = (1 - a_f) / (1 - a_m) the algorithm's acceleration is a = p + r b, p being known when a

@@ -19,7 +19,7 @@ from catenary.solver.base.petsc import PETSc
 from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.detour import LIBRARY, PARTS, Detour
 from catenary.solver.integrators.line_loads import LineLoads
-from catenary.solver.integrators.line_state import AlphaSteps, Motion, MotionAhead, Steps
+from catenary.solver.integrators.line_state import AlphaSteps, LineState, PredictedLineState, Steps
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.step_operators import LineOperators, Loads
@@ -28,7 +28,7 @@ from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 
 
-class LineMotion(ABC):
+class LineIntegrator(ABC):
     """State and step operator of the distributed line, relative to its equilibrium.
 
     Collective to make; ``destroy`` is collective too. Arrays are this rank's part, shape
@@ -37,7 +37,7 @@ class LineMotion(ABC):
 
     Attributes
     ----------
-    motion : Motion, the state as it is kept
+    motion : LineState, the state as it is kept
     position_factor, velocity_factor : sigma [s2] and tau [s]
     operators : LineOperators
     solution : the displacement as a PETSc vector, once ``fill_solution`` has filled it
@@ -75,10 +75,10 @@ class LineMotion(ABC):
         self._loads: LineLoads | None = None
         self._lost: np.ndarray | None = None
         self.detour: Detour | None = None
-        self.motion = Motion(
+        self.motion = LineState(
             aligned_arrays.zeros(n, 2), aligned_arrays.zeros(n, 3), self.operators.answer, gains
         )
-        self.look_at(np.zeros((0, 2), np.int64), np.zeros((0, 4)), np.zeros(0))
+        self.track_droppers(np.zeros((0, 2), np.int64), np.zeros((0, 4)), np.zeros(0))
         # PETSc's time loop wants the solution as a vector; it wraps our array.
         self.solution = PETSc.Vec().createWithArray(self.displacement, size=(n, None), comm=comm)
 
@@ -120,11 +120,11 @@ class LineMotion(ABC):
             return
         self._passes, self._loads = passes, loads
         if passes is not None:
-            passes.look_at(*self._droppers)
+            passes.track_droppers(*self._droppers)
         motion.put(self.displacement, self.velocity, self.acceleration)
         self.motion = motion
 
-    def _ahead(self) -> tuple[MotionAhead, Steps | AlphaSteps] | None:
+    def _ahead(self) -> tuple[PredictedLineState, Steps | AlphaSteps] | None:
         """A motion to keep ahead, in the arrays of this one, and the steps it is kept for.
 
         None if the method cannot.
@@ -180,7 +180,7 @@ class LineMotion(ABC):
         """Continue from what ``state`` returned, here or elsewhere, or from an ``exact_state``."""
         self.motion.take(state)
 
-    def look_at(self, ends: np.ndarray, laws: np.ndarray, tension: np.ndarray) -> None:
+    def track_droppers(self, ends: np.ndarray, laws: np.ndarray, tension: np.ndarray) -> None:
         """Fill ``tension`` (n,) [N] at the end of each ``free_step``, see ``kernels.tension``.
 
         The droppers stand in the order along the track. Without this there are none. Not
@@ -188,7 +188,7 @@ class LineMotion(ABC):
         """
         self._droppers = ends, laws, tension
         if self._passes is not None:
-            self._passes.look_at(ends, laws, tension)
+            self._passes.track_droppers(ends, laws, tension)
 
     def free_step(self, loads: Loads | None = None) -> None:
         """Take the step without contacts and slack droppers: in two passes, or by ``predict``,

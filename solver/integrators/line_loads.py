@@ -77,7 +77,7 @@ class LineLoads:
         self._halo = Halo(comm, ownership, domain.low, self.values)
 
     def change(self, loads: Loads) -> None:
-        """Make ``values`` the constant forces and ``loads``, see ``LineMotion.free_step``.
+        """Make ``values`` the constant forces and ``loads``, see ``LineIntegrator.free_step``.
 
         The very arrays of the step before stand for forces that have not changed.
         """

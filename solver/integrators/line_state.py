@@ -1,4 +1,4 @@
-"""How a line's state is kept: as it is, or as it is predicted for the coming step.
+"""State of the line: displacement, velocity, acceleration, or the next step's prediction.
 
 What kernels read at single unknowns are displacement and velocity at the end of the latest step,
 
@@ -29,7 +29,7 @@ class Steps(NamedTuple):
     damping_share: float
 
 
-class Motion:
+class LineState:
     """State of a rank's part of a line, as it is. Not collective.
 
     Attributes
@@ -83,7 +83,7 @@ class Motion:
         self.put(state["displacement"], state["velocity"], state["acceleration"])
 
 
-class MotionAhead(Motion):
+class PredictedLineState(LineState):
     """The same kept one prediction ahead, for Newmark's method.
 
     Kept are what the coming step's product with K reads, x = -(d* + c v*) with the predictions d*
@@ -166,7 +166,7 @@ class AlphaSteps(NamedTuple):
     damping_share: float
 
 
-class AlphaAhead(MotionAhead):
+class AlphaAhead(PredictedLineState):
     """The same for the generalized-alpha method, whose steps need an acceleration p known before.
 
     Kept are x = -(d* + c v*) of the coming step, y = v, and z = k b + l p, which is what d* + c v*
@@ -192,7 +192,7 @@ class AlphaAhead(MotionAhead):
         way = steps.dt + steps.work_velocity
         by_position = steps.position_factor + way * steps.velocity_factor + steps.balance[0]
         gains = -by_position, steps.velocity_factor
-        Motion.__init__(self, ahead, velocity, balance, gains)
+        LineState.__init__(self, ahead, velocity, balance, gains)
         self.gains[2] = steps.balance[0]
         self.read[3][:] = [-1.0, -way, -1.0, 1.0, 0.0]
         self._way, self._balance, self._shown, self.known = way, steps.balance, shown, known

@@ -9,7 +9,7 @@ import numpy as np
 
 from catenary.solver.integrators.detour import PARTS, Detour, method_detour
 from catenary.solver.integrators.generalized_alpha import GeneralizedAlphaLine
-from catenary.solver.integrators.line_integrator import LineMotion
+from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.newmark import NewmarkLine
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
@@ -27,7 +27,7 @@ def make_line(
     lost: np.ndarray | None = None,
     only_free: bool = True,
     loaded: bool = False,
-) -> LineMotion:
+) -> LineIntegrator:
     """The line with the method that the numerics ask for. Collective.
 
     Parameters
@@ -37,7 +37,7 @@ def make_line(
     loaded : whether its steps will have loads
     """
     if numerics.integrator == NEWMARK:
-        line: LineMotion = NewmarkLine(comm, model, ownership, numerics)
+        line: LineIntegrator = NewmarkLine(comm, model, ownership, numerics)
     else:
         chosen = integration_of(numerics.integrator, numerics.spectral_radius)
         line = GeneralizedAlphaLine(comm, model, ownership, numerics.dt, chosen)

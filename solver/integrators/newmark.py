@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from catenary.solver.integrators import state_kernels
-from catenary.solver.integrators.line_integrator import LineMotion
-from catenary.solver.integrators.line_state import MotionAhead, Steps
+from catenary.solver.integrators.line_integrator import LineIntegrator
+from catenary.solver.integrators.line_state import PredictedLineState, Steps
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.problem.problem import Numerics
 
 
-class NewmarkLine(LineMotion):
+class NewmarkLine(LineIntegrator):
     """The line by Newmark's method: sigma = beta dt^2, tau = gamma dt. Collective to make."""
 
     def __init__(self, comm: Any, model: Model, ownership: Ownership, numerics: Numerics) -> None:
@@ -22,7 +22,7 @@ class NewmarkLine(LineMotion):
         self._predict_position = 0.5 * dt**2 * (1.0 - 2.0 * beta)
         self._predict_velocity = dt * (1.0 - gamma)
 
-    def _ahead(self) -> tuple[MotionAhead, Steps]:
+    def _ahead(self) -> tuple[PredictedLineState, Steps]:
         steps = Steps(
             self._dt,
             self._predict_position,
@@ -35,7 +35,7 @@ class NewmarkLine(LineMotion):
         operators, (shown, velocity, acceleration, _) = self.operators, self.motion.read
         if not self._proportional:
             velocity = operators.rate  # which products with C read
-        return MotionAhead(operators.factor, velocity, acceleration, shown, steps), steps
+        return PredictedLineState(operators.factor, velocity, acceleration, shown, steps), steps
 
     def predict(self) -> None:
         """Turn displacement and velocity into their predictions of eq. (2.5)."""

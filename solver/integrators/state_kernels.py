@@ -52,28 +52,28 @@ def shift(start, places, way):
 
 @in_line
 def displacement_at(unknown, motion):
-    """Displacement at one of a rank's unknowns; ``motion`` as ``Motion.read``."""
+    """Displacement at one of a rank's unknowns; ``motion`` as ``LineState.read``."""
     x, y, z, shares = motion
     return shares[0] * x[unknown] + shares[1] * y[unknown] + shares[2] * z[unknown]
 
 
 @in_line
 def velocity_at(unknown, motion):
-    """Velocity at one of a rank's unknowns; ``motion`` as ``Motion.read``."""
+    """Velocity at one of a rank's unknowns; ``motion`` as ``LineState.read``."""
     _, y, z, shares = motion
     return shares[3] * y[unknown] + shares[4] * z[unknown]
 
 
 @compiled
 def displacements(motion, result):
-    """Fill in all of a rank's displacements; ``motion`` as ``Motion.read``."""
+    """Fill in all of a rank's displacements; ``motion`` as ``LineState.read``."""
     for i in range(result.size):
         result[i] = displacement_at(i, motion)
 
 
 @compiled
 def velocities(motion, result):
-    """Fill in all of a rank's velocities; ``motion`` as ``Motion.read``."""
+    """Fill in all of a rank's velocities; ``motion`` as ``LineState.read``."""
     for i in range(result.size):
         result[i] = velocity_at(i, motion)
 
@@ -94,7 +94,7 @@ def tension(motion, ends, laws, result):
     """Tension N0 + k e + c e' of droppers as if they could push [N].
 
     ``ends`` (n, 2) holds local unknowns of upper and lower end, ``laws`` (n, 4) rest force,
-    stiffness, damping and place; ``motion`` is ``Motion.read``.
+    stiffness, damping and place; ``motion`` is ``LineState.read``.
     """
     for d in range(ends.shape[0]):
         result[d] = tension_of(d, motion, ends, laws)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from catenary.solver.base.bound import bound
-from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps, MotionAhead, Steps
+from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps, PredictedLineState, Steps
 from catenary.solver.integrators.state_kernels import compiled, in_line, tension_of
 from catenary.solver.linear.lanes import Layout, add_scaled, load, pitch, remembers, store, zero
 from catenary.solver.linear.station_factors import (
@@ -35,7 +35,7 @@ class StationPasses:
     Attributes
     ----------
     kernel, arguments : the compiled function of a step, and the tuple that it is called with, for
-        compiled loops that take steps themselves. ``look_at`` replaces the tuple
+        compiled loops that take steps themselves. ``track_droppers`` replaces the tuple
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class StationPasses:
         velocity: np.ndarray,
         loads: np.ndarray,
         answer: np.ndarray,
-        motion: MotionAhead,
+        motion: PredictedLineState,
         steps: Steps | AlphaSteps,
     ) -> None:
         low, high = factors.low, factors.high
@@ -71,10 +71,10 @@ class StationPasses:
         self._stretch = max(1, _STRETCH // layout.pitch)
         self._place = low, high, self._stretch, layout.pitch
         self._parts = multiplied, factored, loads, answer, (*motion.read, known), changes
-        self.look_at(np.zeros((0, 2), np.int64), np.zeros((0, 4)), np.zeros(0))
+        self.track_droppers(np.zeros((0, 2), np.int64), np.zeros((0, 4)), np.zeros(0))
 
-    def look_at(self, ends: np.ndarray, laws: np.ndarray, tension: np.ndarray) -> None:
-        """Fill ``tension`` on the way back, as ``LineMotion.look_at``."""
+    def track_droppers(self, ends: np.ndarray, laws: np.ndarray, tension: np.ndarray) -> None:
+        """Fill ``tension`` on the way back, as ``LineIntegrator.track_droppers``."""
         droppers = ends, laws, tension, pulled(*self._place, ends), self._stretch
         self.kernel, self.arguments = forth_and_back, (*self._parts, droppers)
         self._step = bound(self.kernel, *self.arguments)
@@ -84,7 +84,9 @@ class StationPasses:
         self._step()
 
 
-def changes_of(motion: MotionAhead, steps: Steps | AlphaSteps) -> tuple[tuple[float, ...], Any]:
+def changes_of(
+    motion: PredictedLineState, steps: Steps | AlphaSteps
+) -> tuple[tuple[float, ...], Any]:
     """Numbers that take a state from one prediction to the next, and the known acceleration."""
     by_position, by_velocity, _ = map(float, motion.gains)
     if isinstance(steps, Steps):

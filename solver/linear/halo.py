@@ -1,4 +1,4 @@
-"""The part of the line that a rank computes on, and what it is told by its neighbours."""
+"""The part of the line that a rank computes on, and what its neighbours send."""
 
 from __future__ import annotations
 
@@ -79,10 +79,10 @@ class Halo:
                 self._requests.append(comm.Recv_init(wanted, source=rank))
             begin, end = max(other_low, ownership.first), min(other_high, ownership.last)
             if begin < end:
-                told = array[begin - low : end - low]
-                self._requests.append(comm.Send_init(told, dest=rank))
+                sent = array[begin - low : end - low]
+                self._requests.append(comm.Send_init(sent, dest=rank))
                 self.messages += 1
-                self.bytes_sent += told.nbytes
+                self.bytes_sent += sent.nbytes
 
     def exchange(self) -> None:
         """Bring the others' parts up to date."""

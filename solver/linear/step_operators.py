@@ -1,8 +1,7 @@
-"""What a step does with a line's operators: a product with K, and a solve with A.
+"""Operators of a step: a product with K, and a solve with A.
 
-Every rank holds the rows of its own part of the line and of its overlap with the neighbours'. It is
-told what a product reads there, once a step, and then needs no other word: product and solve are
-its own.
+Every rank holds the rows of its own part of the line and of its overlap with the neighbours'. One
+halo exchange a step; product and solve then need no communication.
 """
 
 from __future__ import annotations

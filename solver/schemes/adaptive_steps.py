@@ -128,7 +128,7 @@ class StepLevels:
         self._go_to(0)
         return goes_on
 
-    def look(
+    def decide(
         self,
         time: float,
         depth: np.ndarray,
@@ -136,7 +136,7 @@ class StepLevels:
         stiffness: np.ndarray,
         compliance: np.ndarray,
     ) -> Decision:
-        """Decide on a step. Rank 0 only; see `schemes.Judge`."""
+        """Decide on a step. Rank 0 only; see `schemes.StepController`."""
         level, size = self._tried, self._dt / 2**self._tried
         error = self._error.of(time, depth, force, stiffness, compliance)
         decision = Decision(True, level)
@@ -150,7 +150,7 @@ class StepLevels:
             self._error.accept(time, depth, force)
         return decision
 
-    def hear(self, level: int) -> None:
+    def set_level(self, level: int) -> None:
         """Learn which level is wanted next. All ranks."""
         self._wanted = level
 

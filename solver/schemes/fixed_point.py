@@ -10,13 +10,13 @@ from mpi4py import MPI
 
 from catenary.solver.base.errors import NotConverged
 from catenary.solver.base.parallel import on_root
-from catenary.solver.contact.forces_on_line import Interaction
+from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.contact_problem.coupling import DIVERGED
 from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.problem.problem import Numerics
-from catenary.solver.schemes.scheme import Counters, Judge, LoadSource, StepRejected
+from catenary.solver.schemes.scheme import Counters, LoadSource, StepController, StepRejected
 
 # A correction that moves any of the line by more than this [m] will not come back.
 _FAR = 10.0
@@ -32,7 +32,7 @@ class FixedPoint:
     """
 
     comm: Any
-    interaction: Interaction
+    interaction: ForcesOnLine
     pantographs: Pantographs
     numerics: Numerics
     law: LawInSteps
@@ -40,7 +40,7 @@ class FixedPoint:
     may_slacken: bool
     loads: LoadSource
     counters: Counters = field(default_factory=Counters)
-    judge: Judge | None = None
+    judge: StepController | None = None
 
     def __post_init__(self) -> None:
         n = self.interaction.line.ownership.n_local
@@ -49,7 +49,7 @@ class FixedPoint:
         self._heads = Heads(self.pantographs.n_contacts)
         self._force = np.zeros(self.pantographs.n_contacts)
 
-    # Iterates that grow beyond all numbers are told by ``_settled``, not by NumPy.
+    # Iterates that grow beyond all numbers are reported by ``_settled``, not by NumPy.
     @np.errstate(over="ignore", invalid="ignore")
     def step(self, time: float, stop: bool) -> bool:
         line = self.interaction.line
@@ -96,14 +96,14 @@ class FixedPoint:
         return not stop
 
     def _ask(
-        self, judge: Judge, time: float, depth: np.ndarray, force: np.ndarray, heads: Heads
+        self, judge: StepController, time: float, depth: np.ndarray, force: np.ndarray, heads: Heads
     ) -> None:
         """Raise StepRejected on all ranks if the step is not to be taken. Collective."""
         stiffness = self.law.tangents[2]
         # Of the line's compliance this scheme knows nothing.
         yielding = heads.height_compliance.diagonal()
-        decision = on_root(self.comm, lambda: judge.look(time, depth, force, stiffness, yielding))
-        judge.hear(decision.level)
+        decision = on_root(self.comm, lambda: judge.decide(time, depth, force, stiffness, yielding))
+        judge.set_level(decision.level)
         if not decision.accepted:
             raise StepRejected
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from catenary.solver.contact.forces_on_line import Interaction
+from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.contact_problem.coupling import make_coupling
 from catenary.solver.contact_problem.law_tangents import law_in_steps
-from catenary.solver.integrators.line_integrator import LineMotion
+from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.line_loads import StepLoads
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.model import Model
@@ -32,8 +32,8 @@ from catenary.solver.statics.equilibrium import Equilibrium
 class Parts:
     """Line, what acts on it, train, and the scheme that steps them. ``destroy`` is collective."""
 
-    line: LineMotion
-    interaction: Interaction
+    line: LineIntegrator
+    interaction: ForcesOnLine
     pantographs: Pantographs
     scheme: Scheme
 
@@ -44,7 +44,7 @@ class Parts:
 
 
 @dataclass(frozen=True)
-class SetUp:
+class SchemeFactory:
     """What parts are made of, whatever has happened to the line. ``make`` is collective.
 
     Parameters
@@ -75,7 +75,7 @@ class SetUp:
         reach = (max(0.0, -min(offsets)), max(0.0, max(offsets)))
         # A kinematic contact ends depths through their rates.
         uses_rate = "contact_damping" in on or isinstance(problem.contact, KinematicLaw)
-        interaction = Interaction(
+        interaction = ForcesOnLine(
             comm,
             model,
             self.form,
@@ -86,7 +86,7 @@ class SetUp:
             uses_rate,
             "dropper_slackening" in on,
         )
-        scheme_of: dict[str, Callable[[Problem, Model, Interaction, Pantographs], Scheme]] = {
+        scheme_of: dict[str, Callable[[Problem, Model, ForcesOnLine, Pantographs], Scheme]] = {
             "one_solve": self._one_solve,
             "fixed_point": self._fixed_point,
             "ts_alpha2": self._ts_alpha2,
@@ -95,7 +95,7 @@ class SetUp:
         return Parts(line, interaction, pantographs, scheme)
 
     def _one_solve(
-        self, problem: Problem, model: Model, interaction: Interaction, pantographs: Pantographs
+        self, problem: Problem, model: Model, interaction: ForcesOnLine, pantographs: Pantographs
     ) -> Scheme:
         slack = interaction.slack_coupling
         band = np.zeros((0, 1)) if slack is None or slack.band is None else slack.band
@@ -104,7 +104,7 @@ class SetUp:
         return OneSolve(self.comm, interaction, pantographs, coupling, self._loads(model))
 
     def _fixed_point(
-        self, problem: Problem, model: Model, interaction: Interaction, pantographs: Pantographs
+        self, problem: Problem, model: Model, interaction: ForcesOnLine, pantographs: Pantographs
     ) -> Scheme:
         return FixedPoint(
             self.comm,
@@ -118,7 +118,7 @@ class SetUp:
         )
 
     def _ts_alpha2(
-        self, problem: Problem, model: Model, interaction: Interaction, pantographs: Pantographs
+        self, problem: Problem, model: Model, interaction: ForcesOnLine, pantographs: Pantographs
     ) -> Scheme:
         slackens = "dropper_slackening" in model.terms_of
         system = WholeSystem(

@@ -10,20 +10,20 @@ import numpy as np
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.base.parallel import on_root
 from catenary.solver.base.petsc_events import NAMES, event
-from catenary.solver.contact.forces_on_line import Interaction
+from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.contact_problem.complementarity import NOT_FINITE, InnerSolution
 from catenary.solver.contact_problem.coupling import Coupling
 from catenary.solver.contact_problem.force_exchange import Exchange, Reply, Verdict
-from catenary.solver.schemes.scheme import Counters, Judge, LoadSource, StepRejected
+from catenary.solver.schemes.scheme import Counters, LoadSource, StepController, StepRejected
 
 # First guesses of what droppers elsewhere may lose [N] and of contact forces [N]; both grow when
 # a step shows that they were too small, and that step is repeated.
 _FIRST_MARGIN = 5.0
 _FIRST_BOUND = 200.0
-# Below it is no tension: no dropper is told of, but for one that is not finite.
+# No tension is below it: no dropper is reported, but for one that is not finite.
 _NO_MARGIN = -np.finfo(float).max
 
 
@@ -36,12 +36,12 @@ class OneSolve:
     """
 
     comm: Any
-    interaction: Interaction
+    interaction: ForcesOnLine
     pantographs: Pantographs
     coupling: Coupling
     loads: LoadSource
     counters: Counters = field(default_factory=Counters)
-    judge: Judge | None = None
+    judge: StepController | None = None
 
     def __post_init__(self) -> None:
         n = self.pantographs.n_contacts
@@ -88,7 +88,7 @@ class OneSolve:
         interaction, events = self.interaction, self._events
         reply = self._solve_inner(time, stop)
         if self.judge is not None:
-            self.judge.hear(reply.level)
+            self.judge.set_level(reply.level)
             if reply.verdict == Verdict.REJECT:
                 raise StepRejected
         events["LineSuperpose"].begin()
@@ -201,7 +201,7 @@ class OneSolve:
                 return Reply(Verdict.REPEAT, self._none)
             if self.judge is not None:
                 yielding = heads.height_compliance.diagonal() + response.height_by_force.diagonal()
-                accepted, level = self.judge.look(
+                accepted, level = self.judge.decide(
                     time, found.depth, found.contact_force, law.tangents[2], yielding
                 )
                 if not accepted:

@@ -45,10 +45,10 @@ class Decision(NamedTuple):
     level: int
 
 
-class Judge(Protocol):
+class StepController(Protocol):
     """Decides on steps whose forces are found, where steps adapt (`adaptive_steps`)."""
 
-    def look(
+    def decide(
         self,
         time: float,
         depth: np.ndarray,
@@ -62,12 +62,12 @@ class Judge(Protocol):
         tangent, and ``compliance`` is what a force takes off the depth within the step [m/N].
         """
 
-    def hear(self, level: int) -> None:
+    def set_level(self, level: int) -> None:
         """Learn the level of what was decided. All ranks."""
 
 
 class StepRejected(Exception):
-    """The judge wants the step repeated: nothing but the line has moved. On all ranks."""
+    """Step control rejected the step; only the state of the line has changed. On all ranks."""
 
 
 class Scheme(Protocol):

@@ -13,7 +13,7 @@ import numpy as np
 
 from catenary.solver.base.errors import InputError, NotConverged
 from catenary.solver.base.petsc import PETSc
-from catenary.solver.contact.forces_on_line import Interaction
+from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.linear.petsc_solvers import PREFIX
 from catenary.solver.problem.integrator_parameters import GENERALIZED_ALPHA, NEWMARK, integration_of
@@ -38,7 +38,7 @@ class TSAlpha2:
     """
 
     comm: Any
-    interaction: Interaction
+    interaction: ForcesOnLine
     pantographs: Pantographs
     system: WholeSystem
     numerics: Numerics
@@ -175,14 +175,14 @@ class TSAlpha2:
 
     def _tell(self, time: float) -> None:
         """Show the state where the march looks for it: at the line and the pantographs."""
-        system, line, told = self.system, self.interaction.line, self.pantographs
+        system, line, pantographs = self.system, self.interaction.line, self.pantographs
         line.displacement[:] = self._u[: system.n_line]
         line.velocity[:] = self._v[: system.n_line]
         force, depth, _ = system.contacts(time, self._u, self._v)
-        told.contact_force[:] = force
-        told.strip_force[:] = force
-        told.head_height[:] = system.level + self._u[system.heads]
-        told.wire_height[:] = told.head_height - depth
+        pantographs.contact_force[:] = force
+        pantographs.strip_force[:] = force
+        pantographs.head_height[:] = system.level + self._u[system.heads]
+        pantographs.wire_height[:] = pantographs.head_height - depth
         self.counters.steps += 1
         self.counters.rounds = self.counters.solves
         self.counters.slack_dropper_steps += int((system.tension(self._u, self._v) < 0.0).sum())

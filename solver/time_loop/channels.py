@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     import numpy as np
 
-    from catenary.solver.contact.forces_on_line import Interaction
+    from catenary.solver.contact.forces_on_line import ForcesOnLine
     from catenary.solver.contact.pantographs import Pantographs
     from catenary.solver.schemes.scheme import Scheme
 
@@ -33,7 +33,7 @@ class Sources(NamedTuple):
     """
 
     pantographs: Pantographs
-    interaction: Interaction
+    interaction: ForcesOnLine
     scheme: Scheme
     arm_uplift: np.ndarray
     dropper_force: np.ndarray

@@ -136,7 +136,7 @@ class CompiledSteps:
             pushed=np.zeros(solving[9].shape[0], dtype=np.int64),
             ends=pantographs.ends,
             of_step=pantographs.of_step,
-            told=pantographs.told,
+            outputs=pantographs.outputs,
             showing=self._showing.showing,
             taps=self._showing.layout.taps,
         )
@@ -153,7 +153,7 @@ def compiled_steps(
     if not isinstance(scheme.coupling, Implicit) or line.passes is None:
         return None
     if not hasattr(step_kernels.take, "overloads"):
-        return None  # Numba was told to compile nothing
+        return None  # NUMBA_DISABLE_JIT
     if scheme.coupling.law.in_loop() is None or scheme.pantographs.records() is None:
         return None
     if scheme.loads(0.0) is not None:

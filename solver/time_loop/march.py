@@ -22,7 +22,7 @@ import numpy as np
 from mpi4py import MPI
 
 from catenary.solver.base.errors import CatenaryError, InputError, RunBroken
-from catenary.solver.base.flush_to_zero import taken_for_zero
+from catenary.solver.base.flush_to_zero import flushed
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.contact.contact_wire import ContactWire
 from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
@@ -37,7 +37,7 @@ from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import DropperBreak, Happened, in_steps
 from catenary.solver.problem.problem import Problem
 from catenary.solver.schemes.adaptive_steps import StepLevels
-from catenary.solver.schemes.make_scheme import Parts, SetUp, kept_ratio
+from catenary.solver.schemes.make_scheme import Parts, SchemeFactory, kept_ratio
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.after_incidents import (
     ChangedLine,
@@ -108,7 +108,7 @@ class March:
         self._nominal_height = nominal_height_rule(model, form, elasticity)
         self._wire = ContactWire(model, form, self.ownership)
         self._pantographs = Pantographs(comm, problem, self._wire, self._nominal_height)
-        self._set_ups = SetUp(comm, form, self.ownership, self._nominal_height)
+        self._set_ups = SchemeFactory(comm, form, self.ownership, self._nominal_height)
         self._set_up(unchanged(model))
         self._first_step = 0
         self._ahead = self._happening()
@@ -267,7 +267,7 @@ class March:
         if self._stepper.broken:
             outcome = self._stepper.broken
         elif self._stepper.stopped or self._stepper.step_number < self.n_steps:
-            # The latter if PETSc was told to end early, for instance by -march_ts_max_steps.
+            # The latter if an option of PETSc ends early, for instance -march_ts_max_steps.
             outcome = "interrupted"
         outcome = audience.finish(outcome)
         n_steps = self._stepper.step_number - first
@@ -301,7 +301,7 @@ class March:
 
     def _advance(self, ts: PETSc.TS) -> None:
         """March to the end of ``ts``. Collective."""
-        with taken_for_zero():
+        with flushed():
             ts.solve(self._line.solution)
 
     def _traffic(self, n_steps: int) -> tuple[float, float] | None:

@@ -78,8 +78,8 @@ def _address(channel: Channel, array: np.ndarray) -> int:
 
 def _part_of(shown: np.ndarray, sources: Sources, array: np.ndarray) -> slice | None:
     """Where an array is in what a step shows, None if it is not a part of it."""
-    told = sources.pantographs.told
-    for whole, at in ((shown, 0), (told, 0)):
+    outputs = sources.pantographs.outputs
+    for whole, at in ((shown, 0), (outputs, 0)):
         begin = array.ctypes.data - whole.ctypes.data
         if 0 <= begin and begin + array.nbytes <= whole.nbytes and array.flags.c_contiguous:
             return slice(at + begin // 8, at + begin // 8 + array.size)

@@ -36,9 +36,9 @@ class Steps(NamedTuple):
     records : of all heads, ``head_records.HEAD``
     heads : (2 n + 2 n^2,) all strips as functions of the forces, see ``HeadState``
     law : numbers of the contact law, see ``report``
-    ends : of the contacts of each pantograph, see ``inner_kernels.tell``
+    ends : of the contacts of each pantograph, see ``contact_kernels.write_outputs``
     pushed : (m,) int, room for the numbers of slack droppers
-    told : what the pantographs tell, of which ``of_step`` is filled by a step
+    outputs : outputs of the pantographs, of which ``of_step`` is filled by a step
     taps : (k,) int, addresses of the numbers of further channels, see ``RowLayout``
     """
 
@@ -56,7 +56,7 @@ class Steps(NamedTuple):
     pushed: np.ndarray
     ends: np.ndarray
     of_step: np.ndarray
-    told: np.ndarray
+    outputs: np.ndarray
     showing: tuple[Any, ...]
     taps: np.ndarray
 
@@ -111,12 +111,12 @@ def take(steps, times, drives, rows, counts, shows, first, n_steps):
     steps, times, drives, rows = borrowed((steps, times, drives, rows))
     speed, moving, placing, free, records, heads = steps[:6]
     responding, solving, law, superposing, compensating = steps[6:11]
-    pushed, ends, of_step, told, showing, taps = steps[11:]
+    pushed, ends, of_step, outputs, showing, taps = steps[11:]
     start, places = moving
     solution, depth, reported = solving[11], solving[12][0], law[3]
     motion, arms, shown, laws, kept = showing
-    n, n_told = ends[-1], told.size
-    n_arms = n_told + arms.size
+    n, n_outputs = ends[-1], outputs.size
+    n_arms = n_outputs + arms.size
     n_shown = n_arms + shown.shape[0]
     force = solution[:n]
     for i in range(first, n_steps):
@@ -137,11 +137,11 @@ def take(steps, times, drives, rows, counts, shows, first, n_steps):
             contact_kernels.compensate(pushed[:n_slack], slack, *compensating)
         for h in range(records.size):
             head_records.move(records[h], force)
-        contact_kernels.tell(force, reported, heads, depth, ends, of_step)
+        contact_kernels.write_outputs(force, reported, heads, depth, ends, of_step)
         if shows:
             row = rows[i]
-            row[:n_told] = told
-            uplift, tension = row[n_told:n_arms], row[n_arms:n_shown]
+            row[:n_outputs] = outputs
+            uplift, tension = row[n_outputs:n_arms], row[n_arms:n_shown]
             state_kernels.show(motion, arms, shown, laws, kept, uplift, tension)
             for j in range(taps.size):
                 row[n_shown + j] = numbers_at(taps[j], 1)[0]

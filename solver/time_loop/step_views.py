@@ -1,4 +1,4 @@
-"""What a march shows its observers: the stage, the state after each step, and checkpoints."""
+"""Views for observers: what a run is made of, the state after each step, checkpoints."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from catenary.solver.base.bound import bound
 from catenary.solver.base.errors import InputError
 from catenary.solver.base.parallel import on_root
-from catenary.solver.contact.forces_on_line import Interaction
+from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.integrators import state_kernels
 from catenary.solver.schemes.scheme import Scheme
@@ -44,7 +44,7 @@ class Showing:
         comm: Any,
         line: ChangedLine,
         form: Equilibrium,
-        interaction: Interaction,
+        interaction: ForcesOnLine,
         pantographs: Pantographs,
         scheme: Scheme,
         kept_ratio: float,
@@ -70,10 +70,10 @@ class Showing:
         nodes = np.arange(model.mesh.n_nodes)
         self._owned_nodes = nodes[owned(model.dofs(nodes))]
         self._node_rows = model.dofs(self._owned_nodes) - first
-        n_told, n_arms = pantographs.told.size, self._arm_rows.size
+        n_outputs, n_arms = pantographs.outputs.size, self._arm_rows.size
         n_droppers = interaction.droppers.shown.size
-        self._shown = np.zeros(n_told + n_arms + n_droppers)
-        _, uplift, tension = np.split(self._shown, [n_told, n_told + n_arms])
+        self._shown = np.zeros(n_outputs + n_arms + n_droppers)
+        _, uplift, tension = np.split(self._shown, [n_outputs, n_outputs + n_arms])
         self._sources = Sources(pantographs, interaction, scheme, uplift, tension)
         self.layout = RowLayout(self._sources, self._shown)
         self._view = StepView(
@@ -117,9 +117,9 @@ class Showing:
 
     def view(self, step: int, time: float) -> StepView:
         """The state after a step; the same object each time."""
-        view, told = self._view, self._pantographs.told
+        view, outputs = self._view, self._pantographs.outputs
         view.step, view.time = step, time
-        self._shown[: told.size] = told
+        self._shown[: outputs.size] = outputs
         self._show()
         view.row[: self._shown.size] = self._shown
         self.layout.fill(view.row)
@@ -161,12 +161,12 @@ class Showing:
                 state = np.zeros(model.n_dofs)
                 state[model.numbering.numbers] = by_row[row_of_node]
                 states[name] = state[owned]
-        told = {
+        outputs = {
             name: _like(checkpoint, name, getattr(pantographs, name)) for name in _OF_PANTOGRAPHS
         }
         on_root(self._comm, lambda: self._refuse_other_states(checkpoint))
         line.restore(states)
-        for name, values in told.items():
+        for name, values in outputs.items():
             getattr(pantographs, name)[:] = values
         self._scheme.restore(checkpoint["contacts"])
         for i, pantograph in enumerate(pantographs.models):

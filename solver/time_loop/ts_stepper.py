@@ -21,7 +21,7 @@ _GROWTH = 4
 class Stepper:
     """Context of a TS of type ``python`` that advances a scheme and shows each step.
 
-    A step that breaks is told with its time and place, whatever broke in it, and counted if its
+    A step that breaks is reported with its time and place, whatever broke in it, and counted if its
     equations were not solved. For PETSc a block is a step, but for the number of the step.
 
     Parameters

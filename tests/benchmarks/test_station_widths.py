@@ -20,7 +20,7 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.solver.base import aligned_arrays
-from catenary.solver.integrators.line_state import MotionAhead, Steps
+from catenary.solver.integrators.line_state import PredictedLineState, Steps
 from catenary.solver.integrators.newmark import NewmarkLine
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.linear.station_factors import station_factors
@@ -54,7 +54,7 @@ def passes(widths: tuple[int, ...]) -> Callable[[], None]:
     n, b = matrix.shape[0], lanes.pitch
     read = aligned_arrays.zeros(n + 2 * b, 0)
     answer, velocity = aligned_arrays.zeros(n, 1), aligned_arrays.zeros(n, 2)
-    motion = MotionAhead(read[b:-b], velocity, answer, np.zeros(n), STEPS)
+    motion = PredictedLineState(read[b:-b], velocity, answer, np.zeros(n), STEPS)
     motion.put(*np.full((3, n), 1e-3))
     return StationPasses(product, factors, read, read, np.zeros(0), answer, motion, STEPS).step
 

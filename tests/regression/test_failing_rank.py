@@ -112,6 +112,7 @@ sys.exit(InputError.exit_code)
 def test_an_unforeseen_error_on_rank_0_is_named_on_the_others(tmp_path: Path) -> None:
     script = """
 from mpi4py import MPI
+from catenary.solver.base.parallel import on_root
 try:
     on_root(MPI.COMM_WORLD, lambda: [].pop())
 except IndexError as error:

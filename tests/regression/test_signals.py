@@ -57,7 +57,7 @@ def signalled(
 RUN = "catenary.cases.run"
 MESH = (RUN, "runner", "mesh_of")
 EQUILIBRIUM = ("catenary.solver.statics", "line_at_rest", "find_form")
-REPORT = (RUN, "runner", "write_report")
+REPORT = ("catenary.postproc.report", "report", "write_report")
 
 
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGXCPU])

@@ -15,7 +15,7 @@ from scipy.sparse import linalg as sparse_linalg
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.effects.all_effects import registry
 from catenary.solver.effects.effect import Effect, register, unregister
-from catenary.solver.integrators.line_integrator import LineMotion
+from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
@@ -90,7 +90,7 @@ def solve_free(matrix: sparse.csc_matrix, model: Model, right: np.ndarray) -> np
 
 
 @contextmanager
-def line_alone(model: Model, numerics: Numerics, loaded: bool = False) -> Iterator[LineMotion]:
+def line_alone(model: Model, numerics: Numerics, loaded: bool = False) -> Iterator[LineIntegrator]:
     """The time stepper of a line alone, all droppers taut; perhaps its steps have loads."""
     ownership = distribute(model, COMM.size, COMM.rank)
     line = make_line(COMM, model, ownership, numerics, loaded=loaded)
@@ -100,7 +100,9 @@ def line_alone(model: Model, numerics: Numerics, loaded: bool = False) -> Iterat
         line.destroy()
 
 
-def release(line: LineMotion, displacement: np.ndarray, velocity: np.ndarray, model: Model) -> None:
+def release(
+    line: LineIntegrator, displacement: np.ndarray, velocity: np.ndarray, model: Model
+) -> None:
     """Start from a state with the acceleration that belongs to it: M a = -K d - C v."""
     force = matrix_of(model, stiffness=1.0) @ displacement
     force += matrix_of(model, damping=1.0) @ velocity
@@ -108,7 +110,7 @@ def release(line: LineMotion, displacement: np.ndarray, velocity: np.ndarray, mo
     line.start(displacement, velocity, acceleration)
 
 
-def step(line: LineMotion) -> None:
+def step(line: LineIntegrator) -> None:
     """One step of the line without loads."""
     line.free_step()
 

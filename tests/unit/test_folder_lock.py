@@ -205,3 +205,18 @@ def test_a_process_is_known_by_when_it_started() -> None:
     assert not dataclasses.replace(me, started="1").alive
     assert read_owner(me.text()) == me
     assert lock_owner.read_owner(me.text().replace("pid", "pit")) is None
+
+
+@pytest.mark.process
+def test_a_process_that_has_ended_is_gone_before_its_parent_takes_note(tmp_path: Path) -> None:
+    child = subprocess.Popen([sys.executable, "-c", HOLD, tmp_path / "out"], stdout=subprocess.PIPE)
+    assert child.stdout is not None and child.stdout.readline() == b"held\n"
+    owner = read_owner((tmp_path / "out" / LOCK_FILE).read_text())
+    assert owner is not None and owner.pid == child.pid and owner.alive
+    child.kill()
+    # It stays in the table of processes until it is waited for.
+    os.waitid(os.P_PID, child.pid, os.WEXITED | os.WNOWAIT)
+    assert not owner.alive
+    FolderLock(tmp_path / "out", "catenary run case").release()
+    child.wait()
+    child.stdout.close()

@@ -171,6 +171,8 @@ def test_libraries_leave_the_handlers_as_they_are(tmp_path: Path) -> None:
     """PETSc and Gmsh set handlers of their own when they start."""
     script = """
 import os, signal
+from catenary.cases.process import interrupts
+from catenary.cases.scene.load import load_scene
 interrupts.install(several_ranks=False)
 def check(what):
     for number in interrupts.STOPPING:

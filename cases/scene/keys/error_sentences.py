@@ -1,4 +1,4 @@
-"""One sentence for each thing that is wrong with a scene."""
+"""Error messages for invalid scenes, one sentence each."""
 
 from __future__ import annotations
 

@@ -9,12 +9,12 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import linalg
 
-from catenary.solver.integrators.line_integrator import LineMotion
+from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.model.matrices import as_petsc, part_of
 from catenary.solver.model.model import Model
 
 
-def by_petsc(line: LineMotion, model: Model, block: int, kind: str, order: str) -> Callable:
+def by_petsc(line: LineIntegrator, model: Model, block: int, kind: str, order: str) -> Callable:
     """A solve with PETSc's factors of the step operator."""
     whole, coefficients = (0, model.n_dofs), (1.0, line.position_factor, line.velocity_factor)
     matrix = as_petsc(part_of(model, whole, whole, coefficients, 1.0, block), PETSc.COMM_SELF)
@@ -29,7 +29,7 @@ def by_petsc(line: LineMotion, model: Model, block: int, kind: str, order: str) 
     return lambda: solve(right, answer)
 
 
-def by_lapack(line: LineMotion, model: Model) -> Callable:
+def by_lapack(line: LineIntegrator, model: Model) -> Callable:
     """A solve with LAPACK's Cholesky factor of the step operator's band."""
     whole, coefficients = (0, model.n_dofs), (1.0, line.position_factor, line.velocity_factor)
     matrix = part_of(model, whole, whole, coefficients, 1.0, 1).tocoo()
@@ -43,7 +43,7 @@ def by_lapack(line: LineMotion, model: Model) -> Callable:
     return lambda: solve(factor, right, lower=1)
 
 
-LIBRARIES: dict[str, Callable[[LineMotion, Model], Callable]] = {
+LIBRARIES: dict[str, Callable[[LineIntegrator, Model], Callable]] = {
     "PETSc, Cholesky in blocks of stations": partial(
         by_petsc, block=4, kind="cholesky", order="natural"
     ),

@@ -10,7 +10,7 @@ import pytest
 from measuring import COMM
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of
 
-from catenary.solver.integrators.line_integrator import LineMotion
+from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
@@ -36,7 +36,7 @@ def model(by_component: bool) -> Model:
 
 def line(
     found: Model, method: Numerics, in_passes: bool, lost: np.ndarray | None, loaded: bool
-) -> LineMotion:
+) -> LineIntegrator:
     made = make_line(COMM, found, distribute(found, 1, 0), method, lost, in_passes, loaded)
     assert (made.passes is not None) is in_passes
     return made

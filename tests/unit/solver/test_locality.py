@@ -23,7 +23,7 @@ from small_lines import (
 
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.effects.build_model import build
-from catenary.solver.integrators.line_integrator import LineMotion
+from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.linear import unit_responses
 from catenary.solver.linear.decay_length import DECAY, reach
 from catenary.solver.linear.unit_responses import Windows
@@ -101,12 +101,12 @@ def test_droppers_far_apart_do_not_lengthen_the_reach() -> None:
 
 
 @pytest.fixture(scope="module")
-def stepper() -> Iterator[LineMotion]:
+def stepper() -> Iterator[LineIntegrator]:
     with line_alone(line_model(2.75e-3, n_spans=6), numerics(1e-3)) as line:
         yield line
 
 
-def test_short_columns_are_the_columns_of_full_solves(stepper: LineMotion) -> None:
+def test_short_columns_are_the_columns_of_full_solves(stepper: LineIntegrator) -> None:
     """Many columns come from one solve, and only windows are stored: nothing is lost by that."""
     model = line_model(2.75e-3, n_spans=6)
     ends = model.dofs(model.mesh.droppers)
@@ -134,7 +134,7 @@ def test_short_columns_are_the_columns_of_full_solves(stepper: LineMotion) -> No
     assert stored < 0.5
 
 
-def test_columns_that_leak_are_refused(stepper: LineMotion) -> None:
+def test_columns_that_leak_are_refused(stepper: LineIntegrator) -> None:
     model = line_model(2.75e-3, n_spans=6)
     nodes = model.mesh.wires["contact_wire"][40:44]
     dofs, x = model.dofs(nodes)[:, None], model.mesh.x(nodes)

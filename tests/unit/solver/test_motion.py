@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catenary.solver.integrators import state_kernels
-from catenary.solver.integrators.line_state import Motion, MotionAhead, Steps
+from catenary.solver.integrators.line_state import LineState, PredictedLineState, Steps
 
 RNG = np.random.default_rng(5)
 N = 12
@@ -21,8 +21,8 @@ def state() -> np.ndarray:
     return RNG.standard_normal((3, N))
 
 
-def ahead() -> MotionAhead:
-    return MotionAhead(*np.zeros((4, N)), STEPS)
+def ahead() -> PredictedLineState:
+    return PredictedLineState(*np.zeros((4, N)), STEPS)
 
 
 def test_it_keeps_what_newmark_s_formulas_predict(state: np.ndarray) -> None:
@@ -70,6 +70,6 @@ def test_what_is_carried_is_taken_bit_by_bit(state: np.ndarray) -> None:
     for found, expected in zip(other.read, motion.read, strict=True):
         assert np.array_equal(found, expected)
     # A motion that is kept as it is has no use for predictions, and gives none away.
-    plain = Motion(*np.zeros((3, N)), (0.0, 0.0))
+    plain = LineState(*np.zeros((3, N)), (0.0, 0.0))
     plain.take(stored)
     assert np.array_equal(plain.displacement, rounded[0]) and not plain.carried()

@@ -7,7 +7,7 @@ import pytest
 from repeating_line import layout, line
 
 from catenary.solver.integrators import state_kernels
-from catenary.solver.integrators.line_state import Motion, MotionAhead, Steps
+from catenary.solver.integrators.line_state import LineState, PredictedLineState, Steps
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.linear.station_factors import station_factors
 from catenary.solver.linear.station_products import station_product
@@ -64,13 +64,13 @@ def compare(
     tension, pulls = np.full((2, upper.size), np.nan)
 
     read, shown = others.copy(), np.zeros(b * n_own)
-    motion = MotionAhead(read[b:-b][own], np.zeros(b * n_own), answer[own], shown, STEPS)
+    motion = PredictedLineState(read[b:-b][own], np.zeros(b * n_own), answer[own], shown, STEPS)
     motion.put(displacement, velocity, answer[own].copy())
     passes = StationPasses(product, factors, read, read, loads, answer, motion, STEPS)
-    passes.look_at(ends, LAWS[: len(ends)], tension)
+    passes.track_droppers(ends, LAWS[: len(ends)], tension)
     passes.step()
     found = motion.displacement, motion.velocity, answer[own], tension
-    plain = Motion(*expected, (0.0, 0.0)).read
+    plain = LineState(*expected, (0.0, 0.0)).read
     state_kernels.tension(plain, ends, LAWS, pulls)
     for one, other in zip(found, (*expected, pulls), strict=True):
         assert np.abs(one - other).max(initial=0.0) < ROUND_OFF * np.abs(other).max(initial=1.0)
@@ -85,7 +85,7 @@ def test_a_compiled_loop_takes_the_same_steps_with_kernel_and_arguments() -> Non
     for by_kernel in (False, True):
         start = np.cos(np.arange(80.0))
         read, answer, shown = np.zeros(88), np.zeros(80), np.zeros(80)
-        motion = MotionAhead(read[4:-4], np.zeros(80), answer, shown, STEPS)
+        motion = PredictedLineState(read[4:-4], np.zeros(80), answer, shown, STEPS)
         motion.put(start, 2.0 * start, 3.0 * start)
         passes = StationPasses(product, factors, read, read, np.zeros(0), answer, motion, STEPS)
         for _ in range(3):

@@ -10,7 +10,7 @@ import pytest
 from measuring import History, start_march
 from small_lines import en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.solver.base.flush_to_zero import taken_for_zero
+from catenary.solver.base.flush_to_zero import flushed
 from catenary.solver.time_loop import march
 
 TINY = np.finfo(float).tiny
@@ -26,9 +26,9 @@ def tenth_of_the_least() -> float:
 
 @known
 def test_they_are_zero_within_and_themselves_again_after() -> None:
-    with taken_for_zero():
+    with flushed():
         assert tenth_of_the_least() == 0.0
-        with taken_for_zero():
+        with flushed():
             assert tenth_of_the_least() == 0.0
         assert tenth_of_the_least() == 0.0
     assert tenth_of_the_least() == 0.1 * TINY > 0.0
@@ -36,14 +36,14 @@ def test_they_are_zero_within_and_themselves_again_after() -> None:
 
 @known
 def test_they_are_themselves_again_after_an_error() -> None:
-    with pytest.raises(RuntimeError), taken_for_zero():
+    with pytest.raises(RuntimeError), flushed():
         raise RuntimeError
     assert tenth_of_the_least() > 0.0
 
 
 def test_usual_numbers_round_as_ever() -> None:
     third = np.array([1.0]) / 3.0
-    with taken_for_zero():
+    with flushed():
         assert np.array([1.0]) / 3.0 == third
 
 
@@ -56,8 +56,8 @@ def test_a_long_line_holds_none_and_its_contact_does_not_notice(
     line = en50318_line(30)
     problem = problem_of(line, train=train(70.0, 70.0, 76.0), numerics=numerics(1e-3))
     found = []
-    for context in (taken_for_zero, nullcontext):
-        monkeypatch.setattr(march, "taken_for_zero", context)
+    for context in (flushed, nullcontext):
+        monkeypatch.setattr(march, "flushed", context)
         run, _ = start_march(problem, mesh_of(line, 4))
         history = History()
         run.run([history])
