@@ -128,7 +128,11 @@ class FolderLock:
             owner = read_owner(os.read(old, 65536).decode(errors="replace"))
             if not _dead(old, owner, me):
                 raise InputError(_in_use(folder, owner, self._silence(old, mine)))
-            # Of two that find the same dead lock one renames it; the other finds a new one here.
+            # A dead lock is removed by who holds flock on it, so that it stays what it is from here
+            # on: who comes later finds another file under its name.
+            if not os.path.samestat(self._stat(LOCK_FILE), os.fstat(old)):
+                return
+            # Without flock the name may still have changed hands: then it is given back.
             aside = f"{LOCK_FILE}.{me.host}.{me.pid}.dead"
             os.rename(LOCK_FILE, aside, src_dir_fd=self._directory, dst_dir_fd=self._directory)
             if not os.path.samestat(self._stat(aside), os.fstat(old)):
