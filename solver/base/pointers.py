@@ -54,6 +54,17 @@ class HeldCall:
         )
 
 
+def can_hold_calls() -> bool:
+    """Whether this Numba gives the address of a compiled function.
+
+    ``entry_point``, by which it does, is no documented part of Numba: without it steps are taken
+    one by one.
+    """
+    kind = types.FunctionType(types.none())
+    _own_address.compile((kind,))
+    return hasattr(_own_address.overloads.get((kind,)), "entry_point")
+
+
 def _function_at(kernel: Any, kinds: tuple[Any, ...]) -> int:
     """Where the machine code of a compiled function is, for arguments of these types."""
     kind = types.FunctionType(types.none(*kinds))

@@ -14,7 +14,7 @@ import numpy as np
 from catenary.mbs.head.head_records import drive_width
 from catenary.solver.base.bound import bound
 from catenary.solver.base.petsc_events import event
-from catenary.solver.base.pointers import HeldCall
+from catenary.solver.base.pointers import HeldCall, can_hold_calls
 from catenary.solver.contact_problem.coupling import Implicit
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
@@ -154,6 +154,8 @@ def compiled_steps(
         return None
     if not hasattr(step_kernels.take, "overloads"):
         return None  # NUMBA_DISABLE_JIT
+    if not can_hold_calls():
+        return None
     if scheme.coupling.law.in_loop() is None or scheme.pantographs.records() is None:
         return None
     if scheme.loads(0.0) is not None:

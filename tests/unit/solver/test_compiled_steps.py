@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.vehicle.irregularity import Irregularity
 from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
 from catenary.meshgen.mesh import LineMesh
+from catenary.solver.base import pointers
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.contact_problem import complementarity
 from catenary.solver.problem.contact_laws import KinematicLaw, LinearLaw
@@ -218,6 +220,18 @@ def test_a_wish_to_stop_is_seen_between_blocks(mesh: LineMesh) -> None:
     # The step after the wish is the last one.
     assert found.n_steps == asked[-1] and len(rows.rows) == asked[-1] + 1
     assert asked[1] > 2
+
+
+def test_without_addresses_of_functions_steps_are_taken_one_by_one(
+    mesh: LineMesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A Numba without ``entry_point``."""
+    nameless = SimpleNamespace(compile=lambda kinds: None, overloads={})
+    monkeypatch.setattr(pointers, "_own_address", nameless)
+    rows = Rows()
+    assert run(problem("one", 50), mesh, rows).outcome == "done"
+    assert len(rows.rows) == 51
+    assert max(rows.blocks, default=1) == 1
 
 
 def test_nobody_needs_to_look(mesh: LineMesh) -> None:
