@@ -18,6 +18,7 @@ from catenary.cases.run.wave_arrivals import (
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.line import Line, Wire
+from catenary.solver.effects.all_effects import simulated
 from catenary.solver.problem.problem import Problem
 
 _WIRES = ("contact_wire", "messenger_wire")
@@ -77,11 +78,8 @@ def wave_line(problem: Problem) -> WaveLine:
     masts = line.support_positions
     wires: list[Wire] = [getattr(line, name) for name in _WIRES]
     mass = sum(wire.mass_per_length for wire in wires) + _hardware(line)
-    dampings = [problem.damping.per_component.get(name) for name in _WIRES]
-    usual = (problem.damping.alpha, problem.damping.beta)
-    pairs = [usual if pair is None else pair for pair in dampings]
-    if "structural_damping" not in problem.effects:
-        pairs = [(0.0, 0.0)]
+    damping = simulated(problem).damping
+    pairs = [damping.per_component.get(name, (damping.alpha, damping.beta)) for name in _WIRES]
     return WaveLine(
         start=float(masts[0]),
         end=float(masts[-1]),

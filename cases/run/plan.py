@@ -178,10 +178,11 @@ def _halved(numerics: Numerics) -> str:
 
 def _slack(problem: Problem) -> str:
     """The law of a slack dropper, with the key that chooses it; empty if none slackens."""
-    if "dropper_slackening" not in problem.effects:
+    laws = effects.simulated(problem)
+    if not laws.slackening:
         return ""
-    keeps = "residual_dropper_stiffness" in problem.effects and problem.residual_stiffness_ratio > 0
-    share = f"{100.0 * problem.residual_stiffness_ratio:g} %"
+    keeps = laws.kept_ratio > 0
+    share = f"{100.0 * laws.kept_ratio:g} %"
     if problem.slack_dampers_act:
         spring = f"keeps {share} of its force" if keeps else "is released"
         return f"spring {spring}, damper goes on acting (line.dropper.slack_damping = kept)"

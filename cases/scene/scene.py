@@ -7,7 +7,7 @@ have been checked, so that what follows meets no surprise.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import Field, PrivateAttr
 
@@ -28,9 +28,7 @@ from catenary.cases.scene.tables.run import (
 from catenary.cases.scene.tables.table import Table
 from catenary.cases.scene.tables.vehicle import VehicleTable
 from catenary.solver.effects import all_effects as effect_registry
-
-if TYPE_CHECKING:
-    pass
+from catenary.solver.effects.effect import Limit
 
 
 class Scene(Table):
@@ -78,6 +76,11 @@ class Scene(Table):
             name: effect.always or self.effects.get(name, effect.default)
             for name, effect in effect_registry.registry().items()
         }
+
+    def holds(self, limit: Limit) -> bool:
+        """Whether no effect that is on lifts a limit."""
+        known, switches = effect_registry.registry(), self.switches()
+        return not any(limit in known[name].lifts for name, on in switches.items() if on)
 
     def mesh_file(self) -> Path | None:
         """The user's own mesh, None if the mesh is made from the line."""

@@ -28,6 +28,7 @@ from catenary.solver.integrators import state_kernels
 from catenary.solver.model.model import Model
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.problem import Placement, Problem
+from catenary.solver.problem.simulated import Simulated
 from catenary.solver.statics.elasticity import Elasticity
 from catenary.solver.statics.equilibrium import Equilibrium
 
@@ -67,6 +68,7 @@ class Pantographs:
         self,
         comm: Any,
         problem: Problem,
+        simulated: Simulated,
         wire: ContactWire,
         nominal_height: Callable[[Placement], float],
     ) -> None:
@@ -102,7 +104,7 @@ class Pantographs:
         self.joints_in_loop = any(has_joints(placement.data) for placement in train.placements)
         self.constraint_violation[:] = np.nan
         self.models: list[Pantograph] = []
-        on_root(comm, lambda: self._make_all(problem, nominal_height))
+        on_root(comm, lambda: self._make_all(problem, simulated, nominal_height))
 
     @property
     def n(self) -> int:
@@ -181,48 +183,50 @@ class Pantographs:
         for mine, theirs in zip(self.models, other.models, strict=True):
             mine.restore(theirs.state())
 
-    def _make_all(self, problem: Problem, nominal_height: Callable[[Placement], float]) -> None:
+    def _make_all(
+        self,
+        problem: Problem,
+        simulated: Simulated,
+        nominal_height: Callable[[Placement], float],
+    ) -> None:
         """Make and place all models. Rank 0 only."""
         velocity = np.zeros(self.n)
         if isinstance(problem.contact, KinematicLaw):
             velocity = self.speed * self._wire.rest_slope(self._start)
         for number, placement in enumerate(problem.train.placements):
-            model = self._make(problem, placement, nominal_height(placement))
+            model = _make(problem, simulated, placement, nominal_height(placement))
             model.place(float(self.head_height[number]), float(velocity[number]))
             self.models.append(model)
         self._models_with_strips = list(zip(self.models, self._strips, strict=True))
         self.look_at_joints()
 
-    def _make(self, problem: Problem, placement: Placement, nominal_height: float) -> Pantograph:
-        numerics = problem.numerics
-        base = _base_of(problem, placement)
-        operation = Operation(
-            placement.static_force,
-            nominal_height,
-            problem.train.raise_time,
-            numerics.dt,
-            numerics.beta,
-            numerics.gamma,
-            _lateral_path(problem, placement, base),
-            base,
-            placement.lowering if "lowering" in problem.effects else None,
-        )
-        return make_pantograph(placement.data, operation)
 
-
-def _base_of(problem: Problem, placement: Placement) -> BaseMotion | None:
-    """How the vehicle moves the base of a pantograph, None if it is not simulated."""
-    train = problem.train
-    if "vehicle_motion" not in problem.effects or train.vehicle is None:
-        return None
-    return BaseMotion(train.vehicle, train.start - placement.behind, train.speed)
+def _make(
+    problem: Problem, simulated: Simulated, placement: Placement, nominal_height: float
+) -> Pantograph:
+    numerics, train = problem.numerics, problem.train
+    start, base = train.start - placement.behind, None
+    if simulated.vehicle is not None:
+        base = BaseMotion(simulated.vehicle, start, train.speed)
+    operation = Operation(
+        placement.static_force,
+        nominal_height,
+        train.raise_time,
+        numerics.dt,
+        numerics.beta,
+        numerics.gamma,
+        _lateral_path(problem, placement, base) if simulated.head_roll else None,
+        base,
+        placement.lowering if simulated.lowering else None,
+    )
+    return make_pantograph(placement.data, operation)
 
 
 def _lateral_path(
     problem: Problem, placement: Placement, base: BaseMotion | None
 ) -> LateralPath | None:
-    """Where the wire crosses the strips of a pantograph, None if its head does not roll."""
-    if "head_roll" not in problem.effects or roll_of(placement.data) is None:
+    """Where the wire crosses the strips of a pantograph, None if its head cannot roll."""
+    if roll_of(placement.data) is None:
         return None
     line, train = problem.line, problem.train
     return LateralPath(

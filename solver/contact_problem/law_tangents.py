@@ -14,6 +14,7 @@ from catenary.solver.base.errors import RunBroken
 from catenary.solver.contact_problem import complementarity_kernels
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
 from catenary.solver.problem.problem import Problem
+from catenary.solver.problem.simulated import Simulated
 
 # Largest difference between the law and its last tangent, relative to the force.
 _TOLERANCE = 1e-10
@@ -232,14 +233,11 @@ class KinematicInSteps(_Tangents):
         self._force[:] = state
 
 
-def law_in_steps(problem: Problem, n: int) -> LawInSteps:
-    """The law of a problem for n contacts, as its effects ask for it."""
-    law, numerics = problem.contact, problem.numerics
-    may_lose_contact = "contact_loss" in problem.effects
-    if "contact_damping" not in problem.effects:
-        law = law.without_damping()
+def law_in_steps(problem: Problem, simulated: Simulated, n: int) -> LawInSteps:
+    """The simulated law of n contacts, for the problem's steps."""
+    law, numerics = simulated.contact, problem.numerics
     if isinstance(law, KinematicLaw):
         return KinematicInSteps(n, numerics.dt, numerics.gamma, problem.train.raise_time)
     if isinstance(law, HertzLaw):
         return HertzInSteps(law, n)
-    return LinearInSteps(law, n, pulls=not may_lose_contact)
+    return LinearInSteps(law, n, pulls=not simulated.contact_loss)

@@ -1,4 +1,4 @@
-"""All effects: the registry with the shipped ones in it, and which of them a problem asks for."""
+"""All effects: the registry with the shipped ones in it, and what those of a problem set."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from catenary.solver.effects import vertical_effects  # noqa: F401  (registers on import)
 from catenary.solver.effects.effect import Effect, registered
 from catenary.solver.problem.problem import Problem
+from catenary.solver.problem.simulated import Simulated
 
 
 def registry() -> dict[str, Effect]:
@@ -17,6 +18,15 @@ def registry() -> dict[str, Effect]:
 def active(problem: Problem) -> list[Effect]:
     """The effects that ``problem`` asks for and has something for, in building order."""
     return [e for e in registry().values() if e.name in problem.effects and e.applies(problem)]
+
+
+def simulated(problem: Problem) -> Simulated:
+    """The laws of a problem: each active effect sets its own, in building order."""
+    laws = Simulated(problem.contact.without_damping())
+    for effect in active(problem):
+        if effect.law is not None:
+            laws = effect.law(laws, problem)
+    return laws
 
 
 def unknowns_per_node(effects: Iterable[Effect]) -> tuple[str, ...]:

@@ -27,6 +27,7 @@ def build(
     row_of_node[along_the_track(mesh)] = np.arange(mesh.n_nodes)
     model = Model(
         problem,
+        effects.simulated(problem),
         mesh,
         tuple(effect.name for effect in active),
         number_unknowns(mesh, effects.unknown_groups(active)),
@@ -39,5 +40,5 @@ def build(
     for effect in active:
         if effect.build is not None:
             effect.build(builder)
-        model.terms_of[effect.name] = builder.take_count()
+        model.terms_of[effect.name] = builder.take_count() + effect.n_laws
     return builder.finish()

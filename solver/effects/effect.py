@@ -1,19 +1,29 @@
 """The registry of effects: each is declared once, and what a scene leaves out does not exist.
 
-An effect names the unknowns that it needs at each wire node and carries one function that adds
-its terms to a model under construction. The scene schema, the plan, the report and the model all
-read this one table. To add an effect, write a module with such a function and ``register`` it.
+An effect declares all that it contributes: unknowns at each wire node, terms of the model
+(matrices, weights, loads in time), laws of the time loop and of the line at rest, limits of a scene
+that it lifts. The scene schema, the plan, the report and the model all read this one table. To add
+an effect, write a module that makes one and registers it with ``register``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from catenary.solver.model.builder import ModelBuilder
     from catenary.solver.problem.problem import Problem
+    from catenary.solver.problem.simulated import Simulated
+
+
+class Limit(Enum):
+    """A limit of all scenes without an effect that lifts it."""
+
+    WAVE_SPEED = "the train is slower than the waves of the contact wire"
+    ONE_PANTOGRAPH = "the train has one pantograph"
 
 
 @dataclass(frozen=True)
@@ -31,7 +41,10 @@ class Effect:
     requires : effects without which it makes no sense
     always : True for what no scene can leave out
     applies : whether the problem holds anything for it to act on
-    build : adds its terms to the model; None where it only selects a law elsewhere
+    build : adds matrices, weights, held unknowns and loads in time to the model
+    law : the record of laws with the fields that the effect sets. Effects are applied in building
+        order, so that an effect may change what one that it requires has set
+    lifts : limits of a scene that do not hold with the effect
     """
 
     name: str
@@ -44,15 +57,30 @@ class Effect:
     always: bool = False
     applies: Callable[[Problem], bool] = lambda problem: True
     build: Callable[[ModelBuilder], None] | None = None
+    law: Callable[[Simulated, Problem], Simulated] | None = None
+    lifts: tuple[Limit, ...] = ()
+
+    @property
+    def n_laws(self) -> int:
+        """Contributions that are no terms of the model: a law, limits lifted."""
+        return int(self.law is not None) + len(self.lifts)
 
 
 _REGISTRY: dict[str, Effect] = {}
 
 
 def register(effect: Effect) -> Effect:
-    """Add an effect to the table and return it; a second one of the same name is an error."""
+    """Add an effect to the table and return it.
+
+    Raises
+    ------
+    ValueError
+        If there is one of that name, or if the effect contributes nothing.
+    """
     if effect.name in _REGISTRY:
         raise ValueError(f"effect {effect.name} is registered already")
+    if not (effect.unknowns or effect.build or effect.n_laws):
+        raise ValueError(f"effect {effect.name} has no unknowns, build, law or lifted limit")
     _REGISTRY[effect.name] = effect
     return effect
 

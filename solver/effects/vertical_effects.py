@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from catenary.mbs.roll import roll_of
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
-from catenary.solver.effects.effect import Effect, register
+from catenary.solver.effects import target_heights
+from catenary.solver.effects.effect import Effect, Limit, register
 from catenary.solver.problem.contact_laws import KinematicLaw
-from catenary.solver.problem.incidents import DropperBreak, TensionLoss
-from catenary.solver.problem.problem import slowest_wave_speed
+from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
+from catenary.solver.problem.problem import Problem, slowest_wave_speed
+from catenary.solver.problem.simulated import Simulated, TargetHeight
 
 if TYPE_CHECKING:
     from catenary.solver.model.builder import ModelBuilder
@@ -50,6 +53,20 @@ def _arm_stiffness(builder: ModelBuilder) -> None:
     builder.add_springs("steady_arms", nodes, "w", builder.problem.line.steady_arm.stiffness)
 
 
+def _shaped(laws: Simulated, by: TargetHeight) -> Simulated:
+    return replace(laws, target_heights=(*laws.target_heights, by))
+
+
+def _residual_stiffness(laws: Simulated, problem: Problem) -> Simulated:
+    return replace(laws, kept_ratio=problem.residual_stiffness_ratio) if laws.slackening else laws
+
+
+def _happening(laws: Simulated, problem: Problem, kind: type[LineIncident]) -> Simulated:
+    """The incidents of one more kind, in the problem's order."""
+    chosen = [i for i in problem.incidents if isinstance(i, kind) or i in laws.incidents]
+    return replace(laws, incidents=tuple(chosen))
+
+
 register(
     Effect(
         "vertical",
@@ -69,7 +86,7 @@ register(
         "weights, static equilibrium, dropper pre-tension and lengths",
         "paper section 2; static equilibrium of a tensioned beam",
         default=True,
-        build=lambda builder: builder.set_gravity(builder.problem.gravity),
+        law=lambda laws, p: replace(laws, gravity=p.gravity),
     )
 )
 register(
@@ -81,7 +98,7 @@ register(
         default=True,
         requires=("gravity",),
         applies=lambda p: any(any(sag) for sag in p.line.pre_sag),
-        build=lambda builder: builder.count_term(),
+        law=lambda laws, p: _shaped(laws, target_heights.pre_sag),
     )
 )
 register(
@@ -92,7 +109,7 @@ register(
         "paper section 5, figure 4",
         default=True,
         applies=lambda p: any(p.line.n_transition) and p.line.transition_rise > 0,
-        build=lambda builder: builder.count_term(),
+        law=lambda laws, p: _shaped(laws, target_heights.transition),
     )
 )
 register(
@@ -157,7 +174,7 @@ register(
             or p.damping.beta > 0
             or any(any(pair) for pair in p.damping.per_component.values())
         ),
-        build=lambda builder: builder.count_term(),
+        law=lambda laws, p: replace(laws, damping=p.damping),
     )
 )
 register(
@@ -168,7 +185,7 @@ register(
         "paper eq. (2.7)",
         default=True,
         requires=("gravity",),
-        build=lambda builder: builder.count_term(),
+        law=lambda laws, p: replace(laws, slackening=True, kept_ratio=0.0),
     )
 )
 register(
@@ -180,7 +197,7 @@ register(
         default=False,
         requires=("dropper_slackening",),
         applies=lambda p: p.residual_stiffness_ratio > 0,
-        build=lambda builder: builder.count_term(),
+        law=_residual_stiffness,
     )
 )
 register(
@@ -191,7 +208,7 @@ register(
         "paper section 4",
         default=True,
         applies=lambda p: not isinstance(p.contact, KinematicLaw),
-        build=lambda builder: builder.count_term(),
+        law=lambda laws, p: replace(laws, contact_loss=True),
     )
 )
 register(
@@ -202,7 +219,7 @@ register(
         "penalty contact with a viscous term, or hysteresis (paper eq. 4.1)",
         default=False,
         applies=lambda p: p.contact.dissipates,
-        build=lambda builder: builder.count_term(),
+        law=lambda laws, p: replace(laws, contact=p.contact),
     )
 )
 register(
@@ -213,7 +230,7 @@ register(
         "paper section 5",
         default=True,
         applies=lambda p: len(p.train.placements) > 1,
-        build=lambda builder: builder.count_term(),
+        lifts=(Limit.ONE_PANTOGRAPH,),
     )
 )
 register(
@@ -224,7 +241,7 @@ register(
         "rigid head on two springs beside each other",
         default=False,
         applies=lambda p: any(roll_of(place.data) is not None for place in p.train.placements),
-        build=lambda builder: builder.count_term(),
+        law=lambda laws, p: replace(laws, head_roll=True),
     )
 )
 register(
@@ -235,7 +252,7 @@ register(
         "given motion, or spectra of track irregularities (FRA; ORE B176)",
         default=False,
         applies=lambda p: p.train.vehicle is not None,
-        build=lambda builder: builder.count_term(),
+        law=lambda laws, p: replace(laws, vehicle=p.train.vehicle),
     )
 )
 register(
@@ -246,7 +263,7 @@ register(
         "equation of motion of the line without it; [[incidents]]",
         default=True,
         applies=lambda p: any(isinstance(incident, DropperBreak) for incident in p.incidents),
-        build=lambda builder: builder.count_term(),
+        law=lambda laws, p: _happening(laws, p, DropperBreak),
     )
 )
 register(
@@ -257,7 +274,7 @@ register(
         "equation of motion of the line with it; [[incidents]]",
         default=True,
         applies=lambda p: any(isinstance(incident, TensionLoss) for incident in p.incidents),
-        build=lambda builder: builder.count_term(),
+        law=lambda laws, p: _happening(laws, p, TensionLoss),
     )
 )
 register(
@@ -268,7 +285,7 @@ register(
         "the course of the raising, the other way; [[incidents]]",
         default=True,
         applies=lambda p: any(place.lowering is not None for place in p.train.placements),
-        build=lambda builder: builder.count_term(),
+        law=lambda laws, p: replace(laws, lowering=True),
     )
 )
 register(
@@ -279,6 +296,6 @@ register(
         "paper eq. (1.1)",
         default=False,
         applies=lambda p: p.train.speed >= slowest_wave_speed(p),
-        build=lambda builder: builder.count_term(),
+        lifts=(Limit.WAVE_SPEED,),
     )
 )

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from catenary.solver.effects.all_effects import simulated
 from catenary.solver.model.unknowns import Unknowns
 from catenary.solver.problem.integrator_parameters import NEWMARK
-from catenary.solver.problem.problem import Numerics, Problem
+from catenary.solver.problem.problem import Damping, Numerics, Problem
 
 # Time of a step in terms of one in two passes, as measured with the case ambrosio2012: part by
 # part with products and solves by stations, and with factors of PETSc.
@@ -32,7 +33,7 @@ def detour_of(problem: Problem, numbering: Unknowns) -> Detour | None:
         return None
     if not numbering.in_stations:
         return Detour("the nodes of the wires are too many or too few to form stations", LIBRARY)
-    reason = method_detour(problem.numerics, _is_damped_by_component(problem))
+    reason = method_detour(problem.numerics, _is_damped_by_component(simulated(problem).damping))
     return Detour(reason, PARTS) if reason else None
 
 
@@ -48,7 +49,5 @@ def method_detour(numerics: Numerics, damped_by_component: bool) -> str:
     return ""
 
 
-def _is_damped_by_component(problem: Problem) -> bool:
-    damping = problem.damping
-    own = {damping.per_component[name] for name in damping.per_component}
-    return "structural_damping" in problem.effects and bool(own - {(damping.alpha, damping.beta)})
+def _is_damped_by_component(damping: Damping) -> bool:
+    return bool(set(damping.per_component.values()) - {(damping.alpha, damping.beta)})

@@ -16,7 +16,6 @@ class ModelBuilder:
         self.model = model
         self.problem: Problem = model.problem
         self.mesh = model.mesh
-        self._gravity = 0.0
         self._hanging: list[tuple[np.ndarray, np.ndarray]] = []
         self._constrained: list[np.ndarray] = []
         self._n_terms = 0
@@ -78,15 +77,6 @@ class ModelBuilder:
         """Hold an unknown of some nodes at its equilibrium value."""
         self._constrained.append(self.model.dofs(nodes, unknown))
 
-    def set_gravity(self, gravity: float) -> None:
-        """Let all masses hang, those of effects built later included [m/s2]."""
-        self._gravity = gravity
-        self._n_terms += 1
-
-    def count_term(self) -> None:
-        """Count a term that is no matrix, such as a law in the time loop."""
-        self._n_terms += 1
-
     def take_count(self) -> int:
         """Terms added since the last call."""
         count, self._n_terms = self._n_terms, 0
@@ -96,9 +86,10 @@ class ModelBuilder:
         """The model, its weights and constraints put together."""
         model = self.model
         model.weight = np.zeros(model.n_dofs)
-        if self._gravity:
+        gravity = model.simulated.gravity
+        if gravity:
             for dofs, mass in self._hanging:
-                np.add.at(model.weight, dofs, -self._gravity * mass)
+                np.add.at(model.weight, dofs, -gravity * mass)
         held = [model.numbering.missing, *self._constrained]
         model.constrained = np.unique(np.concatenate(held))
         return model

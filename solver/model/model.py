@@ -14,6 +14,7 @@ import numpy as np
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.solver.model.unknowns import Unknowns
 from catenary.solver.problem.problem import Problem
+from catenary.solver.problem.simulated import Simulated
 
 
 class StepLoad(Protocol):
@@ -44,6 +45,7 @@ class Model:
 
     Attributes
     ----------
+    simulated : laws of the problem, as its effects set them
     numbering : Unknowns, the registry of all unknowns and their numbers
     row_of_node : (n_nodes,) place of each mesh node in the order along the track
     blocks : element blocks; their sums are M and K
@@ -54,10 +56,11 @@ class Model:
     released_damping : (n_droppers,) the part of ``dropper_damping`` that goes slack with the spring
     broken : (n_droppers,) droppers that carry nothing; what they weigh stays on their clamps
     step_loads : loads that change with time
-    terms_of : effect name -> number of terms that it added
+    terms_of : effect name -> number of terms, laws and lifted limits that it contributes
     """
 
     problem: Problem
+    simulated: Simulated
     mesh: LineMesh
     active: tuple[str, ...]
     numbering: Unknowns
@@ -101,8 +104,6 @@ class Model:
 
     @property
     def dropper_damping(self) -> np.ndarray:
-        if "structural_damping" not in self.terms_of:
-            return np.zeros(self.mesh.droppers.shape[0])
         return self.damping_of("droppers")[0] * self.dropper_stiffness
 
     @property
@@ -111,10 +112,8 @@ class Model:
         return np.zeros_like(damping) if self.problem.slack_dampers_act else damping
 
     def damping_of(self, component: str) -> tuple[float, float]:
-        """Damping factors (alpha [s], beta [1/s]) of a component; zero without the effect."""
-        if "structural_damping" not in self.terms_of:
-            return 0.0, 0.0
-        damping = self.problem.damping
+        """Damping factors (alpha [s], beta [1/s]) of a component."""
+        damping = self.simulated.damping
         return damping.per_component.get(component, (damping.alpha, damping.beta))
 
     @property

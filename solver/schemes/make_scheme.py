@@ -69,12 +69,12 @@ class SchemeFactory:
         in_parts = numerics.scheme != "one_solve" or numerics.coupling == "explicit"
         loaded = bool(model.step_loads)
         line = make_line(comm, model, self.ownership, numerics, changed.load, not in_parts, loaded)
-        on = model.terms_of
+        laws = model.simulated
         trailing = max(placement.behind for placement in train.placements)
         offsets = [x for placement in train.placements for x in placement.data.strip_offsets]
         reach = (max(0.0, -min(offsets)), max(0.0, max(offsets)))
         # A kinematic contact ends depths through their rates.
-        uses_rate = "contact_damping" in on or isinstance(problem.contact, KinematicLaw)
+        uses_rate = laws.contact.dissipates or isinstance(laws.contact, KinematicLaw)
         interaction = ForcesOnLine(
             comm,
             model,
@@ -84,7 +84,7 @@ class SchemeFactory:
             pantographs.contact_place,
             train.speed,
             uses_rate,
-            "dropper_slackening" in on,
+            laws.slackening,
         )
         scheme_of: dict[str, Callable[[Problem, Model, ForcesOnLine, Pantographs], Scheme]] = {
             "one_solve": self._one_solve,
@@ -99,8 +99,8 @@ class SchemeFactory:
     ) -> Scheme:
         slack = interaction.slack_coupling
         band = np.zeros((0, 1)) if slack is None or slack.band is None else slack.band
-        law = law_in_steps(problem, pantographs.n_contacts)
-        coupling = make_coupling(law, kept_ratio(problem, model), band, problem.numerics)
+        law = law_in_steps(problem, model.simulated, pantographs.n_contacts)
+        coupling = make_coupling(law, model.simulated.kept_ratio, band, problem.numerics)
         return OneSolve(self.comm, interaction, pantographs, coupling, self._loads(model))
 
     def _fixed_point(
@@ -111,33 +111,18 @@ class SchemeFactory:
             interaction,
             pantographs,
             problem.numerics,
-            law_in_steps(problem, pantographs.n_contacts),
-            kept_ratio(problem, model),
-            "dropper_slackening" in model.terms_of,
+            law_in_steps(problem, model.simulated, pantographs.n_contacts),
+            model.simulated.kept_ratio,
+            model.simulated.slackening,
             self._loads(model),
         )
 
     def _ts_alpha2(
         self, problem: Problem, model: Model, interaction: ForcesOnLine, pantographs: Pantographs
     ) -> Scheme:
-        slackens = "dropper_slackening" in model.terms_of
-        system = WholeSystem(
-            problem,
-            model,
-            self.form,
-            kept_ratio(problem, model) if slackens else 1.0,
-            self.nominal_height,
-            self._loads(model),
-        )
+        system = WholeSystem(problem, model, self.form, self.nominal_height, self._loads(model))
         return TSAlpha2(self.comm, interaction, pantographs, system, problem.numerics)
 
     def _loads(self, model: Model) -> LoadSource:
         """This rank's part of the loads that change with time; without any, no calls are made."""
         return StepLoads(model, self.ownership) if model.step_loads else lambda time: None
-
-
-def kept_ratio(problem: Problem, model: Model) -> float:
-    """Share of its stiffness that a slack dropper keeps."""
-    if "residual_dropper_stiffness" not in model.terms_of:
-        return 0.0
-    return problem.residual_stiffness_ratio

@@ -43,7 +43,6 @@ class WholeSystem:
 
     Parameters
     ----------
-    kept_ratio : share of what it would push that a dropper keeps; 1 if droppers do not slacken
     nominal_height : of a head under its static force at rest [m]
     loads : of the line, unknowns and forces [N], at a time
     """
@@ -53,15 +52,14 @@ class WholeSystem:
         problem: Problem,
         model: Model,
         form: Equilibrium,
-        kept_ratio: float,
         nominal_height: Callable[[Placement], float],
         loads: LoadSource,
     ) -> None:
-        train, law = problem.train, problem.contact
+        train, law = problem.train, model.simulated.contact
         assert isinstance(law, LinearLaw)
         self._train, self._loads = train, loads
-        self._pulls = "contact_loss" not in problem.effects
-        self._law = law if "contact_damping" in problem.effects else law.without_damping()
+        self._pulls = not model.simulated.contact_loss
+        self._law = law
         self.n_line = model.n_dofs
         data = []
         for placement in train.placements:
@@ -95,7 +93,7 @@ class WholeSystem:
 
         self._ends = model.dofs(model.mesh.droppers)
         self._dropper = (form.dropper_force, model.dropper_stiffness, model.released_damping)
-        self._pushed = 1.0 - kept_ratio
+        self._pushed = 1.0 - model.simulated.kept_ratio
         upper, lower = self._ends.T
         pairs = [(i, j) for i in (upper, lower) for j in (upper, lower)]
         self._dropper_at = np.stack([self._at(i, j) for i, j in pairs], axis=1)

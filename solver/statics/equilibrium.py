@@ -72,18 +72,14 @@ def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
 def _form(model: Model) -> Equilibrium:
     mesh, line = model.mesh, model.problem.line
     contact, messenger = mesh.wires[CONTACT_WIRE], mesh.wires[MESSENGER_WIRE]
-    weighted = "gravity" in model.terms_of
+    weighted = model.simulated.gravity != 0.0
     height = np.zeros(mesh.n_nodes)
     slope = np.zeros(mesh.n_nodes)
 
     lower = mesh.droppers[:, 1]
     arms = mesh.steady_arms if line.steady_arm.holds_height else mesh.steady_arms[:0]
     held = np.concatenate([lower, arms, mesh.anchors[np.isin(mesh.anchors, contact)]])
-    target = line.target_height(mesh.x(held))
-    if "transition_spans" not in model.terms_of:
-        target = np.full_like(target, line.contact_height)
-    if "pre_sag" in model.terms_of:
-        target -= pre_sag_at(line, mesh.x(held))
+    target = model.simulated.target_height(line, mesh.x(held))
     load = model.weight.copy()
     reaction = _rest_on(model, CONTACT_WIRE, held, target, load, height, slope)
     force = reaction[: lower.size] if weighted else np.zeros(lower.size)
@@ -97,20 +93,6 @@ def _form(model: Model) -> Equilibrium:
 
     stretched = height[mesh.droppers[:, 0]] - height[lower]
     return Equilibrium(height, slope, force, stretched - force / model.dropper_stiffness)
-
-
-def pre_sag_at(line: Line, x: np.ndarray) -> np.ndarray:
-    """Pre-sag at positions ``x`` [m], linear between the droppers, zero at the masts."""
-    masts = line.support_positions
-    at, sag = [masts], [np.zeros(masts.size)]
-    for start, droppers, values in zip(
-        masts[:-1], line.dropper_positions, line.pre_sag, strict=True
-    ):
-        at.append(start + np.asarray(droppers))
-        sag.append(np.asarray(values, dtype=float))
-    position = np.concatenate(at)
-    order = np.argsort(position)
-    return np.interp(x, position[order], np.concatenate(sag)[order])
 
 
 def _rest_on(

@@ -34,10 +34,10 @@ from catenary.solver.linear.petsc_solvers import (
 )
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
-from catenary.solver.problem.incidents import DropperBreak, Happened, in_steps
+from catenary.solver.problem.incidents import Happened, in_steps
 from catenary.solver.problem.problem import Problem
 from catenary.solver.schemes.adaptive_steps import StepLevels
-from catenary.solver.schemes.make_scheme import Parts, SchemeFactory, kept_ratio
+from catenary.solver.schemes.make_scheme import Parts, SchemeFactory
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.after_incidents import (
     ChangedLine,
@@ -107,7 +107,9 @@ class March:
         self.ownership = distribute(model, comm.size, comm.rank)
         self._nominal_height = nominal_height_rule(model, form, elasticity)
         self._wire = ContactWire(model, form, self.ownership)
-        self._pantographs = Pantographs(comm, problem, self._wire, self._nominal_height)
+        self._pantographs = Pantographs(
+            comm, problem, model.simulated, self._wire, self._nominal_height
+        )
         self._set_ups = SchemeFactory(comm, form, self.ownership, self._nominal_height)
         self._set_up(unchanged(model))
         self._first_step = 0
@@ -127,7 +129,6 @@ class March:
             parts.interaction,
             self._pantographs,
             self._scheme,
-            kept_ratio(self._problem, changed.model),
         )
 
     def _in_levels(self, changed: ChangedLine, whole: Parts) -> Scheme:
@@ -137,31 +138,26 @@ class March:
         def finer(level: int) -> Parts:
             numerics = replace(problem.numerics, dt=problem.numerics.dt / 2**level)
             finer_problem = replace(problem, numerics=numerics)
-            pantographs = Pantographs(self._comm, finer_problem, self._wire, self._nominal_height)
+            laws = self._first.simulated
+            pantographs = Pantographs(
+                self._comm, finer_problem, laws, self._wire, self._nominal_height
+            )
             return self._set_ups.make(finer_problem, changed, pantographs)
 
         return StepLevels(self._comm, problem.numerics, whole, finer)
 
     def _happening(self) -> list[Happened]:
         """What happens to the line, as far as it is simulated, in order of time."""
-        on = self._first.terms_of
-        simulated = [
-            incident
-            for incident in self._problem.incidents
-            if ("dropper_break" if isinstance(incident, DropperBreak) else "tension_loss") in on
-        ]
-        return in_steps(simulated, self._problem.numerics.dt)
+        return in_steps(self._first.simulated.incidents, self._problem.numerics.dt)
 
     def _happen(self, happened: Happened) -> None:
         """Change the line under way; motion, contacts and counters go on. Collective."""
         before, line, scheme = self._changed, self._line, self._scheme
         after = changed_line(self._first, self._form, happened.incidents)
         moving = line.displacement, line.velocity
-        slackens = "dropper_slackening" in self._first.terms_of
-        kept = kept_ratio(self._problem, self._changed.model)
-        pushed_share = kept if slackens else 1.0
+        kept_ratio = self._first.simulated.kept_ratio
         jump = acceleration_jump(
-            self._comm, self.ownership, before, after, self._form, moving, pushed_share
+            self._comm, self.ownership, before, after, self._form, moving, kept_ratio
         )
         try:
             self._set_up(after)

@@ -31,7 +31,6 @@ class Showing:
     ----------
     comm : mpi4py communicator
     line, form : the line as it is now, and its first rest, from which displacements count
-    kept_ratio : share of its stiffness that a slack dropper keeps
 
     Attributes
     ----------
@@ -47,7 +46,6 @@ class Showing:
         interaction: ForcesOnLine,
         pantographs: Pantographs,
         scheme: Scheme,
-        kept_ratio: float,
     ) -> None:
         self._comm = comm
         model = line.model
@@ -58,11 +56,10 @@ class Showing:
         self._pantographs = pantographs
         self._scheme = scheme
         self._line = interaction.line
-        self._slackens = "dropper_slackening" in model.terms_of
-        self._kept_ratio = kept_ratio
+        self._slackens = model.simulated.slackening
+        # Share of what a dropper would push that acts.
+        self._kept_ratio = model.simulated.kept_ratio
         self._unbalanced = bool(line.load.any())
-        # Of what a dropper would push: all of it where droppers do not slacken.
-        self._pushed_share = kept_ratio if self._slackens else 1.0
         first, owned = self._line.ownership.first, self._line.ownership.owned
         arms = model.dofs(model.mesh.steady_arms)
         self._owned_arms = np.flatnonzero(owned(arms))
@@ -91,7 +88,7 @@ class Showing:
             self._arm_rows,
             interaction.droppers.shown_ends,
             interaction.droppers.shown_laws,
-            self._pushed_share,
+            self._kept_ratio,
         )
         self._show = bound(state_kernels.show, *self.showing, uplift, tension)
 

@@ -1,4 +1,4 @@
-"""A link and a verb, each added in one place, as CONTRIBUTING says.
+"""A link, an effect with laws and a verb, each added in one place, as CONTRIBUTING says.
 
 A channel is added in `test_one_more_channel`, unknowns and a load in `test_lateral_effect`.
 """
@@ -6,22 +6,31 @@ A channel is added in `test_one_more_channel`, unknowns and a load in `test_late
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_lines import HANGING, en50318_line, mesh_of, problem_of
+from measuring import march, registered
+from small_lines import HANGING, en50318_line, mesh_of, problem_of, train
 from typer.testing import CliRunner
 
 from catenary.cases.cli.app import app
+from catenary.cases.scene.load import load_scene
 from catenary.cases.terminal import console
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.solver.base.errors import InputError
 from catenary.solver.effects.build_model import build
-from catenary.solver.effects.effect import Effect, register, unregister
+from catenary.solver.effects.effect import Effect, Limit, register, unregister
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.matrices import whole_matrix
+from catenary.solver.problem.problem import Problem
+from catenary.solver.problem.simulated import Simulated
+from catenary.solver.statics.equilibrium import find_form
 
 STIFFNESS = 1.5e4  # [N/m]
 NAME = "spare_link"
+RISE = 0.03  # [m]
 
 
 def _link(builder: ModelBuilder) -> None:
@@ -51,6 +60,55 @@ def test_a_link_is_an_effect() -> None:
     # One rounding of a sum with what the wires have there, of 1e4 to 1e7 N/m.
     assert added[np.ix_(pair, pair)].toarray() == pytest.approx(spring, abs=1e-8)
     assert abs(added).sum() == pytest.approx(4 * STIFFNESS, abs=1e-8)
+
+
+def test_an_effect_sets_laws_of_the_time_loop() -> None:
+    """Slack droppers that keep half of their stiffness, as two shipped effects have it."""
+
+    def law(laws: Simulated, problem: Problem) -> Simulated:
+        return replace(laws, slackening=True, kept_ratio=0.5)
+
+    line = en50318_line(2)
+    mesh = mesh_of(line, 2)
+    heavy = train(70.0, 50.0, 56.0, static_force=500.0, raise_time=0.01)
+    problem = problem_of(line, HANGING, train=heavy, residual_stiffness_ratio=0.5)
+    shipped = HANGING | {"dropper_slackening", "residual_dropper_stiffness"}
+    expected = march(replace(problem, effects=shipped), mesh)["dropper_force"]
+    assert expected.min() < -1.0  # [N], so that something is slack
+    with registered(Effect("elastic_slack", "slack droppers", "a law", "test", False, law=law)):
+        new = replace(problem, effects=HANGING | {"elastic_slack"})
+        assert np.array_equal(march(new, mesh)["dropper_force"], expected)
+
+
+def test_an_effect_sets_target_heights_and_lifts_limits() -> None:
+    """A contact wire that rises by RISE towards the middle of the line, for fast trains."""
+
+    def rise(line: Line, x: np.ndarray) -> np.ndarray:
+        return np.asarray(RISE * np.sin(np.pi * x / line.support_positions[-1]))
+
+    def law(laws: Simulated, problem: Problem) -> Simulated:
+        return replace(laws, target_heights=(*laws.target_heights, rise))
+
+    line = en50318_line(2)
+    mesh = mesh_of(line, 2)
+    lower = mesh.droppers[:, 1]
+    flat = find_form(problem_of(line, HANGING), mesh)[1].height[lower]
+    fast = ["train.speed_km_h=450"]
+    with pytest.raises(InputError, match="wave speed"):
+        load_scene("en50318_2002", fast)
+    lifts = (Limit.WAVE_SPEED,)
+    with registered(Effect("hump", "a hump", "heights", "test", False, law=law, lifts=lifts)):
+        model, form = find_form(problem_of(line, HANGING | {"hump"}), mesh)
+        assert model.terms_of["hump"] == 2
+        risen = rise(line, mesh.x(lower))
+        # Rounding of heights of 5.5 m.
+        assert form.height[lower] - flat == pytest.approx(risen, abs=1e-14)
+        load_scene("en50318_2002", [*fast, "effects.hump=true"])
+
+
+def test_an_effect_that_contributes_nothing_is_refused() -> None:
+    with pytest.raises(ValueError, match="no unknowns, build, law or lifted limit"):
+        register(Effect("idle", "nothing", "nothing", "test", False))
 
 
 def test_a_verb_is_a_command_of_the_application() -> None:

@@ -18,6 +18,7 @@ from catenary.cases.scene.tables.incidents import (
 )
 from catenary.meshgen.line import Line
 from catenary.postproc.evaluate.wording import counted
+from catenary.solver.effects.effect import Limit
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
@@ -111,7 +112,7 @@ def _dropper(scene: Scene, i: int, table: DropperBreakTable, line: Line) -> Iter
 
 def _tension(scene: Scene, i: int, table: TensionLossTable, line: Line) -> Iterator[Fault]:
     yield from _hangs(scene, i, table)
-    if table.wire != "contact_wire" or scene.switches().get("supercritical_speed", False):
+    if table.wire != "contact_wire" or not scene.holds(Limit.WAVE_SPEED):
         return
     wave = 3.6 * line.contact_wire.wave_speed
     if scene.train.speed_km_h >= math.sqrt(table.share) * wave:

@@ -34,6 +34,7 @@ from catenary.meshgen.geometry import SHORTEST_GAP
 from catenary.meshgen.line import Line
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
+from catenary.solver.effects.effect import Limit
 from catenary.solver.problem.problem import Problem
 
 if TYPE_CHECKING:
@@ -187,7 +188,7 @@ def _effect_data(scene: Scene) -> Iterator[Fault]:
                 f"it acts only with effects.{name} = true; write that, or false to leave it out",
             )
     n = len(scene.train.pantographs)
-    if n > 1 and not switches.get("several_pantographs", True):
+    if n > 1 and scene.holds(Limit.ONE_PANTOGRAPH):
         key = "effects.several_pantographs"
         yield _refusal(
             scene, key, False, f"train.pantographs has {n} entries; leave one or switch it on"
@@ -313,7 +314,7 @@ def _dropper_lengths(scene: Scene, line: Line) -> Iterator[Fault]:
 def _speed(scene: Scene, line: Line) -> Iterator[Fault]:
     wave = 3.6 * line.contact_wire.wave_speed
     speed = scene.train.speed_km_h
-    if speed >= wave and not scene.switches().get("supercritical_speed", False):
+    if speed >= wave and scene.holds(Limit.WAVE_SPEED):
         yield _refusal(
             scene,
             "train.speed_km_h",

@@ -29,7 +29,6 @@ from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import in_steps
 from catenary.solver.problem.problem import Problem
-from catenary.solver.schemes.make_scheme import kept_ratio
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.observers import Stage, StepView
@@ -135,9 +134,7 @@ class LineBalance:
                 ("acceleration", dt**2 * excess * of_acceleration),
             ]
         self._ends = model.dofs(model.mesh.droppers)
-        slackens = "dropper_slackening" in problem.effects
-        kept = kept_ratio(problem, model) if slackens else 1.0
-        released = (1.0 - kept) * model.released_damping
+        released = (1.0 - model.simulated.kept_ratio) * model.released_damping
         of_velocity = 0.5 * dt * (gamma - 0.5) * released
         self._slack = [
             ("velocity", of_velocity),
@@ -276,9 +273,9 @@ def node_places(rest: LineAtRest) -> np.ndarray:
 def run(rest: LineAtRest, comm: Any, with_work: bool = False) -> Watched:
     """March to the end, or to where it breaks. Collective; ``with_work`` on one rank only."""
     wire = ContactWire(rest.model, rest.form, distribute(rest.model, 1, 0)) if with_work else None
-    problem = rest.problem
-    balance = LineBalance(rest.model, problem) if with_work else None
-    keep = [happened.step for happened in in_steps(problem.incidents, problem.numerics.dt)]
+    simulated = rest.model.simulated
+    balance = LineBalance(rest.model, rest.problem) if with_work else None
+    keep = [happened.step for happened in in_steps(simulated.incidents, rest.problem.numerics.dt)]
     watcher = Watcher(wire, keep, balance)
     with March(comm, *rest) as march:
         ended = march.run([watcher])

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 from collections import Counter
+from collections.abc import Set
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +21,7 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import MESSENGER_WIRE, LineMesh
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
+from catenary.solver.effects.effect import Limit
 from catenary.solver.model.model import Model
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.incidents import DropperBreak, TensionLoss
@@ -64,7 +68,7 @@ def mesh() -> LineMesh:
     return mesh_of(full_line(), 2)
 
 
-def model_with(names: frozenset[str], mesh: LineMesh) -> Model:
+def model_with(names: Set[str], mesh: LineMesh) -> Model:
     lengths = np.full(mesh.droppers.shape[0], 1.0)
     return build(full_problem(BARE | names), mesh, lengths)
 
@@ -132,6 +136,57 @@ BLOCKS = {
     "lowering": ({}, 1),
     "supercritical_speed": ({}, 1),
 }
+# The fields of `Simulated` that each effect sets.
+LAWS = {
+    "gravity": "gravity",
+    "pre_sag": "target_heights",
+    "transition_spans": "target_heights",
+    "structural_damping": "damping",
+    "dropper_slackening": "slackening kept_ratio",
+    "contact_loss": "contact_loss",
+    "contact_damping": "contact",
+    "head_roll": "head_roll",
+    "vehicle_motion": "vehicle",
+    "dropper_break": "incidents",
+    "tension_loss": "incidents",
+    "lowering": "lowering",
+}
+LIFTED = {
+    "several_pantographs": (Limit.ONE_PANTOGRAPH,),
+    "supercritical_speed": (Limit.WAVE_SPEED,),
+}
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_an_effect_sets_its_own_laws_and_no_others(name: str, mesh: LineMesh) -> None:
+    bare, alone = (vars(model_with(names, mesh).simulated) for names in (frozenset(), {name}))
+    assert {key for key in bare if alone[key] != bare[key]} == set(LAWS.get(name, "").split())
+    assert effects.registry()[name].lifts == LIFTED.get(name, ())
+
+
+def test_a_slack_dropper_keeps_a_share_only_if_droppers_slacken(mesh: LineMesh) -> None:
+    residual = {"residual_dropper_stiffness"}
+    assert model_with(residual, mesh).simulated.kept_ratio == 1.0
+    both = model_with(residual | {"dropper_slackening"}, mesh).simulated
+    assert (both.slackening, both.kept_ratio) == (True, 0.01)
+
+
+def test_incidents_are_simulated_in_their_order(mesh: LineMesh) -> None:
+    both = model_with({"tension_loss", "dropper_break"}, mesh)
+    assert both.simulated.incidents == both.problem.incidents
+    (loss,) = model_with({"tension_loss"}, mesh).simulated.incidents
+    assert isinstance(loss, TensionLoss)
+
+
+def test_no_effect_is_found_by_its_name() -> None:
+    """What an effect contributes is read from `Simulated` and the model, in all of the solver."""
+    names = set(effects.registry()) - {"vertical", "gravity", "pre_sag"}
+    for path in (Path(__file__).parents[3] / "solver").rglob("*.py"):
+        if path.name == "vertical_effects.py":
+            continue
+        texts = (node for node in ast.walk(ast.parse(path.read_text("utf-8"))))
+        strings = {n.value for n in texts if isinstance(n, ast.Constant)}
+        assert not names & strings, path
 
 
 def test_the_table_names_every_shipped_effect() -> None:

@@ -1,0 +1,59 @@
+"""Laws, motions and incidents that a run simulates: data only, set by its effects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from catenary.mbs.vehicle.motion_sources import VehicleMotion
+from catenary.meshgen.line import Line
+from catenary.solver.problem.contact_laws import ContactLaw
+from catenary.solver.problem.incidents import LineIncident
+from catenary.solver.problem.problem import Damping
+
+# Height [m] above ``Line.contact_height`` that the contact wire is to have at positions x [m].
+TargetHeight = Callable[[Line, np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """All of a run that is no matrix and no load; the defaults are a run without effects.
+
+    `all_effects.simulated` makes it, each active effect setting its own fields.
+
+    Attributes
+    ----------
+    contact : law of the contact; without its damping, unless an effect adds it
+    gravity : of all masses [m/s2]; at 0 nothing has weight and droppers carry nothing at rest
+    target_heights : functions whose sum is the contact wire's height at rest above
+        ``Line.contact_height`` [m]
+    damping : of the line's components
+    slackening : whether droppers slacken
+    kept_ratio : share of its stiffness that a pushed dropper keeps; 1 if droppers do not slacken
+    contact_loss : whether heads leave the wire; without it the contact force may pull
+    head_roll : whether heads roll
+    lowering : whether pantographs are lowered as their placements say
+    vehicle : motion of the pantographs' bases, None if they move along a straight line
+    incidents : of the line, in the order of ``Problem.incidents``
+    """
+
+    contact: ContactLaw
+    gravity: float = 0.0
+    target_heights: tuple[TargetHeight, ...] = ()
+    damping: Damping = Damping(0.0, 0.0)
+    slackening: bool = False
+    kept_ratio: float = 1.0
+    contact_loss: bool = False
+    head_roll: bool = False
+    lowering: bool = False
+    vehicle: VehicleMotion | None = None
+    incidents: tuple[LineIncident, ...] = ()
+
+    def target_height(self, line: Line, x: np.ndarray) -> np.ndarray:
+        """Height that the contact wire is to have at rest at positions ``x``, shape as x [m]."""
+        height = np.full_like(x, line.contact_height, dtype=float)
+        for above in self.target_heights:
+            height += above(line, x)
+        return height
