@@ -14,7 +14,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 DEBIAN_PACKAGES=(
     python3-petsc4py-real python3-mpi4py python3-h5py-mpi "python3-h5py|python3-h5py-serial"
     python3-scipy python3-numpy openmpi-bin python3-venv make
-    libglu1-mesa libgl1 libxrender1 libxcursor1 libxfixes3 libxext6 libxft2 libfontconfig1
+    libglu1-mesa libgl1 libegl1 libxrender1 libxcursor1 libxfixes3 libxext6 libxft2 libfontconfig1
     libxinerama1 libx11-6 libgomp1
 )
 STAMP=.venv/catenary-setup

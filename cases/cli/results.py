@@ -1,4 +1,4 @@
-"""The verbs ``report`` and ``compare``: results of runs that were made before."""
+"""The verbs ``report``, ``compare`` and ``animate``: results of runs that were made before."""
 
 from __future__ import annotations
 
@@ -49,3 +49,56 @@ def compare(
 
     found = examined(first), examined(second)
     console.say(compare_runs(first, second, found).rstrip())
+
+
+@app.command(
+    "animate",
+    help="Make a film of a run, film.mp4 and film.gif: the line and its pantographs from the side, "
+    "the contact force beneath. Each picture is a snapshot of fields.h5.",
+    epilog="Example: catenary animate results/en300 --from 2 --to 6",
+)
+@console.guarded
+@console.serial
+def animate(
+    folder: RunFolder,
+    start: Annotated[
+        float | None, typer.Option("--from", min=0, max=1e7, help="Simulated time to begin at [s].")
+    ] = None,
+    end: Annotated[
+        float | None, typer.Option("--to", min=0, max=1e7, help="Simulated time to end at [s].")
+    ] = None,
+    rate: Annotated[
+        float, typer.Option("--fps", min=1, max=120, help="Snapshots shown a second.")
+    ] = 25.0,
+    width: Annotated[
+        float | None,
+        typer.Option(
+            "--width-m", min=5, max=2000, help="Line in the picture; some two spans if absent."
+        ),
+    ] = None,
+    motion: Annotated[
+        float | None,
+        typer.Option(
+            "--motion",
+            min=1,
+            max=1e5,
+            help="Factor by which motions are drawn larger than heights.",
+        ),
+    ] = None,
+) -> None:
+    """Serial."""
+    from catenary.postproc.film.animate import Wish
+    from catenary.postproc.film.animate import animate as make_film
+    from catenary.postproc.read.guard import examined
+
+    if not folder.is_dir():
+        raise InputError(f"{folder} is no folder; name the folder of a run")
+    wish = Wish(start, end, rate, width, motion)
+    film = make_film(folder, wish, examined(folder), progress=not console.is_quiet())
+    pace = (
+        f"{film.slowed:.2g} times slower"
+        if film.slowed >= 1
+        else (f"{1 / film.slowed:.2g} times faster")
+    )
+    console.say("\n".join(map(str, film.files)))
+    console.say(f"{film.n_pictures} pictures; the film runs {pace} than the train.")

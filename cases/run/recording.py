@@ -103,7 +103,7 @@ def recording_of(output: OutputTable, problem: Problem, extent: Extent, n_steps:
     output : the scene's table
     n_steps : steps after step 0
     """
-    field_every, by_size = _field_every(output, problem.numerics.dt, extent.n_nodes, n_steps)
+    field_every, by_size = _field_every(output, problem, extent.n_nodes, n_steps)
     places = {channels.ARM: extent.arm_x.size, channels.DROPPER: extent.dropper_x.size}
     n_columns = sum(places[channels.CHANNELS[name].per] for name in channels.line_channels())
     return Recording(
@@ -146,9 +146,12 @@ def _line_record(output: OutputTable, problem: Problem, n_columns: int, n_steps:
 
 
 def _field_every(
-    output: OutputTable, dt: float, n_nodes: int, n_steps: int
+    output: OutputTable, problem: Problem, n_nodes: int, n_steps: int
 ) -> tuple[int | None, bool]:
     """Steps between two snapshots, None for none, and whether their size has made them rarer."""
+    dt = problem.numerics.dt
+    if output.field_every_m is not None:
+        return cadence(output.field_every_m / problem.train.speed, dt), False
     if output.field_every_s is not None:
         return cadence(output.field_every_s, dt), False
     usual = cadence(FIELD_EVERY, dt) or 1

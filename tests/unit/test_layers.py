@@ -41,7 +41,7 @@ ROOMS = {
         "base", "problem", "model", "effects", "linear", "statics", "integrators", "contact",
         "contact_problem", "schemes", "time_loop",
     ),
-    "postproc": ("standards", "channels", "files", "read", "record", "evaluate", "report"),
+    "postproc": ("standards", "channels", "files", "read", "record", "evaluate", "film", "report"),
     "cases": (
         "scene.input", "scene.tables", "scene.keys", "scene.scene", "scene.convert",
         "scene.checks", "scene.load", "terminal", "process", "result_folder", "run",

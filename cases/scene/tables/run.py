@@ -273,6 +273,9 @@ class OutputTable(Table):
         description="cadence of field snapshots; 0 writes none; 0.05 s if absent, or as much "
         "longer as keeps them within 500 MB",
     )
+    field_every_m: float | None = Field(
+        None, gt=0, le=1e4, description="the same as a distance that the train travels"
+    )
     energy_every_s: float = Field(
         0.05, ge=0, le=1e4, description="cadence of the line's energy; 0 writes none"
     )
@@ -339,6 +342,8 @@ class OutputTable(Table):
                 "takes line_channels_every_s or line_channels_every_m, but both are given"
                 + TAKE_AWAY
             )
+        if self.field_every_s is not None and self.field_every_m is not None:
+            raise ValueError("takes field_every_s or field_every_m, but both are given" + TAKE_AWAY)
         spans = self.line_channels_spans
         if spans is not None and spans[0] > spans[1]:
             raise ValueError(

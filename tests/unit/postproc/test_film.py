@@ -1,0 +1,206 @@
+"""Films: what is drawn where, and what is refused. Pictures are drawn by VTK without a screen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from catenary.postproc.film import animate, pantograph_shape, scale
+from catenary.postproc.film.animate import SIZE, Wish
+from catenary.postproc.film.film_data import film_data
+from catenary.postproc.film.pantograph_shape import LOWER_ARM, UPPER_ARM
+from catenary.postproc.film.snapshots import Snapshots
+from catenary.postproc.read.results import Results
+from catenary.postproc.record.fields import FieldRecorder
+from catenary.solver.base.errors import InputError
+
+# HDF5's files are examined, and films written, by processes of their own.
+pytestmark = pytest.mark.process
+
+
+@pytest.fixture
+def folder(tmp_path: Path, make_march: Any, record_run: Any) -> Path:
+    """A run of a second with a snapshot every 50 ms."""
+    march = make_march(n_steps=1000, separations=(0.0,))
+    wires, droppers = march.mesh.wires, march.mesh.droppers
+    fields = FieldRecorder(march.comm, tmp_path / "fields.xdmf", wires, droppers, every=50)
+    march.drive(fields)
+    record_run(tmp_path / "run.h5", march)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"), [(1.0, 1.0), (1.99, 1.5), (7.9, 6.0), (62.0, 60.0), (0.45, 0.4)]
+)
+def test_factors_are_round_and_never_larger(value: float, expected: float) -> None:
+    assert scale.round_down(value) == pytest.approx(expected)
+
+
+def test_a_drawing_lifts_by_the_factor_of_motions() -> None:
+    drawn = scale.Scale(8.0, 60.0).drawn(np.array([5.0, 5.0]), np.array([0.0, 0.05]))
+    np.testing.assert_allclose(drawn, [40.0, 43.0])
+
+
+def test_the_largest_uplift_stays_between_the_wires() -> None:
+    found = scale.scale_for(110.0, 6.0, 2.5, 1.2, 0.1)
+    assert 0.2 * 1.2 * found.height < found.motion * 0.1 < 0.5 * 1.2 * found.height
+
+
+@pytest.mark.parametrize("head", [4.2, 5.0, 5.6, 6.4])
+def test_arms_keep_their_lengths_and_reach_the_head(head: float) -> None:
+    (foot, knee, hinge), ends = pantograph_shape.shape(head, 3.6)
+    assert np.hypot(*(knee - foot)) == pytest.approx(LOWER_ARM)
+    assert np.hypot(*(hinge - knee)) == pytest.approx(UPPER_ARM)
+    np.testing.assert_allclose(hinge, ends.mean(axis=0), atol=1e-12)
+    assert hinge[1] == pytest.approx(head) and foot[1] == 3.6
+
+
+def test_arms_that_would_not_reach_are_stretched() -> None:
+    (foot, knee, hinge), _ = pantograph_shape.shape(9.0, 3.6)
+    lower, upper = np.hypot(*(knee - foot)), np.hypot(*(hinge - knee))
+    assert lower / upper == pytest.approx(LOWER_ARM / UPPER_ARM)
+    assert lower > LOWER_ARM and hinge[1] == pytest.approx(9.0)
+
+
+def test_snapshots_are_those_of_the_fields(folder: Path, make_march: Any) -> None:
+    march = make_march(n_steps=1000, separations=(0.0,))
+    points = march.mesh.points
+    with Snapshots(folder, len(points)) as snapshots:
+        np.testing.assert_allclose(snapshots.times, 0.05 * np.arange(21))
+        expected = march.wave(0.35, points[:, 0])
+        np.testing.assert_allclose(snapshots.uplift(7), expected, atol=1e-8)
+
+
+def _cut_times(file: h5py.File) -> None:
+    file["times"][6:] = np.nan
+
+
+def _drop_times(file: h5py.File) -> None:
+    del file["times"]
+
+
+def test_snapshots_of_a_killed_run_end_where_it_ended(folder: Path) -> None:
+    with h5py.File(folder / "fields.h5", "r+") as file:
+        _cut_times(file)
+    with Snapshots(folder, 10) as snapshots:
+        assert snapshots.times.size == 6
+
+
+def test_what_cannot_be_shown_is_refused(folder: Path) -> None:
+    with Results(folder) as results:
+        n_nodes = len(results.line("node_points"))
+    with (
+        Snapshots(folder, n_nodes + 1) as snapshots,
+        pytest.raises(InputError, match="does not belong"),
+    ):
+        snapshots.uplift(0)
+    with h5py.File(folder / "fields.h5", "r+") as file:
+        names = sorted(file["uplift"])
+        file[f"uplift/{names[3]}"][5] = np.nan
+    with Snapshots(folder, n_nodes) as snapshots, pytest.raises(InputError, match=r"t = 0\.15 s"):
+        snapshots.uplift(3)
+    with h5py.File(folder / "fields.h5", "r+") as file:
+        _drop_times(file)
+    with pytest.raises(InputError, match="no times"):
+        Snapshots(folder, n_nodes)
+    (folder / "fields.h5").write_bytes(b"no file of HDF5")
+    with pytest.raises(InputError, match="HDF5 does not read it"):
+        Snapshots(folder, n_nodes)
+    (folder / "fields.h5").unlink()
+    with pytest.raises(InputError, match=r"output\.field_every_s"):
+        Snapshots(folder, n_nodes)
+
+
+def test_snapshots_are_chosen_by_time() -> None:
+    times = 0.05 * np.arange(21)
+    assert animate.chosen(times, Wish()).tolist() == list(range(21))
+    assert animate.chosen(times, Wish(0.2, 0.3)).tolist() == [4, 5, 6]
+    with pytest.raises(
+        InputError, match=r"not two snapshots from 2 to 3 s; they reach from 0 to 1 s"
+    ):
+        animate.chosen(times, Wish(2.0, 3.0))
+
+
+def columns_of(picture: np.ndarray, colour: tuple[int, int, int], rows: slice) -> np.ndarray:
+    """Columns of a picture with pixels of a colour in some rows."""
+    near = (np.abs(picture[rows].astype(int) - colour) < 25).all(axis=2)
+    return np.flatnonzero(near.any(axis=0))
+
+
+def test_the_pantograph_stands_above_its_force_and_the_masts_where_they_are(folder: Path) -> None:
+    """In a picture of 100 m a column is 0.087 m wide; lines are seven columns wide at most."""
+    with Results(folder) as results:
+        data = film_data(results)
+        with Snapshots(folder, len(data.points)) as snapshots:
+            numbers = animate.chosen(snapshots.times, Wish(0.5, 0.6))
+            pictures = list(animate._pictures(data, results, snapshots, numbers, Wish(width=100.0)))
+    assert [picture.shape for picture in pictures] == [(SIZE[1], SIZE[0], 3)] * 3
+    picture = pictures[1]
+    red = (0xB2, 0x18, 0x2B)
+    lower = slice(int(0.68 * SIZE[1]), int(0.93 * SIZE[1]))
+    head = columns_of(picture, red, slice(0, int(0.3 * SIZE[1])))
+    assert head.size, "there is a head in the picture"
+    curve = columns_of(picture, red, lower)
+    # The curve ends below the middle of the head; the legend's sample of its colour is right of it.
+    ends = curve[np.append(np.diff(curve) > 40, True)]
+    assert np.abs(ends - head.mean()).min() <= 8
+    # Below the wires only masts are of their colour; they pass by as far as the train runs.
+    first, second = (masts_of(picture) for picture in pictures[:2])
+    passed = np.subtract.outer(first, second)
+    travelled = float(data.position[data.row_at(0.55), 0] - data.position[data.row_at(0.5), 0])
+    a_pixel = travelled / float(passed[(passed > 20) & (passed < 120)].mean())
+    np.testing.assert_allclose(np.diff(second) * a_pixel, 50.0, atol=1.0)
+
+
+def masts_of(picture: np.ndarray) -> np.ndarray:
+    """Middles of the masts in a picture [columns]."""
+    columns = columns_of(picture, (0xB8, 0xBC, 0xC2), slice(345, 375))
+    groups = np.split(columns, np.flatnonzero(np.diff(columns) > 20) + 1)
+    return np.array([group.mean() for group in groups])
+
+
+def test_a_film_is_whole_or_not_there(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from catenary.postproc.film import video
+
+    (folder / "film.mp4").write_bytes(b"an earlier film")
+
+    def broken(*_: Any, **__: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(video, "_write_mp4", broken)
+        with pytest.raises(InputError, match="No space left"):
+            animate.animate(folder, Wish(), None, progress=False)
+    assert (folder / "film.mp4").read_bytes() == b"an earlier film"
+    assert not list(folder.glob(".film*"))
+
+
+def test_films_have_a_picture_for_each_snapshot(folder: Path) -> None:
+    import imageio_ffmpeg
+    from PIL import Image, ImageSequence
+
+    film = animate.animate(folder, Wish(start=0.2, rate=10.0), None, progress=False)
+    assert film.n_pictures == 17
+    # Snapshots 0.05 s apart, shown 0.1 s each.
+    assert film.slowed == pytest.approx(2.0)
+    count, seconds = imageio_ffmpeg.count_frames_and_secs(str(film.files[0]))
+    assert count == 17 and seconds == pytest.approx(1.7, abs=0.11)
+    with Image.open(film.files[1]) as gif:
+        assert gif.n_frames == 17 and gif.info["duration"] == 100
+        pictures = [np.asarray(picture.convert("RGB")) for picture in ImageSequence.Iterator(gif)]
+    changed = [(a != b).mean() for a, b in zip(pictures, pictures[1:], strict=False)]
+    assert min(changed) > 1e-3
+
+
+def test_without_its_libraries_a_film_says_what_is_missing(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(animate, "_EGL", "libEGL_that_is_not_there.so.1")
+    monkeypatch.setattr(animate.sys, "platform", "linux")
+    with pytest.raises(InputError, match="apt-get install libegl1"):
+        animate.animate(folder, Wish(), None, progress=False)
+    assert not (folder / "film.mp4").exists()
