@@ -22,10 +22,10 @@ from catenary.cases.scene.checks.mesh_size import estimate_memory, size_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.lumped_data import LumpedData
-from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.solver.effects import all_effects as effects
+from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.integrators.detour import Detour, detour_of
-from catenary.solver.model.unknowns import number_unknowns
 from catenary.solver.problem.problem import Problem
 
 # Cost model of the march on one rank, records included: overhead of a step, and time per unknown.
@@ -99,11 +99,13 @@ def needs_of(
     problem : of the scene
     extent : of its mesh
     n_dofs : unknowns of the line
-    widths : unknowns of a station in each plane; two nodes' by default
+    widths : unknowns of a station in each plane; by default of one with a node of each wire
     detour : why steps take longer than they could
     """
     active = effects.active(problem)
-    widths = widths or tuple(2 * len(group) for group in effects.unknown_groups(active))
+    if not widths:
+        groups = effects.unknown_groups(active, (CONTACT_WIRE, MESSENGER_WIRE))
+        widths = tuple(sum(map(len, group.values())) for group in groups)
     scheme = problem.numerics.scheme
     n_steps = max(1, math.floor(simulated_time(problem) / problem.numerics.dt + 1e-9))
     recording = recording_of(scene.output, problem, extent, n_steps)
@@ -141,12 +143,10 @@ def needs_before_meshing(scene: Scene) -> Needs | None:
 def needs_with_mesh(scene: Scene, mesh: LineMesh) -> Needs:
     """What a run on a mesh needs. Not collective."""
     problem = problem_of(scene)
-    groups = effects.unknown_groups(effects.active(problem))
-    numbering = number_unknowns(mesh, groups)
-    n_names = len(numbering.names)
-    widths = tuple(numbering.width * len(group) // n_names for group in groups)
+    numbering = numbering_of(problem, mesh)
     detour = detour_of(problem, numbering)
-    return needs_of(scene, problem, extent_of(mesh), n_names * mesh.n_nodes, widths, detour)
+    extent = extent_of(mesh)
+    return needs_of(scene, problem, extent, numbering.n_unknowns, numbering.planes, detour)
 
 
 def run_size(needs: Needs) -> RunSize:

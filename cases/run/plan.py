@@ -16,6 +16,7 @@ from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.effects import all_effects as effects
+from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.problem.problem import Numerics, Problem, n_halvings
 
 if TYPE_CHECKING:
@@ -123,8 +124,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
     mesh = mesh_of(scene) if mesh is None else mesh
     extent = extent_of(mesh)
     on, off = effect_rows(scene, problem)
-    unknowns = effects.unknowns_per_node(effects.active(problem))
-    n_dofs = mesh.n_nodes * len(unknowns)
+    numbering = numbering_of(problem, mesh)
     train, dt = problem.train, problem.numerics.dt
     needs = needs_with_mesh(scene, mesh)
     length = np.diff(mesh.x(mesh.wires[CONTACT_WIRE]))
@@ -134,9 +134,9 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
         title=scene.case.title,
         on=on,
         off=off,
-        unknowns=unknowns,
+        unknowns=numbering.names,
         n_nodes=mesh.n_nodes,
-        n_dofs=n_dofs,
+        n_dofs=numbering.n_unknowns,
         n_steps=needs.n_steps,
         n_droppers=extent.dropper_x.size,
         n_arms=extent.arm_x.size,
@@ -214,8 +214,7 @@ def plan_text(plan: Plan) -> str:
         ),
         (
             "unknowns",
-            f"{plan.n_dofs} = {plan.n_nodes} nodes x {len(plan.unknowns)} "
-            f"({', '.join(plan.unknowns)})",
+            f"{plan.n_dofs} {_nodes_of_unknowns(plan)} ({', '.join(plan.unknowns)})",
         ),
         (
             "time",
@@ -260,3 +259,10 @@ def _duration(seconds: float) -> str:
     if seconds < 5400:
         return f"{seconds / 60:.1f} min"
     return f"{seconds / 3600:.1f} h"
+
+
+def _nodes_of_unknowns(plan: Plan) -> str:
+    each = len(plan.unknowns)
+    if plan.n_dofs == plan.n_nodes * each:
+        return f"= {plan.n_nodes} nodes x {each}"
+    return f"of {plan.n_nodes} nodes, up to {each} of each"

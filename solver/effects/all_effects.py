@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from catenary.solver.effects import vertical_effects  # noqa: F401  (registers on import)
 from catenary.solver.effects.effect import Effect, registered
+from catenary.solver.model.unknowns import Group
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
 
@@ -29,16 +30,24 @@ def simulated(problem: Problem) -> Simulated:
     return laws
 
 
-def unknowns_per_node(effects: Iterable[Effect]) -> tuple[str, ...]:
-    """Unknowns that a set of effects needs at each wire node, without repetition."""
-    return tuple(name for group in unknown_groups(effects) for name in group)
+def unknown_groups(effects: Iterable[Effect], wires: Iterable[str]) -> list[Group]:
+    """Unknowns that a set of effects needs of each wire, in groups: what one is the first to need.
 
-
-def unknown_groups(effects: Iterable[Effect]) -> list[tuple[str, ...]]:
-    """The same in groups: what an effect is the first to need."""
-    groups: list[tuple[str, ...]] = []
+    An unknown stands in the group of the effect that is the first to need it of any wire.
+    """
+    wires = tuple(wires)
+    groups: list[dict[str, tuple[str, ...]]] = []
+    place: dict[str, int] = {}
     for effect in effects:
-        known = {name for group in groups for name in group}
-        new = tuple(name for name in dict.fromkeys(effect.unknowns) if name not in known)
-        groups += [new] if new else []
-    return groups
+        if effect.unknowns_of_wire is None:
+            continue
+        asked = {wire: effect.unknowns_of_wire(wire) for wire in wires}
+        new = dict.fromkeys(name for own in asked.values() for name in own if name not in place)
+        place.update(dict.fromkeys(new, len(groups)))
+        if new:
+            groups.append(dict.fromkeys(wires, ()))
+        for wire, own in asked.items():
+            for name in own:
+                group = groups[place[name]]
+                group[wire] = tuple(dict.fromkeys((*group[wire], name)))
+    return list(groups)

@@ -8,7 +8,8 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.model import Model
-from catenary.solver.model.unknowns import along_the_track, number_unknowns
+from catenary.solver.model.stations import along_the_track
+from catenary.solver.model.unknowns import Unknowns, number_unknowns
 from catenary.solver.problem.problem import Problem
 
 
@@ -30,7 +31,7 @@ def build(
         effects.simulated(problem),
         mesh,
         tuple(effect.name for effect in active),
-        number_unknowns(mesh, effects.unknown_groups(active)),
+        numbering_of(problem, mesh),
         row_of_node,
         dropper_lengths,
     )
@@ -42,3 +43,8 @@ def build(
             effect.build(builder)
         model.terms_of[effect.name] = builder.take_count() + effect.n_laws
     return builder.finish()
+
+
+def numbering_of(problem: Problem, mesh: LineMesh) -> Unknowns:
+    """The unknowns that the effects of a problem need on a mesh. Not collective."""
+    return number_unknowns(mesh, effects.unknown_groups(effects.active(problem), mesh.wires))

@@ -1,6 +1,6 @@
 """The registry of effects: each is declared once, and what a scene leaves out does not exist.
 
-An effect declares all that it contributes: unknowns at each wire node, terms of the model
+An effect declares all that it contributes: unknowns of each wire, terms of the model
 (matrices, weights, loads in time), laws of the time loop and of the line at rest, limits of a scene
 that it lifts. The scene schema, the plan, the report and the model all read this one table. To add
 an effect, write a module that makes one and registers it with ``register``.
@@ -37,7 +37,8 @@ class Effect:
     adds : the terms that it adds, in words
     source : paper, standard or equation number
     default : whether a scene that says nothing simulates it
-    unknowns : unknowns per wire node, e.g. ("w", "theta_y")
+    unknowns_of_wire : unknowns that it needs at the nodes of a wire, by its name; those of one
+        plane together, e.g. ("w", "theta_y")
     requires : effects without which it makes no sense
     always : True for what no scene can leave out
     applies : whether the problem holds anything for it to act on
@@ -52,7 +53,7 @@ class Effect:
     adds: str
     source: str
     default: bool
-    unknowns: tuple[str, ...] = ()
+    unknowns_of_wire: Callable[[str], tuple[str, ...]] | None = None
     requires: tuple[str, ...] = ()
     always: bool = False
     applies: Callable[[Problem], bool] = lambda problem: True
@@ -79,7 +80,7 @@ def register(effect: Effect) -> Effect:
     """
     if effect.name in _REGISTRY:
         raise ValueError(f"effect {effect.name} is registered already")
-    if not (effect.unknowns or effect.build or effect.n_laws):
+    if not (effect.unknowns_of_wire or effect.build or effect.n_laws):
         raise ValueError(f"effect {effect.name} has no unknowns, build, law or lifted limit")
     _REGISTRY[effect.name] = effect
     return effect

@@ -74,7 +74,7 @@ register(
         "wire bending and tension, droppers, messenger supports, anchors",
         "paper eq. (2.1)",
         default=True,
-        unknowns=("w", "theta_y"),
+        unknowns_of_wire=lambda wire: ("w", "theta_y"),
         always=True,
         build=_vertical,
     )

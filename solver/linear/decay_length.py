@@ -13,7 +13,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 from catenary.solver.model.matrices import iterate_entries
 from catenary.solver.model.model import Model
-from catenary.solver.model.unknowns import SAME_STATION
+from catenary.solver.model.stations import SAME_STATION
 
 # Beyond the reach a column is below this share of its peak; two orders under what an iteration
 # over a whole run may add up to and still agree to 1e-9.
@@ -82,9 +82,7 @@ def _reach_of(
     )
     empty = matrix.diagonal() == 0
     factor = sparse_linalg.splu((matrix + sparse.diags(empty.astype(float))).tocsc())
-    x = np.full(model.n_dofs, np.inf)
-    x[model.numbering.numbers] = model.mesh.points[:, :1]
-    x = x[first:last]
+    x = model.numbering.as_vector(model.mesh.points[:, :1], np.inf)[first:last]
     furthest, seen = 0.0, np.inf
     for station in loads:
         ahead, behind = float(positions[-1] - station), float(station - positions[0])

@@ -101,7 +101,7 @@ class LineOperators:
         self._model = model
         self._ownership = ownership
         self._coefficients = coefficients
-        self._block = model.numbering.width
+        self._block = model.numbering.block
         self._product_event, self._solve_event = event("LineProduct"), event("LineSolve")
         if comm.size > 1 and wants_distributed_solver():
             self._solve_together(windows)
@@ -312,17 +312,16 @@ class LineOperators:
         return self._model.numbering.in_stations
 
     def _overlap(self, windows: Windows) -> tuple[int, int]:
-        """Range of unknowns that influence this rank's own within a step, in whole blocks."""
-        model, ownership, block = self._model, self._ownership, self._block
+        """Range of unknowns that influence this rank's own within a step, of whole stations."""
+        model, ownership = self._model, self._ownership
         first, last = ownership.first, ownership.last
         if first == last:
             return first, last
         places = model.numbering
-        ends = float(places.low[first // block]), float(places.high[last // block - 1])
-        near, coupled = windows.around(*ends), columns_of(model, (first, last))
-        low, high = min(near[0], coupled[0]), max(near[1], coupled[1])
-        # There are none but whole blocks, and ends of the line are ends of blocks.
-        return low - low % block, high + -high % block
+        begin, end = places.stations_over(first, last)
+        near = windows.around(float(places.low[begin]), float(places.high[end - 1]))
+        coupled = columns_of(model, (first, last))
+        return places.whole(min(near[0], coupled[0]), max(near[1], coupled[1]))
 
     def _make_arrays(self, low: int, high: int, comm: Any) -> None:
         """Arrays for [low, high) and what products over it read, and vectors that wrap them.
@@ -331,8 +330,7 @@ class LineOperators:
         the communicator, alive beyond ``destroy``.
         """
         own, block = self._ownership, self._block
-        read_low, read_high = columns_of(self._model, (low, high))
-        read_low, read_high = read_low - read_low % block, read_high + -read_high % block
+        read_low, read_high = self._model.numbering.whole(*columns_of(self._model, (low, high)))
         self.domain = domain = Subdomain(own.first, own.last, low, high, read_low, read_high)
         # Products by stations read one more at both ends, which is zero where the line ends.
         self._read_padded = aligned_arrays.zeros(read_high - read_low + 2 * block, 0)

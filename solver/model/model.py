@@ -75,7 +75,7 @@ class Model:
 
     @property
     def unknowns(self) -> tuple[str, ...]:
-        """Names of the unknowns of a node."""
+        """Names of all unknowns that nodes may have."""
         return self.numbering.names
 
     @property
@@ -86,10 +86,10 @@ class Model:
     @property
     def n_unknowns(self) -> int:
         """How many unknowns all nodes have."""
-        return self.numbering.numbers.size
+        return self.numbering.n_unknowns
 
     def dofs(self, nodes: np.ndarray, unknown: str = "w") -> np.ndarray:
-        """Numbers of one unknown at mesh nodes, shape as ``nodes``."""
+        """Numbers of one unknown at mesh nodes, shape as ``nodes``; ValueError if one has none."""
         return self.numbering.of(nodes, unknown)
 
     @property

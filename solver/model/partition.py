@@ -67,4 +67,4 @@ def distribute(model: Model, n_ranks: int, rank: int) -> Ownership:
     wanted = np.linspace(-spared, n_stations, n_ranks + 1)
     wanted[0] = 0.0
     nearest = cuts[np.clip(np.searchsorted(cuts, wanted), 0, cuts.size - 1)]
-    return Ownership(nearest * numbering.width, rank)
+    return Ownership(numbering.starts[nearest], rank)

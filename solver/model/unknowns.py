@@ -1,36 +1,50 @@
 """Registry of a line's unknowns: which there are, where they stand, and their numbers.
 
 Unknowns are numbered by stations along the track. A station is a cross-section of the line: nodes
-of all wires at one place. Where wires have their nodes at places of their own, it has as many of
-each as make it join no stations but those beside it. Within a station unknowns are numbered by
-groups, which are those that effects asked for together, such as deflection and slope in one plane:
-what nothing joins then stands apart, and is solved for side by side. Nothing else makes numbers.
+of the wires at one place, with the unknowns that effects asked for each of them. Where wires have
+their nodes at places of their own, it has as many of each as make it join no stations but those
+beside it. Within a station unknowns are numbered by groups, which are those that effects asked for
+together, such as deflection and slope in one plane: what nothing joins then stands apart, and is
+solved for side by side. Nothing else makes numbers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from catenary.meshgen.mesh import LineMesh
+from catenary.solver.model.stations import Stations, stations_of
 
-# Nodes closer than this along the track belong to one station [m].
-SAME_STATION = 1e-6
 # Unknowns of a group in a station above which solving by nodes is faster.
 _WIDEST_GROUP = 12
+# Make-ups of stations that a line may have, each with loops of its own; of more the rarer ones are
+# filled up to a whole cross-section.
+MOST_MAKE_UPS = 4
+
+# Unknowns that are numbered together: those of each wire, by its name.
+Group = Mapping[str, tuple[str, ...]]
 
 
 @dataclass(frozen=True)
 class Unknowns:
-    """Numbers and places of unknowns. Of held and missing ones, too: all stations are alike.
+    """Numbers and places of unknowns, those of held ones included.
+
+    A cross-section has a place for each unknown that a station may have. Stations of one make-up
+    have the same places. What a station has without a node is missing: a held unknown.
 
     Attributes
     ----------
-    names : of the unknowns of a node, as effects asked for them
-    numbers : (n_nodes, n_names) number of each, by nodes of the mesh
-    width : unknowns of a station
+    names : of all unknowns, as effects asked for them
+    numbers : (n_nodes, n_names) number of each, by nodes of the mesh; -1 for what a node has not
+    station : (n_nodes,) of each node
+    starts : (n_stations + 1,) number of the first unknown of each station, and how many there are
+    planes : places of a cross-section in each group
+    make_ups : places of each make-up, ascending, as unknowns of a station follow each other
+    make_up : (n_stations,) of each station
     in_stations : whether matrices join stations to those beside them only, as far as wires and
         droppers tell; if not, each node is a station
     low, high : (n_stations,) ascending places [m]: no node from a station on stands before its low,
@@ -39,7 +53,11 @@ class Unknowns:
 
     names: tuple[str, ...]
     numbers: np.ndarray
-    width: int
+    station: np.ndarray
+    starts: np.ndarray
+    planes: tuple[int, ...]
+    make_ups: tuple[tuple[int, ...], ...]
+    make_up: np.ndarray
     in_stations: bool
     low: np.ndarray
     high: np.ndarray
@@ -47,110 +65,153 @@ class Unknowns:
     @property
     def size(self) -> int:
         """How many numbers there are, those that no node has included."""
-        return self.low.size * self.width
+        return int(self.starts[-1])
+
+    @cached_property
+    def n_unknowns(self) -> int:
+        """How many unknowns all nodes have."""
+        return int(np.count_nonzero(self.numbers >= 0))
 
     @property
+    def width(self) -> int:
+        """Places of a cross-section."""
+        return sum(self.planes)
+
+    @cached_property
+    def block(self) -> int:
+        """Largest size of square blocks that every station can be cut into."""
+        return int(np.gcd.reduce([len(places) for places in self.make_ups]))
+
+    @cached_property
     def missing(self) -> np.ndarray:
-        """Numbers that no node has: of stations with fewer nodes than others."""
+        """Numbers that no node has."""
         taken = np.zeros(self.size, dtype=bool)
-        taken[self.numbers] = True
+        taken[self.numbers[self.numbers >= 0]] = True
         return np.flatnonzero(~taken)
 
+    def has(self, nodes: np.ndarray, name: str) -> np.ndarray:
+        """Whether mesh nodes have an unknown, shape as ``nodes``."""
+        if name not in self.names:
+            return np.zeros(np.shape(nodes), dtype=bool)
+        return np.asarray(self.numbers[nodes, self.names.index(name)] >= 0)
+
     def of(self, nodes: np.ndarray, name: str) -> np.ndarray:
-        """Numbers of one unknown at mesh nodes, shape as ``nodes``."""
+        """Numbers of one unknown at mesh nodes, shape as ``nodes``.
+
+        Raises
+        ------
+        ValueError
+            If a node has no such unknown: no effect asked for it there.
+        """
+        there = self.has(nodes, name)
+        if not there.all():
+            node = int(np.asarray(nodes)[~there].flat[0])
+            raise ValueError(
+                f"node {node} has no unknown {name}: no effect asks for it of its wire"
+            )
         return self.numbers[nodes, self.names.index(name)]
+
+    def by_node(self, vector: np.ndarray) -> np.ndarray:
+        """A vector (size,) by nodes and names (n_nodes, n_names), zero for what a node has not."""
+        return np.where(self.numbers >= 0, vector[self.numbers], 0.0)
+
+    def as_vector(self, by_node: np.ndarray, missing: float = 0.0) -> np.ndarray:
+        """The vector (size,) of what ``by_node`` returns, ``missing`` where a number is no node's.
+
+        ``by_node`` may be (n_nodes, 1), the same for all unknowns of a node.
+        """
+        result, there = np.full(self.size, missing), self.numbers >= 0
+        result[self.numbers[there]] = np.broadcast_to(by_node, there.shape)[there]
+        return result
 
     def station_of(self, nodes: np.ndarray) -> np.ndarray:
         """Stations of mesh nodes, shape as ``nodes``."""
-        return self.numbers[nodes, 0] // self.width
+        return self.station[nodes]
+
+    def stations_over(self, low: int, high: int) -> tuple[int, int]:
+        """Range of the stations that have any of the numbers [``low``, ``high``)."""
+        first = int(np.searchsorted(self.starts, low, side="right")) - 1
+        return first, max(first, int(np.searchsorted(self.starts, high)))
+
+    def whole(self, low: int, high: int) -> tuple[int, int]:
+        """A range of numbers, widened to whole stations."""
+        first, last = self.stations_over(low, high)
+        return int(self.starts[first]), int(self.starts[last])
 
     def within(self, x_low: float, x_high: float) -> tuple[int, int]:
         """Range of numbers with all unknowns in [``x_low``, ``x_high``] [m]."""
         first = int(np.searchsorted(self.high, x_low - 1e-9))
         last = int(np.searchsorted(self.low, x_high + 1e-9))
-        return first * self.width, max(first, last) * self.width
+        return int(self.starts[first]), int(self.starts[max(first, last)])
 
 
-def along_the_track(mesh: LineMesh) -> np.ndarray:
-    """Nodes in the order along the track, those at one place in the order of the wires."""
-    order = np.argsort(mesh.points[:, 0], kind="stable")
-    return order[np.lexsort((_wire_of_node(mesh)[order], _places(mesh)[order]))]
+def number_unknowns(mesh: LineMesh, groups: Iterable[Group], padded: bool = True) -> Unknowns:
+    """The registry for a mesh whose wires have the unknowns of ``groups``. Not collective.
 
-
-def number_unknowns(mesh: LineMesh, groups: Iterable[tuple[str, ...]]) -> Unknowns:
-    """The registry for a mesh whose nodes all have the unknowns of ``groups``. Not collective."""
-    groups = list(groups)
-    names = tuple(name for group in groups for name in group)
-    x, n_nodes = mesh.points[:, 0], mesh.n_nodes
-    order = along_the_track(mesh)
-    station = _stations(mesh)
-    in_stations = station is not None
-    most = 1 if station is None else int(np.bincount(station).max(initial=1))
-    if most > len(mesh.wires) and most * max(map(len, groups)) > _WIDEST_GROUP:
-        in_stations, most = False, 1
-    if station is None or not in_stations:
-        station = np.empty(n_nodes, dtype=np.int64)
-        station[order] = np.arange(n_nodes)
-    # The place of a node among those of its station.
-    by_station = order[np.argsort(station[order], kind="stable")]
-    first = np.searchsorted(station[by_station], np.arange(station.max(initial=-1) + 1))
-    slot = np.empty(n_nodes, dtype=np.int64)
-    slot[by_station] = np.arange(n_nodes) - first[station[by_station]]
-    numbers = np.empty((n_nodes, len(names)), dtype=np.int64)
-    width, column = most * len(names), 0
-    for group in groups:
-        start = column * most
-        for offset in range(len(group)):
-            numbers[:, column + offset] = width * station + start + slot * len(group) + offset
-        column += len(group)
-    low, high = np.full((2, first.size), np.inf) * [[1.0], [-1.0]]
-    np.minimum.at(low, station, x)
-    np.maximum.at(high, station, x)
-    low = np.minimum.accumulate(low[::-1])[::-1]
-    return Unknowns(names, numbers, width, in_stations, low, np.maximum.accumulate(high))
-
-
-def _stations(mesh: LineMesh) -> np.ndarray | None:
-    """Station of each node, (n_nodes,); None if there is no way to join neighbours only.
-
-    Where not each place has a node of each wire, a gap between droppers is as many stations long as
-    the wire with the fewest nodes there is: it has one in each, the others perhaps more.
+    ``padded`` fills all stations up to a whole cross-section.
     """
-    places = _places(mesh)
-    if (np.bincount(places) == len(mesh.wires)).all():
-        return places
-    index = np.empty(mesh.n_nodes, dtype=np.int64)
-    for nodes in mesh.wires.values():
-        index[nodes] = np.arange(nodes.size)
-    droppers = mesh.droppers[np.argsort(mesh.x(mesh.droppers[:, 1]), kind="stable")]
-    of_wire = _wire_of_node(mesh)[droppers]
-    if len(mesh.wires) != 2 or (np.sort(of_wire, axis=1) != [0, 1]).any():
-        return None
-    ends = {int(wire): index[droppers[of_wire == wire]] for wire in (0, 1)}
-    sizes = [nodes.size - 1 for nodes in mesh.wires.values()]
-    ties = np.column_stack([np.concatenate([[0], ends[w], [sizes[w]]]) for w in (0, 1)])
-    ties = ties[np.append(True, np.diff(ties, axis=0).any(axis=1))]
-    if (np.diff(ties, axis=0) <= 0).any():
-        return None
-    level = np.concatenate([[0], np.cumsum(np.diff(ties, axis=0).min(axis=1))])
-    stations = np.empty(mesh.n_nodes, dtype=np.int64)
-    for nodes, tie in zip(mesh.wires.values(), ties.T, strict=True):
-        reached = np.interp(np.arange(nodes.size), tie, level)
-        stations[nodes] = np.floor(reached + 0.5 - 1e-9)
-    return stations
+    groups = list(groups)
+    group_names = [_names_of(group) for group in groups]
+    names = tuple(name for own in group_names for name in own)
+    stations = stations_of(mesh, max(2, _WIDEST_GROUP // max(map(len, group_names))))
+    # Whether a slot has an unknown because one of the wires that take it has.
+    has_name = np.zeros((stations.present.shape[1], len(names)), dtype=bool)
+    numbers = np.full((mesh.n_nodes, len(names)), -1)
+    for group in groups:
+        for wire, own in group.items():
+            nodes = mesh.wires[wire]
+            for column in map(names.index, own):
+                has_name[np.unique(stations.slot[nodes]), column] = True
+                numbers[nodes, column] = 0
+    # Places of a cross-section: group by group, slot by slot.
+    places = np.array(
+        [
+            (slot, names.index(name))
+            for own in group_names
+            for slot in range(has_name.shape[0])
+            for name in own
+            if has_name[slot, names.index(name)]
+        ]
+    )
+    planes = tuple(int(has_name[:, [names.index(n) for n in own]].sum()) for own in group_names)
+    present, make_up = _make_ups(stations, padded)
+    there = present[:, places[:, 0]]
+    make_ups = tuple(tuple(map(int, np.flatnonzero(row))) for row in there)
+    # Where the unknown of a slot stands among those of a station of each make-up.
+    offset = np.full((len(make_ups), *has_name.shape), -1)
+    offset[:, places[:, 0], places[:, 1]] = np.where(there, np.cumsum(there, axis=1) - 1, -1)
+    starts = np.concatenate([[0], np.cumsum(there.sum(axis=1)[make_up])])
+    station = stations.of_node
+    own = starts[station][:, None] + offset[make_up[station], stations.slot]
+    numbers = np.where(numbers == 0, own, -1)
+    low, high = _bounds(mesh, station, make_up.size)
+    in_stations = stations.join_neighbours
+    return Unknowns(
+        names, numbers, station, starts, planes, make_ups, make_up, in_stations, low, high
+    )
 
 
-def _places(mesh: LineMesh) -> np.ndarray:
-    """Number of the place along the track at which each node stands, (n_nodes,)."""
-    order = np.argsort(mesh.points[:, 0], kind="stable")
-    x = mesh.points[order, 0]
-    result = np.empty(mesh.n_nodes, dtype=np.int64)
-    result[order] = np.cumsum(np.diff(x, prepend=x[:1]) > SAME_STATION)
-    return result
+def _names_of(group: Group) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(name for own in group.values() for name in own))
 
 
-def _wire_of_node(mesh: LineMesh) -> np.ndarray:
-    wire = np.zeros(mesh.n_nodes, dtype=np.int64)
-    for number, nodes in enumerate(mesh.wires.values()):
-        wire[nodes] = number
-    return wire
+def _make_ups(stations: Stations, padded: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Slots of each make-up, (n, n_slots), and make-up of each station, the commonest first."""
+    present = stations.present | padded
+    if present.all():
+        return present[:1], np.zeros(len(present), dtype=np.int64)
+    rows, make_up, counts = np.unique(present, axis=0, return_inverse=True, return_counts=True)
+    if stations.join_neighbours and counts.size > MOST_MAKE_UPS:
+        rare = np.argsort(-counts, kind="stable")[MOST_MAKE_UPS - 1 :]
+        present = present | np.isin(make_up, rare)[:, None]
+        rows, make_up, counts = np.unique(present, axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(-counts, kind="stable")
+    return rows[order], np.argsort(order)[make_up]
+
+
+def _bounds(mesh: LineMesh, station: np.ndarray, n_stations: int) -> tuple[np.ndarray, np.ndarray]:
+    """Low and high of each station, see ``Unknowns``."""
+    low, high = np.full((2, n_stations), np.inf) * [[1.0], [-1.0]]
+    np.minimum.at(low, station, mesh.points[:, 0])
+    np.maximum.at(high, station, mesh.points[:, 0])
+    return np.minimum.accumulate(low[::-1])[::-1], np.maximum.accumulate(high)

@@ -155,9 +155,7 @@ class Showing:
         for name in line.exact_state():
             if name in checkpoint or name in _MOTION:
                 by_row = np.reshape(_like(checkpoint, name, np.empty(n_nodes * names)), (-1, names))
-                state = np.zeros(model.n_dofs)
-                state[model.numbering.numbers] = by_row[row_of_node]
-                states[name] = state[owned]
+                states[name] = model.numbering.as_vector(by_row[row_of_node])[owned]
         outputs = {
             name: _like(checkpoint, name, getattr(pantographs, name)) for name in _OF_PANTOGRAPHS
         }
@@ -207,10 +205,11 @@ class Showing:
         }
         if self._comm.rank != 0:
             return None
-        numbers = np.empty_like(self._model.numbering.numbers)
-        numbers[self._model.row_of_node] = self._model.numbering.numbers
+        numbering, in_rows = self._model.numbering, np.argsort(self._model.row_of_node)
         result: dict[str, Any] = {
-            k: np.concatenate(parts)[numbers.ravel()] for k, parts in whole.items() if parts
+            name: numbering.by_node(np.concatenate(parts))[in_rows].ravel()
+            for name, parts in whole.items()
+            if parts
         }
         result["row_of_node"] = self._model.row_of_node
         result["step"] = self._view.step

@@ -12,8 +12,8 @@ from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, trai
 from catenary.cases.run.needs import STATION_COST, cost_of_widths, estimate_march
 from catenary.cases.run.plan import make_plan, plan_text
 from catenary.cases.scene.load import load_scene
+from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.integrators.detour import PARTS, detour_of
-from catenary.solver.model.unknowns import number_unknowns
 from catenary.solver.problem.problem import Damping
 
 BY_COMPONENT = "line.damping.per_component={contact_wire={alpha_s=0.01,beta_per_s=0.02}}"
@@ -45,7 +45,7 @@ def test_log_and_outcome_of_a_march_say_the_same(caplog: pytest.LogCaptureFixtur
                 outcome = marched.run([])
         assert bool(outcome.detour) is slower
         assert [record.message for record in caplog.records] == [outcome.detour] * slower
-        told = detour_of(problem, number_unknowns(mesh_of(line, 3), [("w", "theta_y")]))
+        told = detour_of(problem, numbering_of(problem, mesh_of(line, 3)))
         assert (str(told) if told else "") == outcome.detour
 
 

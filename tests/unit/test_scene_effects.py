@@ -27,7 +27,7 @@ def wind() -> Iterator[Effect]:
             "a load",
             "this test",
             default=False,
-            unknowns=("v", "theta_z"),
+            unknowns_of_wire=lambda wire: ("v", "theta_z"),
             requires=("gravity",),
         )
     )

@@ -10,15 +10,17 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from measuring import check, march, matrix_of, registered, solve_free
+from measuring import COMM, check, march, matrix_of, registered, solve_free
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
 from catenary.meshgen.line import Wire
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.effect import Effect, register
+from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.elements import uniform_load
+from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.statics.equilibrium import find_form
 
@@ -57,16 +59,32 @@ LATERAL = Effect(
     "lateral unknowns, wires and anchors; a load per length",
     "test",
     default=False,
-    unknowns=("v", "theta_z"),
+    unknowns_of_wire=lambda wire: ("v", "theta_z"),
     build=build_lateral,
+)
+
+
+def build_sideways(builder: ModelBuilder) -> None:
+    builder.add_wire(CONTACT_WIRE, ("v", "theta_z"))
+    builder.hold(builder.mesh.wires[CONTACT_WIRE][[0, -1]], "v")
+
+
+OF_CONTACT_WIRE = Effect(
+    "sideways",
+    "lateral motion of the contact wire only",
+    "lateral unknowns and one wire",
+    "test",
+    default=False,
+    unknowns_of_wire=lambda wire: ("v", "theta_z") if wire == CONTACT_WIRE else (),
+    build=build_sideways,
 )
 
 
 @pytest.fixture(autouse=True)
 def door() -> Iterator[None]:
-    """Every test here knows the effect; none leaves it behind."""
+    """Every test here knows the effects; none leaves them behind."""
     before = list(effects.registry())
-    with registered(LATERAL):
+    with registered(LATERAL), registered(OF_CONTACT_WIRE):
         yield
     assert list(effects.registry()) == before
 
@@ -107,6 +125,20 @@ def test_four_unknowns_a_node_if_asked_for_and_two_otherwise(mesh: LineMesh) -> 
     assert len(with_wind.blocks) == len(without.blocks) + 2
     assert with_wind.constrained.size == without.constrained.size + mesh.anchors.size
     assert not with_wind.weight[with_wind.dofs(np.arange(mesh.n_nodes), "v")].any()
+
+
+def test_an_effect_of_one_wire_makes_stations_no_wider_than_it_needs(mesh: LineMesh) -> None:
+    """Four vertical unknowns and two lateral ones, which are solved for side by side."""
+    problem = scene(WHOLE | {"sideways"}, Damping(1e-4, 0.0125), 80.0, 1e-3)
+    model, form = find_form(problem, mesh)
+    contact, messenger = mesh.wires[CONTACT_WIRE], mesh.wires[MESSENGER_WIRE]
+    assert model.numbering.planes == (4, 2)
+    assert model.n_dofs == 6 * contact.size and not model.numbering.missing.size
+    with pytest.raises(ValueError, match="has no unknown v"):
+        model.dofs(messenger, "v")
+    line = make_line(COMM, model, distribute(model, 1, 0), problem.numerics)
+    assert line.passes is not None and line.detour is None
+    line.destroy()
 
 
 def blown_out(wire: Wire, x: np.ndarray) -> tuple[np.ndarray, float]:
@@ -175,9 +207,10 @@ def test_a_damped_march_under_wind_ends_at_the_static_deflection(mesh: LineMesh)
     )
 
 
-def test_vertical_results_do_not_notice_the_wind(mesh: LineMesh) -> None:
+@pytest.mark.parametrize("name", [NAME, OF_CONTACT_WIRE.name])
+def test_vertical_results_do_not_notice_what_is_lateral(name: str, mesh: LineMesh) -> None:
     damping = Damping(1e-4, 0.0125)
-    runs = [march(scene(names, damping, 100.0, 1e-3), mesh) for names in (WHOLE, WHOLE | {NAME})]
+    runs = [march(scene(names, damping, 100.0, 1e-3), mesh) for names in (WHOLE, WHOLE | {name})]
     assert runs[0]["contact_force"].max() > 50.0
     # The same equations in another numbering: round-off, which differs in the factorisation and
     # adds up as the square root of the number of steps; a contact force is the difference of two

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.cases.scene.convert.line import span_lengths
 from catenary.cases.scene.input.faults import Fault
+from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.effects import all_effects as effects
 
 if TYPE_CHECKING:
@@ -61,7 +62,8 @@ def size_of(scene: Scene) -> Size | None:
     switches = scene.switches()
     chosen = (effect for name, effect in effects.registry().items() if switches[name])
     nodes = 2 * nodes_of_a_wire
-    unknowns = nodes * len(effects.unknowns_per_node(chosen))
+    groups = effects.unknown_groups(chosen, (CONTACT_WIRE, MESSENGER_WIRE))
+    unknowns = nodes_of_a_wire * sum(len(own) for group in groups for own in group.values())
     return Size(scene.line.n_spans, droppers, nodes, unknowns)
 
 

@@ -9,9 +9,13 @@ import pytest
 from small_lines import ac_simple_line, mesh_of
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
-from catenary.solver.model.unknowns import Unknowns, number_unknowns
+from catenary.solver.model.unknowns import MOST_MAKE_UPS, Group, Unknowns, number_unknowns
 
-VERTICAL, LATERAL = ("w", "theta_y"), ("v", "theta_z")
+VERTICAL, LATERAL = (
+    {CONTACT_WIRE: names, MESSENGER_WIRE: names} for names in (("w", "theta_y"), ("v", "theta_z"))
+)
+OF_CONTACT_WIRE = {CONTACT_WIRE: ("v", "theta_z")}
+STITCH, NEXT_WIRE = "stitch_wire", "next_contact_wire"
 
 
 def paired() -> LineMesh:
@@ -50,6 +54,20 @@ def apart(contact: int, messenger: int) -> LineMesh:
     )
 
 
+def with_wire(mesh: LineMesh, name: str, first: int, last: int) -> LineMesh:
+    """A mesh with one more wire, with nodes beside those of the messenger wire in a range."""
+    nodes = mesh.n_nodes + np.arange(last - first)
+    points = mesh.points[mesh.wires[MESSENGER_WIRE][first:last]] + [0.0, 0.2, 0.0]
+    return replace(
+        mesh, points=np.concatenate([mesh.points, points]), wires={**mesh.wires, name: nodes}
+    )
+
+
+def vertical(mesh: LineMesh) -> Group:
+    """Those of the vertical plane for all wires."""
+    return dict.fromkeys(mesh.wires, ("w", "theta_y"))
+
+
 def joined(mesh: LineMesh) -> np.ndarray:
     """Pairs of nodes that elements and droppers join."""
     wires = [np.column_stack([nodes[:-1], nodes[1:]]) for nodes in mesh.wires.values()]
@@ -57,7 +75,7 @@ def joined(mesh: LineMesh) -> np.ndarray:
 
 
 def check(mesh: LineMesh, found: Unknowns) -> None:
-    taken = np.sort(found.numbers.ravel())
+    taken = np.sort(found.numbers[found.numbers >= 0])
     assert (np.diff(taken) > 0).all() and taken[-1] < found.size
     assert found.missing.size == found.size - taken.size
     stations = found.station_of(joined(mesh))
@@ -67,7 +85,7 @@ def check(mesh: LineMesh, found: Unknowns) -> None:
         low, high = found.within(place, place + 20.0)
         inside = (x >= place) & (x <= place + 20.0)
         numbers = found.numbers[inside]
-        assert low <= numbers.min() and numbers.max() < high
+        assert low <= numbers[numbers >= 0].min() and numbers.max() < high
     assert (found.low[station] <= x).all() and (x <= found.high[station]).all()
 
 
@@ -84,10 +102,10 @@ def test_nodes_of_one_place_are_a_station() -> None:
 def test_groups_of_unknowns_stand_together_in_a_station() -> None:
     mesh = paired()
     found = number_unknowns(mesh, [VERTICAL, LATERAL])
-    assert found.names == VERTICAL + LATERAL and found.width == 8
+    assert found.names == ("w", "theta_y", "v", "theta_z") and found.width == 8
     check(mesh, found)
     nodes = np.arange(mesh.n_nodes)
-    for names, places in ((VERTICAL, range(4)), (LATERAL, range(4, 8))):
+    for names, places in ((found.names[:2], range(4)), (found.names[2:], range(4, 8))):
         numbers = np.concatenate([found.of(nodes, name) for name in names])
         assert set(numbers % found.width) == set(places)
 
@@ -108,3 +126,79 @@ def test_where_stations_would_be_too_wide_each_node_is_one() -> None:
     mesh = apart(30, 1)
     found = number_unknowns(mesh, [VERTICAL])
     assert not found.in_stations and found.width == 2 and not found.missing.size
+
+
+def test_a_wire_has_the_unknowns_that_were_asked_for_it() -> None:
+    mesh = paired()
+    found = number_unknowns(mesh, [VERTICAL, OF_CONTACT_WIRE])
+    contact, messenger = mesh.wires[CONTACT_WIRE], mesh.wires[MESSENGER_WIRE]
+    assert found.names == ("w", "theta_y", "v", "theta_z")
+    assert found.planes == (4, 2) and found.width == 6 and not found.missing.size
+    assert found.n_unknowns == found.size == 6 * contact.size
+    check(mesh, found)
+    assert found.has(contact, "v").all() and not found.has(messenger, "v").any()
+    assert not found.has(contact, "u").any()
+    assert (found.of(contact, "v") % 6 == 4).all()
+    with pytest.raises(ValueError, match=f"node {messenger[0]} has no unknown theta_z"):
+        found.of(messenger, "theta_z")
+
+
+def test_values_go_from_nodes_to_vectors_and_back() -> None:
+    mesh = with_wire(paired(), STITCH, 40, 60)
+    found = number_unknowns(mesh, [vertical(mesh), OF_CONTACT_WIRE])
+    values = np.where(found.numbers >= 0, 1.0 + np.arange(found.numbers.size).reshape(-1, 4), 0.0)
+    vector = found.as_vector(values, missing=-1.0)
+    assert (found.by_node(vector) == values).all()
+    assert (np.flatnonzero(vector == -1.0) == found.missing).all()
+    x = found.as_vector(mesh.points[:, :1])
+    assert (x[found.of(mesh.wires[STITCH], "w")] == mesh.points[mesh.wires[STITCH], 0]).all()
+
+
+def test_a_station_has_the_wires_that_pass_it_or_those_beside_it() -> None:
+    mesh = with_wire(paired(), STITCH, 40, 60)
+    found = number_unknowns(mesh, [vertical(mesh)], padded=False)
+    check(mesh, found)
+    widths = np.diff(found.starts)
+    inside = np.zeros(widths.size, dtype=bool)
+    inside[39:61] = True
+    assert (widths == np.where(inside, 6, 4)).all()
+    assert found.make_ups == ((0, 1, 2, 3), (0, 1, 2, 3, 4, 5)) and found.block == 2
+    # One station without a node of the wire at either end of it.
+    low, high = found.starts[[39, 60]] + 4
+    assert (found.missing == [low, low + 1, high, high + 1]).all()
+    for first, last in ((0, 5), (150, 160), (165, 200)):
+        low, high = found.whole(first, last)
+        assert low <= first and last <= high and {low, high} <= set(found.starts)
+        begin, end = found.stations_over(first, last)
+        assert (found.starts[begin], found.starts[end]) == (low, high)
+    padded = number_unknowns(mesh, [vertical(mesh)], padded=True)
+    check(mesh, padded)
+    assert (np.diff(padded.starts) == 6).all() and padded.block == 6
+
+
+def test_a_wire_takes_the_slot_of_one_that_has_ended() -> None:
+    last = paired().wires[MESSENGER_WIRE].size
+    mesh = paired()
+    for number, first in enumerate((10, 30, 50)):
+        mesh = with_wire(mesh, f"{STITCH}_{number}", first, first + 10)
+    mesh = with_wire(mesh, NEXT_WIRE, 60, last)
+    found = number_unknowns(mesh, [vertical(mesh)], padded=False)
+    check(mesh, found)
+    # The fourth begins where the third has just ended, and both are there in between.
+    assert found.width == 8
+    assert set(found.make_ups) == {
+        tuple(range(4)),
+        tuple(range(6)),
+        tuple(range(8)),
+        (*range(4), 6, 7),
+    }
+
+
+def test_rare_make_ups_are_filled_up() -> None:
+    mesh = paired()
+    for number, (first, last) in enumerate(((5, 80), (15, 70), (25, 60), (35, 50))):
+        mesh = with_wire(mesh, f"{STITCH}_{number}", first, last)
+    found = number_unknowns(mesh, [vertical(mesh)], padded=False)
+    check(mesh, found)
+    assert len(found.make_ups) == MOST_MAKE_UPS and found.width == 12
+    assert max(map(len, found.make_ups)) == 12
