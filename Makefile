@@ -2,8 +2,8 @@
 export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 # What the environment holds is used, not what a user's shell adds; but on a cluster that may bring
-# the packages that setup links.
-unexport PYTHONPATH PYTHONHOME
+# the packages that setup links. Bytecode is kept: tests start some hundred processes.
+unexport PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE
 
 PYTHON := .venv/bin/python
 PYTEST := $(PYTHON) -m pytest

@@ -62,6 +62,8 @@ class StepView:
     row : (n,) the values of all channels one after another
     columns : where in the row each channel is, by name
     node_uplift : () -> (n owned nodes,) vertical displacement [m]; not collective
+    line_state : () -> displacement, velocity and acceleration of the rank's unknowns, by these
+        names; not collective
     energies : () -> the values of ``channels.ENERGIES`` but the time, kinetic and elastic energy of
         the line relative to equilibrium first [J]; collective
     checkpoint : () -> dict of arrays on rank 0 with which to continue, None elsewhere; collective
@@ -72,6 +74,7 @@ class StepView:
     row: np.ndarray
     columns: dict[str, slice]
     node_uplift: Callable[[], np.ndarray]
+    line_state: Callable[[], Mapping[str, np.ndarray]]
     energies: Callable[[], tuple[float, ...]]
     checkpoint: Callable[[], dict[str, Any] | None]
 

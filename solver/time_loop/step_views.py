@@ -79,6 +79,7 @@ class Showing:
             row=np.zeros(self.layout.width),
             columns=self.layout.columns,
             node_uplift=lambda: self._line.displacement[self._node_rows],
+            line_state=self._line.state,
             energies=self._energies,
             checkpoint=self._checkpoint,
         )

@@ -104,6 +104,7 @@ def make_view(step: int, share: Share) -> StepView:
         row=row,
         columns=columns,
         node_uplift=lambda: 1e-3 * step + share(N_NODES),
+        line_state=dict,
         energies=lambda: (COMM.allreduce(1.0), float(step)),
         checkpoint=lambda: checkpoint(step),
     )

@@ -49,8 +49,7 @@ class States(hard_runs.Watcher):
 
     def observe(self, view: StepView) -> None:
         super().observe(view)
-        state = view.checkpoint()
-        assert state is not None
+        state = view.line_state()
         names = ("displacement", "velocity", "acceleration")
         self.states.append(tuple(state[name].copy() for name in names))
 

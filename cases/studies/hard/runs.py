@@ -35,6 +35,10 @@ from catenary.solver.time_loop.observers import Stage, StepView
 
 # Force under which a line is held before it is let go [N].
 PULL = 200.0
+# Steps whose states are kept until the work done in them is summed.
+_BLOCK = 100
+_NEVER = 2**62
+_MOTION = ("displacement", "velocity", "acceleration")
 
 
 @dataclass
@@ -142,30 +146,35 @@ class LineBalance:
         ]
         self._share = 0.5 * model.dropper_stiffness * ((1.0 - gamma) * dt) ** 2
 
-    def damping_terms(self, state: Mapping[str, np.ndarray], taut: np.ndarray) -> float:
-        """What numerical damping adds to the energy of a state with droppers ``taut`` (n,) [J]."""
-        found = 0.0
+    def damping_terms(self, states: Mapping[str, np.ndarray], taut: np.ndarray) -> np.ndarray:
+        """What numerical damping adds to the energy of states (k, n_dofs) each [J], shape (k,).
+
+        ``taut`` (k, n_droppers) tells which droppers carry anything.
+        """
+        found = np.zeros(taut.shape[0])
         for of, matrix in self._terms:
-            found += float(state[of] @ (matrix @ state[of]))
+            found += np.einsum("ij,ij->i", states[of], (matrix @ states[of].T).T)
         for of, factors in self._slack:
-            found -= float(factors[~taut] @ self._between(state[of])[~taut] ** 2)
+            found -= np.where(taut, 0.0, self._between(states[of]) ** 2) @ factors
         return found
 
-    def one_switch(self, state: Mapping[str, np.ndarray], switched: np.ndarray) -> float:
-        """The most that one of the droppers ``switched`` (n,) makes at the state's rates [J]."""
-        rate = self._between(state["velocity"])
-        return float((self._share * rate**2)[switched].max(initial=0.0))
+    def one_switch(self, velocity: np.ndarray, switched: np.ndarray) -> float:
+        """The most that one dropper makes [J] at velocities (k, n_dofs) after the steps in which
+        those ``switched`` (k, n_droppers) slackened or tightened."""
+        made = self._share * self._between(velocity) ** 2
+        return float(made[switched].max(initial=0.0))
 
     def _between(self, values: np.ndarray) -> np.ndarray:
-        """Upper less lower end of each dropper, (n,)."""
+        """Upper less lower end of each dropper, (k, n) of (k, n_dofs)."""
         upper, lower = self._ends.T
-        return np.asarray(values[upper] - values[lower])
+        return np.asarray(values[:, upper] - values[:, lower])
 
 
 class Watcher:
     """Observer that keeps what `Watched` holds; wire and balance are needed for the work.
 
-    With the work, dropper forces and displacements are kept after the steps ``keep``.
+    With the work, dropper forces and displacements are kept after the steps ``keep``. Steps are
+    then looked at one by one, otherwise in blocks of rows.
     """
 
     def __init__(
@@ -178,73 +187,92 @@ class Watcher:
         self._balance = balance
         self._keep = keep
         self._kept: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-        self._rows: dict[str, list[Any]] = {
-            name: [] for name in ("time", "position", "force", "height", "wire", "taut")
-        }
+        self._columns: dict[str, slice] = {}
+        self._rows: list[np.ndarray] = []
+        self._times: list[np.ndarray] = []
         self._energy: list[float] = []
-        self._work: list[float] = []
-        self._terms: list[float] = []
+        self._states: list[tuple[np.ndarray, ...]] = []
+        self._work = np.zeros(0)
+        self._terms = np.zeros(0)
         self._one_switch = 0.0
-        self._before = np.zeros(0)
-        self._pushed: list[tuple[np.ndarray, np.ndarray]] = []
 
     def start(self, stage: Stage) -> None:
         """Nothing is needed of the stage."""
 
+    def next_state(self, step: int) -> int:
+        """Every state if the work is wanted, otherwise none."""
+        return step + 1 if self._balance is not None else _NEVER
+
+    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
+        """Copy rows between two states."""
+        self._times.append(times.copy())
+        self._rows.append(rows.copy())
+
     def observe(self, view: StepView) -> None:
         """Collective if the work is wanted."""
-        for name, value in (
-            ("time", view.time),
-            ("position", view.contact_position.copy()),
-            ("force", view.contact_force.copy()),
-            ("height", view.head_height.copy()),
-            ("wire", view.wire_height.copy()),
-            ("taut", view.dropper_force > 0.0),
-        ):
-            self._rows[name].append(value)
-        if self._wire is not None and self._balance is not None:
+        self._columns = view.columns
+        self.observe_rows(view.step, np.array([view.time]), view.row[np.newaxis])
+        if self._balance is not None:
             self._energy.append(sum(view.energies()))
-            self._add_work(view, self._wire, self._balance)
+            state = view.line_state()
+            self._states.append(tuple(state[name].copy() for name in _MOTION))
+            if view.step in self._keep:
+                self._kept[view.step] = view.dropper_force.copy(), self._states[-1][0]
+            if len(self._states) > _BLOCK:
+                self._add_work()
 
     def finish(self, outcome: str) -> None:
         """Nothing is left to do."""
 
     def watched(self, outcome: str, counters: dict[str, int]) -> Watched:
         """All that was seen."""
-        rows = {name: np.array(values) for name, values in self._rows.items()}
-        energies = np.array(self._energy), np.array(self._work)
+        if self._states:
+            self._add_work()
         return Watched(
             outcome,
-            **rows,
-            energy=energies[0],
-            work=energies[1],
-            damping_terms=np.array(self._terms),
+            time=np.concatenate(self._times),
+            position=self._channel("contact_position"),
+            force=self._channel("contact_force"),
+            height=self._channel("head_height"),
+            wire=self._channel("wire_height"),
+            taut=self._channel("dropper_force") > 0.0,
+            energy=np.array(self._energy),
+            work=self._work,
+            damping_terms=self._terms,
             one_switch=self._one_switch,
             counters=counters,
             kept=self._kept,
         )
 
-    def _add_work(self, view: StepView, wire: ContactWire, balance: LineBalance) -> None:
-        state = view.checkpoint()
-        assert state is not None  # the work is only asked for on one rank
-        displacement = state["displacement"]
-        touches = wire.touches(view.contact_position)
-        ends = touches["element"][:, None] + np.array([0, 1])
-        dofs = wire.dofs[ends].reshape(-1, 4)
-        pushed = [(dofs.ravel(), (view.contact_force[:, None] * touches["whole_value"]).ravel())]
-        done = self._work[-1] if self._work else 0.0
-        if self._before.size:
-            for weight, (where, values) in zip(
-                balance.weights, (*self._pushed, *pushed), strict=True
-            ):
-                done += weight * float(values @ (displacement[where] - self._before[where]))
-            taut, before = self._rows["taut"][-1], self._rows["taut"][-2]
-            self._one_switch = max(self._one_switch, balance.one_switch(state, taut != before))
-        self._work.append(done)
-        self._terms.append(balance.damping_terms(state, self._rows["taut"][-1]))
-        if view.step in self._keep:
-            self._kept[view.step] = view.dropper_force.copy(), displacement.copy()
-        self._before, self._pushed = displacement.copy(), pushed
+    def _channel(self, name: str, last: int = 0) -> np.ndarray:
+        """Values of a channel after all steps, or after the ``last`` of them, (n, width)."""
+        return np.concatenate([rows[:, self._columns[name]] for rows in self._rows[-last:]])
+
+    def _add_work(self) -> None:
+        """Take the states kept so far into account; the last one begins the next block."""
+        wire, balance = self._wire, self._balance
+        assert wire is not None and balance is not None
+        k, seen = len(self._states), self._work.size
+        states = dict(zip(_MOTION, map(np.array, zip(*self._states, strict=True)), strict=True))
+        force = self._channel("contact_force", k)
+        touches = wire.touches(self._channel("contact_position", k).ravel())
+        elements = touches["element"][:, None] + np.array([0, 1])
+        dofs = wire.dofs[elements].reshape(k, -1)
+        pushed = (force.reshape(-1, 1) * touches["whole_value"]).reshape(k, -1)
+        moved = np.diff(states["displacement"], axis=0)
+        done = np.zeros(k)
+        for weight, part in zip(balance.weights, (slice(None, -1), slice(1, None)), strict=True):
+            done[1:] += weight * (pushed[part] * np.take_along_axis(moved, dofs[part], 1)).sum(1)
+        done[0] = self._work[-1] if seen else 0.0
+        taut = self._channel("dropper_force", k) > 0.0
+        switched = taut[1:] != taut[:-1]
+        self._one_switch = max(
+            self._one_switch, balance.one_switch(states["velocity"][1:], switched)
+        )
+        again = min(seen, 1)  # the first state ended the block before
+        self._work = np.append(self._work, np.cumsum(done)[again:])
+        self._terms = np.append(self._terms, balance.damping_terms(states, taut)[again:])
+        del self._states[:-1]
 
 
 def at_rest(scene: Scene, comm: Any) -> LineAtRest:

@@ -222,6 +222,7 @@ class March:
             row=row,
             columns=columns,
             node_uplift=lambda: self.wave(t, nodes),
+            line_state=dict,
             energies=lambda: (2.0 + np.sin(t), 3.0 + np.cos(t)),
             checkpoint=lambda: {"step": step, "state": np.full(50, float(step)), "kind": "made up"},
         )
