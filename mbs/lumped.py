@@ -13,6 +13,7 @@ import numpy as np
 from scipy import linalg
 
 from catenary.mbs.head import head_kernels
+from catenary.mbs.head.head_kernels import FORCE, LinearStep
 from catenary.mbs.head.head_records import LUMPED
 from catenary.mbs.head.newmark_head import SteppedHead, raised
 from catenary.mbs.head.wire_crossing import LateralPath
@@ -74,35 +75,29 @@ class LumpedPantograph(SteppedHead):
         # A step is linear: new state = step @ state + drive * by_drive - by_force @ force, with
         # the state (positions, velocities, accelerations).
         one, none = np.eye(n), np.zeros((n, n))
-        _, ahead, faster, by_place, by_speed = self._newmark
-        predict_position = np.hstack([one, dt * one, ahead * one])
-        predict_velocity = np.hstack([none, one, faster * one])
+        newmark = self._newmark
+        predict_position = np.hstack([one, dt * one, newmark.predict_position * one])
+        predict_velocity = np.hstack([none, one, newmark.predict_velocity * one])
         inverse = np.ascontiguousarray(
             linalg.inv(
-                np.diag(self._masses) + by_speed * self._damping + by_place * self._stiffness
+                np.diag(self._masses)
+                + newmark.velocity * self._damping
+                + newmark.position * self._stiffness
             )
         )
         free = -inverse @ (self._stiffness @ predict_position + self._damping @ predict_velocity)
         step = np.vstack(
-            [predict_position + by_place * free, predict_velocity + by_speed * free, free]
+            [
+                predict_position + newmark.position * free,
+                predict_velocity + newmark.velocity * free,
+                free,
+            ]
         )
-        unit = np.vstack([by_place * inverse, by_speed * inverse, inverse])
+        unit = np.vstack([newmark.position * inverse, newmark.velocity * inverse, inverse])
         by_drive = np.ascontiguousarray(unit[:, self._carrier])
-        self._of_step = {"step": step, "by_drive": by_drive, "inverse": inverse}
-        self._step = bound(
-            head_kernels.linear_step,
-            step,
-            by_drive,
-            inverse,
-            float(by_place),
-            float(by_speed),
-            self._touch,
-            self._state,
-            self._free,
-            self._by_force,
-            self._out,
-            later=(0.0,),
-        )
+        self._of_step = LinearStep(step, by_drive, inverse)
+        arguments = self._of_step, newmark, self._arrays
+        self._step = bound(head_kernels.linear_step, *arguments, later=(0.0,))
 
     def lift(self, time: float) -> float:
         """Net lift on the last mass at ``time`` [N]: a half cosine up to the static force."""
@@ -123,14 +118,14 @@ class LumpedPantograph(SteppedHead):
         if self._base is None:
             constant = self._base_stiffness * self._base_height
             part = np.array([self._part(time) for time in times])
-            drives[:, 0] = self._lift_full * part + constant
+            drives[:, FORCE] = self._lift_full * part + constant
         else:
-            drives[:, 0] = [self._drive(time) for time in times]
+            drives[:, FORCE] = [self._drive(time) for time in times]
         self._fill_lateral(times, drives)
 
     def record(self) -> dict[str, Any]:
         """The pantograph as `head_records.fill_head` takes it."""
-        return {**super().record(), **self._of_step, "model": LUMPED}
+        return {**super().record(), **self._of_step._asdict(), "model": LUMPED}
 
     def energy(self) -> float:
         """Kinetic energy, and elastic energy of all springs, the base spring included [J]."""

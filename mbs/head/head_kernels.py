@@ -1,34 +1,107 @@
 """The loops of a pantograph's step, compiled by Numba: both models, tables, paths.
 
 A pantograph has n coordinates and s strips. Its state are positions, velocities and accelerations
-one after the other (3 n,). ``touch`` (2, s, n) says by how much each coordinate raises each strip,
-and how fast that changes; ``out`` (2 s + 2 s^2,) takes the strips' heights and velocities and both
-matrices of compliance, row by row. Numba keeps the compiled code beside the sources (or in the
-user's cache), so that only the first run waits.
+one after the other (3 n,).
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from catenary.solver.base.compiled import compiled
 
+# Columns of a row of what a head depends on in a step besides its state. A chain of lumped masses
+# has the first alone, the force on its last mass [N]; a reduced mechanism has the part of the full
+# lift, the head's weight [N], the height of its zero [m], and height [m], velocity [m/s] and
+# acceleration [m/s2] of the base on top of it.
+FORCE = 0
+LIFTED, WEIGHT, ZERO, BASE, BASE_VELOCITY, BASE_ACCELERATION = range(6)
+N_DRIVE = 6
+
+
+class NewmarkFactors(NamedTuple):
+    """Factors of Newmark's formulas, the same for all coordinates.
+
+    Attributes
+    ----------
+    dt : step [s]
+    predict_position, predict_velocity : of the acceleration at the start, dt^2 (1/2 - beta) [s2]
+        and dt (1 - gamma) [s]
+    position, velocity : of the acceleration at the end, beta dt^2 [s2] and gamma dt [s]
+    """
+
+    dt: float
+    predict_position: float
+    predict_velocity: float
+    position: float
+    velocity: float
+
+
+class HeadArrays(NamedTuple):
+    """Arrays of a head, the head's own.
+
+    Attributes
+    ----------
+    touch : (2, s, n) by how much each coordinate raises each strip, and how fast that changes
+    state : (3 n,) at the end of the latest step
+    free : (3 n,) of the coming step without contact
+    by_force : (3 n, s) what a unit of each contact force takes off it
+    out : (2 s + 2 s^2,) heights and velocities of the strips without contact, and both matrices
+        of compliance, row by row
+    """
+
+    touch: np.ndarray
+    state: np.ndarray
+    free: np.ndarray
+    by_force: np.ndarray
+    out: np.ndarray
+
+
+class LinearStep(NamedTuple):
+    """A step of a linear system without contact: new state = matrix @ state + drive * by_drive.
+
+    Attributes
+    ----------
+    matrix, by_drive : (3 n, 3 n), (3 n,)
+    inverse : (n, n) of the matrix that gives accelerations
+    """
+
+    matrix: np.ndarray
+    by_drive: np.ndarray
+    inverse: np.ndarray
+
+
+class RaisedHead(NamedTuple):
+    """A head over a reduced mechanism, whose height is the last coordinate.
+
+    Attributes
+    ----------
+    masses, stiffness, damping : (n,), (n, n), (n, n) of all but the mechanism itself
+    breaks, coefficients : (m,), (m - 1, 4, 4) tables of mass [kg], lift [N], damping [N s/m] and
+        carried mass [kg] over the mechanism's height [m]; see `table_at`
+    """
+
+    masses: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    breaks: np.ndarray
+    coefficients: np.ndarray
+
 
 @compiled
-def respond(inverse, by_place, by_speed, touch, free, by_force, out):
-    """Answer (3 n, s) of the state to contact forces, and the strips without and with them.
-
-    ``inverse`` (n, n) gives accelerations; positions and velocities are ``by_place`` and
-    ``by_speed`` times these. ``free`` (3 n,) is the state without contact.
-    """
+def respond(inverse, newmark, head):
+    """Fill ``head.by_force`` and ``head.out`` for accelerations by ``inverse`` (n, n)."""
+    touch, free, by_force, out = head.touch, head.free, head.by_force, head.out
     n, s = inverse.shape[0], touch.shape[1]
     for j in range(s):
         for i in range(n):
             answer = 0.0
             for k in range(n):
                 answer += inverse[i, k] * touch[0, j, k]
-            by_force[i, j] = by_place * answer
-            by_force[n + i, j] = by_speed * answer
+            by_force[i, j] = newmark.position * answer
+            by_force[n + i, j] = newmark.velocity * answer
             by_force[2 * n + i, j] = answer
     for i in range(s):
         height, velocity = 0.0, 0.0
@@ -46,16 +119,15 @@ def respond(inverse, by_place, by_speed, touch, free, by_force, out):
 
 
 @compiled
-def linear_step(
-    step, by_drive, inverse, by_place, by_speed, touch, state, free, by_force, out, drive
-):
-    """A step without contact of a linear system: ``free`` = ``step`` state + drive by_drive."""
+def linear_step(linear, newmark, head, drive):
+    """Step a head without contact under ``drive``, the force on its last mass [N]."""
+    state, free = head.state, head.free
     for i in range(state.size):
-        value = drive * by_drive[i]
+        value = drive * linear.by_drive[i]
         for k in range(state.size):
-            value += step[i, k] * state[k]
+            value += linear.matrix[i, k] * state[k]
         free[i] = value
-    respond(inverse, by_place, by_speed, touch, free, by_force, out)
+    respond(linear.inverse, newmark, head)
 
 
 @compiled
@@ -73,67 +145,48 @@ def table_at(breaks, coefficients, x, values, slopes):
 
 
 @compiled
-def raising_step(
-    newmark,
-    drive,
-    masses,
-    stiffness,
-    damping,
-    breaks,
-    coefficients,
-    touch,
-    state,
-    free,
-    by_force,
-    out,
-):
-    """A step without contact of a head over a mechanism, whose height is the last coordinate.
+def raising_step(raised, newmark, head, drive):
+    """Step a head over a mechanism without contact, with a row ``drive`` (N_DRIVE,).
 
-    Returns the height of the mechanism at which its tables were taken.
-
-    Parameters
-    ----------
-    newmark : dt, dt^2 (1/2 - beta), dt (1 - gamma), beta dt^2, gamma dt
-    drive : part of the full lift, the head's weight [N], height of the mechanism's zero [m], and
-        height [m], velocity [m/s] and acceleration [m/s^2] of the base on top of it
-    masses, stiffness, damping : (n,), (n, n), (n, n) of all but the mechanism itself
-    coefficients : of mass [kg], lift [N], damping [N s/m] and carried mass [kg]; see `table_at`
+    Returns the height of the mechanism at which its tables were taken [m].
     """
-    dt, ahead, faster, by_place, by_speed = newmark
-    raised, weight, zero, base, base_speed, base_acceleration = drive
+    masses, stiffness, damping = raised.masses, raised.stiffness, raised.damping
+    state, free = head.state, head.free
     n = masses.size
     last = n - 1
     position, velocity, force = np.empty(n), np.empty(n), np.empty(n)
     for i in range(n):
-        position[i] = state[i] + dt * state[n + i] + ahead * state[2 * n + i]
-        velocity[i] = state[n + i] + faster * state[2 * n + i]
-    height = position[last] - zero - base
-    speed = velocity[last] - base_speed
+        acceleration = state[2 * n + i]
+        position[i] = state[i] + newmark.dt * state[n + i] + newmark.predict_position * acceleration
+        velocity[i] = state[n + i] + newmark.predict_velocity * acceleration
+    height = position[last] - drive[ZERO] - drive[BASE]
+    speed = velocity[last] - drive[BASE_VELOCITY]
     values, slopes = np.empty(4), np.empty(4)
-    table_at(breaks, coefficients, height, values, slopes)
+    table_at(raised.breaks, raised.coefficients, height, values, slopes)
     mass, lift, slowing, carried = values
     matrix = np.empty((n, n))
     for i in range(n):
         value = 0.0
         for k in range(n):
             value -= stiffness[i, k] * position[k] + damping[i, k] * velocity[k]
-            matrix[i, k] = by_speed * damping[i, k] + by_place * stiffness[i, k]
+            matrix[i, k] = newmark.velocity * damping[i, k] + newmark.position * stiffness[i, k]
         force[i] = value
         matrix[i, i] += masses[i]
-    force[last] += raised * (lift - weight) - slowing * speed - 0.5 * slopes[0] * speed**2
+    lifted = drive[LIFTED]
+    force[last] += lifted * (lift - drive[WEIGHT]) - slowing * speed - 0.5 * slopes[0] * speed**2
     # The base carries the mechanism along, but less of it than what is raised if parts stay low.
-    force[last] += (mass - carried) * base_acceleration
-    matrix[last, last] += mass + by_speed * (slowing + slopes[0] * speed)
-    matrix[last, last] -= by_place * raised * slopes[1]
+    force[last] += (mass - carried) * drive[BASE_ACCELERATION]
+    matrix[last, last] += mass + newmark.velocity * (slowing + slopes[0] * speed)
+    matrix[last, last] -= newmark.position * lifted * slopes[1]
     invert(matrix)
     for i in range(n):
         acceleration = 0.0
         for k in range(n):
             acceleration += matrix[i, k] * force[k]
-        free[i] = position[i] + by_place * acceleration
-        free[n + i] = velocity[i] + by_speed * acceleration
+        free[i] = position[i] + newmark.position * acceleration
+        free[n + i] = velocity[i] + newmark.velocity * acceleration
         free[2 * n + i] = acceleration
-    respond(matrix, by_place, by_speed, touch, free, by_force, out)
+    respond(matrix, newmark, head)
     return height
 
 
@@ -155,25 +208,26 @@ def invert(matrix):
 
 
 @compiled
-def take(free, by_force, contact_force, state):
-    """The state under contact forces (s,)."""
-    for i in range(state.size):
-        value = free[i]
+def take(head, contact_force):
+    """Make ``head.state`` the state under contact forces (s,), after a step without."""
+    for i in range(head.state.size):
+        value = head.free[i]
         for j in range(contact_force.size):
-            value -= contact_force[j] * by_force[i, j]
-        state[i] = value
+            value -= contact_force[j] * head.by_force[i, j]
+        head.state[i] = value
 
 
 @compiled
-def extrapolate(newmark, touch, state, early):
+def extrapolate(newmark, head, early):
     """Heights and velocities (2, s) of the strips by Newmark's predictor (paper eq. 2.5)."""
-    dt, ahead, faster, _, _ = newmark
+    touch, state = head.touch, head.state
     n = state.size // 3
     for i in range(touch.shape[1]):
         height, velocity = 0.0, 0.0
         for k in range(n):
-            place = state[k] + dt * state[n + k] + ahead * state[2 * n + k]
+            acceleration = state[2 * n + k]
+            place = state[k] + newmark.dt * state[n + k] + newmark.predict_position * acceleration
             height += touch[0, i, k] * place
-            velocity += touch[0, i, k] * (state[n + k] + faster * state[2 * n + k])
+            velocity += touch[0, i, k] * (state[n + k] + newmark.predict_velocity * acceleration)
             velocity += touch[1, i, k] * place
         early[0, i], early[1, i] = height, velocity

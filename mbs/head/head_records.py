@@ -12,21 +12,24 @@ from typing import Any
 import numpy as np
 
 from catenary.mbs.head import head_kernels
-from catenary.solver.base.compiled import compiled
+from catenary.mbs.head.head_kernels import (
+    FORCE,
+    N_DRIVE,
+    HeadArrays,
+    LinearStep,
+    NewmarkFactors,
+    RaisedHead,
+)
+from catenary.solver.base.compiled import compiled, in_line
 from catenary.solver.base.pointers import address_of, cube_at, numbers_at, table_at_address
 
 # Models, as `head_kernels` steps them.
 LUMPED, REDUCED = 0, 1
-N_DRIVE = 6
 
-_ADDRESSES = (
-    "newmark", "touch", "state", "free", "by_force", "out",
-    "step", "by_drive", "inverse",
-    "masses", "stiffness", "damping", "breaks", "coefficients",
-)  # fmt: skip
+_ADDRESSES = (*HeadArrays._fields, *LinearStep._fields, *RaisedHead._fields)
 # A head: its model, how many coordinates and strips it has, the coordinate of its roll or -1, its
 # first contact; the heights that a reduced mechanism reaches [m], and how many breaks its tables
-# have; the addresses of its arrays, named as in `head_kernels`.
+# have; its factors, and the addresses of its arrays, named as in `head_kernels`.
 HEAD = np.dtype(
     [
         ("model", np.int64),
@@ -37,6 +40,7 @@ HEAD = np.dtype(
         ("lowest", np.float64),
         ("highest", np.float64),
         ("n_breaks", np.int64),
+        *((name, np.float64) for name in NewmarkFactors._fields),
         *((name, np.int64) for name in _ADDRESSES),
     ]
 )
@@ -53,6 +57,19 @@ def drive_width(n_strips: int) -> int:
     return N_DRIVE + 2 * n_strips
 
 
+@in_line
+def arrays_of(head):
+    """The arrays at the addresses of a record."""
+    n, s = head.n, head.s
+    return HeadArrays(
+        cube_at(head.touch, 2, s, n),
+        numbers_at(head.state, 3 * n),
+        numbers_at(head.free, 3 * n),
+        table_at_address(head.by_force, 3 * n, s),
+        numbers_at(head.out, 2 * s * (1 + s)),
+    )
+
+
 @compiled
 def predict(head, drive, numbers, n_contacts):
     """Predict a head from a row ``drive`` of numbers: its strips' part of ``numbers``.
@@ -61,29 +78,32 @@ def predict(head, drive, numbers, n_contacts):
     head is where its model reaches.
     """
     n, s = head.n, head.s
-    touch = cube_at(head.touch, 2, s, n)
-    state, free = numbers_at(head.state, 3 * n), numbers_at(head.free, 3 * n)
-    by_force, out = table_at_address(head.by_force, 3 * n, s), numbers_at(head.out, 2 * s * (1 + s))
-    newmark = numbers_at(head.newmark, 5)
+    newmark = NewmarkFactors(
+        head.dt, head.predict_position, head.predict_velocity, head.position, head.velocity
+    )
+    arrays = arrays_of(head)
+    touch, out = arrays.touch, arrays.out
     if head.roll >= 0:
         for j in range(s):
             touch[0, j, head.roll] = drive[N_DRIVE + j]
             touch[1, j, head.roll] = drive[N_DRIVE + s + j]
     within = True
     if head.model == LUMPED:
-        head_kernels.linear_step(
-            table_at_address(head.step, 3 * n, 3 * n), numbers_at(head.by_drive, 3 * n),
-            table_at_address(head.inverse, n, n), newmark[3], newmark[4],
-            touch, state, free, by_force, out, drive[0],
-        )  # fmt: skip
+        linear = LinearStep(
+            table_at_address(head.matrix, 3 * n, 3 * n),
+            numbers_at(head.by_drive, 3 * n),
+            table_at_address(head.inverse, n, n),
+        )
+        head_kernels.linear_step(linear, newmark, arrays, drive[FORCE])
     else:
-        height = head_kernels.raising_step(
-            newmark, drive[:N_DRIVE], numbers_at(head.masses, n),
-            table_at_address(head.stiffness, n, n), table_at_address(head.damping, n, n),
+        raised = RaisedHead(
+            numbers_at(head.masses, n),
+            table_at_address(head.stiffness, n, n),
+            table_at_address(head.damping, n, n),
             numbers_at(head.breaks, head.n_breaks),
             cube_at(head.coefficients, head.n_breaks - 1, 4, 4),
-            touch, state, free, by_force, out,
-        )  # fmt: skip
+        )
+        height = head_kernels.raising_step(raised, newmark, arrays, drive[:N_DRIVE])
         # What is not a number is left to those who couple.
         within = not (height < head.lowest or height > head.highest)
     begin = head.first
@@ -99,10 +119,4 @@ def predict(head, drive, numbers, n_contacts):
 @compiled
 def move(head, force):
     """Move a head on under the forces (n,) at all contacts, after ``predict``."""
-    n, s = head.n, head.s
-    head_kernels.take(
-        numbers_at(head.free, 3 * n),
-        table_at_address(head.by_force, 3 * n, s),
-        force[head.first : head.first + s],
-        numbers_at(head.state, 3 * n),
-    )
+    head_kernels.take(arrays_of(head), force[head.first : head.first + head.s])

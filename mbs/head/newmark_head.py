@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from catenary.mbs.head import head_kernels
-from catenary.mbs.head.head_records import N_DRIVE
+from catenary.mbs.head.head_kernels import N_DRIVE, HeadArrays, NewmarkFactors
 from catenary.mbs.head.strips import HeadParts
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.interface import HeadState
@@ -43,15 +43,16 @@ class SteppedHead(ABC):
         self._level[: head.n] = head.level
         self._touch = np.zeros((2, s, n))
         self._touch[0, :, : head.n] = head.touch
-        # dt, then what accelerations add to predictions, and to what is found.
-        self._newmark = np.array(
-            [dt, dt**2 * (0.5 - beta), dt * (1.0 - gamma), beta * dt**2, gamma * dt]
+        self._newmark = NewmarkFactors(
+            dt, dt**2 * (0.5 - beta), dt * (1.0 - gamma), beta * dt**2, gamma * dt
         )
         self._state, self._free = np.zeros((2, 3 * n))
         self._by_force = np.zeros((3 * n, s))
         self._early = np.zeros((2, s))
         self._head = HeadState(s)
-        self._out = self._head.numbers
+        self._arrays = HeadArrays(
+            self._touch, self._state, self._free, self._by_force, self._head.numbers
+        )
 
     @property
     def position(self) -> np.ndarray:
@@ -92,12 +93,8 @@ class SteppedHead(ABC):
             "n": self._n,
             "s": len(self.strip_offsets),
             "roll": -1 if self._lateral is None else self._roll,
-            "newmark": self._newmark,
-            "touch": self._touch,
-            "state": self._state,
-            "free": self._free,
-            "by_force": self._by_force,
-            "out": self._out,
+            **self._newmark._asdict(),
+            **self._arrays._asdict(),
         }
 
     def _fill_lateral(self, times: Sequence[float], drives: np.ndarray) -> None:
@@ -113,12 +110,12 @@ class SteppedHead(ABC):
     def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Heights and velocities (s,) of the strips by Newmark's predictor (paper eq. 2.5)."""
         self._aim(time)
-        head_kernels.extrapolate(self._newmark, self._touch, self._state, self._early)
+        head_kernels.extrapolate(self._newmark, self._arrays, self._early)
         return self._early[0], self._early[1]
 
     def advance(self, contact_force: np.ndarray) -> None:
         """Take the step predicted last with these contact forces (s,) [N]."""
-        head_kernels.take(self._free, self._by_force, contact_force, self._state)
+        head_kernels.take(self._arrays, contact_force)
 
     def state(self) -> np.ndarray:
         """Positions, velocities and accelerations, shape (3 n,)."""

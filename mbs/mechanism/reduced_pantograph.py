@@ -22,7 +22,8 @@ from typing import Any
 import numpy as np
 
 from catenary.mbs.head import head_kernels
-from catenary.mbs.head.head_records import N_DRIVE, REDUCED
+from catenary.mbs.head.head_kernels import BASE, LIFTED, N_DRIVE, WEIGHT, ZERO, RaisedHead
+from catenary.mbs.head.head_records import REDUCED
 from catenary.mbs.head.newmark_head import SteppedHead, raised
 from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning, head_parts
 from catenary.mbs.head.wire_crossing import LateralPath
@@ -91,23 +92,13 @@ class RaisingPantograph(SteppedHead):
         self._stiffness, self._damping = head.stiffness, head.damping
         self._breaks, self._coefficients = data.frame.coefficients(carried=base is not None)
         self._lowest, self._highest = float(self._breaks[0]), float(self._breaks[-1])
-        # Part of the lift, weight, zero, then height, velocity and acceleration of the base.
-        self._drive = np.array([0.0, data.head_weight, self._zero, 0.0, 0.0, 0.0])
-        self._step = bound(
-            head_kernels.raising_step,
-            self._newmark,
-            self._drive,
-            self._masses,
-            self._stiffness,
-            self._damping,
-            self._breaks,
-            self._coefficients,
-            self._touch,
-            self._state,
-            self._free,
-            self._by_force,
-            self._out,
+        self._raised = RaisedHead(
+            self._masses, self._stiffness, self._damping, self._breaks, self._coefficients
         )
+        self._drive = np.zeros(N_DRIVE)
+        self._drive[WEIGHT], self._drive[ZERO] = data.head_weight, self._zero
+        arguments = self._raised, self._newmark, self._arrays, self._drive
+        self._step = bound(head_kernels.raising_step, *arguments)
 
     def predict(self, time: float) -> HeadState:
         """Strips at ``time`` [s] as affine functions of the contact forces in the coming step.
@@ -128,9 +119,9 @@ class RaisingPantograph(SteppedHead):
     def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
         """Fill in lift and base, and where the wire crosses; see `SteppedHead`."""
         drives[:, :N_DRIVE] = self._drive
-        drives[:, 0] = [self._part(time) for time in times]
+        drives[:, LIFTED] = [self._part(time) for time in times]
         if self._base is not None:
-            drives[:, 3:N_DRIVE] = [self._base.vertical(time) for time in times]
+            drives[:, BASE:N_DRIVE] = [self._base.vertical(time) for time in times]
         self._fill_lateral(times, drives)
 
     def record(self) -> dict[str, Any]:
@@ -141,11 +132,7 @@ class RaisingPantograph(SteppedHead):
             "lowest": self._lowest,
             "highest": self._highest,
             "n_breaks": self._breaks.size,
-            "masses": self._masses,
-            "stiffness": self._stiffness,
-            "damping": self._damping,
-            "breaks": self._breaks,
-            "coefficients": self._coefficients,
+            **self._raised._asdict(),
         }
 
     def energy(self) -> float:
@@ -189,9 +176,9 @@ class RaisingPantograph(SteppedHead):
 
     def _move_base(self, time: float) -> None:
         """Put lift and base to ``time`` [s]."""
-        self._drive[0] = self._part(time)
+        self._drive[LIFTED] = self._part(time)
         if self._base is not None:
-            self._drive[3:] = self._base.vertical(time)
+            self._drive[BASE:] = self._base.vertical(time)
 
     def _acceleration(self, time: float) -> np.ndarray:
         self._move_base(time)
