@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
+from catenary.meshgen.chains import names_of
 from catenary.meshgen.gmsh_lines import write_mesh
 from catenary.meshgen.line import Line
-from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
+from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.reader import read_mesh
 from catenary.solver.base.errors import InputError
 
@@ -36,11 +38,11 @@ def make_mesh(
     """
     if path is not None:
         write_mesh(line, elements_per_gap, path, support_refinement=support_refinement)
-        return read_mesh(path)
+        return read_mesh(path, names_of(line))
     with tempfile.TemporaryDirectory(prefix="catenary-") as folder:
         temporary = Path(folder, "line.msh")
         write_mesh(line, elements_per_gap, temporary, support_refinement=support_refinement)
-        return read_mesh(temporary)
+        return read_mesh(temporary, names_of(line))
 
 
 def use_mesh(line: Line, path: Path) -> LineMesh:
@@ -54,20 +56,8 @@ def use_mesh(line: Line, path: Path) -> LineMesh:
     InputError
         If the file is refused by ``catenary.meshgen.reader.read_mesh`` or belongs to another line.
     """
-    mesh = read_mesh(path)
-    masts = line.support_positions
-    droppers = [
-        start + np.asarray(places, dtype=float)
-        for start, places in zip(masts[:-1], line.dropper_positions, strict=True)
-    ]
-    contact_wire, messenger_wire = mesh.wires[CONTACT_WIRE], mesh.wires[MESSENGER_WIRE]
-    for what, found, wanted in (
-        ("ends of contact_wire", mesh.x(contact_wire[[0, -1]]), masts[[0, -1]]),
-        ("ends of messenger_wire", mesh.x(messenger_wire[[0, -1]]), masts[[0, -1]]),
-        ("supports", mesh.x(mesh.supports), masts[1:-1]),
-        ("steady_arms", mesh.x(mesh.steady_arms), masts[1:-1]),
-        ("droppers", mesh.x(mesh.droppers[:, 1]), np.concatenate(droppers)),
-    ):
+    mesh = read_mesh(path, names_of(line))
+    for what, found, wanted in _places(line, mesh):
         if found.size != wanted.size:
             raise InputError(
                 f"{path}: the mesh has {found.size} {what}, but the scene's line has {wanted.size}"
@@ -80,3 +70,23 @@ def use_mesh(line: Line, path: Path) -> LineMesh:
                 f"{found[worst]:g} m in the mesh, {wanted[worst]:g} m in the scene"
             )
     return mesh
+
+
+def _places(line: Line, mesh: LineMesh) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
+    """What is where along the track [m]: its name, places in the mesh and in the line."""
+    for wire in line.wires:
+        pairs = mesh.elements(wire.name)
+        starts = np.setdiff1d(pairs[:, 0], pairs[:, 1])
+        ends = np.setdiff1d(pairs[:, 1], pairs[:, 0])
+        wanted = [x for piece in wire.pieces for x in (piece.x[0], piece.x[-1])]
+        found = np.sort(mesh.x(np.concatenate([starts, ends])))
+        yield f"ends of {wire.name}", found, np.array(wanted)
+    for number, supports in enumerate(line.supports):
+        nodes = mesh.supports[mesh.support_group == number]
+        yield supports.name, mesh.x(nodes), np.array(supports.x)
+    for number, arms in enumerate(line.steady_arms):
+        nodes = mesh.steady_arms[mesh.arm_group == number]
+        yield arms.name, mesh.x(nodes), np.array(arms.x)
+    for number, droppers in enumerate(line.droppers):
+        pairs = mesh.droppers[mesh.dropper_group == number]
+        yield droppers.name, mesh.x(pairs[:, 1]), np.array(droppers.lower_x)

@@ -3,10 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
-from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
+from catenary.meshgen.line import Line
+from catenary.meshgen.mesh import (
+    ANCHORS,
+    CONTACT_WIRE,
+    DROPPERS,
+    MESSENGER_WIRE,
+    STEADY_ARMS,
+    SUPPORTS,
+    LineMesh,
+)
 from catenary.solver.base.errors import InputError
 
 # Nodes closer than this are taken for one place [m].
@@ -17,24 +27,71 @@ _LEAN_LIMIT = 0.5
 
 
 @dataclass(frozen=True)
+class Joins:
+    """A group of droppers: its name and the wires that it joins."""
+
+    name: str
+    upper: str
+    lower: str
+
+
+@dataclass(frozen=True)
+class Names:
+    """The physical groups of a line's mesh file, beside ``anchors``.
+
+    Attributes
+    ----------
+    wires : name -> number of pieces, from the contact wires upwards
+    droppers : groups of droppers
+    steady_arms, supports : name -> name of the wire at which they are
+    """
+
+    wires: dict[str, int]
+    droppers: tuple[Joins, ...]
+    steady_arms: dict[str, str]
+    supports: dict[str, str]
+
+
+SIMPLE = Names(
+    {CONTACT_WIRE: 1, MESSENGER_WIRE: 1},
+    (Joins(DROPPERS, MESSENGER_WIRE, CONTACT_WIRE),),
+    {STEADY_ARMS: CONTACT_WIRE},
+    {SUPPORTS: MESSENGER_WIRE},
+)
+
+
+def names_of(line: Line) -> Names:
+    """The groups of a line's mesh file."""
+    return Names(
+        {wire.name: len(wire.pieces) for wire in line.wires},
+        tuple(Joins(group.name, group.upper, group.lower) for group in line.droppers),
+        {group.name: group.wire for group in line.steady_arms},
+        {group.name: group.wire for group in line.supports},
+    )
+
+
+@dataclass(frozen=True)
 class Groups:
-    """What a mesh file holds: ``points`` (n, 3) [m], the elements of lines (n, 2), nodes (n,)."""
+    """What a mesh file holds.
+
+    Attributes
+    ----------
+    points : (n, 3) [m]
+    lines : name -> (n, 2) int, elements of wires and droppers
+    nodes : name -> (n,) int, of steady arms, supports and anchors
+    """
 
     points: np.ndarray
-    contact_wire: np.ndarray
-    messenger_wire: np.ndarray
-    droppers: np.ndarray
-    steady_arms: np.ndarray
-    supports: np.ndarray
-    anchors: np.ndarray
+    lines: dict[str, np.ndarray]
+    nodes: dict[str, np.ndarray]
 
 
-def assemble(groups: Groups, source: str) -> LineMesh:
+def assemble(groups: Groups, names: Names, source: str) -> LineMesh:
     """The line mesh that the groups make. Not collective.
 
     Parameters
     ----------
-    groups : Groups
+    groups, names : what the file holds, and what the groups are
     source : name of the file, for messages
 
     Raises
@@ -42,28 +99,35 @@ def assemble(groups: Groups, source: str) -> LineMesh:
     InputError
         If the groups do not make a line; the sentence names the group and the place.
     """
-    points = groups.points
-    wires = {
-        CONTACT_WIRE: _order_wire(points, groups.contact_wire, f"{source}: {CONTACT_WIRE}"),
-        MESSENGER_WIRE: _order_wire(points, groups.messenger_wire, f"{source}: {MESSENGER_WIRE}"),
-    }
-    shared = np.intersect1d(wires[CONTACT_WIRE], wires[MESSENGER_WIRE])
-    if shared.size:
-        raise InputError(
-            f"{source}: contact_wire and messenger_wire share the node at {_at(points, shared[0])}"
+    points, starts, wires = groups.points, {}, {}
+    for name, n_pieces in names.wires.items():
+        wires[name], starts[name] = _order_wire(
+            points, groups.lines[name], n_pieces, f"{source}: {name}"
         )
-    droppers = _find_droppers(points, wires, groups.droppers, f"{source}: droppers")
-    for name, nodes, wire in (
-        ("steady arm", groups.steady_arms, CONTACT_WIRE),
-        ("support", groups.supports, MESSENGER_WIRE),
-    ):
-        stray = np.setdiff1d(nodes, wires[wire])
-        if stray.size:
+    _check_apart(points, wires, source)
+    droppers = [
+        _find_droppers(points, wires, groups.lines[joins.name], joins, f"{source}: {joins.name}")
+        for joins in names.droppers
+    ]
+    for what, hardware in (("steady arm", names.steady_arms), ("support", names.supports)):
+        for name, wire in hardware.items():
+            stray = np.setdiff1d(groups.nodes[name], wires[wire])
+            if stray.size:
+                raise InputError(
+                    f"{source}: the {what} at {_at(points, stray[0])} is not a node of {wire}"
+                )
+    ends = [wires[name][at] for name in wires for at in (starts[name], starts[name] - 1)]
+    _check_anchors(points, np.concatenate(ends), groups.nodes[ANCHORS], source)
+    return _renumber(groups, names, wires, starts, droppers)
+
+
+def _check_apart(points: np.ndarray, wires: dict[str, np.ndarray], source: str) -> None:
+    for (one, nodes), (other, others) in combinations(wires.items(), 2):
+        shared = np.intersect1d(nodes, others)
+        if shared.size:
             raise InputError(
-                f"{source}: the {name} at {_at(points, stray[0])} is not a node of {wire}"
+                f"{source}: {one} and {other} share the node at {_at(points, shared[0])}"
             )
-    _check_anchors(points, wires, groups.anchors, source)
-    return _renumber(groups, wires, droppers)
 
 
 def _at(points: np.ndarray, node: int) -> str:
@@ -71,8 +135,13 @@ def _at(points: np.ndarray, node: int) -> str:
     return f"x = {x:g}, y = {y:g}, z = {z:g} m"
 
 
-def _order_wire(points: np.ndarray, edges: np.ndarray, what: str) -> np.ndarray:
-    """Nodes of a wire in order of x; an error unless its elements join just the neighbours."""
+def _order_wire(
+    points: np.ndarray, edges: np.ndarray, n_pieces: int, what: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes of a wire in order of x, and the places in it of its pieces' first nodes.
+
+    An error unless its elements join just the neighbours in as many pieces.
+    """
     _check_lengths(points, edges, what)
     used, degree = np.unique(edges, return_counts=True)
     nodes = used[np.argsort(points[used, 0], kind="stable")]
@@ -80,31 +149,37 @@ def _order_wire(points: np.ndarray, edges: np.ndarray, what: str) -> np.ndarray:
     rank[nodes] = np.arange(nodes.size)
     joined = np.sort(rank[edges], axis=1)
     joined = joined[np.argsort(joined[:, 0], kind="stable")]
-    neighbours = np.column_stack([np.arange(nodes.size - 1), np.arange(1, nodes.size)])
-    if not np.array_equal(joined, neighbours):
-        raise InputError(_why_no_chain(points, used, degree, what))
+    starts = np.setdiff1d(np.arange(nodes.size), joined[:, 1])
+    neighbours = np.delete(np.arange(nodes.size - 1), starts[1:] - 1)
+    if starts.size != n_pieces or not np.array_equal(
+        joined, np.column_stack([neighbours, neighbours + 1])
+    ):
+        raise InputError(_why_no_chain(points, used, degree, n_pieces, what))
     level = np.flatnonzero(np.diff(points[nodes, 0]) < _SAME_PLACE)
     if level.size:
         raise InputError(
             f"{what} does not advance along the track at {_at(points, nodes[level[0]])}"
         )
-    return nodes
+    return nodes, starts
 
 
-def _why_no_chain(points: np.ndarray, used: np.ndarray, degree: np.ndarray, what: str) -> str:
+def _why_no_chain(
+    points: np.ndarray, used: np.ndarray, degree: np.ndarray, n_pieces: int, what: str
+) -> str:
     ends, branches = used[degree == 1], used[degree > 2]
+    chain = "one simple chain" if n_pieces == 1 else f"{n_pieces} simple chains"
     if branches.size:
         return (
-            f"{what} is not one simple chain: more than two of its elements meet at "
+            f"{what} is not {chain}: more than two of its elements meet at "
             f"{_at(points, branches[0])}"
         )
-    if ends.size > 2:
+    if ends.size != 2 * n_pieces and ends.size > 2:
         places = ", ".join(f"{x:g}" for x in np.sort(points[ends, 0])[:6])
         return (
-            f"{what} is not one simple chain but {ends.size // 2} separate ones, which end at x = "
+            f"{what} is not {chain} but {ends.size // 2} separate ones, which end at x = "
             f"{places} m (nodes at the same place must be merged)"
         )
-    return f"{what} is not one simple chain in the order of x: it turns back or closes in itself"
+    return f"{what} is not {chain} in the order of x: it turns back or closes in itself"
 
 
 def _check_lengths(points: np.ndarray, edges: np.ndarray, what: str) -> None:
@@ -116,30 +191,33 @@ def _check_lengths(points: np.ndarray, edges: np.ndarray, what: str) -> None:
 
 
 def _find_droppers(
-    points: np.ndarray, wires: dict[str, np.ndarray], edges: np.ndarray, what: str
+    points: np.ndarray, wires: dict[str, np.ndarray], edges: np.ndarray, joins: Joins, what: str
 ) -> np.ndarray:
     """Upper and lower node of each dropper in order of x, (n, 2); chains are shortened to ends."""
     _check_lengths(points, edges, what)
     wire_of = np.full(points.shape[0], -1)
-    wire_of[wires[MESSENGER_WIRE]], wire_of[wires[CONTACT_WIRE]] = 0, 1
-    ends = _ends_of_chains(points, wire_of >= 0, edges, what)
+    for number, name in enumerate(wires):
+        wire_of[wires[name]] = 2 + number
+    wire_of[wires[joins.upper]], wire_of[wires[joins.lower]] = 0, 1
+    ends = _ends_of_chains(points, wire_of >= 0, edges, joins, what)
     sides = wire_of[ends]
-    same = np.flatnonzero(sides[:, 0] == sides[:, 1])
-    if same.size:
-        first, last = ends[same[0]]
-        wire = (MESSENGER_WIRE, CONTACT_WIRE)[sides[same[0], 0]]
+    wrong = np.flatnonzero((np.sort(sides, axis=1) != [0, 1]).any(axis=1))
+    if wrong.size:
+        first, last = ends[wrong[0]]
+        found = [next(n for n in wires if node in wires[n]) for node in (first, last)]
+        other = "itself" if found[0] == found[1] else found[1]
         raise InputError(
-            f"{what}: the dropper from {_at(points, first)} to {_at(points, last)} joins {wire} "
-            "with itself, but must join messenger_wire and contact_wire"
+            f"{what}: the dropper from {_at(points, first)} to {_at(points, last)} joins "
+            f"{found[0]} with {other}, but must join {joins.upper} and {joins.lower}"
         )
     ends = np.take_along_axis(ends, np.argsort(sides, axis=1), axis=1)
     ends = ends[np.lexsort((ends[:, 0], points[ends[:, 1], 0]))]
-    _check_droppers(points, ends, what)
+    _check_droppers(points, ends, joins, what)
     return ends
 
 
 def _ends_of_chains(
-    points: np.ndarray, on_wire: np.ndarray, edges: np.ndarray, what: str
+    points: np.ndarray, on_wire: np.ndarray, edges: np.ndarray, joins: Joins, what: str
 ) -> np.ndarray:
     """Follow chains of elements from wire node to wire node, (n, 2)."""
     meeting: dict[int, list[int]] = {}
@@ -151,8 +229,8 @@ def _ends_of_chains(
         if len(elements) != 2:
             fault = "ends in the air" if len(elements) == 1 else "branches"
             raise InputError(
-                f"{what}: a dropper {fault} at {_at(points, node)}, but must join messenger_wire "
-                "and contact_wire"
+                f"{what}: a dropper {fault} at {_at(points, node)}, but must join {joins.upper} "
+                f"and {joins.lower}"
             )
     found = []
     visited = np.zeros(edges.shape[0], dtype=bool)
@@ -175,14 +253,14 @@ def _ends_of_chains(
     return np.array(found, dtype=np.int64).reshape(-1, 2)
 
 
-def _check_droppers(points: np.ndarray, ends: np.ndarray, what: str) -> None:
+def _check_droppers(points: np.ndarray, ends: np.ndarray, joins: Joins, what: str) -> None:
     """Refuse droppers that stand upside down, lean too far or lie on one another."""
     across = points[ends[:, 0]] - points[ends[:, 1]]
     inverted = np.flatnonzero(across[:, 2] < _SAME_PLACE)
     if inverted.size:
         raise InputError(
             f"{what}: the dropper at {_at(points, ends[inverted[0], 1])} does not hang down: its "
-            "end on messenger_wire must be above its end on contact_wire"
+            f"end on {joins.upper} must be above its end on {joins.lower}"
         )
     leaning = np.flatnonzero(np.abs(across[:, 0]) > _LEAN_LIMIT)
     if leaning.size:
@@ -197,10 +275,7 @@ def _check_droppers(points: np.ndarray, ends: np.ndarray, what: str) -> None:
         raise InputError(f"{what}: two droppers join the same nodes at {place}")
 
 
-def _check_anchors(
-    points: np.ndarray, wires: dict[str, np.ndarray], anchors: np.ndarray, source: str
-) -> None:
-    ends = np.concatenate([wire[[0, -1]] for wire in wires.values()])
+def _check_anchors(points: np.ndarray, ends: np.ndarray, anchors: np.ndarray, source: str) -> None:
     stray, free = np.setdiff1d(anchors, ends), np.setdiff1d(ends, anchors)
     if stray.size:
         raise InputError(
@@ -213,27 +288,47 @@ def _check_anchors(
         )
 
 
-def _renumber(groups: Groups, wires: dict[str, np.ndarray], droppers: np.ndarray) -> LineMesh:
-    """The mesh with the wires' nodes only, numbered along the track.
+def _renumber(
+    groups: Groups,
+    names: Names,
+    wires: dict[str, np.ndarray],
+    starts: dict[str, np.ndarray],
+    droppers: list[np.ndarray],
+) -> LineMesh:
+    """The mesh with the wires' nodes only, numbered along the track, the upper wires' first.
 
-    Neighbours along the track get neighbouring numbers, across both wires: what a banded or
+    Neighbours along the track get neighbouring numbers, across all wires: what a banded or
     distributed matrix wants.
     """
     points = groups.points
-    used = np.concatenate([wires[MESSENGER_WIRE], wires[CONTACT_WIRE]])
+    used = np.concatenate([wires[name] for name in reversed(names.wires)])
     # x is rounded so that nodes of one station stay together whatever their last bits say.
     order = used[np.argsort(np.round(points[used, 0], 6), kind="stable")]
     number = np.full(points.shape[0], -1)
     number[order] = np.arange(order.size)
 
-    def along(nodes: np.ndarray) -> np.ndarray:
-        return np.asarray(number[nodes[np.argsort(points[nodes, 0], kind="stable")]])
+    def along(
+        members: list[np.ndarray], shape: tuple[int, ...] = (0,)
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Members of groups in order of x, and the number of each one's group."""
+        nodes = np.concatenate([np.zeros(shape, dtype=np.int64), *members])
+        group = np.repeat(np.arange(len(members)), [len(own) for own in members])
+        place = nodes if nodes.ndim == 1 else nodes[:, -1]
+        by_x = np.argsort(points[place, 0], kind="stable")
+        return number[nodes[by_x]], group[by_x]
 
+    hanging, dropper_group = along(droppers, (0, 2))
+    arms, arm_group = along([groups.nodes[name] for name in names.steady_arms])
+    supports, support_group = along([groups.nodes[name] for name in names.supports])
     return LineMesh(
         points=points[order],
         wires={name: number[nodes] for name, nodes in wires.items()},
-        droppers=number[droppers],
-        steady_arms=along(groups.steady_arms),
-        supports=along(groups.supports),
-        anchors=along(groups.anchors),
+        droppers=hanging,
+        steady_arms=arms,
+        supports=supports,
+        anchors=along([groups.nodes[ANCHORS]])[0],
+        dropper_group=dropper_group,
+        arm_group=arm_group,
+        support_group=support_group,
+        breaks={name: at[1:] for name, at in starts.items() if at.size > 1},
     )

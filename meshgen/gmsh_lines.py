@@ -9,9 +9,9 @@ from pathlib import Path
 import gmsh
 import numpy as np
 
-from catenary.meshgen import mesh as names
-from catenary.meshgen.geometry import Stations, find_stations
-from catenary.meshgen.line import Line
+from catenary.meshgen.geometry import Cuts, find_cuts
+from catenary.meshgen.line import Droppers, Line
+from catenary.meshgen.mesh import ANCHORS
 from catenary.solver.base.errors import InputError
 from catenary.solver.base.python_signals import python_signals_kept
 
@@ -21,9 +21,9 @@ def write_mesh(
 ) -> None:
     """Write the mesh of ``line`` to ``path``, a Gmsh file (MSH 2.2, ASCII).
 
-    Not collective: call it on one rank. Both wires are cut at every mast and at every dropper and
-    divided evenly in between; a dropper is one element. The heights are those wanted of the
-    contact wire and estimated of the messenger wire; form finding corrects them.
+    Not collective: call it on one rank. All wires are cut at every mast, dropper and end of a wire
+    and divided evenly in between; a dropper is one element. Heights are wanted or estimated ones;
+    form finding corrects them.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def write_mesh(
     ------
     InputError
         If a count is below 1, the file cannot be written, or the line is impossible
-        (see ``catenary.meshgen.geometry.find_stations``).
+        (see ``catenary.meshgen.geometry.find_cuts``).
     """
     for key, count in (
         ("elements_per_gap", elements_per_gap),
@@ -46,9 +46,9 @@ def write_mesh(
             raise InputError(f"{key} is {count}, but must be a whole number of at least 1")
     if path.suffix != ".msh":
         raise InputError(f"the mesh file {path} must have a name that ends in .msh")
-    stations = find_stations(line)
+    cuts = find_cuts(line)
     with _session(path.stem):
-        _describe(stations, elements_per_gap, support_refinement)
+        _describe(line, cuts, elements_per_gap, support_refinement)
         gmsh.model.mesh.generate(1)
         # meshio reads 2.2 ten times faster than 4.1 when there is a curve for each gap.
         gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
@@ -80,34 +80,47 @@ def _session(name: str) -> Iterator[None]:
                 gmsh.finalize()
 
 
-def _describe(stations: Stations, elements_per_gap: int, support_refinement: int) -> None:
+def _describe(line: Line, cuts: Cuts, elements_per_gap: int, support_refinement: int) -> None:
     """Geometry, divisions and physical groups in the current model."""
-    is_mast = stations.is_mast
-    near_mast = is_mast[:-1] | is_mast[1:]
+    near_mast = cuts.is_mast[:-1] | cuts.is_mast[1:]
     divisions = elements_per_gap * np.where(near_mast, support_refinement, 1)
-    messenger_points, messenger_curves = _add_wire(stations.messenger_wire, divisions)
-    contact_points, contact_curves = _add_wire(stations.contact_wire, divisions)
-    at = np.flatnonzero(~is_mast)
-    droppers = [gmsh.model.geo.addLine(messenger_points[i], contact_points[i]) for i in at]
-    for curve in droppers:
-        gmsh.model.geo.mesh.setTransfiniteCurve(curve, 2)
+    points = {wire.name: np.zeros(cuts.x.size, dtype=np.int64) for wire in line.wires}
+    curves: dict[str, list[int]] = {wire.name: [] for wire in line.wires}
+    ends: list[int] = []
+    # From the topmost wire down, which is the order of the tags.
+    for piece in reversed(cuts.pieces):
+        last = piece.first + len(piece.points) - 1
+        tags, between = _add_wire(piece.points, divisions[piece.first : last])
+        points[piece.wire][piece.first : last + 1] = tags
+        curves[piece.wire] += between
+        ends += [tags[end] for end, held in zip((0, -1), piece.ends, strict=True) if held]
+    droppers = {group.name: _add_droppers(group, points, cuts) for group in line.droppers}
     gmsh.model.geo.synchronize()
 
-    inner = np.flatnonzero(is_mast)[1:-1]
-    ends = [messenger_points[0], messenger_points[-1], contact_points[0], contact_points[-1]]
-    groups = (
-        (1, names.MESSENGER_WIRE, messenger_curves),
-        (1, names.CONTACT_WIRE, contact_curves),
-        (1, names.DROPPERS, droppers),
-        (0, names.STEADY_ARMS, [contact_points[i] for i in inner]),
-        (0, names.SUPPORTS, [messenger_points[i] for i in inner]),
-        (0, names.ANCHORS, ends),
-    )
+    groups: list[tuple[int, str, list[int]]] = [
+        *((1, wire.name, curves[wire.name]) for wire in reversed(line.wires)),
+        *((1, group.name, droppers[group.name]) for group in line.droppers),
+        *(
+            (0, group.name, points[group.wire][cuts.of(np.array(group.x))].tolist())
+            for group in line.hardware
+        ),
+        (0, ANCHORS, ends),
+    ]
     for number, (dimension, name, tags) in enumerate(groups, start=1):
         if tags:
             gmsh.model.addPhysicalGroup(dimension, tags, number)
         # A group without members is named as well: its name tells a reader that none is meant.
         gmsh.model.setPhysicalName(dimension, number, name)
+
+
+def _add_droppers(group: Droppers, points: dict[str, np.ndarray], cuts: Cuts) -> list[int]:
+    """Tags of the lines of a group of droppers, one element each."""
+    upper = points[group.upper][cuts.of(np.array(group.upper_x))].tolist()
+    lower = points[group.lower][cuts.of(np.array(group.lower_x))].tolist()
+    curves = [gmsh.model.geo.addLine(*pair) for pair in zip(upper, lower, strict=True)]
+    for curve in curves:
+        gmsh.model.geo.mesh.setTransfiniteCurve(curve, 2)
+    return curves
 
 
 def _add_wire(points: np.ndarray, divisions: np.ndarray) -> tuple[list[int], list[int]]:

@@ -1,18 +1,41 @@
-"""The line as an engineer describes it: spans, wires, droppers, arms; SI units, no mesh yet.
+"""The line as an engineer describes it: masts, wires by name and role, what hangs between them.
 
-Axes: x along the track from the first anchor, y lateral, z up from the top of rail.
+SI units, no mesh yet. Axes: x along the track from the first anchor, y lateral, z up from the top
+of rail. Which wires a line has is decided by its topology (``catenary.meshgen.topologies``).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 
+from catenary.meshgen.spans import Spans
+
+# Places closer than this along the track are one [m].
+_SAME_PLACE = 1e-6
+
+
+class Role(StrEnum):
+    """What a wire is there for."""
+
+    CONTACT = "contact"
+    MESSENGER = "messenger"
+    AUXILIARY = "auxiliary"
+    STITCH = "stitch"
+
+
+class End(StrEnum):
+    """How a piece of wire ends: HELD in height by a tensioner or an anchor."""
+
+    HELD = "held"
+
 
 @dataclass(frozen=True)
-class Wire:
-    """A tensioned wire: tension [N], mass per length [kg/m], bending stiffness EI [N m2]."""
+class Conductor:
+    """A tensioned conductor: tension [N], mass per length [kg/m], bending stiffness EI [N m2]."""
 
     tension: float
     mass_per_length: float
@@ -20,13 +43,134 @@ class Wire:
 
     @property
     def wave_speed(self) -> float:
-        """Speed of transverse waves on the wire as a string, sqrt(F/rho) [m/s] (paper eq. 1.1)."""
+        """Speed of transverse waves on it as a string, sqrt(F/rho) [m/s] (paper eq. 1.1)."""
         return float(np.sqrt(self.tension / self.mass_per_length))
 
 
 @dataclass(frozen=True)
+class Piece:
+    """A wire from end to end: points that it passes before form finding, straight in between.
+
+    x : positions along the track, ascending [m]
+    y : lateral positions [m]
+    z : heights; of an end that is held and of a support those at which it stays [m]
+    ends : how it begins and ends
+    """
+
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    z: tuple[float, ...]
+    ends: tuple[End, End] = (End.HELD, End.HELD)
+
+    def points(self, x: np.ndarray) -> np.ndarray:
+        """Points of the piece at positions ``x`` (n,) along the track, shape (n, 3) [m]."""
+        return np.column_stack([x, np.interp(x, self.x, self.y), np.interp(x, self.x, self.z)])
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Heights that a wire is to have at rest where it is held: at its droppers' lower ends.
+
+    height : at the masts of the running spans [m]
+    sag_x, sag : pre-sag below that height at positions along the track, linear between them [m]
+    rise : height gained over all transition spans of one end [m]
+    ends, running : from and to of the line and of its running spans [m]
+    """
+
+    height: float
+    sag_x: tuple[float, ...]
+    sag: tuple[float, ...]
+    rise: float
+    ends: tuple[float, float]
+    running: tuple[float, float]
+
+    def level(self, x: np.ndarray) -> np.ndarray:
+        """Height without pre-sag at positions ``x`` [m], shape as ``x``.
+
+        Constant in the running spans; in the transition spans a parabola that leaves the running
+        height without a kink and has gained ``rise`` at the anchor.
+        """
+        x = np.asarray(x, dtype=float)
+        start, end = self.running
+        height = np.full_like(x, self.height)
+        if start > self.ends[0]:
+            into = np.clip((start - x) / (start - self.ends[0]), 0.0, None)
+            height += self.rise * into**2
+        if end < self.ends[1]:
+            into = np.clip((x - end) / (self.ends[1] - end), 0.0, None)
+            height += self.rise * into**2
+        return height
+
+    def pre_sag(self, x: np.ndarray) -> np.ndarray:
+        """Pre-sag at positions ``x`` [m], shape as ``x``."""
+        return np.interp(x, self.sag_x, self.sag)
+
+
+@dataclass(frozen=True)
+class Wire(Conductor):
+    """A wire of a line.
+
+    Attributes
+    ----------
+    name : of the wire, of its group in a mesh file and of its component in the damping
+    role : what it is there for
+    pieces : where it runs, one piece or several by ascending x that do not overlap
+    profile : heights wanted at its droppers' lower ends; None if none hangs it
+    """
+
+    name: str
+    role: Role
+    pieces: tuple[Piece, ...]
+    profile: Profile | None = None
+
+    @classmethod
+    def of(
+        cls,
+        conductor: Conductor,
+        name: str,
+        role: Role,
+        pieces: tuple[Piece, ...],
+        profile: Profile | None = None,
+    ) -> Wire:
+        """A wire made of a conductor."""
+        return cls(
+            conductor.tension,
+            conductor.mass_per_length,
+            conductor.bending_stiffness,
+            name,
+            role,
+            pieces,
+            profile,
+        )
+
+    @property
+    def length(self) -> float:
+        """Length of all pieces along the track [m]."""
+        return sum(piece.x[-1] - piece.x[0] for piece in self.pieces)
+
+    @property
+    def top(self) -> float:
+        """Height at the masts of the running spans, or the greatest one without a profile [m]."""
+        if self.profile is not None:
+            return self.profile.height
+        return max(max(piece.z) for piece in self.pieces)
+
+    def points(self, x: np.ndarray) -> np.ndarray:
+        """Points of the wire at positions ``x`` (n,) inside its pieces, shape (n, 3) [m]."""
+        starts = [piece.x[0] for piece in self.pieces]
+        which = np.clip(np.searchsorted(starts, x + _SAME_PLACE, side="right") - 1, 0, None)
+        points = np.empty((x.size, 3))
+        for number in np.unique(which):
+            here = which == number
+            points[here] = self.pieces[number].points(x[here])
+        if self.profile is not None:
+            points[:, 2] = self.profile.level(x) - self.profile.pre_sag(x)
+        return points
+
+
+@dataclass(frozen=True)
 class DropperKind:
-    """What all droppers of a line share.
+    """What all droppers of a group share.
 
     Exactly one of ``stiffness`` [N/m] and ``axial_stiffness`` EA [N] is given; with EA the
     stiffness of each dropper is EA over its own length. Clamp masses in kg.
@@ -35,17 +179,43 @@ class DropperKind:
     stiffness: float | None
     axial_stiffness: float | None
     mass_per_length: float
-    messenger_clamp_mass: float
-    contact_clamp_mass: float
+    upper_clamp_mass: float
+    lower_clamp_mass: float
+
+    def stiffness_at(self, length: np.ndarray) -> np.ndarray:
+        """Stiffness of droppers of these lengths (n,) [m], shape as ``length`` [N/m]."""
+        if self.stiffness is not None:
+            return np.full(length.shape, self.stiffness)
+        assert self.axial_stiffness is not None
+        return np.asarray(self.axial_stiffness / length)
+
+
+@dataclass(frozen=True)
+class Droppers:
+    """A group of droppers from one wire down to another.
+
+    Attributes
+    ----------
+    name : of their group in a mesh file and of their component in the damping
+    upper, lower : names of the wires that they join
+    upper_x, lower_x : positions of their ends, in ascending order of ``lower_x`` [m]
+    """
+
+    name: str
+    kind: DropperKind
+    upper: str
+    lower: str
+    upper_x: tuple[float, ...]
+    lower_x: tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class SteadyArm:
-    """A steady arm hinged at its registration end and clamped to the contact wire.
+    """A steady arm hinged at its registration end and clamped to a wire.
 
     length [m], mass per length [kg/m], clamp mass [kg], vertical stiffness at the wire [N/m].
-    ``holds_height``: whether the arm holds the contact wire at its height at rest and so carries
-    weight there; otherwise the wire hangs freely between the droppers next to the arm.
+    ``holds_height``: whether the arm holds the wire at its height at rest and so carries weight
+    there; otherwise the wire hangs freely between the droppers next to the arm.
     """
 
     length: float
@@ -56,67 +226,79 @@ class SteadyArm:
 
 
 @dataclass(frozen=True)
-class Line:
-    """A simple catenary: one messenger wire, one contact wire, vertical droppers.
+class SteadyArms:
+    """Steady arms of one kind on one wire; ``x`` are their places, ascending [m]."""
+
+    name: str
+    kind: SteadyArm
+    wire: str
+    x: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Supports:
+    """Supports of one kind under one wire: springs relaxed at the height of its course there.
+
+    ``stiffness`` is vertical [N/m]; ``x`` are their places, ascending [m].
+    """
+
+    name: str
+    stiffness: float
+    wire: str
+    x: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Line(Spans):
+    """A line: masts, wires, and the groups of what hangs between them and stands under them.
 
     Attributes
     ----------
-    span_lengths : (n_spans,) [m]
-    dropper_positions : per span, distances from the span's left support, ascending [m]
-    pre_sag : per span, per dropper: how far the contact wire hangs below ``contact_height`` [m]
-    stagger : (n_spans + 1,) lateral position of the contact wire at each support [m]
-    contact_height : height of the contact wire at the supports of the running spans [m]
-    encumbrance : height of the messenger wire above ``contact_height`` at the supports [m]
-    support_stiffness : vertical stiffness of a messenger-wire support [N/m]
-    n_transition : spans at the start and at the end in which the contact wire rises to the
-        tensioner
-    transition_rise : height gained by the contact wire over all transition spans of one end [m]
+    topology : name of what made it
+    wires : from the contact wires upwards
+    droppers, steady_arms, supports : groups
     """
 
-    span_lengths: tuple[float, ...]
-    dropper_positions: tuple[tuple[float, ...], ...]
-    pre_sag: tuple[tuple[float, ...], ...]
-    stagger: tuple[float, ...]
-    contact_height: float
-    encumbrance: float
-    contact_wire: Wire
-    messenger_wire: Wire
-    dropper: DropperKind
-    support_stiffness: float
-    steady_arm: SteadyArm
-    n_transition: tuple[int, int]
-    transition_rise: float
+    topology: str
+    wires: tuple[Wire, ...]
+    droppers: tuple[Droppers, ...]
+    steady_arms: tuple[SteadyArms, ...]
+    supports: tuple[Supports, ...]
+
+    def wire(self, name: str) -> Wire:
+        """The wire of that name; KeyError if there is none."""
+        for wire in self.wires:
+            if wire.name == name:
+                return wire
+        raise KeyError(f"the line has no wire {name}")
+
+    def wires_of(self, role: Role) -> tuple[Wire, ...]:
+        """The wires of a role, in the order of ``wires``."""
+        return tuple(wire for wire in self.wires if wire.role is role)
 
     @property
-    def n_spans(self) -> int:
-        return len(self.span_lengths)
+    def hardware(self) -> tuple[SteadyArms | Supports, ...]:
+        """Groups of what stands at single places of wires: arms, then supports."""
+        return (*self.steady_arms, *self.supports)
 
     @property
-    def support_positions(self) -> np.ndarray:
-        """Positions of all masts, both anchors included, shape (n_spans + 1,) [m]."""
-        return np.concatenate([[0.0], np.cumsum(self.span_lengths)])
+    def profiles(self) -> tuple[Profile, ...]:
+        """Heights wanted of the wires that droppers hang, in the order of ``wires``."""
+        return tuple(wire.profile for wire in self.wires if wire.profile is not None)
 
     @property
-    def running_range(self) -> tuple[float, float]:
-        """Where a pantograph may run: from the end of the first transition to the start of the
-        last one [m]."""
-        masts = self.support_positions
-        return float(masts[self.n_transition[0]]), float(masts[self.n_spans - self.n_transition[1]])
+    def dropper_x(self) -> np.ndarray:
+        """Places of the lower ends of all droppers, ascending [m]."""
+        return np.sort(np.concatenate([np.zeros(0), *(group.lower_x for group in self.droppers)]))
 
-    def target_height(self, x: np.ndarray) -> np.ndarray:
-        """Height that the contact wire is to have without pre-sag, shape as ``x`` [m].
+    def droppers_of_span(self, span: int) -> np.ndarray:
+        """Places of the lower ends of a span's droppers, ascending [m]; spans count from 0."""
+        masts, x = self.support_positions, self.dropper_x
+        return np.asarray(x[(x > masts[span]) & (x < masts[span + 1])])
 
-        Constant in the running spans; in the transition spans a parabola that leaves the running
-        height without a kink and has gained ``transition_rise`` at the anchor.
-        """
-        x = np.asarray(x, dtype=float)
-        masts = self.support_positions
-        start, end = self.running_range
-        height = np.full_like(x, self.contact_height)
-        if self.n_transition[0]:
-            into = np.clip((start - x) / (start - masts[0]), 0.0, None)
-            height += self.transition_rise * into**2
-        if self.n_transition[1]:
-            into = np.clip((x - end) / (masts[-1] - end), 0.0, None)
-            height += self.transition_rise * into**2
-        return height
+    def with_shares(self, shares: Mapping[str, float]) -> Line:
+        """The line with the tension of the named wires a share of what it was."""
+        wires = (
+            replace(wire, tension=shares.get(wire.name, 1.0) * wire.tension) for wire in self.wires
+        )
+        return replace(self, wires=tuple(wires))

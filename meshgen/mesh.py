@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-# Names of the physical groups of a mesh file: lines, then points.
+# Names of the physical groups of a simple catenary's mesh file: lines, then points.
 CONTACT_WIRE = "contact_wire"
 MESSENGER_WIRE = "messenger_wire"
 DROPPERS = "droppers"
 STEADY_ARMS = "steady_arms"
 SUPPORTS = "supports"
 ANCHORS = "anchors"
+
+
+_NONE = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -24,16 +27,20 @@ class LineMesh:
     points : (n_nodes, 3) [m]
         x along the track, y lateral, z up.
     wires : name -> (n,) int
-        The nodes of each wire in order of x; element e of a wire joins nodes e and e + 1.
-        A simple catenary has ``contact_wire`` and ``messenger_wire``.
+        The nodes of each wire in order of x, those of the contact wires first.
     droppers : (n_droppers, 2) int
-        Upper (messenger) and lower (contact) node of each dropper, in order of x.
+        Upper and lower node of each dropper, in order of x of the lower one.
     steady_arms : (n_arms,) int
-        Contact-wire nodes at which a steady arm is clamped, in order of x.
+        Nodes at which a steady arm is clamped, in order of x.
     supports : (n_supports,) int
-        Messenger-wire nodes carried by a support, in order of x.
+        Nodes carried by a support, in order of x.
     anchors : (n_anchors,) int
         Wire ends held by the tensioners: no vertical motion.
+    dropper_group, arm_group, support_group : (n,) int
+        Number of the line's group that each belongs to; of the first one if not given.
+    breaks : name -> (n,) int
+        Places in ``wires[name]`` of the first nodes of all pieces but the first one; a wire that
+        is not named is of one piece.
     """
 
     points: np.ndarray
@@ -42,6 +49,20 @@ class LineMesh:
     steady_arms: np.ndarray
     supports: np.ndarray
     anchors: np.ndarray
+    dropper_group: np.ndarray = field(default_factory=lambda: _NONE)
+    arm_group: np.ndarray = field(default_factory=lambda: _NONE)
+    support_group: np.ndarray = field(default_factory=lambda: _NONE)
+    breaks: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name, members in (
+            ("dropper_group", self.droppers),
+            ("arm_group", self.steady_arms),
+            ("support_group", self.supports),
+        ):
+            if getattr(self, name).size != len(members):
+                assert getattr(self, name).size == 0, name
+                object.__setattr__(self, name, np.zeros(len(members), dtype=np.int64))
 
     @property
     def n_nodes(self) -> int:
@@ -50,3 +71,10 @@ class LineMesh:
     def x(self, nodes: np.ndarray) -> np.ndarray:
         """Positions of ``nodes`` along the track [m]."""
         return np.asarray(self.points[nodes, 0])
+
+    def elements(self, wire: str) -> np.ndarray:
+        """First and second node of the elements of a wire, (n, 2), in order of x."""
+        nodes = self.wires[wire]
+        pairs = np.stack([nodes[:-1], nodes[1:]], axis=1)
+        breaks = self.breaks.get(wire)
+        return pairs if breaks is None else np.delete(pairs, breaks - 1, axis=0)

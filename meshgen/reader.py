@@ -11,14 +11,10 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from catenary.meshgen import mesh as names
-from catenary.meshgen.chains import Groups, assemble
-from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.chains import SIMPLE, Groups, Names, assemble
+from catenary.meshgen.mesh import ANCHORS, LineMesh
 from catenary.solver.base.errors import InputError
 
-_LINE_GROUPS = (names.CONTACT_WIRE, names.MESSENGER_WIRE, names.DROPPERS)
-_POINT_GROUPS = (names.STEADY_ARMS, names.SUPPORTS, names.ANCHORS)
-_MAY_BE_EMPTY = (names.DROPPERS, names.STEADY_ARMS, names.SUPPORTS)
 # A mesh of four million nodes takes half of it.
 MOST_BYTES = 500_000_000
 _HEAD = 65536  # [B], comments may stand first
@@ -26,18 +22,20 @@ _SHOWN, _SOME = 60, 12  # of the names of groups that a file has
 _KINDS = {0: "points", 1: "lines", 2: "surfaces", 3: "volumes"}
 
 
-def read_mesh(path: Path) -> LineMesh:
+def read_mesh(path: Path, names: Names = SIMPLE) -> LineMesh:
     """The line mesh of a ``.msh`` file (MSH 2.2 or 4.1), checked. Not collective: one rank reads.
 
     Numbering and orientation of nodes and elements in the file do not matter; a dropper may
     consist of several elements, of which only the ends are kept. Nodes that nothing uses are left
-    out, the others are numbered along the track, the messenger wire's first at equal x.
+    out, the others are numbered along the track, the upper wires' first at equal x.
 
     Parameters
     ----------
-    path : file with the physical groups of lines ``contact_wire``, ``messenger_wire``,
-        ``droppers`` and of points ``steady_arms``, ``supports``, ``anchors``. ``droppers``,
-        ``steady_arms`` and ``supports`` may have no members, but must be named.
+    path : file with the physical groups of ``names``: lines for wires and droppers, points for
+        hardware and ``anchors``. Droppers, arms and supports may have no members, but must be
+        named.
+    names : the groups; by default those of a simple catenary, which are ``contact_wire``,
+        ``messenger_wire``, ``droppers``, ``steady_arms``, ``supports``
 
     Raises
     ------
@@ -46,14 +44,19 @@ def read_mesh(path: Path) -> LineMesh:
         one sentence with the file's name and the place.
     """
     content = _load(path)
-    members: dict[str, np.ndarray] = {}
-    for dimension, wanted in ((1, _LINE_GROUPS), (0, _POINT_GROUPS)):
-        for name in wanted:
-            members[name] = _members(content, name, dimension, path)
+    full = (*names.wires, ANCHORS)
+    groups = (
+        (*names.steady_arms, *names.supports, ANCHORS),
+        (*names.wires, *(joins.name for joins in names.droppers)),
+    )
+    nodes, lines = (
+        {name: _members(content, name, dimension, path, name not in full) for name in wanted}
+        for dimension, wanted in enumerate(groups)
+    )
     points = np.ascontiguousarray(content.points, dtype=float)
     if points.shape[1] != 3 or not np.isfinite(points).all():
         raise InputError(f"{path}: the nodes must have three finite coordinates each")
-    return assemble(Groups(points=points, **members), str(path))
+    return assemble(Groups(points, lines, nodes), names, str(path))
 
 
 def _load(path: Path) -> meshio.Mesh:
@@ -92,7 +95,9 @@ def _head(path: Path, refused: str) -> bytes:
         raise InputError(f"{refused}: {(error.strerror or '').lower()}") from error
 
 
-def _members(content: meshio.Mesh, name: str, dimension: int, path: Path) -> np.ndarray:
+def _members(
+    content: meshio.Mesh, name: str, dimension: int, path: Path, may_be_empty: bool
+) -> np.ndarray:
     """Elements of a physical group, shape (n, 2) for lines; node numbers, (n,), for points."""
     if name not in content.field_data:
         names_there = sorted(str(found)[:_SHOWN] for found in content.field_data)[:_SOME]
@@ -118,7 +123,7 @@ def _members(content: meshio.Mesh, name: str, dimension: int, path: Path) -> np.
             "two nodes are understood (Mesh.ElementOrder = 1)"
         )
     found = np.concatenate([np.empty((0, width), dtype=np.int64), *blocks])
-    if found.size == 0 and name not in _MAY_BE_EMPTY:
+    if found.size == 0 and not may_be_empty:
         raise InputError(f"{path}: the physical group {name} has no members")
     if found.size and found.min() < 0:
         raise InputError(f"{path}: the physical group {name} uses a node that the file lacks")

@@ -17,11 +17,9 @@ from catenary.cases.run.wave_arrivals import (
 )
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
-from catenary.meshgen.line import Line, Wire
+from catenary.meshgen.line import Line
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.problem.problem import Problem
-
-_WIRES = ("contact_wire", "messenger_wire")
 
 
 class Told(NamedTuple):
@@ -76,16 +74,19 @@ def wave_line(problem: Problem) -> WaveLine:
     """The line as long waves see it; hardware counts with its mean mass per length."""
     line = problem.line
     masts = line.support_positions
-    wires: list[Wire] = [getattr(line, name) for name in _WIRES]
-    mass = sum(wire.mass_per_length for wire in wires) + _hardware(line)
+    total = float(masts[-1] - masts[0])
+    # A wire that is only over a part of the line counts with that part.
+    shares = [(wire, wire.length / total) for wire in line.wires]
+    mass = sum(share * wire.mass_per_length for wire, share in shares) + _hardware(line)
     damping = simulated(problem).damping
-    pairs = [damping.per_component.get(name, (damping.alpha, damping.beta)) for name in _WIRES]
+    usual = (damping.alpha, damping.beta)
+    pairs = [damping.per_component.get(wire.name, usual) for wire in line.wires]
     return WaveLine(
         start=float(masts[0]),
         end=float(masts[-1]),
         span=_span(line),
-        speed=math.sqrt(sum(wire.tension for wire in wires) / mass),
-        fastest=max(wire.wave_speed for wire in wires),
+        speed=math.sqrt(sum(share * wire.tension for wire, share in shares) / mass),
+        fastest=max(wire.wave_speed for wire in line.wires),
         alpha=min(pair[0] for pair in pairs),
         beta=min(pair[1] for pair in pairs),
     )
@@ -114,11 +115,13 @@ def _told(problem: Problem) -> Told:
 
 def _hardware(line: Line) -> float:
     """Mass of droppers and their clamps per length of line [kg/m]."""
-    kind = line.dropper
-    length = max(line.encumbrance, 0.0)
-    each = kind.mass_per_length * length + kind.messenger_clamp_mass + kind.contact_clamp_mass
-    n = sum(len(positions) for positions in line.dropper_positions)
-    return float(n * each / sum(line.span_lengths))
+    total = 0.0
+    for group in line.droppers:
+        kind = group.kind
+        length = max(line.wire(group.upper).top - line.wire(group.lower).top, 0.0)
+        each = kind.mass_per_length * length + kind.upper_clamp_mass + kind.lower_clamp_mass
+        total += len(group.lower_x) * each
+    return float(total / sum(line.span_lengths))
 
 
 def _span(line: Line) -> float:

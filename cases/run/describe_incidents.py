@@ -34,7 +34,7 @@ def _sentence(table: Incident, line: Line) -> str:
         x = dropper_place(table, line)
         return f"dropper {table.dropper} of span {table.span}, at {x:g} m, breaks"
     if isinstance(table, TensionLossTable):
-        left = table.share * getattr(line, table.wire).tension / 1e3
+        left = table.share * line.wire(table.wire).tension / 1e3
         name = table.wire.replace("_", " ")
         return f"the tension of the {name} falls to {left:.4g} kN, {table.share:g} of what it was"
     return (

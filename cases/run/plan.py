@@ -118,7 +118,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
     import numpy as np
 
     from catenary.cases.run.scene_mesh import mesh_of
-    from catenary.meshgen.mesh import CONTACT_WIRE
+    from catenary.meshgen.line import Role
 
     problem = problem_of(scene)
     mesh = mesh_of(scene) if mesh is None else mesh
@@ -127,7 +127,8 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
     numbering = numbering_of(problem, mesh)
     train, dt = problem.train, problem.numerics.dt
     needs = needs_with_mesh(scene, mesh)
-    length = np.diff(mesh.x(mesh.wires[CONTACT_WIRE]))
+    contact = problem.line.wires_of(Role.CONTACT)[0]
+    length = np.diff(mesh.x(mesh.elements(contact.name)), axis=1)
     waves = arrival_facts(scene, problem)
     return Plan(
         case=scene.case.name,
@@ -143,7 +144,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
         n_pantographs=len(train.placements),
         element_lengths=(float(length.min()), float(length.max())),
         speed=train.speed,
-        wave_speed=problem.line.contact_wire.wave_speed,
+        wave_speed=contact.wave_speed,
         static_forces=tuple(place.static_force for place in train.placements),
         kinds=tuple((name, told[0]) for name, told in kind_lines(scene, problem).items()),
         start=train.start,

@@ -41,20 +41,17 @@ class Extent(NamedTuple):
 
 def extent_of(mesh: LineMesh) -> Extent:
     """What of a mesh is recorded. Not collective."""
-    n_cells = sum(len(nodes) - 1 for nodes in mesh.wires.values()) + len(mesh.droppers)
+    n_cells = sum(len(mesh.elements(name)) for name in mesh.wires) + len(mesh.droppers)
     arms, droppers = mesh.x(mesh.steady_arms), mesh.x(mesh.droppers[:, 1])
     return Extent(arms, droppers, mesh.n_nodes, n_cells)
 
 
 def extent_before_meshing(line: Line, n_nodes: int) -> Extent:
     """The same of a line that is to be meshed, of which only the nodes are counted."""
-    masts = line.support_positions
-    droppers = [
-        start + np.asarray(places, dtype=float)
-        for start, places in zip(masts[:-1], line.dropper_positions, strict=True)
-    ]
-    dropper_x = np.concatenate(droppers)
-    return Extent(masts[1:-1], dropper_x, n_nodes, n_nodes - 2 + dropper_x.size)
+    arm_x = np.sort(np.concatenate([[], *(group.x for group in line.steady_arms)]))
+    n_pieces = sum(len(wire.pieces) for wire in line.wires)
+    n_cells = n_nodes - n_pieces + line.dropper_x.size
+    return Extent(arm_x, line.dropper_x, n_nodes, n_cells)
 
 
 @dataclass(frozen=True)

@@ -173,7 +173,7 @@ def static_table(scene: Scene) -> dict[str, np.ndarray]:
     rest = line_at_rest(problem, mesh)
     data = {
         **line_datasets(problem.line, mesh, problem.evaluation),
-        **static_datasets(mesh, rest.form, rest.lift),
+        **static_datasets(mesh, rest.model.contact_nodes, rest.form, rest.lift),
         "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
     }
     return {name.rsplit("/", 1)[-1]: values for name, values in data.items()}
@@ -381,7 +381,9 @@ def _header(order: _Order, problem: Problem, at_rest: LineAtRest) -> Header:
         },
         datasets={
             **line_datasets(line, at_rest.mesh, problem.evaluation),
-            **static_datasets(at_rest.mesh, at_rest.form, at_rest.lift),
+            **static_datasets(
+                at_rest.mesh, at_rest.model.contact_nodes, at_rest.form, at_rest.lift
+            ),
         },
         facts=facts_of(problem, at_rest.mesh, at_rest.model.dropper_lengths),
     )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from catenary.cases.scene.input.case_files import CaseEntry
-from catenary.meshgen.line import Line
+from catenary.meshgen.spans import Spans
 from catenary.postproc.evaluate.comparing import decimals_that_tell
 from catenary.postproc.evaluate.wording import counted, fixed
 
@@ -94,7 +94,7 @@ def _number(value: float | None, digits: int = 1) -> str:
     return "-" if value is None else fixed(value, digits)
 
 
-def static_text(table: Mapping[str, Any], line: Line) -> str:
+def static_text(table: Mapping[str, Any], line: Spans) -> str:
     """Dropper table, sag and elasticity of a line at rest.
 
     Parameters

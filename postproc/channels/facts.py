@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from catenary.meshgen.mesh import CONTACT_WIRE
+from catenary.meshgen.line import Role, Wire
 from catenary.solver.problem.contact_laws import ContactLaw, HertzLaw, LinearLaw
 from catenary.solver.problem.integrator_parameters import Integration, integration_of
 from catenary.solver.time_loop.channels import PANTOGRAPH, RUN
@@ -89,6 +89,11 @@ def _integration(source: Derivation) -> Integration:
     return integration_of(*own)
 
 
+def _contact(source: Derivation) -> Wire:
+    """The first contact wire."""
+    return source.problem.line.wires_of(Role.CONTACT)[0]
+
+
 def _damping(source: Derivation, component: str) -> tuple[float, float]:
     own = source.problem.damping
     return own.per_component.get(component, (own.alpha, own.beta))
@@ -96,19 +101,18 @@ def _damping(source: Derivation, component: str) -> tuple[float, float]:
 
 def _longest_element(source: Derivation) -> float:
     """Of the contact wire, where it is evaluated."""
-    x = source.mesh.x(source.mesh.wires[CONTACT_WIRE])
+    x = source.mesh.x(source.mesh.wires[_contact(source).name])
     start, end = source.problem.evaluation
     lengths = np.diff(x)[(x[1:] > start) & (x[:-1] < end)]
     return float(lengths.max(initial=np.diff(x).min()))
 
 
 def _stiffest_dropper(source: Derivation) -> float:
-    kind = source.problem.line.dropper
-    if not source.dropper_length.size:
-        return 0.0
-    if kind.axial_stiffness is not None:
-        return float(kind.axial_stiffness / source.dropper_length.min())
-    return _or_none(kind.stiffness)
+    stiffest = 0.0
+    for number, group in enumerate(source.problem.line.droppers):
+        length = source.dropper_length[source.mesh.dropper_group == number]
+        stiffest = max(stiffest, float(group.kind.stiffness_at(length).max(initial=0.0)))
+    return stiffest
 
 
 def _stiffness_under(law: ContactLaw, force: float) -> float:
@@ -187,7 +191,7 @@ FACTS: dict[str, Fact] = {
     "wave_speed": Fact(
         "m/s",
         "speed of transverse waves on the contact wire as a string, at the start",
-        lambda source: source.problem.line.contact_wire.wave_speed,
+        lambda source: _contact(source).wave_speed,
         low=_POSITIVE,
         high=1e6,
         earlier="wave_speed_m_per_s",
@@ -195,29 +199,29 @@ FACTS: dict[str, Fact] = {
     "contact_wire_tension": Fact(
         "N",
         "tension of the contact wire at the start",
-        lambda source: source.problem.line.contact_wire.tension,
+        lambda source: _contact(source).tension,
         low=1e-6,
     ),
     "contact_wire_mass": Fact(
         "kg/m",
         "mass per length of the contact wire",
-        lambda source: source.problem.line.contact_wire.mass_per_length,
+        lambda source: _contact(source).mass_per_length,
         low=1e-9,
     ),
     "contact_wire_bending_stiffness": Fact(
         "N m2",
         "bending stiffness of the contact wire",
-        lambda source: source.problem.line.contact_wire.bending_stiffness,
+        lambda source: _contact(source).bending_stiffness,
     ),
     "contact_wire_stiffness_damping": Fact(
         "s",
         "alpha of the contact wire's proportional damping C = alpha K + beta M",
-        lambda source: _damping(source, CONTACT_WIRE)[0],
+        lambda source: _damping(source, _contact(source).name)[0],
     ),
     "contact_wire_mass_damping": Fact(
         "1/s",
         "beta of the contact wire's proportional damping C = alpha K + beta M",
-        lambda source: _damping(source, CONTACT_WIRE)[1],
+        lambda source: _damping(source, _contact(source).name)[1],
     ),
     "longest_element": Fact(
         "m",
@@ -230,7 +234,10 @@ FACTS: dict[str, Fact] = {
     "dropper_stiffness_damping": Fact(
         "s",
         "alpha of the droppers' proportional damping C = alpha K + beta M",
-        lambda source: _damping(source, "droppers")[0],
+        lambda source: max(
+            (_damping(source, group.name)[0] for group in source.problem.line.droppers),
+            default=0.0,
+        ),
     ),
     "static_force": Fact(
         "N",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from catenary.meshgen.line import Line
-from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
+from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.channels.facts import FACTS
 
 if TYPE_CHECKING:
@@ -77,10 +77,14 @@ def line_datasets(
 
 
 def static_datasets(
-    mesh: LineMesh, equilibrium: Equilibrium, elasticity: Elasticity
+    mesh: LineMesh, contact: np.ndarray, equilibrium: Equilibrium, elasticity: Elasticity
 ) -> dict[str, np.ndarray]:
-    """Datasets of ``/static``: droppers, profile and elasticity at rest. Not collective."""
-    contact = mesh.wires[CONTACT_WIRE]
+    """Datasets of ``/static``: droppers, profile and elasticity at rest. Not collective.
+
+    Parameters
+    ----------
+    contact : (n,) nodes of the contact wire
+    """
     return {
         "static/dropper_length": equilibrium.dropper_length,
         "static/dropper_force": equilibrium.dropper_force,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.contact import contact_kernels
 from catenary.solver.contact.contact_kernels import NODE, TOUCH
 from catenary.solver.model.model import Model
@@ -26,7 +25,7 @@ class ContactWire:
     """
 
     def __init__(self, model: Model, form: Equilibrium, ownership: Ownership) -> None:
-        nodes = model.mesh.wires[CONTACT_WIRE]
+        nodes = model.contact_nodes
         self.x = model.mesh.x(nodes)
         self.dofs = np.stack([model.dofs(nodes), model.dofs(nodes, "theta_y")], axis=1)
         mine = ownership.owned(self.dofs)

@@ -18,7 +18,7 @@ from catenary.mbs.lowering import LoweredPantograph
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.roll import roll_of
 from catenary.mbs.vehicle.base_motion import BaseMotion
-from catenary.meshgen.mesh import CONTACT_WIRE
+from catenary.meshgen.line import Role
 from catenary.solver.base.bound import bound
 from catenary.solver.base.parallel import on_root
 from catenary.solver.contact import contact_kernels
@@ -228,10 +228,10 @@ def _lateral_path(
     """Where the wire crosses the strips of a pantograph, None if its head cannot roll."""
     if roll_of(placement.data) is None:
         return None
-    line, train = problem.line, problem.train
+    train, wire = problem.train, problem.line.wires_of(Role.CONTACT)[0]
     return LateralPath(
-        line.support_positions,
-        line.stagger,
+        np.concatenate([piece.x for piece in wire.pieces]),
+        tuple(y for piece in wire.pieces for y in piece.y),
         train.start - placement.behind,
         placement.data.strip_offsets,
         train.speed,
@@ -248,7 +248,7 @@ def nominal_height_rule(
     ``elasticity`` when the static force lifts it, so that the base spring neither adds to the
     mean force nor takes from it.
     """
-    nodes = model.mesh.wires[CONTACT_WIRE]
+    nodes = model.contact_nodes
     x = elasticity.x
     at_rest = np.interp(x, model.mesh.x(nodes), form.height[nodes])
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from catenary.mbs.roll import roll_of
-from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.effects import target_heights
 from catenary.solver.effects.effect import Effect, Limit, register
 from catenary.solver.problem.contact_laws import KinematicLaw
@@ -19,38 +18,50 @@ if TYPE_CHECKING:
 
 
 def _vertical(builder: ModelBuilder) -> None:
-    mesh, line, model = builder.mesh, builder.problem.line, builder.model
-    builder.add_wire(MESSENGER_WIRE)
-    builder.add_wire(CONTACT_WIRE)
-    builder.add_links("droppers", mesh.droppers, "w", model.dropper_stiffness)
-    builder.add_springs("supports", mesh.supports, "w", line.support_stiffness)
+    mesh, line = builder.mesh, builder.problem.line
+    for wire in reversed(line.wires):
+        builder.add_wire(wire.name)
+    stiffness = builder.model.dropper_stiffness
+    for number, droppers in enumerate(line.droppers):
+        mine = mesh.dropper_group == number
+        builder.add_links(droppers.name, mesh.droppers[mine], "w", stiffness[mine])
+    for number, supports in enumerate(line.supports):
+        nodes = mesh.supports[mesh.support_group == number]
+        builder.add_springs(supports.name, nodes, "w", supports.stiffness)
     builder.hold(mesh.anchors, "w")
 
 
 def _dropper_mass(builder: ModelBuilder) -> None:
-    half = 0.5 * builder.problem.line.dropper.mass_per_length * builder.model.dropper_lengths
-    for side in (0, 1):
-        builder.add_masses("droppers", builder.mesh.droppers[:, side], half)
+    mesh = builder.mesh
+    for number, droppers in enumerate(builder.problem.line.droppers):
+        mine = mesh.dropper_group == number
+        half = 0.5 * droppers.kind.mass_per_length * builder.model.dropper_lengths[mine]
+        for side in (0, 1):
+            builder.add_masses(droppers.name, mesh.droppers[mine, side], half)
 
 
 def _clamp_mass(builder: ModelBuilder) -> None:
-    kind, mesh = builder.problem.line.dropper, builder.mesh
-    builder.add_masses(MESSENGER_WIRE, mesh.droppers[:, 0], kind.messenger_clamp_mass)
-    builder.add_masses(CONTACT_WIRE, mesh.droppers[:, 1], kind.contact_clamp_mass)
+    mesh = builder.mesh
+    for number, droppers in enumerate(builder.problem.line.droppers):
+        upper, lower = mesh.droppers[mesh.dropper_group == number].T
+        builder.add_masses(droppers.upper, upper, droppers.kind.upper_clamp_mass)
+        builder.add_masses(droppers.lower, lower, droppers.kind.lower_clamp_mass)
 
 
 def _arm_inertia(builder: ModelBuilder) -> None:
-    arm, nodes = builder.problem.line.steady_arm, builder.mesh.steady_arms
-    rod = arm.mass_per_length * arm.length
-    # A rod hinged at its far end: a third of its mass moves with the wire, half of it hangs there.
-    builder.add_masses(
-        "steady_arms", nodes, rod / 3 + arm.clamp_mass, hanging_mass=rod / 2 + arm.clamp_mass
-    )
+    mesh = builder.mesh
+    for number, arms in enumerate(builder.problem.line.steady_arms):
+        nodes, clamp = mesh.steady_arms[mesh.arm_group == number], arms.kind.clamp_mass
+        rod = arms.kind.mass_per_length * arms.kind.length
+        # A rod hinged at its far end: a third of its mass moves with the wire, half of it hangs.
+        builder.add_masses(arms.name, nodes, rod / 3 + clamp, hanging_mass=rod / 2 + clamp)
 
 
 def _arm_stiffness(builder: ModelBuilder) -> None:
-    nodes = builder.mesh.steady_arms
-    builder.add_springs("steady_arms", nodes, "w", builder.problem.line.steady_arm.stiffness)
+    mesh = builder.mesh
+    for number, arms in enumerate(builder.problem.line.steady_arms):
+        nodes = mesh.steady_arms[mesh.arm_group == number]
+        builder.add_springs(arms.name, nodes, "w", arms.kind.stiffness)
 
 
 def _shaped(laws: Simulated, by: TargetHeight) -> Simulated:
@@ -97,7 +108,7 @@ register(
         "paper section 1 (pre-sag of 1/1000)",
         default=True,
         requires=("gravity",),
-        applies=lambda p: any(any(sag) for sag in p.line.pre_sag),
+        applies=lambda p: any(any(wanted.sag) for wanted in p.line.profiles),
         law=lambda laws, p: _shaped(laws, target_heights.pre_sag),
     )
 )
@@ -108,7 +119,9 @@ register(
         "target heights of the form finding at both ends",
         "paper section 5, figure 4",
         default=True,
-        applies=lambda p: any(p.line.n_transition) and p.line.transition_rise > 0,
+        applies=lambda p: (
+            any(p.line.n_transition) and any(wanted.rise > 0 for wanted in p.line.profiles)
+        ),
         law=lambda laws, p: _shaped(laws, target_heights.transition),
     )
 )
@@ -119,7 +132,7 @@ register(
         "half of each dropper's mass at either end",
         "paper Table 1",
         default=True,
-        applies=lambda p: p.line.dropper.mass_per_length > 0,
+        applies=lambda p: any(group.kind.mass_per_length > 0 for group in p.line.droppers),
         build=_dropper_mass,
     )
 )
@@ -127,11 +140,12 @@ register(
     Effect(
         "clamp_mass",
         "mass of the dropper clamps",
-        "lumped masses on both wires",
+        "lumped masses at both ends of the droppers",
         "paper section 2 and Table 1",
         default=True,
-        applies=lambda p: (
-            p.line.dropper.messenger_clamp_mass + p.line.dropper.contact_clamp_mass > 0
+        applies=lambda p: any(
+            group.kind.upper_clamp_mass + group.kind.lower_clamp_mass > 0
+            for group in p.line.droppers
         ),
         build=_clamp_mass,
     )
@@ -143,10 +157,9 @@ register(
         "a third of the hinged arm's mass and its clamp on the contact wire",
         "paper Table 1; hinged rod",
         default=True,
-        applies=lambda p: (
-            p.line.steady_arm.clamp_mass
-            + p.line.steady_arm.mass_per_length * p.line.steady_arm.length
-            > 0
+        applies=lambda p: any(
+            group.kind.clamp_mass + group.kind.mass_per_length * group.kind.length > 0
+            for group in p.line.steady_arms
         ),
         build=_arm_inertia,
     )
@@ -158,7 +171,7 @@ register(
         "springs from the contact wire to the ground at the arms",
         "EN 50318:2002 reference model",
         default=True,
-        applies=lambda p: p.line.steady_arm.stiffness > 0,
+        applies=lambda p: any(group.kind.stiffness > 0 for group in p.line.steady_arms),
         build=_arm_stiffness,
     )
 )

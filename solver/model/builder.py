@@ -23,7 +23,7 @@ class ModelBuilder:
     def add_wire(self, wire: str, unknowns: tuple[str, str] = ("w", "theta_y")) -> None:
         """Bending and tension of a wire in the plane of two unknowns; its mass and weight."""
         dofs, length = wire_elements(self.model, wire, unknowns)
-        data = getattr(self.problem.line, wire)
+        data = self.problem.line.wire(wire)
         self._add_block(
             wire,
             dofs,

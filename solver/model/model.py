@@ -11,7 +11,8 @@ from typing import Protocol
 
 import numpy as np
 
-from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
+from catenary.meshgen.line import Role
+from catenary.meshgen.mesh import LineMesh
 from catenary.solver.model.unknowns import Unknowns
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
@@ -94,17 +95,16 @@ class Model:
 
     @property
     def dropper_stiffness(self) -> np.ndarray:
-        kind = self.problem.line.dropper
-        if kind.stiffness is not None:
-            stiffness = np.full(self.mesh.droppers.shape[0], kind.stiffness)
-        else:
-            assert kind.axial_stiffness is not None
-            stiffness = kind.axial_stiffness / self.dropper_lengths
+        stiffness = np.zeros(self.mesh.droppers.shape[0])
+        for number, group in enumerate(self.problem.line.droppers):
+            mine = self.mesh.dropper_group == number
+            stiffness[mine] = group.kind.stiffness_at(self.dropper_lengths[mine])
         return np.where(self.broken, 0.0, stiffness)
 
     @property
     def dropper_damping(self) -> np.ndarray:
-        return self.damping_of("droppers")[0] * self.dropper_stiffness
+        alphas = [self.damping_of(group.name)[0] for group in self.problem.line.droppers]
+        return np.array([*alphas, 0.0])[self.mesh.dropper_group] * self.dropper_stiffness
 
     @property
     def released_damping(self) -> np.ndarray:
@@ -127,16 +127,23 @@ class Model:
 
     @property
     def contact_x(self) -> np.ndarray:
-        """Positions of the contact wire's nodes [m], ascending."""
-        return self.mesh.x(self.mesh.wires[CONTACT_WIRE])
+        """Positions of the (first) contact wire's nodes [m], ascending."""
+        return self.mesh.x(self.contact_nodes)
+
+    @property
+    def contact_nodes(self) -> np.ndarray:
+        """Nodes of the (first) contact wire, in order of x."""
+        return self.nodes_of(Role.CONTACT)[0]
+
+    def nodes_of(self, role: Role) -> list[np.ndarray]:
+        """Nodes of each wire of a role, in order of x."""
+        return [self.mesh.wires[wire.name] for wire in self.problem.line.wires_of(role)]
 
 
 def wire_elements(
     model: Model, wire: str, unknowns: tuple[str, str]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Element unknowns (n, 4) of a wire in the plane of two unknowns, and lengths (n,) [m]."""
-    nodes = model.mesh.wires[wire]
-    w = model.dofs(nodes, unknowns[0])
-    theta = model.dofs(nodes, unknowns[1])
-    dofs = np.stack([w[:-1], theta[:-1], w[1:], theta[1:]], axis=1)
-    return dofs, np.diff(model.mesh.x(nodes))
+    first, second = model.mesh.elements(wire).T
+    ends = [model.dofs(nodes, name) for nodes in (first, second) for name in unknowns]
+    return np.stack(ends, axis=1), model.mesh.x(second) - model.mesh.x(first)

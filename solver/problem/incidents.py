@@ -22,7 +22,7 @@ class DropperBreak:
 class TensionLoss:
     """From ``time`` [s] on a ``wire`` has only the ``share`` of its first tension.
 
-    ``wire`` is a wire of the mesh, ``contact_wire`` or ``messenger_wire``.
+    ``wire`` is the name of a wire of the line.
     """
 
     time: float

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from catenary.mbs.vehicle.motion_sources import VehicleMotion
-from catenary.meshgen.line import Line
-from catenary.meshgen.mesh import CONTACT_WIRE
+from catenary.meshgen.line import Line, Role
 from catenary.solver.problem.contact_laws import ContactLaw
 from catenary.solver.problem.incidents import LineIncident, TensionLoss
 
@@ -26,8 +25,8 @@ class Damping:
     """Proportional damping C = alpha K + beta M (paper, section 2).
 
     ``alpha`` [s] acts on stiffness, ``beta`` [1/s] on mass. ``per_component`` replaces both for
-    the components that it names (``contact_wire``, ``messenger_wire``, ``droppers``,
-    ``steady_arms``, ``supports``) with a pair (alpha, beta).
+    the components that it names (wires and groups of droppers, arms and supports, by
+    their names in the line) with a pair (alpha, beta).
     """
 
     alpha: float
@@ -134,7 +133,10 @@ def n_halvings(dt: float, smallest: float | None) -> int:
 
 
 def slowest_wave_speed(problem: Problem) -> float:
-    """Least wave speed of the contact wire in a run, losses of its tension included [m/s]."""
-    losses = (i for i in problem.incidents if isinstance(i, TensionLoss) and i.wire == CONTACT_WIRE)
-    share = min((loss.share for loss in losses), default=1.0)
-    return share**0.5 * problem.line.contact_wire.wave_speed
+    """Least wave speed of the contact wires in a run, losses of tension included [m/s]."""
+    losses = [loss for loss in problem.incidents if isinstance(loss, TensionLoss)]
+    return min(
+        min((loss.share for loss in losses if loss.wire == wire.name), default=1.0) ** 0.5
+        * wire.wave_speed
+        for wire in problem.line.wires_of(Role.CONTACT)
+    )

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.mbs.vehicle.motion_sources import VehicleMotion
-from catenary.meshgen.line import Line
+from catenary.meshgen.line import Profile
 from catenary.solver.problem.contact_laws import ContactLaw
 from catenary.solver.problem.incidents import LineIncident
 from catenary.solver.problem.problem import Damping
 
-# Height [m] above ``Line.contact_height`` that the contact wire is to have at positions x [m].
-TargetHeight = Callable[[Line, np.ndarray], np.ndarray]
+# Height [m] above ``Profile.height`` that a wire with a profile is to have at positions x [m].
+TargetHeight = Callable[[Profile, np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,8 @@ class Simulated:
     ----------
     contact : law of the contact; without its damping, unless an effect adds it
     gravity : of all masses [m/s2]; at 0 nothing has weight and droppers carry nothing at rest
-    target_heights : functions whose sum is the contact wire's height at rest above
-        ``Line.contact_height`` [m]
+    target_heights : functions whose sum is the height at rest of wires with a profile above
+        ``Profile.height`` [m]
     damping : of the line's components
     slackening : whether droppers slacken
     kept_ratio : share of its stiffness that a pushed dropper keeps; 1 if droppers do not slacken
@@ -51,9 +51,9 @@ class Simulated:
     vehicle: VehicleMotion | None = None
     incidents: tuple[LineIncident, ...] = ()
 
-    def target_height(self, line: Line, x: np.ndarray) -> np.ndarray:
-        """Height that the contact wire is to have at rest at positions ``x``, shape as x [m]."""
-        height = np.full_like(x, line.contact_height, dtype=float)
+    def target_height(self, wanted: Profile, x: np.ndarray) -> np.ndarray:
+        """Height that a wire is to have at rest at positions ``x``, shape as x [m]."""
+        height = np.full_like(x, wanted.height, dtype=float)
         for above in self.target_heights:
-            height += above(line, x)
+            height += above(wanted, x)
         return height

@@ -18,7 +18,6 @@ from scipy import sparse
 
 from catenary.mbs.head.newmark_head import raised
 from catenary.mbs.lumped_data import LumpedData
-from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.model.matrices import iterate_entries
 from catenary.solver.model.model import Model
 from catenary.solver.model.shape_functions import shape_slopes, shape_values
@@ -84,7 +83,7 @@ class WholeSystem:
                 for place, kind in zip(train.placements, data, strict=True)
             ]
         )
-        nodes = model.mesh.wires[CONTACT_WIRE]
+        nodes = model.contact_nodes
         self._x = model.mesh.x(nodes)
         self._wire = np.stack([model.dofs(nodes), model.dofs(nodes, "theta_y")], axis=1)
         self._rest = np.stack([form.height[nodes], form.slope[nodes]], axis=1)

@@ -28,7 +28,6 @@ from typing import Any
 
 import numpy as np
 
-from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.effects.build_model import build
 from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.step_operators import LineOperators
@@ -38,7 +37,6 @@ from catenary.solver.model.matrices import iterate_entries
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.problem.incidents import DropperBreak, LineIncident
-from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.equilibrium import Equilibrium
 
 
@@ -73,15 +71,14 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
             broken[dropper_at(first, incident.x)] = True
         else:
             shares[incident.wire] = incident.share
-    after = replace(problem, line=replace(problem.line, **_wires(problem, shares)))
+    after = replace(problem, line=problem.line.with_shares(shares))
     model = build(after, mesh, first.dropper_lengths, broken)
     load, energy = np.zeros(model.n_dofs), 0.0
     for wire, share in shares.items():
         dofs, length = first.wire_elements(wire)
-        lost = (share - 1.0) * getattr(problem.line, wire).tension
-        nodes = mesh.wires[wire]
-        at = np.stack([form.height[nodes], form.slope[nodes]], axis=1)
-        shape = np.concatenate([at[:-1], at[1:]], axis=1)
+        lost = (share - 1.0) * problem.line.wire(wire).tension
+        pairs = mesh.elements(wire)
+        shape = np.stack([form.height[pairs], form.slope[pairs]], axis=2).reshape(-1, 4)
         pull = np.einsum("nij,nj->ni", elements.stiffness(length, 0.0, lost), shape)
         np.add.at(load, dofs, -pull)
         energy += 0.5 * float((shape * pull).sum())
@@ -138,15 +135,6 @@ def acceleration_jump(
     held = after.model.constrained[ownership.owned(after.model.constrained)] - first
     force[held] = 0.0
     return _divided_by_mass(comm, ownership, after.model, force)
-
-
-def _wires(problem: Problem, shares: dict[str, float]) -> dict[str, Any]:
-    """The wires of a line whose tension is a share of what it was, by field of the line."""
-    wires = {}
-    for name in (CONTACT_WIRE, MESSENGER_WIRE):
-        wire = getattr(problem.line, name)
-        wires[name] = replace(wire, tension=shares.get(name, 1.0) * wire.tension)
-    return wires
 
 
 def _times(

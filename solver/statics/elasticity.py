@@ -8,8 +8,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from catenary.meshgen.line import Line
-from catenary.meshgen.mesh import CONTACT_WIRE
+from catenary.meshgen.spans import Spans
 from catenary.solver.model.matrices import stiffness_matrix
 from catenary.solver.model.model import Model
 
@@ -28,7 +27,7 @@ def elasticity(model: Model, x_from: float, x_to: float) -> Elasticity:
     Droppers taut, arms included. The line outside is condensed to the unknowns that it is joined
     to, exactly; then there is a small solve for each node. Not collective.
     """
-    nodes = model.mesh.wires[CONTACT_WIRE]
+    nodes = model.contact_nodes
     x = model.mesh.x(nodes)
     inside = np.flatnonzero((x >= x_from - 1e-9) & (x <= x_to + 1e-9))
     first, last = model.numbering.within(x_from, x_to)
@@ -62,7 +61,7 @@ def _condensed(matrix: sparse.csc_matrix, first: int, last: int) -> sparse.csc_m
     return (inner - change).tocsc()
 
 
-def middle_span(line: Line) -> tuple[float, float]:
+def middle_span(line: Spans) -> tuple[float, float]:
     """Ends of the running span in the middle of the line [m]."""
     masts = line.support_positions
     first, last = line.n_transition[0], line.n_spans - line.n_transition[1]

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from catenary.meshgen.line import Line
-from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
+from catenary.meshgen.line import Line, Role
+from catenary.meshgen.mesh import LineMesh
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects.build_model import build
 from catenary.solver.model import elements
@@ -71,25 +71,27 @@ def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
 
 def _form(model: Model) -> Equilibrium:
     mesh, line = model.mesh, model.problem.line
-    contact, messenger = mesh.wires[CONTACT_WIRE], mesh.wires[MESSENGER_WIRE]
+    lower_wire, upper_wire = line.wires_of(Role.CONTACT)[0], line.wires_of(Role.MESSENGER)[0]
+    contact, messenger = mesh.wires[lower_wire.name], mesh.wires[upper_wire.name]
+    assert lower_wire.profile is not None
     weighted = model.simulated.gravity != 0.0
     height = np.zeros(mesh.n_nodes)
     slope = np.zeros(mesh.n_nodes)
 
     lower = mesh.droppers[:, 1]
-    arms = mesh.steady_arms if line.steady_arm.holds_height else mesh.steady_arms[:0]
+    arms = mesh.steady_arms if line.steady_arms[0].kind.holds_height else mesh.steady_arms[:0]
     held = np.concatenate([lower, arms, mesh.anchors[np.isin(mesh.anchors, contact)]])
-    target = model.simulated.target_height(line, mesh.x(held))
+    target = model.simulated.target_height(lower_wire.profile, mesh.x(held))
     load = model.weight.copy()
-    reaction = _rest_on(model, CONTACT_WIRE, held, target, load, height, slope)
+    reaction = _rest_on(model, lower_wire.name, held, target, load, height, slope)
     force = reaction[: lower.size] if weighted else np.zeros(lower.size)
 
     np.add.at(load, model.dofs(mesh.droppers[:, 0]), -force)
-    top = line.contact_height + line.encumbrance
+    top = upper_wire.top
     ends = mesh.anchors[np.isin(mesh.anchors, messenger)]
     # A support is a spring relaxed at the encumbrance: it gives way under the line's weight.
-    springs = (mesh.supports, line.support_stiffness, top)
-    _rest_on(model, MESSENGER_WIRE, ends, np.full(ends.size, top), load, height, slope, springs)
+    springs = (mesh.supports, line.supports[0].stiffness, top)
+    _rest_on(model, upper_wire.name, ends, np.full(ends.size, top), load, height, slope, springs)
 
     stretched = height[mesh.droppers[:, 0]] - height[lower]
     return Equilibrium(height, slope, force, stretched - force / model.dropper_stiffness)
@@ -112,7 +114,7 @@ def _rest_on(
     """
     nodes = model.mesh.wires[wire]
     length = np.diff(model.mesh.x(nodes))
-    data = getattr(model.problem.line, wire)
+    data = model.problem.line.wire(wire)
     band = _chain_band(elements.stiffness(length, data.bending_stiffness, data.tension))
     place = np.full(model.mesh.n_nodes, -1)
     place[nodes] = np.arange(nodes.size)

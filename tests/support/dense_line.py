@@ -56,7 +56,7 @@ class DenseLine:
         self.size = n + 2
         mass, stiffness = np.zeros((2, self.size, self.size))
         for wire in (CONTACT_WIRE, MESSENGER_WIRE):
-            data, nodes = getattr(line, wire), mesh.wires[wire]
+            data, nodes = line.wire(wire), mesh.wires[wire]
             for left, right in zip(nodes[:-1], nodes[1:], strict=True):
                 length = mesh.points[right, 0] - mesh.points[left, 0]
                 place = 0.5 * length * (1.0 + _POINTS)
@@ -71,12 +71,13 @@ class DenseLine:
         self.pull = np.zeros((len(mesh.droppers), self.size))
         for row, (upper, lower) in zip(self.pull, mesh.droppers, strict=True):
             row[2 * upper], row[2 * lower] = 1.0, -1.0
-        assert line.dropper.stiffness is not None
-        self.k = line.dropper.stiffness
+        (droppers,), (supports,), (arms,) = line.droppers, line.supports, line.steady_arms
+        assert droppers.kind.stiffness is not None
+        self.k = droppers.kind.stiffness
         stiffness += self.k * self.pull.T @ self.pull
         for nodes, value in (
-            (mesh.supports, line.support_stiffness),
-            (mesh.steady_arms, line.steady_arm.stiffness),
+            (mesh.supports, supports.stiffness),
+            (mesh.steady_arms, arms.kind.stiffness),
         ):
             stiffness[2 * nodes, 2 * nodes] += value
         alpha, beta = self.problem.damping.alpha, self.problem.damping.beta

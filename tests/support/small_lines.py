@@ -7,8 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from catenary.mbs.lumped_data import LumpedData
-from catenary.meshgen.line import DropperKind, Line, SteadyArm, Wire
-from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
+from catenary.meshgen.geometry import find_cuts
+from catenary.meshgen.line import Conductor, DropperKind, Line, SteadyArm
+from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.topologies.all_topologies import make_line
+from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import (
     Damping,
@@ -37,8 +40,8 @@ WHOLE = HANGING | {
     "several_pantographs",
 }
 
-EN_CONTACT_WIRE = Wire(tension=20e3, mass_per_length=1.35, bending_stiffness=195.0)
-EN_MESSENGER_WIRE = Wire(tension=16e3, mass_per_length=1.07, bending_stiffness=131.7)
+EN_CONTACT_WIRE = Conductor(tension=20e3, mass_per_length=1.35, bending_stiffness=195.0)
+EN_MESSENGER_WIRE = Conductor(tension=16e3, mass_per_length=1.07, bending_stiffness=131.7)
 # EN 50318:2002, annex: head 7.2 kg, frame 15 kg.
 EN_PANTOGRAPH = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0))
 # One mass without springs: what it does against a rigid wire has a closed form.
@@ -46,10 +49,12 @@ FREE_MASS = LumpedData((8.0,), (0.0,), (0.0,))
 
 
 def bare_wires(
-    length: float, contact_wire: Wire = EN_CONTACT_WIRE, messenger_wire: Wire = EN_MESSENGER_WIRE
-) -> Line:
+    length: float,
+    contact_wire: Conductor = EN_CONTACT_WIRE,
+    messenger_wire: Conductor = EN_MESSENGER_WIRE,
+) -> LineData:
     """One span of ``length`` [m] without droppers: two wires pinned at both ends, not coupled."""
-    return Line(
+    return LineData(
         span_lengths=(length,),
         dropper_positions=((),),
         pre_sag=((),),
@@ -66,7 +71,7 @@ def bare_wires(
     )
 
 
-def en50318_line(n_spans: int) -> Line:
+def en50318_line(n_spans: int) -> LineData:
     """The reference line of EN 50318:2002: spans of 60 m, 9 massless droppers, no pre-sag."""
     droppers = (5.0, 10.5, 17.0, 23.5, 30.0, 36.5, 43.0, 49.5, 55.0)
     return replace(
@@ -79,18 +84,18 @@ def en50318_line(n_spans: int) -> Line:
     )
 
 
-def ac_simple_line(n_spans: int) -> Line:
+def ac_simple_line(n_spans: int) -> LineData:
     """The simple AC catenary of the benchmark of ten codes (2015): pre-sag, clamps, steady arms."""
     sag = tuple(millimetres / 1000 for millimetres in (0, 24, 41, 52, 55, 52, 41, 24, 0))
-    return Line(
+    return LineData(
         span_lengths=(55.0,) * n_spans,
         dropper_positions=(tuple(4.5 + 5.75 * k for k in range(9)),) * n_spans,
         pre_sag=(sag,) * n_spans,
         stagger=tuple(0.2 * (-1) ** i for i in range(n_spans + 1)),
         contact_height=5.08,
         encumbrance=1.2,
-        contact_wire=Wire(22e3, 1.35, 195.0),
-        messenger_wire=Wire(16e3, 1.08, 131.7),
+        contact_wire=Conductor(22e3, 1.35, 195.0),
+        messenger_wire=Conductor(16e3, 1.08, 131.7),
         dropper=DropperKind(1e5, None, 0.117, 0.195, 0.165),
         support_stiffness=5e5,
         steady_arm=SteadyArm(1.22, 0.73, 0.2, 0.0),
@@ -99,36 +104,60 @@ def ac_simple_line(n_spans: int) -> Line:
     )
 
 
-def mesh_of(line: Line, elements_per_gap: int) -> LineMesh:
-    """Equal elements between neighbouring masts and droppers, the same on both wires."""
-    masts = line.support_positions
-    droppers = np.array(
+def mesh_of(line: LineData | Line, elements_per_gap: int) -> LineMesh:
+    """Equal elements between neighbouring cuts, on all wires; heights without pre-sag and sag."""
+    line = make_line(line) if isinstance(line, LineData) else line
+    cuts = find_cuts(line)
+    share = np.arange(elements_per_gap) / elements_per_gap
+    gaps = cuts.x[:-1, None] + np.diff(cuts.x)[:, None] * share
+    x = np.append(gaps.ravel(), cuts.x[-1])
+    points, anchors, n_nodes = [], [], 0
+    wires: dict[str, np.ndarray] = {}
+    breaks: dict[str, np.ndarray] = {}
+    node_at = {wire.name: np.full(x.size, -1) for wire in line.wires}
+    for piece in cuts.pieces:
+        wire, first = line.wire(piece.wire), piece.first * elements_per_gap
+        place = np.arange(first, first + (len(piece.points) - 1) * elements_per_gap + 1)
+        nodes = n_nodes + np.arange(place.size)
+        n_nodes += place.size
+        level = wire.profile.level(x[place]) if wire.profile else np.full(place.size, wire.top)
+        points.append(np.column_stack([x[place], np.zeros(place.size), level]))
+        anchors += [nodes[end] for end, held in zip((0, -1), piece.ends, strict=True) if held]
+        node_at[piece.wire][place] = nodes
+        if piece.wire in wires:
+            begun = breaks.get(piece.wire, np.zeros(0, dtype=np.int64))
+            breaks[piece.wire] = np.append(begun, wires[piece.wire].size)
+        wires[piece.wire] = np.append(wires.get(piece.wire, nodes[:0]), nodes)
+
+    def at(wire: str, places: tuple[float, ...]) -> np.ndarray:
+        return node_at[wire][np.searchsorted(x, np.array(places) - 1e-6)]
+
+    def together(members: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        nodes = np.concatenate([members[0][:0], *members])
+        group = np.repeat(np.arange(len(members)), [len(own) for own in members])
+        order = np.argsort(whole[nodes.T[-1] if nodes.ndim == 2 else nodes, 0], kind="stable")
+        return nodes[order], group[order]
+
+    whole = np.concatenate(points)
+    droppers, dropper_group = together(
         [
-            mast + place
-            for mast, places in zip(masts[:-1], line.dropper_positions, strict=True)
-            for place in places
+            np.column_stack([at(group.upper, group.upper_x), at(group.lower, group.lower_x)])
+            for group in line.droppers
         ]
     )
-    cuts = np.unique(np.concatenate([masts, droppers]).round(9))
-    share = np.arange(elements_per_gap) / elements_per_gap
-    x = np.append((cuts[:-1, None] + np.diff(cuts)[:, None] * share).ravel(), cuts[-1])
-    n = x.size
-    points = np.zeros((2 * n, 3))
-    points[:, 0] = np.tile(x, 2)
-    points[:n, 2] = line.target_height(x)
-    points[n:, 2] = line.contact_height + line.encumbrance
-
-    def nodes_at(places: np.ndarray) -> np.ndarray:
-        return np.searchsorted(x, places - 1e-6)
-
-    at_droppers, at_masts = nodes_at(droppers), nodes_at(masts[1:-1])
+    arms, arm_group = together([at(group.wire, group.x) for group in line.steady_arms])
+    supports, support_group = together([at(group.wire, group.x) for group in line.supports])
     return LineMesh(
-        points=points,
-        wires={CONTACT_WIRE: np.arange(n), MESSENGER_WIRE: n + np.arange(n)},
-        droppers=np.column_stack([n + at_droppers, at_droppers]),
-        steady_arms=at_masts,
-        supports=n + at_masts,
-        anchors=np.array([0, n - 1, n, 2 * n - 1]),
+        points=whole,
+        wires=wires,
+        droppers=droppers,
+        steady_arms=arms,
+        supports=supports,
+        anchors=np.array(anchors),
+        dropper_group=dropper_group,
+        arm_group=arm_group,
+        support_group=support_group,
+        breaks=breaks,
     )
 
 
@@ -158,11 +187,13 @@ def train(
     return Train(speed, start, end, raise_time, placements)
 
 
-def problem_of(line: Line, effects: frozenset[str] = WHOLE, **changes: object) -> Problem:
+def problem_of(
+    line: LineData | Line, effects: frozenset[str] = WHOLE, **changes: object
+) -> Problem:
     """A problem on ``line`` with the damping and contact of EN 50318; keywords replace fields."""
     first, last = line.running_range
     usual = Problem(
-        line=line,
+        line=make_line(line) if isinstance(line, LineData) else line,
         damping=Damping(alpha=1e-4, beta=0.0125),
         contact=LinearLaw(stiffness=5e4, damping=0.0),
         train=train(70.0, first, last),

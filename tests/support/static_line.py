@@ -8,7 +8,6 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.model import elements
 from catenary.solver.model.model import Model
 from catenary.solver.statics.equilibrium import Equilibrium
@@ -27,17 +26,16 @@ def absolute_rest(
     mesh, line = model.mesh, model.problem.line
     matrix = sparse.lil_matrix((model.n_dofs, model.n_dofs))
     load = model.weight.copy()
-    for wire in (CONTACT_WIRE, MESSENGER_WIRE):
+    for wire in mesh.wires:
         dofs, length = model.wire_elements(wire)
-        stiffness = elements.stiffness(
-            length, getattr(line, wire).bending_stiffness, tensions[wire]
-        )
+        stiffness = elements.stiffness(length, line.wire(wire).bending_stiffness, tensions[wire])
         for own, values in zip(dofs, stiffness, strict=True):
             matrix[np.ix_(own, own)] += values
-    top = line.contact_height + line.encumbrance
-    springs: list[tuple[Any, float, Any]] = [(mesh.supports, line.support_stiffness, top)]
-    if line.steady_arm.stiffness:
-        springs.append((mesh.steady_arms, line.steady_arm.stiffness, form.height[mesh.steady_arms]))
+    (supports,), (arms,) = line.supports, line.steady_arms
+    top = line.wire(supports.wire).top
+    springs: list[tuple[Any, float, Any]] = [(mesh.supports, supports.stiffness, top)]
+    if arms.kind.stiffness:
+        springs.append((mesh.steady_arms, arms.kind.stiffness, form.height[mesh.steady_arms]))
     for nodes, value, relaxed in springs:
         at = model.dofs(nodes)
         matrix[at, at] = matrix[at, at].toarray() + value

@@ -11,7 +11,7 @@ import pytest
 
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.checks.scene import estimated_dropper_lengths
-from catenary.cases.scene.convert.line import line_of
+from catenary.cases.scene.convert.line import line_data_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.load import load_scene
@@ -66,7 +66,7 @@ def test_estimated_dropper_lengths_come_near_those_of_form_finding() -> None:
         scene = load_scene(case)
         problem = problem_of(scene)
         _, form = find_form(problem, mesh_of(scene))
-        estimate = np.concatenate(estimated_dropper_lengths(problem.line, problem.gravity))
+        estimate = np.concatenate(estimated_dropper_lengths(line_data_of(scene), problem.gravity))
         assert np.abs(estimate - form.dropper_length).max() < 0.06
 
 
@@ -78,7 +78,7 @@ def test_ac_simple_starts_from_the_mean_force_of_the_standard() -> None:
 
 
 def test_ambrosio_has_the_papers_line() -> None:
-    line = line_of(load_scene("ambrosio2012"))
+    line = line_data_of(load_scene("ambrosio2012"))
     assert line.n_spans == 25
     assert line.n_spans - sum(line.n_transition) == 20
     assert all(len(x) == 8 for x in line.dropper_positions)

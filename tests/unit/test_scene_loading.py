@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from catenary.cases.scene.convert.course import end_of, resolved
-from catenary.cases.scene.convert.line import line_of
+from catenary.cases.scene.convert.line import line_data_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.case_files import find_case, shipped
 from catenary.cases.scene.input.origin import Origin
@@ -115,14 +115,14 @@ def test_the_end_stops_at_the_end_of_the_running_range() -> None:
 
 
 def test_quantities_reach_the_problem_in_si_units() -> None:
-    problem = problem_of(load_scene("ac_simple", ["train.speed_km_h=288"]))
+    scene = load_scene("ac_simple", ["train.speed_km_h=288"])
+    problem = problem_of(scene)
     assert problem.train.speed == pytest.approx(80.0, rel=1e-15)
-    assert problem.line.pre_sag[0] == pytest.approx(
-        (0, 0.024, 0.041, 0.052, 0.055, 0.052, 0.041, 0.024, 0)
-    )
-    assert problem.line.stagger[:3] == (0.2, -0.2, 0.2)
-    assert len(problem.line.stagger) == problem.line.n_spans + 1
-    assert problem.line.contact_wire.tension == 22000.0
+    line = line_data_of(scene)
+    assert line.pre_sag[0] == pytest.approx((0, 0.024, 0.041, 0.052, 0.055, 0.052, 0.041, 0.024, 0))
+    assert line.stagger[:3] == (0.2, -0.2, 0.2)
+    assert len(line.stagger) == line.n_spans + 1
+    assert problem.line.wire("contact_wire").tension == 22000.0
     assert problem.damping.alpha == 1e-4
     assert problem.damping.beta == 0.0125
 
@@ -140,12 +140,12 @@ def test_span_lengths_are_repeated_over_the_running_spans() -> None:
     scene = load_scene(
         "ambrosio2012", ["line.span_m=[54, 52]", "line.n_spans=9", *_short_evaluation()]
     )
-    assert line_of(scene).span_lengths == (50, 50, 54, 52, 54, 52, 50, 50, 50)
+    assert line_data_of(scene).span_lengths == (50, 50, 54, 52, 54, 52, 50, 50, 50)
     without = load_scene(
         "ambrosio2012",
         ["line.span_m=[54, 52]", "line.n_spans=9", "line.transition.span_m=", *_short_evaluation()],
     )
-    assert line_of(without).span_lengths == (54, 52, 54, 52, 54, 52, 54, 52, 54)
+    assert line_data_of(without).span_lengths == (54, 52, 54, 52, 54, 52, 54, 52, 54)
 
 
 def _short_evaluation() -> list[str]:
@@ -153,7 +153,7 @@ def _short_evaluation() -> list[str]:
 
 
 def test_counted_droppers_are_centred_and_their_pre_sag_is_a_parabola() -> None:
-    line = line_of(load_scene("ambrosio2012"))
+    line = line_data_of(load_scene("ambrosio2012"))
     x, sag = np.array(line.dropper_positions[10]), np.array(line.pre_sag[10])
     assert x[0] == pytest.approx(54 - x[-1])
     assert np.diff(x) == pytest.approx(np.full(7, 6.75))
@@ -171,7 +171,7 @@ def test_patterns_give_each_span_length_its_droppers() -> None:
         " {span_m=54, positions_m=[10, 27, 44], pre_sag_mm=[0, 20, 0]}]"
     )
     removed = [f"line.dropper.{key}=" for key in ("count", "spacing_m", "pre_sag_mid_mm")]
-    line = line_of(load_scene("ambrosio2012", [patterns, *removed]))
+    line = line_data_of(load_scene("ambrosio2012", [patterns, *removed]))
     assert line.dropper_positions[0] == (10, 40)
     assert line.dropper_positions[5] == (10, 27, 44)
     assert line.pre_sag[5] == (0, 0.02, 0)

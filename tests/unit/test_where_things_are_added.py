@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from catenary.cases.cli.app import app
 from catenary.cases.scene.load import load_scene
 from catenary.cases.terminal import console
-from catenary.meshgen.line import Line
+from catenary.meshgen.line import Profile
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects.build_model import build
@@ -83,8 +83,8 @@ def test_an_effect_sets_laws_of_the_time_loop() -> None:
 def test_an_effect_sets_target_heights_and_lifts_limits() -> None:
     """A contact wire that rises by RISE towards the middle of the line, for fast trains."""
 
-    def rise(line: Line, x: np.ndarray) -> np.ndarray:
-        return np.asarray(RISE * np.sin(np.pi * x / line.support_positions[-1]))
+    def rise(wanted: Profile, x: np.ndarray) -> np.ndarray:
+        return np.asarray(RISE * np.sin(np.pi * x / wanted.ends[1]))
 
     def law(laws: Simulated, problem: Problem) -> Simulated:
         return replace(laws, target_heights=(*laws.target_heights, rise))
@@ -100,7 +100,7 @@ def test_an_effect_sets_target_heights_and_lifts_limits() -> None:
     with registered(Effect("hump", "a hump", "heights", "test", False, law=law, lifts=lifts)):
         model, form = find_form(problem_of(line, HANGING | {"hump"}), mesh)
         assert model.terms_of["hump"] == 2
-        risen = rise(line, mesh.x(lower))
+        risen = rise(line.profile, mesh.x(lower))
         # Rounding of heights of 5.5 m.
         assert form.height[lower] - flat == pytest.approx(risen, abs=1e-14)
         load_scene("en50318_2002", [*fast, "effects.hump=true"])

@@ -83,7 +83,7 @@ def test_tsalpha2_integrates_the_same_model_to_the_same_forces(ours: dict[str, A
     # derivative, whose place within a step is left to chance: the share of steps in which a
     # contact or a dropper changes its state, or the head passes to the next element.
     h = float(np.diff(mesh.x(mesh.wires[CONTACT_WIRE])).min())
-    masses = (EN_PANTOGRAPH.masses[0], problem.line.contact_wire.mass_per_length * h / 2)
+    masses = (EN_PANTOGRAPH.masses[0], problem.line.wire(CONTACT_WIRE).mass_per_length * h / 2)
     omega = np.sqrt(problem.contact.stiffness * sum(1 / mass for mass in masses))
     jumps = 2 * changes / lost.size + SPEED * steps[-2] / h
     within = np.log2(1 + (omega * steps[-2]) ** 2 + jumps)

@@ -12,12 +12,12 @@ import numpy as np
 from measuring import History, check, march, print_table
 from small_lines import BARE, FREE_MASS, bare_wires, mesh_of, numerics, problem_of, train
 
-from catenary.meshgen.line import Wire
+from catenary.meshgen.line import Conductor
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.statics.equilibrium import Equilibrium
 
-RIGID = Wire(tension=20e3, mass_per_length=1e15, bending_stiffness=195.0)
+RIGID = Conductor(tension=20e3, mass_per_length=1e15, bending_stiffness=195.0)
 MASS = FREE_MASS.masses[0]
 LIFT, STIFFNESS = 100.0, 5e4
 LENGTH, SPEED, START = 20.0, 50.0, 1.0

@@ -29,7 +29,7 @@ from scipy import linalg
 from scipy.sparse import linalg as sparse_linalg
 from small_lines import BARE, HANGING, bare_wires, en50318_line, mesh_of, numerics, problem_of
 
-from catenary.meshgen.line import Wire
+from catenary.meshgen.line import Conductor
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.matrices import stiffness_matrix
 from catenary.solver.model.model import Model
@@ -49,7 +49,7 @@ METHODS = [
 ]
 EPS = np.finfo(float).eps
 LENGTH, N_ELEMENTS = 60.0, 30
-STRING = Wire(tension=20e3, mass_per_length=1.35, bending_stiffness=0.0)
+STRING = Conductor(tension=20e3, mass_per_length=1.35, bending_stiffness=0.0)
 DAMPINGS = {
     "undamped": Damping(0.0, 0.0),
     "proportional": Damping(2.75e-3, 0.0125),

@@ -90,7 +90,7 @@ def test_the_line_comes_to_rest_where_statics_wants_it(incidents: tuple[LineInci
             shares[incident.wire] = incident.share
         else:
             broken.add(int(np.flatnonzero(np.abs(places - incident.x) < 1e-9)[0]))
-    tensions = {wire: share * getattr(line, wire).tension for wire, share in shares.items()}
+    tensions = {wire: share * problem.line.wire(wire).tension for wire, share in shares.items()}
     expected = absolute_rest(model, form, tensions=tensions, broken=broken) - first_rest(
         model, form
     )
@@ -189,7 +189,7 @@ def test_the_energy_that_leaves_is_what_broke_or_ran_out(incident: LineIncident)
         number = int(np.argmin(np.abs(mesh.x(mesh.droppers[:, 1]) - incident.x)))
         force = seen["dropper_force"][:, number]
         assert force[at] > 50.0 and not force[at + 1 :].any()
-        released = force[at] ** 2 / (2 * problem.line.dropper.stiffness)
+        released = force[at] ** 2 / (2 * problem.line.droppers[0].kind.stiffness)
     else:
         shape = first_rest(rest.model, rest.form) + seen.watched[at]["displacement"]
         released = (1 - incident.share) * slope_energy(problem, rest.model, shape, incident.wire)
@@ -212,7 +212,7 @@ def slope_energy(problem: Problem, model: Model, shape: np.ndarray, wire: str) -
         for point, weight in zip(points, weights, strict=True):
             slope = shape_slopes(0.5 * (1 + point), h) @ shape[own]
             total += 0.5 * weight * h * slope**2
-    return float(0.5 * getattr(problem.line, wire).tension * total)
+    return float(0.5 * problem.line.wire(wire).tension * total)
 
 
 @pytest.mark.parametrize(

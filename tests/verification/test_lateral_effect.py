@@ -13,7 +13,7 @@ import pytest
 from measuring import COMM, check, march, matrix_of, registered, solve_free
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.meshgen.line import Wire
+from catenary.meshgen.line import Conductor
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.effect import Effect, register
@@ -141,7 +141,7 @@ def test_an_effect_of_one_wire_makes_stations_no_wider_than_it_needs(mesh: LineM
     line.destroy()
 
 
-def blown_out(wire: Wire, x: np.ndarray) -> tuple[np.ndarray, float]:
+def blown_out(wire: Conductor, x: np.ndarray) -> tuple[np.ndarray, float]:
     """Deflection q x (L - x) / (2 T) - q EI / T^2 (1 - exp(-lambda x) - exp(-lambda (L - x))) [m],
 
     lambda^2 = T / EI, and what elements much longer than 1 / lambda leave out of it: they spread

@@ -26,14 +26,14 @@ from measuring import check, free_dofs, free_matrices, print_table
 from scipy.sparse import linalg as sparse_linalg
 from small_lines import BARE, bare_wires, mesh_of, problem_of
 
-from catenary.meshgen.line import Wire
+from catenary.meshgen.line import Conductor
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
 
 LENGTH = 60.0
-STRING = Wire(tension=20e3, mass_per_length=1.35, bending_stiffness=0.0)
+STRING = Conductor(tension=20e3, mass_per_length=1.35, bending_stiffness=0.0)
 # EI k^2 / T reaches 1 in the fifth mode: neither tension nor bending can be missed.
-BEAM = Wire(
+BEAM = Conductor(
     tension=16e3, mass_per_length=1.07, bending_stiffness=16e3 * (LENGTH / (5 * np.pi)) ** 2
 )
 
@@ -58,12 +58,12 @@ def eigenvalues(n_elements: int, wire: str, count: int) -> np.ndarray:
     return np.sort(found)
 
 
-def exact(wire: Wire, mode: np.ndarray) -> np.ndarray:
+def exact(wire: Conductor, mode: np.ndarray) -> np.ndarray:
     k = mode * np.pi / LENGTH
     return (wire.tension * k**2 + wire.bending_stiffness * k**4) / wire.mass_per_length
 
 
-def element_error(wire: Wire, mode: np.ndarray, n_elements: int, terms: int = 2) -> np.ndarray:
+def element_error(wire: Conductor, mode: np.ndarray, n_elements: int, terms: int = 2) -> np.ndarray:
     """Relative error of omega^2 by the first one or two terms of the series."""
     kh = mode * np.pi / n_elements
     s = wire.bending_stiffness * (mode * np.pi / LENGTH) ** 2 / wire.tension
@@ -76,7 +76,7 @@ def element_error(wire: Wire, mode: np.ndarray, n_elements: int, terms: int = 2)
 
 @pytest.mark.parametrize(("name", "wire"), [("contact_wire", STRING), ("messenger_wire", BEAM)])
 def test_frequencies_agree_with_the_closed_form_to_the_error_of_the_elements(
-    name: str, wire: Wire
+    name: str, wire: Conductor
 ) -> None:
     mode = np.arange(1, 9)
     for n_elements in (20, 40, 80):
@@ -105,7 +105,7 @@ def test_frequencies_agree_with_the_closed_form_to_the_error_of_the_elements(
     ("name", "wire", "theory"), [("contact_wire", STRING, 6), ("messenger_wire", BEAM, 4)]
 )
 def test_eigenvalues_converge_with_the_order_of_the_theory(
-    name: str, wire: Wire, theory: int
+    name: str, wire: Conductor, theory: int
 ) -> None:
     """The tenth mode: its error stays far above round-off on all meshes."""
     mode, sizes = 10, [10, 20, 40, 80]

@@ -14,14 +14,14 @@ import numpy as np
 from measuring import check, print_table
 from small_lines import bare_wires, mesh_of, problem_of
 
-from catenary.meshgen.line import Wire
+from catenary.meshgen.line import Conductor
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.model.shape_functions import shape_slopes, shape_values
 from catenary.solver.statics.equilibrium import find_form
 
 # lambda = 1/m: the boundary layer fills a tenth of the span, and all meshes resolve it.
 LENGTH, LAMBDA = 10.0, 1.0
-WIRE = Wire(tension=1000.0, mass_per_length=1.0, bending_stiffness=1000.0 / LAMBDA**2)
+WIRE = Conductor(tension=1000.0, mass_per_length=1.0, bending_stiffness=1000.0 / LAMBDA**2)
 SIZES = [8, 16, 32, 64]
 PLACES = np.linspace(0.0, 1.0, 17)
 

@@ -61,7 +61,7 @@ def test_one_solve_is_the_limit_of_the_fixed_point_correction(
     of_step = law.stiffness * accuracy.eps_d + law.damping * accuracy.eps_v
     within = np.sqrt(force.shape[0]) * of_step
     check("contact forces [N]", iterated["contact_force"], force, within=within)
-    dropper = problem.line.dropper.stiffness / law.stiffness
+    dropper = problem.line.droppers[0].kind.stiffness / law.stiffness
     check("dropper forces [N]", iterated["dropper_force"], droppers, within=dropper * within)
     # What the default scheme saves.
     assert counters["solves"] == counters["steps"]

@@ -15,8 +15,8 @@ from dense_line import DenseLine
 from measuring import COMM, History, check, march, matrix_of, start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
+from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.model.shape_functions import shape_values
@@ -31,7 +31,7 @@ AVERAGE = Damping(alpha=0.0275, beta=0.0)
 RESIDUAL = frozenset({"residual_dropper_stiffness"})
 
 
-def short_line() -> Line:
+def short_line() -> LineData:
     """Two spans of 24 m with three droppers each."""
     return replace(
         en50318_line(2),
@@ -41,7 +41,7 @@ def short_line() -> Line:
     )
 
 
-def problem_on(line: Line, **changes: Any) -> Problem:
+def problem_on(line: LineData, **changes: Any) -> Problem:
     """A head that rises into the wire, fast and strong enough to leave droppers slack."""
     run = train(100.0, 6.0, 42.0, static_force=260.0, raise_time=0.0, nominal_height=5.5)
     usual = problem_of(

@@ -17,8 +17,8 @@ from small_lines import (
     problem_of,
 )
 
-from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.base.errors import InputError
 from catenary.solver.statics.elasticity import middle_span
 from catenary.solver.statics.equilibrium import find_form
@@ -28,7 +28,7 @@ EPS = np.finfo(float).eps
 WEIGHTS = frozenset({"vertical", "gravity"})
 
 
-def flexible(line: Line) -> Line:
+def flexible(line: LineData) -> LineData:
     """The same line with wires that do not resist bending."""
     return replace(
         line,
@@ -37,7 +37,7 @@ def flexible(line: Line) -> Line:
     )
 
 
-def middle_droppers(line: Line) -> slice:
+def middle_droppers(line: LineData) -> slice:
     """The droppers of the middle span; all spans have equally many."""
     span = round(middle_span(line)[0] / line.span_lengths[0])
     count = len(line.dropper_positions[0])
@@ -177,7 +177,7 @@ def test_bending_stiffness_rounds_the_kinks_but_keeps_the_weights() -> None:
     lengths = form.height[model.mesh.droppers[:, 0]] - form.height[model.mesh.droppers[:, 1]]
     weight = GRAVITY * (
         line.contact_wire.mass_per_length * line.span_lengths[0]
-        + 9 * kind.contact_clamp_mass
+        + 9 * kind.lower_clamp_mass
         + 0.5 * kind.mass_per_length * lengths[own].sum()
         + 0.5 * arm.mass_per_length * arm.length
         + arm.clamp_mass

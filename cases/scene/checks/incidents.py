@@ -16,7 +16,7 @@ from catenary.cases.scene.tables.incidents import (
     LoweringTable,
     TensionLossTable,
 )
-from catenary.meshgen.line import Line
+from catenary.meshgen.topologies.line_data import LineData
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.effects.effect import Limit
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
 
 
-def check_incidents(scene: Scene, line: Line) -> Iterator[Fault]:
+def check_incidents(scene: Scene, line: LineData) -> Iterator[Fault]:
     """The incidents that cannot be."""
     seen: dict[tuple[object, ...], int] = {}
     duration = (end_of(scene) - scene.train.start_m) / (scene.train.speed_km_h / 3.6)
@@ -97,7 +97,7 @@ def _hangs(scene: Scene, i: int, table: DropperBreakTable | TensionLossTable) ->
         yield _refusal(scene, i, "type", table.type, why)
 
 
-def _dropper(scene: Scene, i: int, table: DropperBreakTable, line: Line) -> Iterator[Fault]:
+def _dropper(scene: Scene, i: int, table: DropperBreakTable, line: LineData) -> Iterator[Fault]:
     yield from _hangs(scene, i, table)
     if table.span > line.n_spans:
         yield _refusal(
@@ -110,7 +110,7 @@ def _dropper(scene: Scene, i: int, table: DropperBreakTable, line: Line) -> Iter
         yield _refusal(scene, i, "dropper", table.dropper, why)
 
 
-def _tension(scene: Scene, i: int, table: TensionLossTable, line: Line) -> Iterator[Fault]:
+def _tension(scene: Scene, i: int, table: TensionLossTable, line: LineData) -> Iterator[Fault]:
     yield from _hangs(scene, i, table)
     if table.wire != "contact_wire" or not scene.holds(Limit.WAVE_SPEED):
         return
@@ -128,7 +128,7 @@ def _tension(scene: Scene, i: int, table: TensionLossTable, line: Line) -> Itera
         )
 
 
-def _lowering(scene: Scene, i: int, table: LoweringTable, line: Line) -> Iterator[Fault]:
+def _lowering(scene: Scene, i: int, table: LoweringTable, line: LineData) -> Iterator[Fault]:
     n = len(scene.train.pantographs)
     if table.pantograph > n:
         noun = counted(n, "pantograph")

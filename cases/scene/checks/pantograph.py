@@ -13,7 +13,7 @@ from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.tables.mechanism import ActuatorTable
 from catenary.cases.scene.tables.pantograph import MultibodyTable
 from catenary.mbs.frame import SPACE
-from catenary.meshgen.line import Line
+from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.base.errors import InputError, RunBroken
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def check_pantographs(scene: Scene) -> Iterator[Fault]:
             yield from _actuator(scene, name, table)
 
 
-def check_mechanisms(scene: Scene, line: Line) -> Iterator[Fault]:
+def check_mechanisms(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Mechanisms on the train that cannot be assembled, or do not reach the wire from the height
     that ``nominal_height_m`` puts them to. Names and forces have no fault.
 
@@ -48,7 +48,7 @@ def check_mechanisms(scene: Scene, line: Line) -> Iterator[Fault]:
     yield from found or _heights(scene, line)
 
 
-def _heights(scene: Scene, line: Line) -> Iterator[Fault]:
+def _heights(scene: Scene, line: LineData) -> Iterator[Fault]:
     lowest = line.contact_height - max(max(sags, default=0.0) for sags in line.pre_sag)
     heights = lowest, line.contact_height
     for name in dict.fromkeys(place.name for place in scene.train.pantographs):
@@ -70,7 +70,7 @@ def _heights(scene: Scene, line: Line) -> Iterator[Fault]:
             break
 
 
-def reaches_below(scene: Scene, name: str, line: Line, drop: float) -> bool:
+def reaches_below(scene: Scene, name: str, line: LineData, drop: float) -> bool:
     """Whether a kind of pantograph can go down by ``drop`` [m] from wherever the wire is."""
     table = scene.pantographs[name]
     if not isinstance(table, MultibodyTable):

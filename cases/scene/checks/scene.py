@@ -25,13 +25,12 @@ from catenary.cases.scene.checks.scheme import check_scheme
 from catenary.cases.scene.checks.usual import usual_faults
 from catenary.cases.scene.checks.vehicle import check_vehicle
 from catenary.cases.scene.convert.course import end_of, strips_ahead
-from catenary.cases.scene.convert.line import line_of
+from catenary.cases.scene.convert.line import line_data_of
 from catenary.cases.scene.input.faults import Fault, SceneError
 from catenary.cases.scene.input.origin import shown
 from catenary.cases.scene.keys.error_sentences import refusal, unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys
-from catenary.meshgen.geometry import SHORTEST_GAP
-from catenary.meshgen.line import Line
+from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.effect import Limit
@@ -104,12 +103,12 @@ class _Findings:
         return len(self.faults) == before
 
 
-def _line(scene: Scene, found: _Findings) -> Line | None:
+def _line(scene: Scene, found: _Findings) -> LineData | None:
     """The line of a scene, None if its droppers do not fit into its spans."""
-    lines: list[Line] = []
+    lines: list[LineData] = []
 
     def make() -> Iterator[Fault]:
-        lines.append(line_of(scene))
+        lines.append(line_data_of(scene))
         yield from _droppers_inside_spans(scene, lines[0])
 
     return lines[0] if found.nothing_by(make) else None
@@ -231,7 +230,7 @@ def _separations(scene: Scene) -> Iterator[Fault]:
             )
 
 
-def _droppers_inside_spans(scene: Scene, line: Line) -> Iterator[Fault]:
+def _droppers_inside_spans(scene: Scene, line: LineData) -> Iterator[Fault]:
     kind = scene.line.dropper
     if kind.positions_m is not None and len(set(line.span_lengths)) > 1:
         key = "line.dropper.positions_m"
@@ -273,7 +272,7 @@ def _droppers_inside_spans(scene: Scene, line: Line) -> Iterator[Fault]:
         return
 
 
-def estimated_dropper_lengths(line: Line, gravity: float) -> list[np.ndarray]:
+def estimated_dropper_lengths(line: LineData, gravity: float) -> list[np.ndarray]:
     """Dropper lengths of each span [m], the messenger wire taken as a parabola.
 
     Its load is its own weight and that of the contact wire less what the pre-sag's curvature lets
@@ -297,7 +296,7 @@ def estimated_dropper_lengths(line: Line, gravity: float) -> list[np.ndarray]:
     return lengths
 
 
-def _dropper_lengths(scene: Scene, line: Line) -> Iterator[Fault]:
+def _dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
     gravity = Problem.gravity if scene.switches().get("gravity", True) else 0.0
     shortest = [float(v.min()) for v in estimated_dropper_lengths(line, gravity)]
     span = int(np.argmin(shortest))
@@ -311,7 +310,7 @@ def _dropper_lengths(scene: Scene, line: Line) -> Iterator[Fault]:
         )
 
 
-def _speed(scene: Scene, line: Line) -> Iterator[Fault]:
+def _speed(scene: Scene, line: LineData) -> Iterator[Fault]:
     wave = 3.6 * line.contact_wire.wave_speed
     speed = scene.train.speed_km_h
     if speed >= wave and scene.holds(Limit.WAVE_SPEED):
@@ -326,7 +325,7 @@ def _speed(scene: Scene, line: Line) -> Iterator[Fault]:
         )
 
 
-def _running(scene: Scene, line: Line) -> Iterator[Fault]:
+def _running(scene: Scene, line: LineData) -> Iterator[Fault]:
     first, last = line.running_range
     start, end = scene.train.start_m, end_of(scene)
     rear = scene.train.pantographs[-1].behind_m

@@ -16,7 +16,7 @@ from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.tables.pantograph import LumpedTable, MultibodyTable
 from catenary.cases.scene.tables.vehicle import MotionTable
 from catenary.mbs.roll import roll_of
-from catenary.meshgen.line import Line
+from catenary.meshgen.topologies.line_data import LineData
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
@@ -27,7 +27,7 @@ STEPS_PER_WAVE = 8
 _TINY = 1e-6
 
 
-def check_vehicle(scene: Scene, line: Line) -> Iterator[Fault]:
+def check_vehicle(scene: Scene, line: LineData) -> Iterator[Fault]:
     """What contradicts each other in vehicle, heads and line."""
     yield from _vehicle_acts(scene)
     yield from _roll_acts(scene)
@@ -149,7 +149,7 @@ def _waves(scene: Scene) -> Iterator[Fault]:
         )
 
 
-def _strip_lengths(scene: Scene, line: Line) -> Iterator[Fault]:
+def _strip_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
     for i, place in enumerate(scene.train.pantographs):
         kind = scene.pantographs[place.name]
         length = kind.strips.length_m
@@ -170,7 +170,7 @@ def _strip_lengths(scene: Scene, line: Line) -> Iterator[Fault]:
             )
 
 
-def _farthest(scene: Scene, line: Line, number: int) -> tuple[float, float]:
+def _farthest(scene: Scene, line: LineData, number: int) -> tuple[float, float]:
     """Where the wire is farthest from the middle of a pantograph's strips on its run, and the
     pantograph's place then [m]."""
     place, speed = scene.train.pantographs[number], scene.train.speed_km_h / 3.6

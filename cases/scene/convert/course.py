@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from catenary.cases.scene.convert.line import line_of
+from catenary.cases.scene.convert.line import line_data_of
 from catenary.cases.scene.scene import Scene
 
 
@@ -12,7 +12,7 @@ def end_of(scene: Scene) -> float:
     """Where the leading pantograph stops [m]: ``train.end_m`` or what stands for it."""
     if scene.train.end_m is not None:
         return scene.train.end_m
-    line = line_of(scene)
+    line = line_data_of(scene)
     running_end = line.running_range[1]
     behind = max(placement.behind_m for placement in scene.train.pantographs)
     run_out = sum(line.span_lengths) / line.n_spans

@@ -44,8 +44,7 @@ def lowering_of(tables: Sequence[IncidentTable], number: int, dt: float) -> Lowe
 
 def dropper_place(table: DropperBreakTable, line: Line) -> float:
     """Where a dropper of the line stands [m]."""
-    within = line.dropper_positions[table.span - 1][table.dropper - 1]
-    return float(line.support_positions[table.span - 1] + within)
+    return float(line.droppers_of_span(table.span - 1)[table.dropper - 1])
 
 
 def at_step(time: float, dt: float) -> float:

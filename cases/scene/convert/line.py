@@ -7,7 +7,9 @@ import numpy as np
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.tables.line import LineTable, WireTable
 from catenary.cases.scene.tables.units import length_from_mm
-from catenary.meshgen.line import DropperKind, Line, SteadyArm, Wire
+from catenary.meshgen.line import Conductor, DropperKind, Line, SteadyArm
+from catenary.meshgen.topologies.all_topologies import make_line
+from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.base.errors import InputError
 
 # Span lengths are written in decimal; two that differ by less are the same one.
@@ -16,6 +18,17 @@ _SAME_SPAN = 1e-6
 
 def line_of(scene: Scene) -> Line:
     """The line of a scene.
+
+    Raises
+    ------
+    InputError
+        If the droppers are not declared for one of the span lengths, or do not fit into one.
+    """
+    return make_line(line_data_of(scene))
+
+
+def line_data_of(scene: Scene) -> LineData:
+    """What a scene says of its line.
 
     Raises
     ------
@@ -31,21 +44,21 @@ def line_of(scene: Scene) -> Line:
         for i in range(table.n_spans)
     ]
     kind = table.dropper
-    return Line(
+    return LineData(
         span_lengths=spans,
         dropper_positions=tuple(positions),
         pre_sag=tuple(pre_sag),
         stagger=_stagger(table),
         contact_height=table.contact_height_m,
         encumbrance=table.encumbrance_m,
-        contact_wire=_wire(table.contact_wire),
-        messenger_wire=_wire(table.messenger_wire),
+        contact_wire=_conductor(table.contact_wire),
+        messenger_wire=_conductor(table.messenger_wire),
         dropper=DropperKind(
             stiffness=kind.stiffness_N_per_m,
             axial_stiffness=kind.axial_stiffness_N,
             mass_per_length=kind.mass_kg_per_m,
-            messenger_clamp_mass=kind.messenger_clamp_kg,
-            contact_clamp_mass=kind.contact_clamp_kg,
+            upper_clamp_mass=kind.messenger_clamp_kg,
+            lower_clamp_mass=kind.contact_clamp_kg,
         ),
         support_stiffness=table.support.stiffness_N_per_m,
         steady_arm=SteadyArm(
@@ -110,5 +123,5 @@ def _stagger(table: LineTable) -> tuple[float, ...]:
     return tuple(side if i % 2 == 0 else -side for i in range(table.n_spans + 1))
 
 
-def _wire(table: WireTable) -> Wire:
-    return Wire(table.tension_N, table.mass_kg_per_m, table.bending_stiffness_N_m2)
+def _conductor(table: WireTable) -> Conductor:
+    return Conductor(table.tension_N, table.mass_kg_per_m, table.bending_stiffness_N_m2)

@@ -59,11 +59,11 @@ def _leaves(
     before = shares.get(incident.wire, 1.0)
     shares[incident.wire] = incident.share
     dofs, length = rest.model.wire_elements(incident.wire)
-    nodes = mesh.wires[incident.wire]
-    at = np.stack([rest.form.height[nodes], rest.form.slope[nodes]], axis=1)
-    shape = np.concatenate([at[:-1], at[1:]], axis=1) + displacement[dofs]
+    form, pairs = rest.form, mesh.elements(incident.wire)
+    at = np.stack([form.height[pairs], form.slope[pairs]], axis=2)
+    shape = at.reshape(-1, 4) + displacement[dofs]
     total = 0.0
     for values, h in zip(shape, length, strict=True):
         slopes = [shape_slopes(0.5 * (1.0 + point), h) @ values for point in _POINTS]
         total += 0.5 * h * float(_WEIGHTS @ np.square(slopes))
-    return 0.5 * (before - incident.share) * getattr(line, incident.wire).tension * total
+    return 0.5 * (before - incident.share) * line.wire(incident.wire).tension * total

@@ -20,7 +20,6 @@ from scipy.sparse.linalg import spsolve
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
-from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.base.parallel import on_root
 from catenary.solver.contact.contact_wire import ContactWire
 from catenary.solver.integrators.make_line import make_line
@@ -282,7 +281,7 @@ def at_rest(scene: Scene, comm: Any) -> LineAtRest:
 
 def cut_of(rest: LineAtRest) -> float:
     """Where the boundary between two ranks lies [m]: the last node that the first one owns."""
-    nodes = rest.mesh.wires[CONTACT_WIRE]
+    nodes = rest.model.contact_nodes
     mine = distribute(rest.model, 2, 0).owned(rest.model.dofs(nodes))
     return float(rest.mesh.x(nodes[mine]).max())
 
@@ -295,7 +294,7 @@ def rest_height(rest: LineAtRest, x: np.ndarray) -> np.ndarray:
 
 def node_places(rest: LineAtRest) -> np.ndarray:
     """Places of the contact wire's nodes [m]."""
-    return np.asarray(rest.mesh.x(rest.mesh.wires[CONTACT_WIRE]))
+    return rest.model.contact_x
 
 
 def run(rest: LineAtRest, comm: Any, with_work: bool = False) -> Watched:
@@ -316,7 +315,7 @@ def run_free(rest: LineAtRest, comm: Any, n_steps: int) -> Watched:
     The acceleration at the start is the one that belongs to the shape: M a = -K u.
     """
     model, numerics = rest.model, rest.problem.numerics
-    nodes = model.mesh.wires[CONTACT_WIRE]
+    nodes = model.contact_nodes
     load = np.zeros(model.n_dofs)
     load[model.dofs(nodes[nodes.size // 2])] = PULL
     stiffness = stiffness_matrix(model)

@@ -10,10 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from catenary.meshgen.line import DropperKind, Line, SteadyArm, Wire
+from catenary.meshgen.line import Conductor, DropperKind, SteadyArm
+from catenary.meshgen.topologies.line_data import LineData
 
 
-def _line(**changes: object) -> Line:
+def _line(**changes: object) -> LineData:
     settings: dict[str, object] = {
         "span_lengths": (50.0, 60.0, 60.0, 45.0),
         "dropper_positions": (
@@ -26,19 +27,19 @@ def _line(**changes: object) -> Line:
         "stagger": (0.0, 0.2, -0.2, 0.2, 0.0),
         "contact_height": 5.3,
         "encumbrance": 1.4,
-        "contact_wire": Wire(20e3, 1.35, 195.0),
-        "messenger_wire": Wire(16e3, 1.07, 131.7),
+        "contact_wire": Conductor(20e3, 1.35, 195.0),
+        "messenger_wire": Conductor(16e3, 1.07, 131.7),
         "dropper": DropperKind(1e5, None, 0.1, 0.195, 0.165),
         "support_stiffness": 5e5,
         "steady_arm": SteadyArm(1.2, 0.73, 0.2, 300.0),
         "n_transition": (1, 1),
         "transition_rise": 0.4,
     }
-    return Line(**{**settings, **changes})  # type: ignore[arg-type]
+    return LineData(**{**settings, **changes})  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="session")
-def make_line() -> Callable[..., Line]:
+def make_line() -> Callable[..., LineData]:
     """Four uneven spans with pre-sag and rising ends; keywords replace fields."""
     return _line
 

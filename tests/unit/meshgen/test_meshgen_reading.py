@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from catenary.meshgen.build import make_mesh, use_mesh
-from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.reader import read_mesh
+from catenary.meshgen.topologies.all_topologies import make_line as line_from
+from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.base.errors import InputError
 
 
@@ -33,10 +34,10 @@ def test_a_file_in_any_order_and_numbering_is_read(by_hand: Any, tmp_path: Path)
 @pytest.mark.parametrize("version", [2.2, 4.1])
 @pytest.mark.parametrize("binary", [0, 1])
 def test_what_gmsh_saves_again_in_another_version_is_the_same_line(
-    make_line: Callable[..., Line], tmp_path: Path, version: float, binary: int
+    make_line: Callable[..., LineData], tmp_path: Path, version: float, binary: int
 ) -> None:
     first, second = tmp_path / "line.msh", tmp_path / "again.msh"
-    mesh = make_mesh(make_line(), 3, first)
+    mesh = make_mesh(line_from(make_line()), 3, first)
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
@@ -228,9 +229,9 @@ def test_what_is_no_mesh_file_is_refused_in_silence(
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_truncated_file_is_refused(make_line: Callable[..., Line], tmp_path: Path) -> None:
+def test_a_truncated_file_is_refused(make_line: Callable[..., LineData], tmp_path: Path) -> None:
     path = tmp_path / "line.msh"
-    make_mesh(make_line(), 2, path)
+    make_mesh(line_from(make_line()), 2, path)
     content = path.read_bytes()
     for share in (0.2, 0.5, 0.9):
         path.write_bytes(content[: int(share * len(content))])
@@ -262,7 +263,7 @@ def test_elements_without_a_group_are_explained(by_hand: Any, tmp_path: Path) ->
         read_mesh(second)
 
 
-def _two_spans(make_line: Callable[..., Line], **changes: object) -> Line:
+def _two_spans(make_line: Callable[..., LineData], **changes: object) -> LineData:
     settings: dict[str, object] = {
         "span_lengths": (10.0, 10.0),
         "dropper_positions": ((5.0,), (5.0,)),
@@ -273,9 +274,9 @@ def _two_spans(make_line: Callable[..., Line], **changes: object) -> Line:
 
 
 def test_a_mesh_of_ones_own_serves_the_line_that_it_fits(
-    by_hand: Any, make_line: Callable[..., Line], tmp_path: Path
+    by_hand: Any, make_line: Callable[..., LineData], tmp_path: Path
 ) -> None:
-    mesh = use_mesh(_two_spans(make_line), by_hand.write(tmp_path / "own.msh"))
+    mesh = use_mesh(line_from(_two_spans(make_line)), by_hand.write(tmp_path / "own.msh"))
     assert mesh.n_nodes == 10
 
 
@@ -293,11 +294,11 @@ def test_a_mesh_of_ones_own_serves_the_line_that_it_fits(
 )
 def test_a_mesh_of_another_line_is_refused(
     by_hand: Any,
-    make_line: Callable[..., Line],
+    make_line: Callable[..., LineData],
     tmp_path: Path,
     changes: dict[str, object],
     sentence: str,
 ) -> None:
     path = by_hand.write(tmp_path / "own.msh")
     with pytest.raises(InputError, match=sentence):
-        use_mesh(_two_spans(make_line, **changes), path)
+        use_mesh(line_from(_two_spans(make_line, **changes)), path)

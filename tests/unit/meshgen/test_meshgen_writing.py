@@ -14,16 +14,17 @@ from hypothesis import strategies as st
 
 from catenary.meshgen.build import make_mesh
 from catenary.meshgen.gmsh_lines import write_mesh
-from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.reader import read_mesh
+from catenary.meshgen.topologies.all_topologies import make_line as line_from
+from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.base.errors import InputError
 
 # Gmsh finds the parameter of each node to 1e-12 of the line's length, and writes 16 digits.
 PLACE = 1e-8
 
 
-def cuts_of(line: Line) -> np.ndarray:
+def cuts_of(line: LineData) -> np.ndarray:
     """Masts and droppers in order [m]."""
     masts = line.support_positions
     places = [
@@ -34,10 +35,10 @@ def cuts_of(line: Line) -> np.ndarray:
 
 @pytest.mark.parametrize("elements_per_gap", [1, 2, 5])
 def test_every_gap_holds_the_elements_asked_for(
-    make_line: Callable[..., Line], elements_per_gap: int
+    make_line: Callable[..., LineData], elements_per_gap: int
 ) -> None:
     line = make_line()
-    mesh = make_mesh(line, elements_per_gap)
+    mesh = make_mesh(line_from(line), elements_per_gap)
     cuts = cuts_of(line)
     for wire in (CONTACT_WIRE, MESSENGER_WIRE):
         x = mesh.x(mesh.wires[wire])
@@ -55,9 +56,11 @@ def test_every_gap_holds_the_elements_asked_for(
     assert mesh.anchors.shape == (4,)
 
 
-def test_refinement_multiplies_the_gaps_next_to_masts_only(make_line: Callable[..., Line]) -> None:
+def test_refinement_multiplies_the_gaps_next_to_masts_only(
+    make_line: Callable[..., LineData],
+) -> None:
     line = make_line()
-    mesh = make_mesh(line, 2, support_refinement=3)
+    mesh = make_mesh(line_from(line), 2, support_refinement=3)
     masts, cuts = line.support_positions, cuts_of(line)
     for wire in (CONTACT_WIRE, MESSENGER_WIRE):
         x = mesh.x(mesh.wires[wire])
@@ -67,18 +70,18 @@ def test_refinement_multiplies_the_gaps_next_to_masts_only(make_line: Callable[.
             assert inside + 1 == (6 if next_to_mast else 2)
 
 
-def test_droppers_hang_where_the_line_says_in_order(make_line: Callable[..., Line]) -> None:
+def test_droppers_hang_where_the_line_says_in_order(make_line: Callable[..., LineData]) -> None:
     line = make_line()
-    mesh = make_mesh(line, 3)
+    mesh = make_mesh(line_from(line), 3)
     wanted = np.setdiff1d(cuts_of(line), line.support_positions)
     for side, wire in ((0, MESSENGER_WIRE), (1, CONTACT_WIRE)):
         np.testing.assert_allclose(mesh.x(mesh.droppers[:, side]), wanted, atol=PLACE)
         assert np.isin(mesh.droppers[:, side], mesh.wires[wire]).all()
 
 
-def test_arms_supports_and_anchors_sit_on_their_wires(make_line: Callable[..., Line]) -> None:
+def test_arms_supports_and_anchors_sit_on_their_wires(make_line: Callable[..., LineData]) -> None:
     line = make_line()
-    mesh = make_mesh(line, 3)
+    mesh = make_mesh(line_from(line), 3)
     masts = line.support_positions
     np.testing.assert_allclose(mesh.x(mesh.steady_arms), masts[1:-1], atol=PLACE)
     np.testing.assert_allclose(mesh.x(mesh.supports), masts[1:-1], atol=PLACE)
@@ -89,10 +92,10 @@ def test_arms_supports_and_anchors_sit_on_their_wires(make_line: Callable[..., L
 
 
 def test_contact_wire_follows_pre_sag_stagger_and_the_rise_to_the_tensioners(
-    make_line: Callable[..., Line],
+    make_line: Callable[..., LineData],
 ) -> None:
     line = make_line()
-    mesh = make_mesh(line, 4)
+    mesh = make_mesh(line_from(line), 4)
     x, y, z = mesh.points[mesh.wires[CONTACT_WIRE]].T
     masts = line.support_positions
     np.testing.assert_allclose(y, np.interp(x, masts, line.stagger), atol=1e-9)
@@ -105,9 +108,11 @@ def test_contact_wire_follows_pre_sag_stagger_and_the_rise_to_the_tensioners(
         assert np.interp(place, x, z) == pytest.approx(5.3 - sag, abs=1e-9)
 
 
-def test_messenger_wire_sags_by_the_weight_of_both_wires(make_line: Callable[..., Line]) -> None:
+def test_messenger_wire_sags_by_the_weight_of_both_wires(
+    make_line: Callable[..., LineData],
+) -> None:
     line = make_line()
-    mesh = make_mesh(line, 1)
+    mesh = make_mesh(line_from(line), 1)
     x, y, z = mesh.points[mesh.wires[MESSENGER_WIRE]].T
     assert not y.any()
     np.testing.assert_allclose(np.interp(line.support_positions, x, z), 5.3 + 1.4, atol=1e-12)
@@ -115,8 +120,8 @@ def test_messenger_wire_sags_by_the_weight_of_both_wires(make_line: Callable[...
     assert np.interp(25.0, x, z) == pytest.approx(6.7 - (1.35 + 1.07) * 9.81 * 50.0**2 / (8 * 16e3))
 
 
-def test_nodes_are_numbered_along_the_track(make_line: Callable[..., Line]) -> None:
-    mesh = make_mesh(make_line(), 3)
+def test_nodes_are_numbered_along_the_track(make_line: Callable[..., LineData]) -> None:
+    mesh = make_mesh(line_from(make_line()), 3)
     assert (np.diff(mesh.points[:, 0]) > -PLACE).all()
     # both wires' nodes of one station are neighbours, the messenger wire's first
     np.testing.assert_array_equal(mesh.wires[CONTACT_WIRE] - mesh.wires[MESSENGER_WIRE], 1)
@@ -133,7 +138,7 @@ def spans(draw: st.DrawFn) -> tuple[float, tuple[float, ...]]:
 @settings(max_examples=40, deadline=None)
 @given(given_spans=st.lists(spans(), min_size=1, max_size=5), elements_per_gap=st.integers(1, 6))
 def test_any_spans_and_droppers_are_meshed_as_described(
-    make_line: Callable[..., Line],
+    make_line: Callable[..., LineData],
     given_spans: list[tuple[float, tuple[float, ...]]],
     elements_per_gap: int,
 ) -> None:
@@ -146,7 +151,7 @@ def test_any_spans_and_droppers_are_meshed_as_described(
         n_transition=(0, 0),
         encumbrance=10.0,
     )
-    mesh = make_mesh(line, elements_per_gap)
+    mesh = make_mesh(line_from(line), elements_per_gap)
     cuts = cuts_of(line)
     for wire in (CONTACT_WIRE, MESSENGER_WIRE):
         np.testing.assert_allclose(mesh.x(mesh.wires[wire])[::elements_per_gap], cuts, atol=PLACE)
@@ -155,10 +160,10 @@ def test_any_spans_and_droppers_are_meshed_as_described(
 
 
 def test_gmsh_opens_the_file_with_its_physical_groups(
-    make_line: Callable[..., Line], tmp_path: Path
+    make_line: Callable[..., LineData], tmp_path: Path
 ) -> None:
     path = tmp_path / "line.msh"
-    mesh = make_mesh(make_line(), 2, path)
+    mesh = make_mesh(line_from(make_line()), 2, path)
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
@@ -183,7 +188,7 @@ def test_gmsh_opens_the_file_with_its_physical_groups(
     }
 
 
-def test_a_single_span_has_no_supports_and_is_read_back(make_line: Callable[..., Line]) -> None:
+def test_a_single_span_has_no_supports_and_is_read_back(make_line: Callable[..., LineData]) -> None:
     line = make_line(
         span_lengths=(50.0,),
         dropper_positions=((),),
@@ -191,7 +196,7 @@ def test_a_single_span_has_no_supports_and_is_read_back(make_line: Callable[...,
         stagger=(0.0, 0.0),
         n_transition=(0, 0),
     )
-    mesh = make_mesh(line, 4)
+    mesh = make_mesh(line_from(line), 4)
     assert mesh.n_nodes == 10
     assert mesh.droppers.shape == (0, 2)
     assert mesh.supports.size == mesh.steady_arms.size == 0
@@ -217,7 +222,7 @@ def test_a_single_span_has_no_supports_and_is_read_back(make_line: Callable[...,
     ],
 )
 def test_an_impossible_line_is_refused(
-    make_line: Callable[..., Line], tmp_path: Path, changes: dict[str, object], sentence: str
+    make_line: Callable[..., LineData], tmp_path: Path, changes: dict[str, object], sentence: str
 ) -> None:
     two_spans: dict[str, object] = {
         "span_lengths": (50.0, 50.0),
@@ -227,7 +232,7 @@ def test_an_impossible_line_is_refused(
     }
     path = tmp_path / "line.msh"
     with pytest.raises(InputError, match=sentence):
-        write_mesh(make_line(**{**two_spans, **changes}), 3, path)
+        write_mesh(line_from(make_line(**{**two_spans, **changes})), 3, path)
     assert not path.exists()
 
 
@@ -241,7 +246,7 @@ def test_an_impossible_line_is_refused(
     ],
 )
 def test_an_impossible_request_is_refused(
-    make_line: Callable[..., Line],
+    make_line: Callable[..., LineData],
     tmp_path: Path,
     arguments: tuple[int, int],
     name: str,
@@ -249,15 +254,15 @@ def test_an_impossible_request_is_refused(
 ) -> None:
     count, refinement = arguments
     with pytest.raises(InputError, match=sentence):
-        write_mesh(make_line(), count, tmp_path / name, support_refinement=refinement)
+        write_mesh(line_from(make_line()), count, tmp_path / name, support_refinement=refinement)
     assert not gmsh.isInitialized()
 
 
 def test_gmsh_prints_nothing_and_leaves_the_interrupt_alone(
-    make_line: Callable[..., Line], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    make_line: Callable[..., LineData], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     before = signal.getsignal(signal.SIGINT)
-    write_mesh(make_line(), 3, tmp_path / "line.msh")
+    write_mesh(line_from(make_line()), 3, tmp_path / "line.msh")
     read_mesh(tmp_path / "line.msh")
     assert signal.getsignal(signal.SIGINT) is before
     assert not gmsh.isInitialized()
@@ -265,13 +270,13 @@ def test_gmsh_prints_nothing_and_leaves_the_interrupt_alone(
 
 
 def test_an_open_session_of_the_caller_stays_open(
-    make_line: Callable[..., Line], tmp_path: Path
+    make_line: Callable[..., LineData], tmp_path: Path
 ) -> None:
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.model.add("of the caller")
-        write_mesh(make_line(), 3, tmp_path / "line.msh")
+        write_mesh(line_from(make_line()), 3, tmp_path / "line.msh")
         assert gmsh.isInitialized()
         assert gmsh.model.list() == ["", "of the caller"]
     finally:

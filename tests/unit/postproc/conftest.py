@@ -11,8 +11,10 @@ import pytest
 from mpi4py import MPI
 
 from catenary.mbs.lumped_data import LumpedData
-from catenary.meshgen.line import DropperKind, Line, SteadyArm, Wire
+from catenary.meshgen.line import Conductor, DropperKind, Line, SteadyArm
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
+from catenary.meshgen.topologies.all_topologies import make_line as make_line_of
+from catenary.meshgen.topologies.line_data import LineData
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, line_datasets, static_datasets
 from catenary.postproc.record.recorder import Recorder
@@ -30,20 +32,22 @@ EVALUATION = (250.0, 550.0)
 
 def make_line() -> Line:
     sag = tuple(0.05 * (1.0 - ((x - SPAN / 2) / 20.0) ** 2) for x in DROPPERS)
-    return Line(
-        span_lengths=(SPAN,) * N_SPANS,
-        dropper_positions=(DROPPERS,) * N_SPANS,
-        pre_sag=(sag,) * N_SPANS,
-        stagger=tuple(0.2 * (-1) ** i for i in range(N_SPANS + 1)),
-        contact_height=5.3,
-        encumbrance=1.2,
-        contact_wire=Wire(20e3, 1.33, 180.0),
-        messenger_wire=Wire(16e3, 1.07, 130.0),
-        dropper=DropperKind(1e5, None, 0.117, 0.195, 0.165),
-        support_stiffness=5e5,
-        steady_arm=SteadyArm(1.2, 0.7, 0.2, 300.0),
-        n_transition=(1, 1),
-        transition_rise=0.5,
+    return make_line_of(
+        LineData(
+            span_lengths=(SPAN,) * N_SPANS,
+            dropper_positions=(DROPPERS,) * N_SPANS,
+            pre_sag=(sag,) * N_SPANS,
+            stagger=tuple(0.2 * (-1) ** i for i in range(N_SPANS + 1)),
+            contact_height=5.3,
+            encumbrance=1.2,
+            contact_wire=Conductor(20e3, 1.33, 180.0),
+            messenger_wire=Conductor(16e3, 1.07, 130.0),
+            dropper=DropperKind(1e5, None, 0.117, 0.195, 0.165),
+            support_stiffness=5e5,
+            steady_arm=SteadyArm(1.2, 0.7, 0.2, 300.0),
+            n_transition=(1, 1),
+            transition_rise=0.5,
+        )
     )
 
 
@@ -64,7 +68,7 @@ def make_mesh(line: Line) -> LineMesh:
     x = np.append(x, stations[-1])
     n = x.size
     within = np.mod(x, SPAN)
-    contact_z = line.target_height(x) - 0.05 * np.clip(
+    contact_z = line.profiles[0].level(x) - 0.05 * np.clip(
         1.0 - ((within - SPAN / 2) / 20.0) ** 2, 0.0, None
     )
     messenger_z = 6.5 - 0.4 * within * (SPAN - within) / (SPAN / 2) ** 2
@@ -131,7 +135,7 @@ def make_header(problem: Problem, mesh: LineMesh, **attributes: Any) -> Header:
     }
     datasets = {
         **line_datasets(line, mesh, EVALUATION),
-        **static_datasets(mesh, equilibrium, elasticity),
+        **static_datasets(mesh, mesh.wires[CONTACT_WIRE], equilibrium, elasticity),
     }
     return Header({**known, **attributes}, datasets, facts_of(problem, mesh, length))
 

@@ -93,8 +93,9 @@ def test_droppers_with_an_axial_stiffness_count_with_the_shortest(
     problem: Problem, derived: Any
 ) -> None:
     """EA / l = 1e5 N / 0.5 m."""
-    kind = replace(problem.line.dropper, stiffness=None, axial_stiffness=1e5)
-    line = replace(problem.line, dropper=kind)
+    (group,) = problem.line.droppers
+    kind = replace(group.kind, stiffness=None, axial_stiffness=1e5)
+    line = replace(problem.line, droppers=(replace(group, kind=kind),))
     assert derived(replace(problem, line=line))["stiffest_dropper"] == 2e5
     assert derived(problem)["stiffest_dropper"] == 1e5
 

@@ -17,8 +17,9 @@ from catenary.mbs.head.strips import Turning
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lowering import Lowering
 from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
-from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import MESSENGER_WIRE, LineMesh
+from catenary.meshgen.topologies.all_topologies import make_line
+from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
 from catenary.solver.effects.effect import Limit
@@ -31,7 +32,7 @@ from catenary.solver.statics.equilibrium import find_form
 N_SPANS = 4
 
 
-def full_line() -> Line:
+def full_line() -> LineData:
     """A line on which every shipped effect finds something to act on."""
     line = ac_simple_line(N_SPANS)
     return replace(
@@ -236,7 +237,7 @@ def test_a_scene_without_an_effect_has_no_trace_of_it(name: str, mesh: LineMesh)
         ("dropper_mass", lambda p: with_dropper(p, mass_per_length=0.0)),
         (
             "clamp_mass",
-            lambda p: with_dropper(p, messenger_clamp_mass=0.0, contact_clamp_mass=0.0),
+            lambda p: with_dropper(p, upper_clamp_mass=0.0, lower_clamp_mass=0.0),
         ),
         ("arm_stiffness", lambda p: with_arm(p, stiffness=0.0)),
         ("arm_inertia", lambda p: with_arm(p, mass_per_length=0.0, clamp_mass=0.0)),
@@ -264,15 +265,15 @@ def test_an_effect_with_nothing_to_act_on_does_not_exist(
 
 
 def with_line(problem: Problem, **changes: object) -> Problem:
-    return replace(problem, line=replace(problem.line, **changes))
+    return replace(problem, line=make_line(replace(full_line(), **changes)))
 
 
 def with_dropper(problem: Problem, **changes: float) -> Problem:
-    return with_line(problem, dropper=replace(problem.line.dropper, **changes))
+    return with_line(problem, dropper=replace(full_line().dropper, **changes))
 
 
 def with_arm(problem: Problem, **changes: float) -> Problem:
-    return with_line(problem, steady_arm=replace(problem.line.steady_arm, **changes))
+    return with_line(problem, steady_arm=replace(full_line().steady_arm, **changes))
 
 
 def test_weights_are_those_of_the_masses_that_exist(mesh: LineMesh) -> None:
@@ -282,7 +283,7 @@ def test_weights_are_those_of_the_masses_that_exist(mesh: LineMesh) -> None:
     wires = line.support_positions[-1] * (
         line.contact_wire.mass_per_length + line.messenger_wire.mass_per_length
     )
-    clamps = n["droppers"] * (line.dropper.messenger_clamp_mass + line.dropper.contact_clamp_mass)
+    clamps = n["droppers"] * (line.dropper.upper_clamp_mass + line.dropper.lower_clamp_mass)
     droppers = n["droppers"] * line.dropper.mass_per_length * 1.0  # all 1 m long here
     arm = line.steady_arm
     arms = n["arms"] * (0.5 * arm.mass_per_length * arm.length + arm.clamp_mass)
@@ -335,8 +336,8 @@ def test_point_masses_are_those_of_the_parts(mesh: LineMesh) -> None:
 
     expected = np.zeros(mesh.n_nodes)
     upper, lower = mesh.droppers.T
-    expected[upper] = kind.messenger_clamp_mass + 0.5 * kind.mass_per_length * lengths
-    expected[lower] = kind.contact_clamp_mass + 0.5 * kind.mass_per_length * lengths
+    expected[upper] = kind.upper_clamp_mass + 0.5 * kind.mass_per_length * lengths
+    expected[lower] = kind.lower_clamp_mass + 0.5 * kind.mass_per_length * lengths
     # Kinetic energy of a hinged rod: its moment of inertia m l^2 / 3 turned into a mass at its end.
     expected[mesh.steady_arms] += arm.mass_per_length * arm.length / 3 + arm.clamp_mass
     assert masses(whole) - masses(bare) == pytest.approx(expected, abs=1e-13)

@@ -14,14 +14,14 @@ from small_lines import (
     problem_of,
 )
 
-from catenary.meshgen.line import Line
+from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.contact.pantographs import nominal_height_rule
 from catenary.solver.problem.problem import Placement
 from catenary.solver.statics.elasticity import elasticity, middle_span
 from catenary.solver.statics.equilibrium import find_form
 
 
-def height_on(line: Line, elements: int, placement: Placement) -> float:
+def height_on(line: LineData, elements: int, placement: Placement) -> float:
     model, form = find_form(problem_of(line, HANGING), mesh_of(line, elements))
     lift = elasticity(model, *middle_span(line))
     return nominal_height_rule(model, form, lift)(placement)

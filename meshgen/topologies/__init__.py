@@ -1,0 +1,1 @@
+"""Topologies: which wires, droppers and hardware a line has, one file each."""

@@ -1,0 +1,25 @@
+"""From the data of a line to the line; importing this module registers the shipped topologies."""
+
+from __future__ import annotations
+
+from catenary.meshgen.line import Line
+from catenary.meshgen.topologies import simple  # noqa: F401  registers itself
+from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.topologies.registry import registered
+from catenary.solver.base.errors import InputError
+
+
+def make_line(data: LineData) -> Line:
+    """The line of the topology that ``data`` names.
+
+    Raises
+    ------
+    InputError
+        If there is no such topology, or the data make no line.
+    """
+    make = registered().get(data.topology)
+    if make is None:
+        known = ", ".join(sorted(registered()))
+        raise InputError(f"the topology {data.topology} is unknown; it must be one of: {known}")
+    data.check()
+    return make(data)

@@ -1,0 +1,120 @@
+"""What a scene says of a line, in SI units: all that a topology makes its wires from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from catenary.meshgen.line import Conductor, DropperKind, Profile, SteadyArm
+from catenary.meshgen.spans import Spans
+from catenary.solver.base.errors import InputError
+
+# Two cuts of a wire closer than this are taken for a slip of the pen [m].
+SHORTEST_GAP = 1e-3
+
+
+@dataclass(frozen=True)
+class LineData(Spans):
+    """What a scene says of a line.
+
+    Attributes
+    ----------
+    dropper_positions : per span, distances from the span's left support, ascending [m]
+    pre_sag : per span, per dropper: how far the contact wire hangs below ``contact_height`` [m]
+    stagger : (n_spans + 1,) lateral position of the contact wire at each support [m]
+    contact_height : height of the contact wire at the supports of the running spans [m]
+    encumbrance : height of the messenger wire above ``contact_height`` at the supports [m]
+    support_stiffness : vertical stiffness of a messenger-wire support [N/m]
+    transition_rise : height gained by the contact wire over all transition spans of one end [m]
+    topology : name of the topology that makes the line
+    """
+
+    dropper_positions: tuple[tuple[float, ...], ...]
+    pre_sag: tuple[tuple[float, ...], ...]
+    stagger: tuple[float, ...]
+    contact_height: float
+    encumbrance: float
+    contact_wire: Conductor
+    messenger_wire: Conductor
+    dropper: DropperKind
+    support_stiffness: float
+    steady_arm: SteadyArm
+    transition_rise: float
+    topology: str = "simple"
+
+    @cached_property
+    def dropper_x(self) -> np.ndarray:
+        """Places of all droppers along the line, ascending [m]."""
+        counts = [len(places) for places in self.dropper_positions]
+        starts = np.repeat(self.support_positions[:-1], counts)
+        within = [place for places in self.dropper_positions for place in places]
+        return np.asarray(starts + np.array(within, dtype=float))
+
+    @cached_property
+    def profile(self) -> Profile:
+        """Heights wanted of the contact wire: pre-sag is zero at the masts."""
+        masts = self.support_positions
+        x = np.concatenate([masts, self.dropper_x])
+        sag = np.concatenate([np.zeros(masts.size), *self.pre_sag])
+        order = np.argsort(x)
+        return Profile(
+            self.contact_height,
+            tuple(x[order].tolist()),
+            tuple(sag[order].tolist()),
+            self.transition_rise,
+            (float(masts[0]), float(masts[-1])),
+            self.running_range,
+        )
+
+    def target_height(self, x: np.ndarray) -> np.ndarray:
+        """Height that the contact wire is to have without pre-sag, shape as ``x`` [m]."""
+        return self.profile.level(x)
+
+    def check(self) -> None:
+        """Refuse lists of wrong length and droppers outside their spans.
+
+        Raises
+        ------
+        InputError
+            If lists do not fit the number of spans, a dropper is not inside its span, or droppers
+            are not in order.
+        """
+        if self.n_spans == 0:
+            raise InputError("the line has no span: span_lengths must name at least one length")
+        for name, n, wanted in (
+            ("dropper_positions", len(self.dropper_positions), self.n_spans),
+            ("pre_sag", len(self.pre_sag), self.n_spans),
+            ("stagger", len(self.stagger), self.n_spans + 1),
+        ):
+            if n != wanted:
+                raise InputError(f"{name} has {n} entries, but {self.n_spans} spans need {wanted}")
+        spans = zip(self.span_lengths, self.dropper_positions, self.pre_sag, strict=True)
+        for span, (length, places, lowered) in enumerate(spans, start=1):
+            if len(places) != len(lowered):
+                raise InputError(
+                    f"span {span} has {len(places)} droppers, but pre_sag names {len(lowered)} "
+                    "values"
+                )
+            _check_span(span, length, places)
+
+
+def _check_span(span: int, length: float, places: tuple[float, ...]) -> None:
+    if not length > SHORTEST_GAP:
+        raise InputError(f"the length of span {span} is {length:g} m, but must be positive")
+    for place in places:
+        if not SHORTEST_GAP <= place <= length - SHORTEST_GAP:
+            where = (
+                "on a mast" if min(abs(place), abs(place - length)) < SHORTEST_GAP else "outside"
+            )
+            raise InputError(
+                f"the dropper at {place:g} m of span {span} lies {where}, but must lie "
+                f"between the masts, which stand at 0 and {length:g} m"
+            )
+    for left, right in zip(places[:-1], places[1:], strict=True):
+        if right - left < SHORTEST_GAP:
+            raise InputError(
+                f"the droppers at {left:.10g} and {right:.10g} m of span {span} are not in "
+                f"ascending order at least {SHORTEST_GAP:g} m apart"
+            )

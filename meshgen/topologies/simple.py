@@ -1,0 +1,35 @@
+"""Simple catenary: one messenger wire, one contact wire, vertical droppers."""
+
+from __future__ import annotations
+
+from catenary.meshgen.line import Droppers, Line, Piece, Role, SteadyArms, Supports, Wire
+from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE, STEADY_ARMS, SUPPORTS
+from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.topologies.registry import register
+from catenary.meshgen.topologies.sag import sagging
+
+SIMPLE = "simple"
+
+
+@register(SIMPLE)
+def simple_catenary(data: LineData) -> Line:
+    """A contact wire that droppers hang from a messenger wire straight above the track."""
+    masts = data.support_positions
+    at_masts, at_droppers = tuple(masts.tolist()), tuple(data.dropper_x.tolist())
+    inner = at_masts[1:-1]
+    contact = Piece(at_masts, data.stagger, tuple(data.profile.level(masts).tolist()))
+    load = data.contact_wire.mass_per_length + data.messenger_wire.mass_per_length
+    top = data.contact_height + data.encumbrance
+    messenger = sagging(data, data.dropper_x, top, load, data.messenger_wire.tension)
+    return Line(
+        data.span_lengths,
+        data.n_transition,
+        SIMPLE,
+        (
+            Wire.of(data.contact_wire, CONTACT_WIRE, Role.CONTACT, (contact,), data.profile),
+            Wire.of(data.messenger_wire, MESSENGER_WIRE, Role.MESSENGER, (messenger,)),
+        ),
+        (Droppers(DROPPERS, data.dropper, MESSENGER_WIRE, CONTACT_WIRE, at_droppers, at_droppers),),
+        (SteadyArms(STEADY_ARMS, data.steady_arm, CONTACT_WIRE, inner),),
+        (Supports(SUPPORTS, data.support_stiffness, MESSENGER_WIRE, inner),),
+    )
