@@ -164,7 +164,7 @@ def test_wind_deflects_a_wire_like_a_tensioned_beam(wire: str, mesh: LineMesh) -
     np.add.at(load, wind.dofs, wind.values(1.0))
     solution = solve_free(matrix_of(model, stiffness=1.0), model, load)
     nodes = mesh.wires[wire]
-    expected, left_out = blown_out(getattr(problem.line, wire), mesh.x(nodes))
+    expected, left_out = blown_out(problem.line.wire(wire), mesh.x(nodes))
     found = solution[model.dofs(nodes, "v")]
     check(f"{wire} [m]", found, expected, within=left_out)
     assert not solution[model.dofs(nodes)].any()
