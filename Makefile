@@ -33,7 +33,7 @@ endif
 # The targets share .venv and two cores: one after the other, also under make -j.
 .NOTPARALLEL:
 .PHONY: help setup setup-newest compile update-versions run check test test-unit test-verification test-mpi \
-    test-regression bench long-runs fuzz lint types format clean
+    test-regression bench long-runs fuzz test-paraview lint types format clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -92,6 +92,11 @@ fuzz: setup ## random scenes: 4000 that run, 4000 refused, 50 sweeps, 25 killed,
 
 long-runs: setup ## all bodies of a pantograph over 20 s and ten minutes; some seven minutes
 	$(PYTEST) -q -s $(LONG_RUNS)
+
+test-paraview: setup ## open runs in the ParaView of this machine (Debian: paraview python3-paraview xvfb)
+	@command -v pvpython >/dev/null && command -v xvfb-run >/dev/null || \
+	    { echo "test-paraview needs pvpython and xvfb-run: apt-get install python3-paraview xvfb"; exit 1; }
+	$(PYTEST) -q tests/paraview
 
 lint: setup ## ruff (lint and format) and mypy
 	$(PYTHON) -m ruff check .

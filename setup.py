@@ -20,6 +20,6 @@ setup(
             "studies/hard/hard.toml",
             "*/*.py",
         ],
-        "catenary.postproc": ["report/templates/*"],
+        "catenary.postproc": ["report/templates/*", "paraview/*.template"],
     },
 )

@@ -1,4 +1,4 @@
-"""The verbs ``report``, ``compare`` and ``animate``: results of runs that were made before."""
+"""The verbs ``report``, ``compare``, ``animate`` and ``paraview``, about runs made before."""
 
 from __future__ import annotations
 
@@ -102,3 +102,33 @@ def animate(
     )
     console.say("\n".join(map(str, film.files)))
     console.say(f"{film.n_pictures} pictures; the film runs {pace} than the train.")
+
+
+@app.command(
+    "paraview",
+    help="Write paraview/view.py into the folder of a run: a script that opens it in ParaView, "
+    "from the side, with pantographs, forces and masts, heights and motions drawn larger.",
+    epilog="Example: catenary paraview results/en300",
+)
+@console.guarded
+@console.serial
+def paraview(
+    folder: RunFolder,
+    motion: Annotated[
+        float | None,
+        typer.Option("--motion", min=1, max=1e5, help="Factor by which motions are drawn larger."),
+    ] = None,
+) -> None:
+    """Serial."""
+    import shutil
+
+    from catenary.postproc.paraview.open_in_paraview import write_script
+    from catenary.postproc.read.guard import examined
+
+    if not folder.is_dir():
+        raise InputError(f"{folder} is no folder; name the folder of a run")
+    script, *others = write_script(folder, examined(folder), motion)
+    console.say("\n".join(map(str, (script, *others))))
+    console.say(f"Open it with: paraview --script={script}")
+    if shutil.which("paraview") is None:
+        console.warn("paraview is not on this machine (Debian, Ubuntu: apt-get install paraview)")

@@ -42,7 +42,9 @@ ROOMS = {
         "base", "problem", "model", "effects", "linear", "statics", "integrators", "contact",
         "contact_problem", "schemes", "time_loop",
     ),
-    "postproc": ("standards", "channels", "files", "read", "record", "evaluate", "film", "report"),
+    "postproc": ("standards", "channels", "files", "read", "record", "evaluate", "film", "paraview",
+        "report",
+    ),
     "cases": (
         "scene.input", "scene.tables", "scene.keys", "scene.scene", "scene.convert",
         "scene.checks", "scene.load", "terminal", "process", "result_folder", "run",

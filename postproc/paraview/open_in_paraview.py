@@ -1,0 +1,99 @@
+"""Writes the script that opens a run in ParaView, and what it shows beside the line."""
+
+from __future__ import annotations
+
+import json
+import os
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+
+from catenary.postproc.film.film_data import FilmData, film_data
+from catenary.postproc.film.pantograph_shape import BELOW_HEAD
+from catenary.postproc.film.scale import round_down
+from catenary.postproc.film.snapshots import Snapshots
+from catenary.postproc.paraview import scenery
+from catenary.postproc.read.records import Records
+from catenary.postproc.read.results import Results
+from catenary.postproc.record.fields import COMPONENTS
+from catenary.solver.base.errors import InputError
+
+SCRIPT, FOLDER = "view.py", "paraview"
+_TEMPLATE = "view.py.template"
+# Line in the window beside one pantograph [m], width over height of the window, and the share of
+# the room between the wires that the largest uplift fills.
+_WIDTH, _ASPECT, _SHARE = 110.0, 1280.0 / 480.0, 0.4
+
+
+def write_script(folder: Path, records: Records | None, motion: float | None = None) -> list[Path]:
+    """Write ``paraview/view.py`` and its data into the folder of a run. Not collective.
+
+    Parameters
+    ----------
+    records : what ``guard.examined`` found in the result file
+    motion : factor by which motions are drawn larger, None for one that fits
+
+    Raises
+    ------
+    InputError
+        If the folder holds no run with snapshots, or cannot be written to.
+    """
+    target = folder / FOLDER
+    with Results(folder, records) as results:
+        data = film_data(results)
+        with Snapshots(folder, len(data.points)) as snapshots:
+            settings = _settings(folder, data, snapshots, motion)
+            try:
+                target.mkdir(exist_ok=True)
+                files = scenery.write(data, snapshots.times, target)
+                script = _script(settings)
+                part = target / f".{SCRIPT}.{os.getpid()}"
+                part.write_text(script, encoding="utf-8")
+                os.replace(part, target / SCRIPT)
+            except OSError as error:
+                raise InputError(f"{target} cannot be written: {error}") from error
+    return [target / SCRIPT, files.pantographs, files.forces, files.surroundings]
+
+
+def _script(settings: dict[str, object]) -> str:
+    template = resources.files(__package__).joinpath(_TEMPLATE).read_text(encoding="utf-8")
+    # Text of strangers, such as names, stays text: JSON's notation of it is Python's as well.
+    return template.replace("@SETTINGS@", json.dumps(settings, indent=4))
+
+
+def _settings(
+    folder: Path, data: FilmData, snapshots: Snapshots, motion: float | None
+) -> dict[str, object]:
+    """All numbers of the script."""
+    times = snapshots.times
+    width = _WIDTH + 1.1 * float(np.ptp(data.position[0]))
+    heights = data.points[:, 2]
+    contact = heights[data.wires[data.contact]]
+    low, high = float(np.median(contact)) - BELOW_HEAD - 0.4, float(heights.max()) + 0.6
+    height = round_down(width / _ASPECT / (high - low))
+    some = range(0, times.size, max(1, times.size // 200))
+    largest = max(1e-4, *(float(np.abs(snapshots.uplift(number)).max()) for number in some))
+    between = float(heights.max() - np.median(contact))
+    fitting = max(height, round_down(_SHARE * between * height / largest))
+    components = {name: number for name, number in COMPONENTS.items()}
+    first = data.row_at(float(times[0]))
+    return {
+        "folder": str((folder / FOLDER).absolute()),
+        "line": "../fields.xdmf",
+        "pantographs": scenery.PANTOGRAPHS,
+        "forces": scenery.FORCES,
+        "surroundings": scenery.SURROUNDINGS,
+        "components": components,
+        "names": data.names,
+        "height": height,
+        "motion": motion or fitting,
+        "largest_uplift_m": largest,
+        "radius": 0.0018 * width,
+        "metres_a_newton": 0.1 * height * between / max(float(data.force.mean()), 1.0) * 4.0,
+        "width_m": width,
+        "middle_m": 0.5 * height * (low + high),
+        "start_m": float(data.position[first].mean()) - data.speed * float(times[0]),
+        "speed": data.speed,
+        "times": [float(times[0]), float(times[-1])],
+    }
