@@ -61,6 +61,7 @@ def data_files() -> set[str]:
         "cases/studies/hard/hard.toml",
         "cases/*/*.py",
         "postproc/report/templates/*",
+        "postproc/paraview/*.template",
     )
     return {
         f"catenary/{path.relative_to(ROOT)}"
