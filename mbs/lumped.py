@@ -6,7 +6,6 @@ Source: EN 50318, annex (two masses); the benchmark of ten codes of 2015 (three 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from scipy import linalg
 from catenary.mbs.head import head_kernels
 from catenary.mbs.head.head_kernels import FORCE, LinearStep
 from catenary.mbs.head.head_records import LUMPED
-from catenary.mbs.head.newmark_head import SteppedHead, raised
+from catenary.mbs.head.newmark_head import Raising, SteppedHead, parts_of
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.interface import HeadState
 from catenary.mbs.lumped_data import LumpedData, chain_matrix
@@ -58,7 +57,7 @@ class LumpedPantograph(SteppedHead):
         n = head.n + data.n_masses - 1
         super().__init__(head, n, dt, beta, gamma, lateral)
         self._lift_full = static_force
-        self._part: Callable[[float], float] = partial(raised, raise_time=raise_time)
+        self._part: Callable[[float], float] = Raising(raise_time)
         self._base = base
         # The lift acts on the last mass, which is the head itself if there is no other.
         self._carrier = n - 1 if data.n_masses > 1 else int(np.flatnonzero(head.level)[-1])
@@ -117,8 +116,7 @@ class LumpedPantograph(SteppedHead):
         """Fill in the force on the last mass, and where the wire crosses; see `SteppedHead`."""
         if self._base is None:
             constant = self._base_stiffness * self._base_height
-            part = np.array([self._part(time) for time in times])
-            drives[:, FORCE] = self._lift_full * part + constant
+            drives[:, FORCE] = self._lift_full * parts_of(self._part, times) + constant
         else:
             drives[:, FORCE] = [self._drive(time) for time in times]
         self._fill_lateral(times, drives)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -139,3 +140,21 @@ def raised(time: float, raise_time: float) -> float:
     if time >= raise_time:
         return 1.0
     return 0.5 * (1.0 - float(np.cos(np.pi * time / raise_time)))
+
+
+@dataclass(frozen=True)
+class Raising:
+    """Part of the lift that acts at a time [s], see ``raised``."""
+
+    raise_time: float
+
+    def __call__(self, time: float) -> float:
+        """The part at ``time`` [s]."""
+        return raised(time, self.raise_time)
+
+
+def parts_of(part: Callable[[float], float], times: Sequence[float]) -> np.ndarray:
+    """The parts of the lift at ``times`` [s], which grow, shape (len(times),)."""
+    if isinstance(part, Raising) and times[0] >= part.raise_time:
+        return np.ones(len(times))
+    return np.array([part(time) for time in times])

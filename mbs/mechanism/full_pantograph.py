@@ -10,11 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
-from catenary.mbs.head.newmark_head import raised
+from catenary.mbs.head.newmark_head import Raising
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, head_weight_under_way, stand
@@ -122,7 +121,7 @@ class FullPantograph:
         standing = stand(data)
         self._data, self._dt = data, dt
         self._lateral, self._base = lateral, base
-        part = partial(raised, raise_time=raise_time)
+        part = Raising(raise_time)
         self._hold_down = _HoldDown("held down until raised", data.arm, part)
         system = without_spins(standing.system, standing.motion)
         system = system.with_forces(*data.wind, self._hold_down)

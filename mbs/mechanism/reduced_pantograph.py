@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,7 @@ import numpy as np
 from catenary.mbs.head import head_kernels
 from catenary.mbs.head.head_kernels import BASE, LIFTED, N_DRIVE, WEIGHT, ZERO, RaisedHead
 from catenary.mbs.head.head_records import REDUCED
-from catenary.mbs.head.newmark_head import SteppedHead, raised
+from catenary.mbs.head.newmark_head import Raising, SteppedHead, parts_of
 from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning, head_parts
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.interface import HeadState
@@ -85,7 +84,7 @@ class RaisingPantograph(SteppedHead):
         head = head_parts(*values, data.strips, data.roll if lateral is not None else None)
         super().__init__(head, head.n + 1, dt, beta, gamma, lateral)
         self._data = data
-        self._part: Callable[[float], float] = partial(raised, raise_time=raise_time)
+        self._part: Callable[[float], float] = Raising(raise_time)
         self._base = base
         self._zero = data.head_offset + data.base_height
         self._masses = np.append(head.masses, 0.0)
@@ -119,7 +118,7 @@ class RaisingPantograph(SteppedHead):
     def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
         """Fill in lift and base, and where the wire crosses; see `SteppedHead`."""
         drives[:, :N_DRIVE] = self._drive
-        drives[:, LIFTED] = [self._part(time) for time in times]
+        drives[:, LIFTED] = parts_of(self._part, times)
         if self._base is not None:
             drives[:, BASE:N_DRIVE] = [self._base.vertical(time) for time in times]
         self._fill_lateral(times, drives)

@@ -9,6 +9,9 @@ import traceback
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+import numpy as np
+from mpi4py import MPI
+
 from catenary.solver.base.errors import CatenaryError, RunBroken
 
 T = TypeVar("T")
@@ -52,6 +55,16 @@ def on_root(comm: Any, work: Callable[[], T]) -> T:
     elif error is not None:
         raise error
     return result
+
+
+def total(comm: Any, parts: np.ndarray) -> np.ndarray:
+    """The sums of what ranks have, element by element, on all of them. Collective.
+
+    ``parts`` (n,) of this rank; the array itself on one rank.
+    """
+    if comm.size > 1:
+        comm.Allreduce(MPI.IN_PLACE, parts, op=MPI.SUM)
+    return parts
 
 
 def _portable(error: BaseException | None) -> BaseException | None:

@@ -69,12 +69,7 @@ class Droppers:
 
     def energy_of_pushing(self) -> float:
         """Elastic energy that the owned droppers would hold by pushing, were they springs [J]."""
-        upper, lower = self.ends.T
-        displacement = self._line.displacement
-        stretch = displacement[upper] - displacement[lower]
-        rest, stiffness = self.laws[:, 0], self.laws[:, 1]
-        pushing = np.minimum(rest + stiffness * stretch, 0.0)
-        return float((pushing**2 / (2.0 * stiffness)).sum())
+        return float(state_kernels.energy_of_pushing(self._line.motion.read, self.ends, self.laws))
 
     def near(self, x: float, distance: float) -> slice:
         """The droppers within ``distance`` of ``x`` [m]."""

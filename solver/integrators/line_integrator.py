@@ -15,6 +15,7 @@ import numpy as np
 from mpi4py import MPI
 
 from catenary.solver.base import aligned_arrays
+from catenary.solver.base.parallel import total
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.detour import LIBRARY, PARTS, Detour
@@ -253,6 +254,11 @@ class LineIntegrator(ABC):
 
     def energies(self) -> tuple[float, float]:
         """Kinetic and elastic energy relative to equilibrium, all droppers taut [J]. Collective."""
+        kinetic, elastic = total(self._comm, self.energy_parts()).tolist()
+        return kinetic, elastic
+
+    def energy_parts(self) -> np.ndarray:
+        """What this rank adds to each of ``energies`` [J], shape (2,). Collective."""
         operators, displacement, velocity = self.operators, self.displacement, self.velocity
         ahead = operators.factor.copy()
         np.copyto(operators.factor, velocity)
@@ -260,7 +266,7 @@ class LineIntegrator(ABC):
         np.copyto(operators.factor, displacement)
         elastic = 0.5 * operators.square("stiffness")
         np.copyto(operators.factor, ahead)
-        return kinetic, elastic
+        return np.array([kinetic, elastic])
 
     def destroy(self) -> None:
         """Free all PETSc objects. Collective."""

@@ -72,6 +72,13 @@ def displacements(motion, result):
 
 
 @compiled
+def displacements_of(unknowns, motion, result):
+    """Displacements at some of a rank's unknowns; ``motion`` as ``LineState.read``."""
+    for i in range(unknowns.size):
+        result[i] = displacement_at(unknowns[i], motion)
+
+
+@compiled
 def velocities(motion, result):
     """Fill in all of a rank's velocities; ``motion`` as ``LineState.read``."""
     for i in range(result.size):
@@ -98,6 +105,18 @@ def tension(motion, ends, laws, result):
     """
     for d in range(ends.shape[0]):
         result[d] = tension_of(d, motion, ends, laws)
+
+
+@compiled
+def energy_of_pushing(motion, ends, laws):
+    """Elastic energy that the droppers of ``tension`` would hold by pushing, were they springs."""
+    energy = 0.0
+    for d in range(ends.shape[0]):
+        upper, lower = ends[d, 0], ends[d, 1]
+        stretch = displacement_at(upper, motion) - displacement_at(lower, motion)
+        pushing = min(laws[d, 0] + laws[d, 1] * stretch, 0.0)
+        energy += pushing**2 / (2.0 * laws[d, 1])
+    return energy
 
 
 @compiled

@@ -227,13 +227,12 @@ class LineOperators:
         return self.answer
 
     def square(self, name: str) -> float:
-        """x M x or x K x of the whole line for x in ``factor``, by ``name``. Collective."""
+        """This rank's part of x M x or x K x for x in ``factor``, by ``name``. Collective."""
         self.exchange()
-        local = 0.0
-        if self.domain.size:
-            self._multiply(name, self._loaded.array, self._loaded_here)
-            local = float(self._loaded.array[self.domain.owned] @ self.factor)
-        return float(self._comm.allreduce(local))
+        if not self.domain.size:
+            return 0.0
+        self._multiply(name, self._loaded.array, self._loaded_here)
+        return float(self._loaded.array[self.domain.owned] @ self.factor)
 
     def residual(self) -> float:
         """Relative residual of a solve with a load on every unknown. Collective.

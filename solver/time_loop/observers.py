@@ -61,7 +61,8 @@ class StepView:
     step, time : number of the step (0 is the initial state) and its time [s]
     row : (n,) the values of all channels one after another
     columns : where in the row each channel is, by name
-    node_uplift : () -> (n owned nodes,) vertical displacement [m]; not collective
+    node_uplift : () -> (n owned nodes,) vertical displacement [m], overwritten by the next call;
+        not collective
     line_state : () -> displacement, velocity and acceleration of the rank's unknowns, by these
         names; not collective
     energies : () -> the values of ``channels.ENERGIES`` but the time, kinetic and elastic energy of

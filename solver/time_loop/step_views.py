@@ -8,7 +8,7 @@ import numpy as np
 
 from catenary.solver.base.bound import bound
 from catenary.solver.base.errors import InputError
-from catenary.solver.base.parallel import on_root
+from catenary.solver.base.parallel import on_root, total
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.integrators import state_kernels
@@ -66,7 +66,8 @@ class Showing:
         self._arm_rows = (arms[self._owned_arms] - first).astype(np.int64)
         nodes = np.arange(model.mesh.n_nodes)
         self._owned_nodes = nodes[owned(model.dofs(nodes))]
-        self._node_rows = model.dofs(self._owned_nodes) - first
+        self._node_rows = (model.dofs(self._owned_nodes) - first).astype(np.int64)
+        self._node_uplift = np.zeros(self._node_rows.size)
         n_outputs, n_arms = pantographs.outputs.size, self._arm_rows.size
         n_droppers = interaction.droppers.shown.size
         self._shown = np.zeros(n_outputs + n_arms + n_droppers)
@@ -78,7 +79,7 @@ class Showing:
             time=0.0,
             row=np.zeros(self.layout.width),
             columns=self.layout.columns,
-            node_uplift=lambda: self._line.displacement[self._node_rows],
+            node_uplift=self._uplift_of_nodes,
             line_state=self._line.state,
             energies=self._energies,
             checkpoint=self._checkpoint,
@@ -178,6 +179,11 @@ class Showing:
         for i, pantograph in enumerate(self._pantographs.models):
             _like(checkpoint, f"pantograph_{i}", pantograph.state())
 
+    def _uplift_of_nodes(self) -> np.ndarray:
+        """Vertical displacements of the rank's nodes [m]; overwritten when asked for again."""
+        state_kernels.displacements_of(self._node_rows, self._line.motion.read, self._node_uplift)
+        return self._node_uplift
+
     def _energies(self) -> tuple[float, ...]:
         """The energies that are recorded, in the order of their table. Collective."""
         return energies_of(Energies(*self._line_energies(), self._sources))
@@ -187,15 +193,15 @@ class Showing:
 
         Collective. After an incident it is that of what is left of the line; see `after_incidents`.
         """
-        kinetic, elastic = self._line.energies()
+        parts = self._line.energy_parts()
         if self._unbalanced:
             load = self._changed.load[self._line.ownership.first : self._line.ownership.last]
-            elastic -= self._comm.allreduce(float(load @ self._line.displacement))
-            elastic += self._changed.energy
+            parts[1] -= load @ self._line.displacement
         if self._slackens:
-            pushing = self._comm.allreduce(self._interaction.droppers.energy_of_pushing())
-            elastic -= (1.0 - self._kept_ratio) * pushing
-        return kinetic, elastic
+            pushing = self._interaction.droppers.energy_of_pushing()
+            parts[1] -= (1.0 - self._kept_ratio) * pushing
+        kinetic, elastic = total(self._comm, parts).tolist()
+        return kinetic, elastic + self._changed.energy if self._unbalanced else elastic
 
     def _checkpoint(self) -> dict[str, Any] | None:
         """Everything needed to continue after the step shown last, on rank 0. Collective."""
