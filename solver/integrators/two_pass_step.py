@@ -1,9 +1,9 @@
 """A line's step without contacts in two passes over its state, for Newmark's family.
 
-Forth, from both ends of the line to its middle: product with K and elimination. Back:
-substitution, correction, and the prediction of the step to come. A step that does these one after
-the other reads the state from memory as often as there are of them, which is what long lines wait
-for; here a stretch of the line is in the nearest cache until a pass is through with it.
+Forth, from both ends of the line to its middle: product with K and elimination, station by station.
+Back: substitution, correction, and the prediction of the step to come. A step that does these one
+after the other reads the state from memory as often as there are of them, which is what long lines
+wait for. Two chains of stations go side by side, each of which waits for itself only.
 """
 
 from __future__ import annotations
@@ -13,19 +13,15 @@ from typing import Any
 import numpy as np
 
 from catenary.solver.base.bound import bound
+from catenary.solver.base.pointers import borrowed
 from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps, PredictedLineState, Steps
 from catenary.solver.integrators.state_kernels import compiled, in_line, tension_of
-from catenary.solver.linear.lanes import Layout, add_scaled, load, pitch, remembers, store, zero
-from catenary.solver.linear.station_factors import (
-    StationFactors,
-    eliminate,
-    substitute,
-    substitute_outside,
-)
-from catenary.solver.linear.station_products import StationProduct, multiply_rows
+from catenary.solver.linear.lanes import add, add_scaled, load, pitch, remembers, store, zero
+from catenary.solver.linear.station_factors import StationFactors, eliminate, meet, substitute
+from catenary.solver.linear.station_products import StationProduct, read_station, row_sums
 
-# Unknowns of a stretch: large enough for memory to be read ahead, 64 kB of each array, of which a
-# cache next to a processor, of 1 MB, holds the six that both ends need.
+# Unknowns of a stretch of the pass back, after which its droppers are looked at: large enough for
+# memory to be read ahead, 64 kB of each array, which a cache next to a processor holds.
 _STRETCH = 8192
 
 
@@ -64,7 +60,7 @@ class StationPasses:
         low, high = factors.low, factors.high
         layout = factors.layout
         if isinstance(steps, AlphaSteps):
-            layout = Layout(layout.widths, layout.paired, remembers=True)
+            layout = layout.remembering()
         factored = layout, factors.kinds, factors.blocks, low, high
         multiplied = product.layout, product.kinds, product.blocks, product.first, read, velocity
         changes, known = changes_of(motion, steps)
@@ -144,37 +140,47 @@ def go_on_by_alpha(layout, at, solution, motion, changes):
 
 
 @in_line
-def eliminate_both(factored, begin, end, left, right, answer):
-    """Eliminate own stations from ``begin`` to ``end``, counted from both ends."""
-    _, _, _, low, high = factored
-    for k in range(begin, end):
-        left = eliminate(factored, answer, low + k, left, answer)
-        right = eliminate(factored, answer, high - 1 - k, right, answer)
-    return left, right
+def eliminate_row(multiplied, factored, loads, station, states, outward, answer):
+    """``eliminate`` with the right-hand side from a row of the product, and of ``loads`` if there
+    are any; ``states`` are what ``read_station`` gives before, at and after the station."""
+    before, here, after = states
+    positions, velocities = (before[0], here[0], after[0]), (before[1], here[1], after[1])
+    sums = row_sums(multiplied, station, positions, velocities)
+    if loads.size > 0:
+        layout = factored[0]
+        load_here = load(layout, loads, pitch(layout) * np.uint64(station))
+        sums = add(sums[0], load_here), sums[1]
+    return eliminate(factored, sums, station, outward, answer)
 
 
 @compiled
-def forth(multiplied, factored, loads, answer, stretch):
+def forth(multiplied, factored, loads, answer):
     """Leave in ``answer`` what elimination leaves of the right-hand side; see ``StationPasses``."""
+    multiplied, factored, loads, answer = borrowed((multiplied, factored, loads, answer))
     layout, kinds, _, low, high = factored
-    middle, pairs = (low + high) // 2, (high - low - 1) // 2
-    multiply_rows(multiplied, loads, 0, low, answer)
-    multiply_rows(multiplied, loads, high, kinds.size, answer)
-    left, right = zero(layout), zero(layout)
-    for i in range(low):
-        left = eliminate(factored, answer, i, left, answer)
-    for j in range(kinds.size - 1, high - 1, -1):
-        right = eliminate(factored, answer, j, right, answer)
-    for start in range(0, pairs, stretch):
-        stop = min(start + stretch, pairs)
-        multiply_rows(multiplied, loads, low + start, low + stop, answer)
-        multiply_rows(multiplied, loads, high - stop, high - start, answer)
-        left, right = eliminate_both(factored, start, stop, left, right, answer)
-    multiply_rows(multiplied, loads, low + pairs, high - pairs, answer)
-    # One more towards the start of the line, if there is an even number of them.
-    for i in range(low + pairs, middle + 1):
-        left = eliminate(factored, answer, i, left, answer)
-    substitute(factored, middle, right, answer)
+    n, middle = kinds.size, (low + high) // 2
+    pairs = min(middle, n - 1 - middle)
+    left = right = zero(layout)
+    before, here = read_station(multiplied, -1), read_station(multiplied, 0)
+    beyond, there = read_station(multiplied, n), read_station(multiplied, n - 1)
+    for i in range(pairs):
+        j = n - 1 - i
+        after, ahead = read_station(multiplied, i + 1), read_station(multiplied, j - 1)
+        states, others = (before, here, after), (ahead, there, beyond)
+        left = eliminate_row(multiplied, factored, loads, i, states, left, answer)
+        right = eliminate_row(multiplied, factored, loads, j, others, right, answer)
+        before, here, beyond, there = here, after, there, ahead
+    for j in range(n - 1 - pairs, middle, -1):
+        ahead = read_station(multiplied, j - 1)
+        others = ahead, there, beyond
+        right = eliminate_row(multiplied, factored, loads, j, others, right, answer)
+        beyond, there = there, ahead
+    for i in range(pairs, middle + 1):
+        after = read_station(multiplied, i + 1)
+        states = before, here, after
+        left = eliminate_row(multiplied, factored, loads, i, states, left, answer)
+        before, here = here, after
+    meet(factored, middle, right, answer)
 
 
 @compiled
@@ -215,8 +221,9 @@ def pull(number, motion, droppers):
 
 @compiled
 def back(factored, motion, answer, changes, droppers):
-    """Fill ``answer`` with the solution, take the rank's own motion on, and find the tension of
-    its droppers, which come with their ranges of ``pulled``; after ``forth``."""
+    """Take the rank's own motion on from what ``forth`` has left in ``answer``, and find the
+    tension of its droppers, which come with their ranges of ``pulled``."""
+    factored, motion, answer, droppers = borrowed((factored, motion, answer, droppers))
     layout, _, _, low, high = factored
     stretch = droppers[4]
     middle, pairs = (low + high) // 2, (high - low - 1) // 2
@@ -231,15 +238,15 @@ def back(factored, motion, answer, changes, droppers):
             go_on(layout, middle + k - low, y, motion, changes)
         pull(number, motion, droppers)
         number += 1
+    # One more towards the start of the line, if there is an even number of them.
     for i in range(middle - pairs - 1, low - 1, -1):
         x = substitute(factored, i, x, answer)
         go_on(layout, i - low, x, motion, changes)
     pull(number, motion, droppers)
-    substitute_outside(factored, low, high, x, y, answer)
 
 
 @compiled
 def forth_and_back(multiplied, factored, loads, answer, motion, changes, droppers):
     """Both passes."""
-    forth(multiplied, factored, loads, answer, droppers[4])
+    forth(multiplied, factored, loads, answer)
     back(factored, motion, answer, changes, droppers)

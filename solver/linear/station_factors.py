@@ -14,8 +14,11 @@ from scipy import sparse
 from catenary.solver.base.bound import bound
 from catenary.solver.base.compiled import compiled, in_line
 from catenary.solver.base.petsc import PETSc
+from catenary.solver.base.pointers import borrowed
 from catenary.solver.linear import station_products
-from catenary.solver.linear.lanes import Layout, add_product, block_size, load, pitch, store, zero
+from catenary.solver.linear.lane_products import add_whole, numbers_from, sums_from, total_of
+from catenary.solver.linear.lanes import load, pitch, store, whole_size, zero
+from catenary.solver.linear.station_layout import Layout
 
 
 class StationFactors:
@@ -25,9 +28,10 @@ class StationFactors:
     ----------
     layout : Layout
     kinds : (n,) kind of each station
-    blocks : of each kind S^-1, -S^-1 times its block towards the end of the line that
-        elimination starts from, and -S^-1 times that towards the middle, packed by the layout; S
-        is its diagonal block after elimination
+    blocks : of each kind -B S^-1 with its block B towards the end of the line that elimination
+        starts from and the S of the station there, its own S^-1, and -S^-1 times its block
+        towards the middle, packed by the layout; S is a diagonal block after elimination. In the
+        middle the third is the first towards the other end
     low, high : range of stations in whose middle elimination ends
     n_stations, n_kinds : in the matrix, and how many have different factors
     """
@@ -37,7 +41,10 @@ class StationFactors:
     ) -> None:
         self.layout, self.kinds, self.blocks = layout, kinds, blocks
         self.low, self.high = low, high
-        self.n_stations, self.n_kinds = kinds.size, blocks.size // (3 * layout.partners.size)
+        self.n_stations, self.n_kinds = (
+            kinds.size,
+            blocks.size // (3 * layout.whole_terms.sources.size),
+        )
         factored, vectors = (layout, kinds, blocks, low, high), (np.zeros(0), np.zeros(0))
         self._solve = bound(solve, factored, later=vectors)
 
@@ -73,38 +80,45 @@ def station_factors(
     high = n if high is None else high
     factors = np.zeros((n, 3, layout.pitch, layout.pitch))
     factorise(blocks, (low + high) // 2, factors)
-    kinds, numbers = station_products.by_kinds(layout.packed(factors).reshape(n, -1))
+    kinds, numbers = station_products.by_kinds(
+        layout.packed(factors, layout.whole_terms).reshape(n, -1)
+    )
     return StationFactors(layout, kinds, numbers, low, high)
 
 
 @compiled
 def factorise(blocks, middle, factors):
     """Fill ``factors`` (n, 3, b, b), by rows, of ``blocks`` (3, n, b, b); see ``StationFactors``
-    and ``station_blocks.neighbours``."""
+    and ``station_products.neighbours``."""
     to_start, own, to_end = blocks[0], blocks[1], blocks[2]
     n = own.shape[0]
     for i in range(middle):
         pivot = own[i].copy()
         if i > 0:
+            factors[i, 0] = factors[i - 1, 2].T
             pivot += to_start[i] @ factors[i - 1, 2]
-        put_factors(pivot, to_start[i], to_end[i], factors[i])
+        invert(pivot, factors[i, 1])
+        factors[i, 2] = -(factors[i, 1] @ to_end[i])
     for i in range(n - 1, middle, -1):
         pivot = own[i].copy()
         if i < n - 1:
+            factors[i, 0] = factors[i + 1, 2].T
             pivot += to_end[i] @ factors[i + 1, 2]
-        put_factors(pivot, to_end[i], to_start[i], factors[i])
+        invert(pivot, factors[i, 1])
+        factors[i, 2] = -(factors[i, 1] @ to_start[i])
     pivot = own[middle].copy()
     if middle > 0:
+        factors[middle, 0] = factors[middle - 1, 2].T
         pivot += to_start[middle] @ factors[middle - 1, 2]
     if middle < n - 1:
+        factors[middle, 2] = factors[middle + 1, 2].T
         pivot += to_end[middle] @ factors[middle + 1, 2]
-    put_factors(pivot, to_start[middle], to_end[middle], factors[middle])
+    invert(pivot, factors[middle, 1])
 
 
 @compiled
-def put_factors(pivot, outward, inward, factors):
-    """Factors (3, b, b) of a station from its pivot S and its blocks to both sides."""
-    inverse = factors[0]
+def invert(pivot, inverse):
+    """Fill in the inverse of a positive definite block, which is overwritten."""
     inverse[:] = np.eye(pivot.shape[0])
     # A positive definite block needs no exchange of rows.
     for i in range(pivot.shape[0]):
@@ -116,31 +130,66 @@ def put_factors(pivot, outward, inward, factors):
                 share = pivot[j, i]
                 pivot[j] -= share * pivot[i]
                 inverse[j] -= share * inverse[i]
-    factors[1] = -(inverse @ outward)
-    factors[2] = -(inverse @ inward)
 
 
 @in_line
-def eliminate(factored, right, station, outward, answer):
-    """Leave in ``answer`` what is left of a station's unknowns after those ``outward`` of it."""
+def factors_of(factored, station):
+    """Where the blocks of a station are."""
     layout, kinds, blocks, _, _ = factored
+    return numbers_from(
+        blocks, np.uint64(3) * whole_size(layout) * np.uint64(kinds[np.uint64(station)])
+    )
+
+
+@in_line
+def eliminate(factored, sums, station, outward, answer):
+    """Leave in ``answer`` what the right-hand side of a station, as ``sums``, is after those
+    ``outward`` of it are eliminated."""
+    layout = factored[0]
+    numbers = factors_of(factored, station)
+    left = total_of(layout, add_whole(layout, sums, numbers, np.uint64(0), outward))
     # Indices are unsigned, which spares a check for negative ones.
-    size, here = block_size(layout), pitch(layout) * np.uint64(station)
-    at = np.uint64(3) * size * np.uint64(kinds[station])
-    own = add_product(layout, zero(layout), blocks, at, load(layout, right, here))
-    own = add_product(layout, own, blocks, at + size, outward)
+    store(layout, answer, pitch(layout) * np.uint64(station), left)
+    return left
+
+
+@in_line
+def meet(factored, middle, towards_end, answer):
+    """Unknowns of the middle station from what ``answer`` holds of it and what is left of the one
+    beside it, ``towards_end`` of the line."""
+    layout = factored[0]
+    here = pitch(layout) * np.uint64(middle)
+    size, numbers = whole_size(layout), factors_of(factored, middle)
+    sums = sums_from(layout, load(layout, answer, here))
+    left = total_of(layout, add_whole(layout, sums, numbers, np.uint64(2) * size, towards_end))
+    sums = sums_from(layout, zero(layout))
+    own = total_of(layout, add_whole(layout, sums, numbers, size, left))
     store(layout, answer, here, own)
     return own
 
 
 @in_line
 def substitute(factored, station, inward, answer):
-    """Unknowns of a station from what ``answer`` holds of them and those ``inward`` of it."""
-    layout, kinds, blocks, _, _ = factored
-    size, here = block_size(layout), pitch(layout) * np.uint64(station)
-    at = np.uint64(3) * size * np.uint64(kinds[station]) + np.uint64(2) * size
-    own = add_product(layout, load(layout, answer, here), blocks, at, inward)
-    store(layout, answer, here, own)
+    """Unknowns of a station from what ``answer`` holds of it and the unknowns ``inward`` of it."""
+    layout = factored[0]
+    size, numbers = whole_size(layout), factors_of(factored, station)
+    left = load(layout, answer, pitch(layout) * np.uint64(station))
+    sums = add_whole(layout, sums_from(layout, zero(layout)), numbers, size, left)
+    return total_of(layout, add_whole(layout, sums, numbers, np.uint64(2) * size, inward))
+
+
+@in_line
+def right_side(factored, right, station):
+    """The right-hand side of a station as sums."""
+    layout = factored[0]
+    return sums_from(layout, load(layout, right, pitch(layout) * np.uint64(station)))
+
+
+@in_line
+def substitute_into(factored, station, inward, answer):
+    """``substitute`` that leaves the unknowns in ``answer``, too."""
+    own = substitute(factored, station, inward, answer)
+    store(factored[0], answer, pitch(factored[0]) * np.uint64(station), own)
     return own
 
 
@@ -148,32 +197,24 @@ def substitute(factored, station, inward, answer):
 def solve(factored, right, answer):
     """Fill ``answer`` from ``right``; ``factored`` are layout, kinds, blocks, low and high of
     ``StationFactors``."""
+    factored, right, answer = borrowed((factored, right, answer))
     layout, kinds, _, low, high = factored
-    middle, pairs = (low + high) // 2, (high - low - 1) // 2
+    n, middle = kinds.size, (low + high) // 2
+    pairs = min(middle, n - 1 - middle)
     x, y = zero(layout), zero(layout)
-    for i in range(low):
-        x = eliminate(factored, right, i, x, answer)
-    for j in range(kinds.size - 1, high - 1, -1):
-        y = eliminate(factored, right, j, y, answer)
     for k in range(pairs):
-        x = eliminate(factored, right, low + k, x, answer)
-        y = eliminate(factored, right, high - 1 - k, y, answer)
-    # One more towards the start of the line, if there is an even number of them.
-    for i in range(low + pairs, middle + 1):
-        x = eliminate(factored, right, i, x, answer)
-    x = y = substitute(factored, middle, y, answer)
+        x = eliminate(factored, right_side(factored, right, k), k, x, answer)
+        j = n - 1 - k
+        y = eliminate(factored, right_side(factored, right, j), j, y, answer)
+    for i in range(pairs, middle + 1):
+        x = eliminate(factored, right_side(factored, right, i), i, x, answer)
+    for j in range(n - 1 - pairs, middle, -1):
+        y = eliminate(factored, right_side(factored, right, j), j, y, answer)
+    x = y = meet(factored, middle, y, answer)
     for k in range(1, pairs + 1):
-        x = substitute(factored, middle - k, x, answer)
-        y = substitute(factored, middle + k, y, answer)
-    substitute_outside(factored, middle - pairs, high, x, y, answer)
-
-
-@in_line
-def substitute_outside(factored, low, high, x, y, answer):
-    """Unknowns of stations before ``low`` and from ``high`` on, from those beside these, x and
-    y."""
-    _, kinds, _, _, _ = factored
-    for i in range(low - 1, -1, -1):
-        x = substitute(factored, i, x, answer)
-    for j in range(high, kinds.size):
-        y = substitute(factored, j, y, answer)
+        x = substitute_into(factored, middle - k, x, answer)
+        y = substitute_into(factored, middle + k, y, answer)
+    for i in range(middle - pairs - 1, -1, -1):
+        x = substitute_into(factored, i, x, answer)
+    for j in range(middle + pairs + 1, n):
+        y = substitute_into(factored, j, y, answer)

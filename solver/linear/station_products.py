@@ -14,20 +14,16 @@ from scipy import sparse
 from catenary.solver.base import aligned_arrays
 from catenary.solver.base.bound import bound
 from catenary.solver.base.compiled import compiled, in_line
-from catenary.solver.linear.lanes import (
-    WIDEST,
-    Layout,
-    add,
-    add_product,
-    add_product_beside,
-    beside_size,
-    block_size,
-    is_damped,
-    load,
-    pitch,
-    store,
-    zero,
+from catenary.solver.base.pointers import borrowed
+from catenary.solver.linear.lane_products import (
+    add_beside,
+    add_own,
+    numbers_from,
+    sums_from,
+    total_of,
 )
+from catenary.solver.linear.lanes import beside_size, is_damped, load, own_size, pitch, store, zero
+from catenary.solver.linear.station_layout import WIDEST, Layout
 from catenary.solver.linear.unique_rows import kinds_of
 
 
@@ -54,24 +50,28 @@ def layout_of(operator: np.ndarray, stiffness: np.ndarray) -> Layout | None:
 
     None if a plane is wider than kernels are.
     """
-    joined = (operator != 0).any(axis=(0, 1)) | (stiffness != 0).any(axis=(0, 1))
-    widths = _planes(joined)
+    widths = _planes((operator != 0).any(axis=(0, 1)) | (stiffness != 0).any(axis=(0, 1)))
     if max(widths) > WIDEST:
         return None
-    even = all(width % 2 == 0 for width in widths)
-    return Layout(widths, even and _in_pairs((stiffness[0::2] != 0).any(axis=(0, 1))))
+    return _joining(Layout(widths, (), ()), stiffness)
 
 
 def with_damping(layout: Layout, damping: np.ndarray | None) -> Layout:
     """The same for products with C, by its blocks, as well."""
-    paired = layout.paired and damping is not None and _in_pairs((damping[0::2] != 0).any((0, 1)))
-    return Layout(layout.widths, paired, damped=True)
+    found = layout if damping is None else _joining(layout, damping)
+    return Layout(found.widths, found.own, found.beside, damped=True)
 
 
-def _in_pairs(joined: np.ndarray) -> bool:
-    """Whether ``joined`` (b, b) joins the unknowns 0 and 1, 2 and 3 and so on at most."""
-    rows, columns = np.nonzero(joined)
-    return bool((rows // 2 == columns // 2).all())
+def _joining(layout: Layout, blocks: np.ndarray) -> Layout:
+    """A layout for a matrix of these blocks, see ``neighbours``, too."""
+    joined = (blocks != 0).any(axis=1)
+    own = layout.differences(joined[1])
+    beside = layout.differences(joined[0] | joined[2])
+    return Layout(
+        layout.widths,
+        tuple(sorted({*layout.own, *own})),
+        tuple(sorted({*layout.beside, *beside})),
+    )
 
 
 def _planes(joined: np.ndarray) -> tuple[int, ...]:
@@ -104,7 +104,7 @@ class StationProduct:
 
     def __init__(self, layout: Layout, kinds: np.ndarray, blocks: np.ndarray, first: int) -> None:
         self.layout, self.kinds, self.blocks, self.first = layout, kinds, blocks, first
-        size = layout.partners.size + 2 * layout.partners_beside.size
+        size = layout.own_terms.sources.size + 2 * layout.beside_terms.sources.size
         self.n_kinds = blocks.size // (size * (1 + layout.damped))
         vectors = np.zeros(0), np.zeros(0), np.zeros(0)
         self._multiply = bound(multiply, layout, kinds, blocks, first, later=vectors)
@@ -127,15 +127,16 @@ def station_product(
     The factor has a station more at both ends than the matrix has columns. None if the matrix joins
     what the layout does not.
     """
-    parts = []
+    parts, beside = [], layout.beside_terms
     for rows, sign in ((matrix, 1.0), (damping, -1.0)):
         if rows is None:
             continue
         blocks = neighbours(rows, first)
         if blocks is None:
             return None
-        for block, beside in ((blocks[1], False), (blocks[0], True), (blocks[2], True)):
-            packed = layout.packed(block, beside)
+        for place, terms in ((1, layout.own_terms), (0, beside), (2, beside)):
+            block = blocks[place]
+            packed = layout.packed(block, terms)
             if np.count_nonzero(packed) != np.count_nonzero(block):
                 return None
             parts.append(sign * packed)
@@ -143,57 +144,52 @@ def station_product(
 
 
 @in_line
-def multiply_row(layout, kinds, blocks, row, factors, velocities):
-    """A row of a product with what ``factors`` and ``velocities`` hold before, at and after the
-    station; see ``StationProduct``."""
-    size, beside = block_size(layout), beside_size(layout)
-    before, here, after = factors
+def row_sums(multiplied, row, positions, velocities):
+    """Sums of a row of a product, with what the factor and the velocity hold before, at and after
+    its station.
+
+    ``multiplied`` holds layout, kinds, blocks and first of ``StationProduct`` and both vectors.
+    """
+    layout, kinds, blocks, _, _, _ = multiplied
+    size, beside = own_size(layout), beside_size(layout)
+    stored = size + np.uint64(2) * beside
     if is_damped(layout):
-        at = np.uint64(2) * (size + np.uint64(2) * beside) * np.uint64(kinds[row])
+        numbers = numbers_from(blocks, np.uint64(2) * stored * np.uint64(kinds[np.uint64(row)]))
     else:
-        at = (size + np.uint64(2) * beside) * np.uint64(kinds[row])
-    total = add_product(layout, zero(layout), blocks, at, here)
-    total = add_product_beside(layout, total, blocks, at + size, before)
-    total = add_product_beside(layout, total, blocks, at + size + beside, after)
+        numbers = numbers_from(blocks, stored * np.uint64(kinds[np.uint64(row)]))
+    sums = sums_from(layout, zero(layout))
+    sums = add_own(layout, sums, numbers, np.uint64(0), positions[1])
+    sums = add_beside(layout, sums, numbers, size, positions[0])
+    sums = add_beside(layout, sums, numbers, size + beside, positions[2])
     if is_damped(layout):
-        before, here, after = velocities
-        at += size + np.uint64(2) * beside
-        total = add_product(layout, total, blocks, at, here)
-        total = add_product_beside(layout, total, blocks, at + size, before)
-        total = add_product_beside(layout, total, blocks, at + size + beside, after)
-    return total
+        sums = add_own(layout, sums, numbers, stored, velocities[1])
+        sums = add_beside(layout, sums, numbers, stored + size, velocities[0])
+        sums = add_beside(layout, sums, numbers, stored + size + beside, velocities[2])
+    return sums
 
 
 @in_line
-def multiply_rows(multiplied, loads, begin, end, result):
-    """Rows from ``begin`` to ``end`` of a product, and of ``loads`` if there are any.
-
-    ``multiplied`` holds layout, kinds, blocks and first of ``StationProduct`` and both factors.
-    """
-    layout, kinds, blocks, first, factor, velocity = multiplied
-    width = pitch(layout)
+def read_station(multiplied, row):
+    """What the factor and the velocity hold at the station of a row, which may be one before or
+    after all rows."""
+    layout, _, _, first, factor, velocity = multiplied
     # Indices are unsigned, which spares a check for negative ones.
-    at = width * np.uint64(first + begin)
-    before, here = load(layout, factor, at - width), load(layout, factor, at)
-    v_before = v_here = v_after = before
+    at = pitch(layout) * np.uint64(first + row)
+    position = load(layout, factor, at)
     if is_damped(layout):
-        v_before, v_here = load(layout, velocity, at - width), load(layout, velocity, at)
-    for i in range(begin, end):
-        at = width * np.uint64(first + i + 1)
-        after = load(layout, factor, at)
-        if is_damped(layout):
-            v_after = load(layout, velocity, at)
-        factors, velocities = (before, here, after), (v_before, v_here, v_after)
-        row = multiply_row(layout, kinds, blocks, i, factors, velocities)
-        if loads.size > 0:
-            row = add(row, load(layout, loads, width * np.uint64(i)))
-        store(layout, result, width * np.uint64(i), row)
-        before, here = here, after
-        v_before, v_here = v_here, v_after
+        return position, load(layout, velocity, at)
+    return position, position
 
 
 @compiled
 def multiply(layout, kinds, blocks, first, factor, velocity, result):
     """``result`` = K ``factor``, less C ``velocity``; see ``StationProduct``."""
-    multiplied = layout, kinds, blocks, first, factor, velocity
-    multiply_rows(multiplied, blocks[:0], 0, kinds.size, result)
+    multiplied = borrowed((layout, kinds, blocks, first, factor, velocity))
+    result = borrowed(result)
+    before, here = read_station(multiplied, -1), read_station(multiplied, 0)
+    for i in range(np.uint64(kinds.size)):
+        after = read_station(multiplied, np.int64(i) + 1)
+        positions, velocities = (before[0], here[0], after[0]), (before[1], here[1], after[1])
+        row = total_of(layout, row_sums(multiplied, i, positions, velocities))
+        store(layout, result, pitch(layout) * i, row)
+        before, here = here, after

@@ -18,7 +18,6 @@ from catenary.solver.base.errors import NotConverged, RunBroken
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.base.petsc_events import event
 from catenary.solver.linear.halo import Halo, Subdomain
-from catenary.solver.linear.lanes import WIDEST, Layout
 from catenary.solver.linear.petsc_solvers import (
     DIRECT,
     PREFIX,
@@ -29,6 +28,7 @@ from catenary.solver.linear.petsc_solvers import (
     wants_view,
 )
 from catenary.solver.linear.station_factors import StationFactors
+from catenary.solver.linear.station_layout import WIDEST, Layout
 from catenary.solver.linear.station_products import (
     StationProduct,
     layout_of,

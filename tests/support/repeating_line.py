@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from catenary.solver.linear.lanes import Layout
+from catenary.solver.linear.station_layout import Layout
 from catenary.solver.linear.station_products import layout_of, neighbours
 
 

@@ -8,8 +8,8 @@ from repeating_line import layout, line
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from catenary.solver.linear.lanes import WIDEST, Layout
 from catenary.solver.linear.station_factors import station_factors
+from catenary.solver.linear.station_layout import WIDEST, Layout
 from catenary.solver.linear.station_products import layout_of, neighbours, station_product
 
 RNG = np.random.default_rng(7)
@@ -37,8 +37,7 @@ def test_factors_and_products_of_any_width(widths: tuple[int, ...], joined: bool
     matrix = line(40, widths=widths, joined=joined)
     lanes = layout(matrix)
     assert lanes.widths == widths
-    in_pairs = all(width % 2 == 0 for width in widths)
-    assert lanes.paired is (in_pairs and (not joined or max(widths) == 2))
+    assert (lanes.beside == (0, 1)) is (not joined or max(widths) == 2)
     compare_product(matrix, 0, lanes)
 
 

@@ -1,0 +1,124 @@
+"""Products of packed blocks with the unknowns of a station in vector lanes, for Numba's kernels.
+
+Products that are added to each other share two sums, which a processor works on side by side.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+
+from catenary.solver.linear.lanes import (
+    FUSED,
+    Lanes,
+    Registers,
+    gathered,
+    inlined,
+    register_ranges,
+    spread,
+    vector_type,
+)
+from catenary.solver.linear.station_layout import Terms
+
+_NUMBERS = types.CPointer(types.float64)
+
+
+@inlined
+def numbers_from(typing_context, array, at):
+    """Where ``array[at]`` is in memory; the array is contiguous, and kept alive by others."""
+
+    def generate(context, builder, signature, arguments):
+        array, at = arguments
+        data = context.make_array(signature.args[0])(context, builder, array).data
+        place = builder.gep(data, [at])
+        # Unknown to the compiler, which else computes the address anew for each number.
+        unchanged = ir.FunctionType(place.type, [place.type])
+        return builder.asm(unchanged, "", "=r,0", [place], side_effect=False)
+
+    return _NUMBERS(array, at), generate
+
+
+@inlined
+def sums_from(typing_context, layout, total):
+    """Two sums of products with blocks of a layout, to which ``total`` is added."""
+
+    def generate(context, builder, signature, arguments):
+        _, total = arguments
+        none = ir.Constant(total.type, [-0.0] * total.type.count)  # adds nothing, not even a sign
+        return context.make_tuple(builder, signature.return_type, [total, none])
+
+    return types.UniTuple(total, 2)(layout, total), generate
+
+
+@inlined
+def total_of(typing_context, layout, sums):
+    """What both sums are together."""
+
+    def generate(context, builder, signature, arguments):
+        layout = signature.args[0].layout
+        first, second = (builder.extract_value(arguments[1], number) for number in range(2))
+        registers = Registers(layout.n_lanes)
+        result = []
+        for one, other in zip(
+            registers.apart(builder, first), registers.apart(builder, second), strict=True
+        ):
+            if layout.turns:
+                other = spread(builder, other, [lane ^ 1 for lane in range(other.type.count)])
+            result.append(builder.fadd(one, other))
+        return registers.together(builder, result)
+
+    return Lanes(layout.layout.n_lanes)(layout, sums), generate
+
+
+def _product(terms_of: Any, summary: str) -> Any:
+    """A function that adds the product of a block of such terms to sums."""
+
+    def product(typing_context, layout, sums, numbers, skipped, x):
+        def generate(context, builder, signature, arguments):
+            _, sums, numbers, skipped, x = arguments
+            data = builder.gep(numbers, [skipped])
+            terms = terms_of(signature.args[0].layout)
+            both = [builder.extract_value(sums, number) for number in range(2)]
+            _add_terms(builder, both, data, x, terms)
+            return context.make_tuple(builder, signature.return_type, both)
+
+        return sums(layout, sums, numbers, skipped, x), generate
+
+    product.__doc__ = f"""{summary}
+
+    The block stands ``skipped`` numbers after the place of ``numbers``.
+    """
+    return inlined(product)
+
+
+add_whole = _product(
+    lambda layout: layout.whole_terms, "Add a block that joins all of a plane, times x, to sums."
+)
+add_own = _product(
+    lambda layout: layout.own_terms, "Add a diagonal block of K or C, times x, to sums."
+)
+add_beside = _product(
+    lambda layout: layout.beside_terms,
+    "Add a block of K or C that joins a station to one beside it, times x, to sums.",
+)
+
+
+def _add_terms(builder: Any, sums: list[Any], data: Any, x: Any, terms: Terms) -> None:
+    """Add all terms of a block stored at ``data`` times x to two ``sums``, which are replaced."""
+    n_lanes = x.type.count
+    registers = Registers(n_lanes)
+    factors = registers.apart(builder, x)
+    parts = [registers.apart(builder, one) for one in sums]
+    sources = np.where(terms.sources < 0, terms.targets, terms.sources)
+    for term, (source, number) in enumerate(zip(sources, terms.sums, strict=True)):
+        for register, (first, size) in enumerate(register_ranges(n_lanes)):
+            factor = gathered(builder, factors, source[first : first + size])
+            place = builder.gep(data, [ir.Constant(ir.IntType(64), term * n_lanes + first)])
+            stored = builder.load(builder.bitcast(place, vector_type(size).as_pointer()), align=8)
+            product = builder.fmul(stored, factor, flags=FUSED)
+            total = parts[number][register]
+            parts[number][register] = builder.fadd(total, product, flags=FUSED)
+    sums[:] = [registers.together(builder, part) for part in parts]

@@ -1,0 +1,157 @@
+"""How the unknowns of a station stand in vector lanes, and which products with blocks need.
+
+The layout of a line is known before its kernels are compiled, and these are compiled for it.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+# Lanes that a plane may take: the least of these that holds its unknowns.
+LANES = (2, 4, 8, 12, 16)
+# Unknowns of a plane that kernels take.
+WIDEST = LANES[-1]
+# Lanes of an LLVM vector; more are held in several.
+REGISTER = 8
+
+
+class Terms(NamedTuple):
+    """What a block times a vector is the sum of, and how its numbers are stored.
+
+    In term k each lane is multiplied with the number of lane ``sources[k]`` of the vector, and
+    counts for lane ``targets[k]`` of the result. There are two sums, which a processor works on
+    side by side; the lanes of the second are exchanged at the end, all at once.
+
+    Attributes
+    ----------
+    sources : (n_terms, n_lanes) int, -1 where there is no such lane
+    targets : (n_terms, n_lanes) int
+    sums : (n_terms,) which sum each belongs to, 0 or 1
+    """
+
+    sources: np.ndarray
+    targets: np.ndarray
+    sums: np.ndarray
+
+
+class Layout:
+    """How the unknowns of a station stand in lanes, and which of them matrices join.
+
+    Planes are sets of unknowns that no matrix joins. They stand side by side, so that one
+    instruction works on all of them. A block of a matrix is kept by terms, see ``Terms``. Each
+    joins lanes whose places in their plane differ by one number, in the sense of exclusive or: 0
+    those with themselves, 1 a beam's deflection and slope, 2 the deflections of two wires.
+
+    Parameters
+    ----------
+    widths : unknowns of a station in each plane, as they follow each other in vectors
+    own, beside : numbers of the terms that K and C have within a station, and between a station
+        and those beside it; all of them by default
+    damped : whether a product with K is one with C as well
+    remembers : whether steps need an acceleration known before, as the generalized-alpha method's
+
+    Attributes
+    ----------
+    pitch : unknowns of a station
+    n_lanes : lanes that they take, those without an unknown included
+    turns : whether lanes 0 and 1, 2 and 3 and so on of a second sum are exchanged
+    """
+
+    def __init__(
+        self,
+        widths: tuple[int, ...],
+        own: tuple[int, ...] | None = None,
+        beside: tuple[int, ...] | None = None,
+        damped: bool = False,
+        remembers: bool = False,
+    ) -> None:
+        self.widths = tuple(widths)
+        self._plane = min(lanes for lanes in LANES if lanes >= max(self.widths))
+        every = tuple(range(self._plane if self._plane & (self._plane - 1) == 0 else WIDEST))
+        self.own = every if own is None else tuple(own)
+        self.beside = every if beside is None else tuple(beside)
+        self.damped, self.remembers = bool(damped), bool(remembers)
+        self.pitch = sum(self.widths)
+        self.n_lanes = self._plane * len(self.widths)
+        # Columns where there are fewer of these than of differences.
+        self.turns = self._plane <= REGISTER and max(self.widths) > self._plane - 2
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Layout) and self.key == other.key
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """All that makes a layout."""
+        return self.widths, self.own, self.beside, self.damped, self.remembers
+
+    def remembering(self) -> Layout:
+        """The same for steps that need an acceleration known before."""
+        return Layout(self.widths, self.own, self.beside, self.damped, remembers=True)
+
+    @cached_property
+    def unknowns(self) -> np.ndarray:
+        """Unknown of each lane, -1 in one that has none, shape (n_lanes,)."""
+        result = np.full((len(self.widths), self._plane), -1)
+        first = 0
+        for row, width in zip(result, self.widths, strict=True):
+            row[:width] = np.arange(first, first + width)
+            first += width
+        return result.ravel()
+
+    @cached_property
+    def whole_terms(self) -> Terms:
+        """Of a block that joins all unknowns of each plane."""
+        if self.turns:
+            return self._terms(tuple(range(self._plane)))
+        lane, columns = np.arange(self.n_lanes), np.arange(max(self.widths))[:, None]
+        sources = lane - lane % self._plane + columns
+        return Terms(sources, np.broadcast_to(lane, sources.shape), columns.ravel() % 2)
+
+    @cached_property
+    def own_terms(self) -> Terms:
+        """Of the diagonal blocks of K and C."""
+        return self._terms(self.own)
+
+    @cached_property
+    def beside_terms(self) -> Terms:
+        """Of the blocks of K and C that join a station to those beside it."""
+        return self._terms(self.beside)
+
+    def _terms(self, differences: tuple[int, ...]) -> Terms:
+        number = np.array(differences, dtype=int)[:, None]
+        if self.turns:
+            # An odd difference is an even one of sources and a 1 of targets: few are exchanged.
+            return Terms(
+                self._differing(number & ~1), self._differing(number & 1), number[:, 0] & 1
+            )
+        sources = self._differing(number)
+        targets = np.broadcast_to(np.arange(self.n_lanes), sources.shape)
+        return Terms(sources, targets, np.arange(len(differences)) % 2)
+
+    def _differing(self, number: np.ndarray) -> np.ndarray:
+        """Lanes of the same plane whose place differs by a number, -1 where there is none."""
+        lane = np.arange(self.n_lanes)
+        place = lane % self._plane
+        other = place ^ number
+        return np.where(other < self._plane, lane - place + other, -1)
+
+    def differences(self, joined: np.ndarray) -> tuple[int, ...]:
+        """Numbers of the terms that hold what ``joined`` (b, b) joins, each within a plane."""
+        place = np.zeros(self.pitch, dtype=int)
+        there = self.unknowns >= 0
+        place[self.unknowns[there]] = (np.arange(self.n_lanes) % self._plane)[there]
+        row, column = np.nonzero(joined)
+        return tuple(np.unique(place[row] ^ place[column]).tolist())
+
+    def packed(self, blocks: np.ndarray, terms: Terms) -> np.ndarray:
+        """Blocks (..., pitch, pitch) as products read them, shape (..., n_terms n_lanes)."""
+        row, column = self.unknowns[terms.targets], self.unknowns[terms.sources]
+        there = (row >= 0) & (column >= 0) & (terms.sources >= 0)
+        numbers = np.where(there, blocks[..., row, column], 0.0)
+        return numbers.reshape(*blocks.shape[:-2], terms.sources.size)
