@@ -89,13 +89,12 @@ def accuracy(
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.accuracy import output as accuracy_output
     from catenary.cases.studies.accuracy import runs as study
+    from catenary.cases.studies.sweep.jobs import RunOptions
     from catenary.postproc.evaluate.wording import counted
     from catenary.solver.base.parallel import on_root
 
     with held(out, comm, f"catenary accuracy {case}"):
-        found, ended = study.run(
-            plan, out, comm, force=force, petsc_options=arguments, tell=console.say
-        )
+        found, ended = study.run(plan, out, comm, RunOptions(force, arguments, console.say))
         if found is None:
             console.complain("the study was interrupted; the same command continues it")
             return console.BROKEN

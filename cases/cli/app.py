@@ -53,12 +53,14 @@ Assignments = Annotated[
         autocompletion=completion.assignments,
     ),
 ]
-Out = Annotated[
-    Path,
-    typer.Option(
-        "-o", "--out", parser=console.folder, metavar="<path>", help="Folder for the results."
-    ),
-]
+
+
+def folder_option(what: str) -> Any:
+    """The option ``-o FOLDER`` with its line of help."""
+    return typer.Option("-o", "--out", parser=console.folder, metavar="<path>", help=what)
+
+
+Out = Annotated[Path, folder_option("Folder for the results.")]
 MoreAssignments = Annotated[
     list[str] | None,
     typer.Argument(

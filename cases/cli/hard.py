@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from catenary.cases.cli.app import Force, Verbose, app, begin
+from catenary.cases.cli.app import Force, Verbose, app, begin, folder_option
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
 from catenary.postproc.files.csv_text import csv_text
@@ -44,14 +44,7 @@ def hard(
         list[str] | None, typer.Argument(metavar="NAME", help="Only the hard cases named.")
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--out",
-            parser=console.folder,
-            metavar="<path>",
-            help="Folder for the table as hard.csv and hard.md.",
-        ),
+        Path | None, folder_option("Folder for the table as hard.csv and hard.md.")
     ] = None,
     shortened: Annotated[
         bool, typer.Option("--short", help="Shorter runs, steps halved once only.")

@@ -7,7 +7,15 @@ from typing import Annotated
 
 import typer
 
-from catenary.cases.cli.app import Assignments, Case, Force, MoreAssignments, app, load
+from catenary.cases.cli.app import (
+    Assignments,
+    Case,
+    Force,
+    MoreAssignments,
+    app,
+    folder_option,
+    load,
+)
 from catenary.cases.terminal import console
 
 
@@ -31,14 +39,7 @@ def pantograph(
         ),
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--out",
-            parser=console.folder,
-            metavar="<path>",
-            help="Folder for receptance.csv, receptance.png and lumped.toml.",
-        ),
+        Path | None, folder_option("Folder for receptance.csv, receptance.png and lumped.toml.")
     ] = None,
     masses: Annotated[
         int | None,

@@ -99,13 +99,14 @@ def sweep(
     comm, jobs, arguments = begin(read, verbose, lambda made: made[0].scene)
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.sweep import output as sweep_output
+    from catenary.cases.studies.sweep.jobs import RunOptions
     from catenary.cases.studies.sweep.run_jobs import run_jobs
     from catenary.solver.base.parallel import on_root
 
     name = jobs[0].scene.case.name
     show = _names(plotted) or sweep_output.PLOTTED
     with held(out, comm, f"catenary sweep {case}"):
-        ended = run_jobs(jobs, out, comm, force=force, petsc_options=arguments, tell=console.say)
+        ended = run_jobs(jobs, out, comm, RunOptions(force, arguments, console.say))
         files = on_root(comm, lambda: sweep_output.write(out, name, ended, show))
     console.say("\n" + sweep_output.as_text(ended))
     console.say("\n" + "\n".join(str(path) for path in files))
@@ -134,11 +135,10 @@ def run_study(
     comm, plan, arguments = begin(read, verbose, lambda made: made.jobs[0].scene)
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies import case_study
+    from catenary.cases.studies.sweep.jobs import RunOptions
 
     with held(out, comm, f"catenary run {case} --study"):
-        report, ended = case_study.run(
-            plan, out, comm, force=force, petsc_options=arguments, tell=console.say
-        )
+        report, ended = case_study.run(plan, out, comm, RunOptions(force, arguments, console.say))
     if report is not None:
         console.say("\n" + report)
     return verdict(ended, "study")

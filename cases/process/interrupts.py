@@ -13,7 +13,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any, TypeVar
 
 from catenary.solver.base.errors import RunBroken
@@ -150,12 +150,7 @@ class Phase:
         self._scope.__enter__()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
         self._scope.__exit__(None, None, None)
         if isinstance(error, Stopped):
             raise self._interrupted(error.name) from None
@@ -196,12 +191,7 @@ class StopRequest:
             install(several_ranks=False)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
         if self._before:
             for number, handler in self._before.items():
                 signal.signal(number, handler)

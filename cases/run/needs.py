@@ -7,8 +7,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-
 from catenary.cases.result_folder.output_folder import RunSize
 from catenary.cases.run.file_sizes import FileSizes, estimate_files
 from catenary.cases.run.recording import (
@@ -18,8 +16,9 @@ from catenary.cases.run.recording import (
     extent_of,
     recording_of,
 )
-from catenary.cases.scene.checks.mesh_size import estimate_memory, size_of
+from catenary.cases.scene.checks.mesh_size import size_of
 from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.cost_model import estimate_march, estimate_memory
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
@@ -27,21 +26,6 @@ from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.integrators.detour import Detour, detour_of
 from catenary.solver.problem.problem import Problem
-
-# Cost model of the march on one rank, records included: overhead of a step, and time per unknown.
-# Runs of the case ambrosio2012 on 25, 100 and 1000 spans, 4.5e3 to 1.8e5 unknowns, on a two-core
-# machine of 2026 (Debian 12, PETSc 3.18) lie within 40 % of it, and machines differ by a factor of
-# two; the plan calls it an estimate.
-STEP_OVERHEAD = 4.5e-5  # [s]
-STEP_PER_UNKNOWN = 4.8e-9  # [s]
-# Time of a station by its unknowns in a plane, in terms of four; as in the benchmark of widths.
-STATION_COST = {2: 0.6, 4: 1.0, 6: 1.8, 8: 2.2, 10: 4.8, 12: 5.6, 16: 8.0}
-# The fixed-point scheme repeats the solve; 3 times the time of one_solve was measured.
-# PETSc's TSALPHA2 factors anew in every iteration; 26 times was measured.
-SCHEME_FACTOR = {"one_solve": 1.0, "fixed_point": 3.0, "ts_alpha2": 26.0}
-# A substep of a pantograph with all its bodies: 0.21 to 0.38 ms were measured with the paper's
-# seven, by the way of keeping joints.
-ALL_BODIES_SUBSTEP = 3.0e-4  # [s]
 
 # Time between two flushes of the result file, each of which takes some 5 ms [s], and what may wait
 # for one in memory [B].
@@ -173,31 +157,6 @@ def total_size(runs: Iterable[Kept]) -> RunSize:
         seconds += needs.march
         n_steps += needs.n_steps
     return RunSize(left + largest, seconds, n_steps)
-
-
-def estimate_march(
-    n_dofs: int,
-    n_steps: int,
-    scheme: str,
-    n_substeps: int = 0,
-    widths: tuple[int, ...] = (4,),
-) -> float:
-    """Wall time of the time loop on one rank [s].
-
-    ``n_substeps`` are those of a step that pantographs with all their bodies take, all together;
-    ``widths`` the unknowns of a station in each plane.
-    """
-    step = STEP_OVERHEAD + STEP_PER_UNKNOWN * n_dofs * cost_of_widths(widths)
-    step *= SCHEME_FACTOR[scheme]
-    return n_steps * (step + ALL_BODIES_SUBSTEP * n_substeps)
-
-
-def cost_of_widths(widths: tuple[int, ...]) -> float:
-    """Time per unknown of stations with planes of these widths, in terms of one plane of four."""
-    station = sum(
-        np.interp(width, list(STATION_COST), list(STATION_COST.values())) for width in widths
-    )
-    return float(station / sum(widths) * 4.0)
 
 
 def _substeps(problem: Problem) -> int:

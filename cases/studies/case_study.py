@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import importlib.util
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.sweep.jobs import Ended, Job, make_jobs
+from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, Job, RunOptions, make_jobs
 from catenary.cases.studies.sweep.variants import Variant, slug
 from catenary.solver.base.errors import InputError
 from catenary.solver.base.parallel import on_root
@@ -104,10 +104,7 @@ def run(
     plan: Plan,
     out_dir: Path,
     comm: Any,
-    *,
-    force: bool = False,
-    petsc_options: Sequence[str] = (),
-    tell: Callable[[str], None] = lambda line: None,
+    options: RunOptions = AS_USUAL,
 ) -> tuple[str | None, list[Ended]]:
     """Run what is not done yet, write the study's report; returns its text and the runs.
 
@@ -117,21 +114,13 @@ def run(
     Raises
     ------
     InputError
-        If ``out_dir`` holds other results and ``force`` is not given.
+        If ``out_dir`` holds other results and ``options.force`` is not given.
     """
     from catenary.cases.studies.sweep.run_jobs import run_jobs
 
     begin = time.perf_counter()
     module = _load(plan.path)
-    ended = run_jobs(
-        plan.jobs,
-        out_dir / RUNS,
-        comm,
-        force=force,
-        petsc_options=petsc_options,
-        measure=module.measure,
-        tell=tell,
-    )
+    ended = run_jobs(plan.jobs, out_dir / RUNS, comm, options, measure=module.measure)
     if ended and ended[-1].outcome == "interrupted":
         return None, ended
     text = on_root(comm, lambda: _conclude(plan, module, out_dir, ended, begin))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import TracebackType
 
 import h5py
 import numpy as np
@@ -58,12 +57,7 @@ class Snapshots:
     def __enter__(self) -> Snapshots:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
         self._file.close()
 
     def uplift(self, number: int) -> np.ndarray:

@@ -1,10 +1,13 @@
 """PETSc's TSAdapt as a controller of step sizes: which steps are taken, and how long the next is.
 
-petsc4py does not expose TSAdapt, and a TS of type ``python`` asks its context for a step size (the
-hook ``adaptStep``), never its own TSAdapt. So a small TS on one rank presents the estimated error
-as the difference of two solutions, and TSAdaptChoose and TSAdaptCheckStage, which PETSc's own
-implicit TS call, are called here through ctypes, from the library that petsc4py has loaded. Options
-are those of PETSc: ``-march_ts_adapt_type``, ``_safety``, ``_reject_safety``, ``_clip``,
+petsc4py does not expose TSAdapt, and a TS of type ``python`` takes its step size from the hook
+``adaptStep`` of its context, never from its own TSAdapt. So a small TS on one rank presents the
+estimated error as the difference of two solutions, and PETSc's C functions are called through
+ctypes, from the library that petsc4py has loaded. All five are public: they are declared in
+``petscts.h`` and have manual pages (TSGetAdapt; TSAdaptCandidatesClear, TSAdaptCandidateAdd,
+TSAdaptChoose and TSAdaptCheckStage at the level of developers of time steppers). Arguments are
+handles, integers, reals and booleans of the sizes that petsc4py was built with. Options are those
+of PETSc: ``-march_ts_adapt_type``, ``_safety``, ``_reject_safety``, ``_clip``,
 ``_always_accept``, ``_scale_solve_failed``, ``_monitor``.
 """
 

@@ -15,7 +15,6 @@ import math
 import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -285,12 +284,7 @@ class March:
     def __enter__(self) -> March:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
         # Errors of ours reach all ranks; at any other the rest may be waiting elsewhere.
         if error is None or isinstance(error, CatenaryError):
             self.destroy()

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.cases.run.needs import estimate_march
 from catenary.cases.run.plan import make_plan, plan_text
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.checks.mesh_size import estimate_memory
+from catenary.cases.scene.cost_model import estimate_march, estimate_memory
 from catenary.cases.scene.load import load_scene
 
 

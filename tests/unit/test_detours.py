@@ -9,8 +9,8 @@ import pytest
 from measuring import start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.cases.run.needs import STATION_COST, cost_of_widths, estimate_march
 from catenary.cases.run.plan import make_plan, plan_text
+from catenary.cases.scene.cost_model import STATION_COST, cost_of_widths, estimate_march
 from catenary.cases.scene.load import load_scene
 from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.integrators.detour import PARTS, detour_of

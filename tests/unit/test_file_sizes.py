@@ -13,7 +13,7 @@ from catenary.cases.run.needs import Kept, needs_before_meshing, needs_with_mesh
 from catenary.cases.run.plan import make_plan, plan_text
 from catenary.cases.run.runner import run_case
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.checks.mesh_size import estimate_memory
+from catenary.cases.scene.cost_model import estimate_memory
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene
 from catenary.cases.terminal import console

@@ -47,7 +47,8 @@ ROOMS = {
     ),
     "cases": (
         "scene.input", "scene.tables", "scene.keys", "scene.scene", "scene.convert",
-        "scene.checks", "scene.load", "terminal", "process", "result_folder", "run",
+        "scene.cost_model", "scene.checks", "scene.load", "terminal", "process",
+        "result_folder", "run",
         "studies.sweep", "studies.pantograph", "studies.accuracy", "studies.hard",
         "studies.stability", "studies.case_study", "ambrosio2012", "cli",
     ),

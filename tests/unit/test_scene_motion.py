@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from catenary.cases.run.needs import estimate_march
 from catenary.cases.run.plan import make_plan, plan_text
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.cost_model import estimate_march
 from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.scene.scene import Scene

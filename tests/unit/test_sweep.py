@@ -20,7 +20,7 @@ from catenary.cases.run.needs import needs_before_meshing
 from catenary.cases.run.runner import run_case
 from catenary.cases.studies.sweep.axis_words import STATISTICS_IN_WORDS, key_in_words
 from catenary.cases.studies.sweep.done_before import read_record, read_summary
-from catenary.cases.studies.sweep.jobs import STATISTICS, Ended, Job, make_jobs
+from catenary.cases.studies.sweep.jobs import STATISTICS, Ended, Job, RunOptions, make_jobs
 from catenary.cases.studies.sweep.output import as_text, draw, rows, write
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant, parse_vary, product
@@ -158,7 +158,7 @@ def test_another_configuration_is_not_overwritten_without_force(tmp_path: Path) 
     with pytest.raises(InputError, match="another configuration"):
         run_jobs(changed, tmp_path, COMM)
     assert (tmp_path / "one" / "summary.json").read_text() == before
-    (ended,) = run_jobs(changed, tmp_path, COMM, force=True)
+    (ended,) = run_jobs(changed, tmp_path, COMM, RunOptions(force=True))
     assert ended.done and not ended.skipped
     assert (tmp_path / "one" / "summary.json").read_text() != before
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.cases.scene.convert.line import span_lengths
+from catenary.cases.scene.cost_model import estimate_memory, estimate_meshing
 from catenary.cases.scene.input.faults import Fault
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.effects import all_effects as effects
@@ -19,14 +20,6 @@ if TYPE_CHECKING:
 MOST_NODES = 4_000_000
 # From here on a mesh takes longer than one waits without a word.
 MANY_NODES = 50_000
-# Time of Gmsh and of reading its file, measured with 1e5 and 4e5 nodes on a two-core machine.
-_MESHING = 4.5e-5  # [s]
-# Resident memory of runs of ambrosio2012 on 25, 300, 1000 and 2000 spans, report included, within
-# 10 %: program and libraries, then per unknown.
-MEMORY_BASE = 3.85e8  # [B]
-MEMORY_PER_UNKNOWN = 2200.0  # [B]
-# What a step adds, as the report takes the history of one pantograph after the other.
-MEMORY_PER_STEP = 40.0  # [B]
 
 
 class Size(NamedTuple):
@@ -39,10 +32,10 @@ class Size(NamedTuple):
 
     def sentence(self) -> str:
         """What it is and what it takes, in one sentence."""
-        memory = estimate_memory(self.unknowns)
+        memory, meshing = estimate_memory(self.unknowns), estimate_meshing(self.nodes)
         return (
             f"{self.spans} spans and {self.droppers} droppers make {self.nodes} nodes and "
-            f"{self.unknowns} unknowns: meshing takes about {_MESHING * self.nodes:.0f} s and a "
+            f"{self.unknowns} unknowns: meshing takes about {meshing:.0f} s and a "
             f"run about {memory / 1e9:.1f} GB of memory on one rank"
         )
 
@@ -89,8 +82,3 @@ def size_faults(scene: Scene) -> Iterator[Fault]:
             f"({scene.mesh.elements_per_gap}) or mesh.support_refinement "
             f"({scene.mesh.support_refinement})",
         )
-
-
-def estimate_memory(n_dofs: int, n_steps: int = 0) -> float:
-    """Resident memory of a run on one rank, its report included [B]."""
-    return MEMORY_BASE + MEMORY_PER_UNKNOWN * n_dofs + MEMORY_PER_STEP * n_steps

@@ -8,15 +8,22 @@ left out; all others go on.
 from __future__ import annotations
 
 import difflib
-import functools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from catenary.cases.scene.checks.contact import check_contact
+from catenary.cases.scene.checks.droppers import (
+    check_dropper_lengths,
+    check_droppers_inside_spans,
+)
+from catenary.cases.scene.checks.effects import (
+    check_effect_data,
+    check_effect_names,
+    check_requirements_of_chosen,
+    check_requirements_of_defaults,
+)
 from catenary.cases.scene.checks.incidents import check_incidents
 from catenary.cases.scene.checks.mesh_size import size_faults
 from catenary.cases.scene.checks.output import check_output
@@ -27,14 +34,11 @@ from catenary.cases.scene.checks.vehicle import check_vehicle
 from catenary.cases.scene.convert.course import end_of, strips_ahead
 from catenary.cases.scene.convert.line import line_data_of
 from catenary.cases.scene.input.faults import Fault, SceneError
-from catenary.cases.scene.input.origin import shown
 from catenary.cases.scene.keys.error_sentences import refusal, unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys
-from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData
+from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.base.errors import InputError
-from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.effect import Limit
-from catenary.solver.problem.problem import Problem
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
@@ -43,12 +47,6 @@ if TYPE_CHECKING:
 MIN_SEPARATION = 1.0
 # Slack for sums of decimal lengths [m].
 _TINY = 1e-6
-# As many span lengths are told in a sentence.
-_SOME = 6
-# Effects that are off by default and need a value in the scene: the key that holds it.
-_DATA_OF = {
-    "residual_dropper_stiffness": "line.dropper.residual_stiffness_ratio",
-}
 
 
 def check(scene: Scene) -> None:
@@ -71,7 +69,7 @@ def faults_of(scene: Scene) -> list[Fault]:
     line = _line(scene, found) if sound else None
     if line is None:
         return found.faults
-    for of_line in (_dropper_lengths, _speed):
+    for of_line in (check_dropper_lengths, _speed):
         found.nothing_by(of_line, scene, line)
     if found.nothing_by(_running, scene, line) and found.nothing_by(_evaluation, scene):
         found.nothing_by(_raising, scene)
@@ -79,7 +77,7 @@ def faults_of(scene: Scene) -> list[Fault]:
         return found.faults
     # What may need the machinery of multibody systems stands last: other faults are told at once.
     if found.nothing_by(check_mechanisms, scene, line):
-        found.nothing_by(_requirements_of_defaults, scene)
+        found.nothing_by(check_requirements_of_defaults, scene)
         found.nothing_by(check_vehicle, scene, line)
         found.nothing_by(check_incidents, scene, line)
     return found.faults
@@ -109,7 +107,7 @@ def _line(scene: Scene, found: _Findings) -> LineData | None:
 
     def make() -> Iterator[Fault]:
         lines.append(line_data_of(scene))
-        yield from _droppers_inside_spans(scene, lines[0])
+        yield from check_droppers_inside_spans(scene, lines[0])
 
     return lines[0] if found.nothing_by(make) else None
 
@@ -124,74 +122,6 @@ def _test_keys(scene: Scene) -> Iterator[Fault]:
         if not is_known(key, known) or key.startswith("test."):
             where = f"in the [test] table {scene.origin.of('test')}"
             yield Fault("test", unknown_key(key, where, known))
-
-
-def _effect_names(scene: Scene) -> Iterator[Fault]:
-    known = effects.registry()
-    for name, on in scene.effects.items():
-        key = f"effects.{name}"
-        if name not in known:
-            near = difflib.get_close_matches(name, known, n=1)
-            hint = f"did you mean effects.{near[0]}?" if near else f"known are {', '.join(known)}"
-            yield Fault(key, f"{shown(key)[1:-1]} {scene.origin.of(key)} is unknown; {hint}")
-        elif known[name].always and not on:
-            yield _refusal(scene, key, on, "it is part of every scene and cannot be left out")
-
-
-def _requirements_of_chosen(scene: Scene) -> Iterator[Fault]:
-    for name in scene.effects:
-        yield from _requirements(scene, name, "on", f"effects.{name}")
-
-
-def _requirements_of_defaults(scene: Scene) -> Iterator[Fault]:
-    """Of effects that are on by default, unless the scene holds nothing for them to act on."""
-    from catenary.cases.scene.convert.problem import problem_of
-
-    problem = functools.cache(lambda: problem_of(scene))
-    for name, effect in effects.registry().items():
-        if name in scene.effects:
-            continue
-        for fault in _requirements(scene, name, "on by default", ""):
-            if effect.applies(problem()):
-                yield fault
-
-
-def _requirements(scene: Scene, name: str, how: str, key: str) -> Iterator[Fault]:
-    switches = scene.switches()
-    for required in effects.registry()[name].requires if switches.get(name) else ():
-        if not switches[required]:
-            at = key or f"effects.{required}"
-            yield Fault(
-                at,
-                f"effects.{name} is {how} and requires effects.{required}, which is off "
-                f"{scene.origin.of(at)}; switch both on or both off",
-            )
-
-
-def _effect_data(scene: Scene) -> Iterator[Fault]:
-    values = {
-        "residual_dropper_stiffness": scene.line.dropper.residual_stiffness_ratio,
-    }
-    switches = scene.switches()
-    for name, value in values.items():
-        key = _DATA_OF[name]
-        if switches.get(name) and value == 0:
-            yield _refusal(
-                scene, key, value, f"effects.{name} is on and needs a value greater than 0"
-            )
-        if value > 0 and name not in scene.effects and switches.get(name) is False:
-            yield _refusal(
-                scene,
-                key,
-                value,
-                f"it acts only with effects.{name} = true; write that, or false to leave it out",
-            )
-    n = len(scene.train.pantographs)
-    if n > 1 and scene.holds(Limit.ONE_PANTOGRAPH):
-        key = "effects.several_pantographs"
-        yield _refusal(
-            scene, key, False, f"train.pantographs has {n} entries; leave one or switch it on"
-        )
 
 
 def _pantograph_names(scene: Scene) -> Iterator[Fault]:
@@ -228,86 +158,6 @@ def _separations(scene: Scene) -> Iterator[Fault]:
                 f"it must be at least {MIN_SEPARATION + strips:g} m more than the "
                 f"{behind[i - 1]:g} m of the pantograph before it{because}",
             )
-
-
-def _droppers_inside_spans(scene: Scene, line: LineData) -> Iterator[Fault]:
-    kind = scene.line.dropper
-    if kind.positions_m is not None and len(set(line.span_lengths)) > 1:
-        key = "line.dropper.positions_m"
-        lengths = ", ".join(f"{span:g}" for span in sorted(set(line.span_lengths))[:_SOME])
-        yield Fault(
-            key,
-            f"{key} {scene.origin.of(key)} holds for one span length, but the spans are "
-            f"{lengths} m long; give line.dropper.patterns or count and spacing_m",
-        )
-        return
-    for span, positions in zip(line.span_lengths, line.dropper_positions, strict=True):
-        outside = [x for x in positions if not SHORTEST_GAP <= x <= span - SHORTEST_GAP]
-        close = [pair for pair in zip(positions, positions[1:], strict=False)
-                 if pair[1] - pair[0] < SHORTEST_GAP]  # fmt: skip
-        if not outside and not close:
-            continue
-        if kind.count is not None and not outside:
-            why = f"droppers must be at least {SHORTEST_GAP:g} m apart"
-            yield _refusal(scene, "line.dropper.spacing_m", kind.spacing_m, why)
-            return
-        if kind.count is not None:
-            yield _refusal(
-                scene,
-                "line.dropper.count",
-                kind.count,
-                f"at a spacing of {kind.spacing_m:g} m these do not fit into a span of {span:g} m",
-            )
-            return
-        which = "positions_m" if kind.positions_m is not None else "patterns"
-        key = f"line.dropper.{which}"
-        if outside:
-            what = f"a dropper at {outside[0]:g} m; it must lie inside the span, between 0 and "
-            what += f"{span:g} m"
-        else:
-            left, right = close[0]
-            what = f"droppers at {left:.10g} and {right:.10g} m; they must be at least "
-            what += f"{SHORTEST_GAP:g} m apart"
-        yield Fault(key, f"{key} {scene.origin.of(key)} puts {what}")
-        return
-
-
-def estimated_dropper_lengths(line: LineData, gravity: float) -> list[np.ndarray]:
-    """Dropper lengths of each span [m], the messenger wire taken as a parabola.
-
-    Its load is its own weight and that of the contact wire less what the pre-sag's curvature lets
-    the contact wire's tension carry; bending and the supports' give are left out. Good to a few
-    centimetres: it serves to refuse the impossible, the form finding gives the lengths.
-    """
-    lengths = []
-    places = [np.asarray(positions, dtype=float) for positions in line.dropper_positions]
-    ends = np.cumsum([place.size for place in places])[:-1]
-    masts = np.repeat(line.support_positions[:-1], [place.size for place in places])
-    heights = np.split(line.target_height(masts + np.concatenate(places)), ends)
-    for i, (span, x) in enumerate(zip(line.span_lengths, places, strict=True)):
-        pre_sag = np.asarray(line.pre_sag[i])
-        height = heights[i] - pre_sag
-        mid_sag = float(pre_sag.max(initial=0.0))
-        carried = 8 * mid_sag * line.contact_wire.tension / span**2
-        weight = gravity * (line.contact_wire.mass_per_length + line.messenger_wire.mass_per_length)
-        load = max(weight - carried, gravity * line.messenger_wire.mass_per_length)
-        sag = load * x * (span - x) / (2 * line.messenger_wire.tension)
-        lengths.append(line.contact_height + line.encumbrance - sag - height)
-    return lengths
-
-
-def _dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
-    gravity = Problem.gravity if scene.switches().get("gravity", True) else 0.0
-    shortest = [float(v.min()) for v in estimated_dropper_lengths(line, gravity)]
-    span = int(np.argmin(shortest))
-    if shortest[span] <= 0:
-        yield _refusal(
-            scene,
-            "line.encumbrance_m",
-            line.encumbrance,
-            f"the messenger wire would hang {-shortest[span]:.2f} m below the contact wire in span "
-            f"{span + 1}: raise it, raise line.messenger_wire.tension_N or shorten the span",
-        )
 
 
 def _speed(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -411,9 +261,9 @@ def _mesh_file(scene: Scene) -> Iterator[Fault]:
 # Checks that need no other one.
 _OF_TABLES: tuple[Callable[[Scene], Iterator[Fault]], ...] = (
     _test_keys,
-    _effect_names,
-    _requirements_of_chosen,
-    _effect_data,
+    check_effect_names,
+    check_requirements_of_chosen,
+    check_effect_data,
     check_contact,
     _separations,
     _standard,

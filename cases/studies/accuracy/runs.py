@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from catenary.cases.studies.accuracy.analysis import Found, Row, compare, separate, uncertainties
 from catenary.cases.studies.accuracy.plan import Plan, PlannedAxis, again
-from catenary.cases.studies.sweep.jobs import Ended
+from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, RunOptions
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import covers
@@ -74,10 +74,7 @@ def run(
     plan: Plan,
     out_dir: Path,
     comm: Any,
-    *,
-    force: bool = False,
-    petsc_options: Sequence[str] = (),
-    tell: Callable[[str], None] = lambda line: None,
+    options: RunOptions = AS_USUAL,
 ) -> tuple[Measured | None, list[Ended]]:
     """Run what is not done yet; returns what was found and all runs. Collective.
 
@@ -87,11 +84,10 @@ def run(
     Raises
     ------
     InputError
-        If ``out_dir`` holds other results and ``force`` is not given.
+        If ``out_dir`` holds other results and ``options.force`` is not given.
     """
-    options: dict[str, Any] = {"force": force, "petsc_options": petsc_options, "tell": tell}
     folder = out_dir / RUNS
-    ended = run_jobs(plan.jobs, folder, comm, measure=measure, **options)
+    ended = run_jobs(plan.jobs, folder, comm, options, measure=measure)
     if _interrupted(ended):
         return None, ended
     every = list(ended)
@@ -99,9 +95,10 @@ def run(
     work = {one.variant.name: _work(one) for one in ended if one.done}
     short = [job for job in plan.jobs if work.get(job.variant.name, _LONG) < _LONG]
     for number in range(2, plan.repeats + 1):
-        tell(f"again, for their time, no. {number} of {plan.repeats}: {len(short)} short runs")
+        round_of = f"no. {number} of {plan.repeats}"
+        options.progress(f"again, for their time, {round_of}: {len(short)} short runs")
         short.reverse()  # whatever else the machine does now and then meets others
-        repeated = run_jobs([again(job, number) for job in short], folder, comm, **options)
+        repeated = run_jobs([again(job, number) for job in short], folder, comm, options)
         every += repeated
         if _interrupted(repeated):
             return None, every

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from catenary.cases.scene.input.origin import shown
 from catenary.cases.scene.input.toml_input import Assigned
@@ -53,6 +53,24 @@ class Job:
     scene: Scene
     full_report: bool = False
     keep_results: bool = True
+
+
+class RunOptions(NamedTuple):
+    """How the runs of a sweep or study are made.
+
+    Attributes
+    ----------
+    force : run all anew, whatever is there, and however large the runs are
+    petsc : the options that PETSc was started with, for the record
+    progress : called with a line before and after each run
+    """
+
+    force: bool = False
+    petsc: Sequence[str] = ()
+    progress: Callable[[str], None] = lambda line: None
+
+
+AS_USUAL = RunOptions()
 
 
 @dataclass(frozen=True)

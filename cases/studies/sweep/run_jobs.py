@@ -22,7 +22,7 @@ from catenary.cases.run.needs import Kept, total_size
 from catenary.cases.run.runner import RESULT, run_case
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.studies.sweep.done_before import read_record, read_summary, record_text
-from catenary.cases.studies.sweep.jobs import Ended, Job
+from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, Job, RunOptions
 from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.files.own_files import VARIANT_FILE as RECORD
 from catenary.postproc.files.result_file import DONE, INTERRUPTED
@@ -38,11 +38,9 @@ def run_jobs(
     jobs: Sequence[Job],
     out_dir: Path,
     comm: Any,
+    options: RunOptions = AS_USUAL,
     *,
-    force: bool = False,
-    petsc_options: Sequence[str] = (),
     measure: Measure | None = None,
-    tell: Callable[[str], None] = lambda line: None,
 ) -> list[Ended]:
     """Run what is not done yet, each job in ``out_dir/<name>``. Collective.
 
@@ -51,40 +49,38 @@ def run_jobs(
     Parameters
     ----------
     jobs : the same on all ranks
-    force : run all anew, whatever is there, and however large the runs are
-    petsc_options : the options that PETSc was started with, for the record
     measure : takes figures from each result file, on rank 0
-    tell : called with a line before and after each run
 
     Raises
     ------
     InputError
         If ``out_dir`` cannot be written to, or if it or a job's folder holds other results and
-        ``force`` is not given, or if there is no room for all runs; nothing is run then.
+        ``options.force`` is not given, or if there is no room for all runs; nothing is run then.
     RunBroken
         If a record of what is done cannot be written.
     """
-    earlier = on_root(comm, lambda: _earlier(jobs, out_dir, force, measure is not None))
+    earlier = on_root(comm, lambda: _earlier(jobs, out_dir, options.force, measure is not None))
     left = [job for job, found in zip(jobs, earlier, strict=True) if found is None]
-    on_root(comm, lambda: _check_room(left, out_dir, force))
+    on_root(comm, lambda: _check_room(left, out_dir, options.force))
     ended: list[Ended] = []
     begin, n_left = time.perf_counter(), len(left)
     n_run = 0
     for number, (job, found) in enumerate(zip(jobs, earlier, strict=True), start=1):
         place = f"[{number}/{len(jobs)}] {job.variant.name}"
         if found is not None:
-            tell(f"{place}: done already")
+            options.progress(f"{place}: done already")
             ended.append(found)
             continue
-        tell(place)
-        one = _run(job, out_dir / job.variant.name, comm, petsc_options, measure, force)
+        options.progress(place)
+        one = _run(job, out_dir / job.variant.name, comm, options, measure)
         ended.append(one)
         if one.outcome == INTERRUPTED:
             break
         n_run += 1
         spent = time.perf_counter() - begin
         ahead = spent / n_run * (n_left - n_run)
-        tell(f"    {_figures(one)}; {spent:.0f} s gone, about {ahead:.0f} s left")
+        left_of_it = f"{spent:.0f} s gone, about {ahead:.0f} s left"
+        options.progress(f"    {_figures(one)}; {left_of_it}")
     return ended
 
 
@@ -92,9 +88,8 @@ def _run(
     job: Job,
     folder: Path,
     comm: Any,
-    petsc_options: Sequence[str],
+    options: RunOptions,
     measure: Measure | None,
-    large: bool,
 ) -> Ended:
     """Run one job and leave its record. Collective; raises only if that cannot be written."""
     clock = time.perf_counter()
@@ -104,9 +99,9 @@ def _run(
             folder,
             comm,
             force=True,
-            petsc_options=petsc_options,
+            petsc_options=options.petsc,
             only_summary=not job.full_report,
-            large=large,
+            large=options.force,
         )
         outcome, summary = result.outcome, result.summary
     except Interrupted:
