@@ -155,6 +155,12 @@ class Wire(Conductor):
             return self.profile.height
         return max(max(piece.z) for piece in self.pieces)
 
+    @property
+    def held_heights(self) -> list[float]:
+        """Heights of its ends that are held, in order of x [m]."""
+        ends = ((piece, end) for piece in self.pieces for end in (0, -1))
+        return [piece.z[end] for piece, end in ends if piece.ends[end] is End.HELD]
+
     def points(self, x: np.ndarray) -> np.ndarray:
         """Points of the wire at positions ``x`` (n,) inside its pieces, shape (n, 3) [m]."""
         starts = [piece.x[0] for piece in self.pieces]

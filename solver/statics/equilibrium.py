@@ -1,7 +1,8 @@
-"""Form finding: dropper forces and lengths for the wanted contact-wire profile, and elasticity.
+"""Form finding: the line at rest under its own weight, in the wanted profiles.
 
-The wires' static shape is linear in the loads, so the profile is prescribed at the droppers and
-the forces that hold it there are the dropper tensions; the messenger wire then carries them.
+Wires are linear in their loads. At each dropper the lower wire's height is wanted and the dropper's
+force unknown: one sparse system over the nodes of all wires in the order along the track, in which
+a height that is given has its force as unknown. Any number of wires may hang below each other.
 """
 
 from __future__ import annotations
@@ -10,9 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg
+from scipy import sparse
+from scipy.sparse import linalg as sparse_linalg
 
-from catenary.meshgen.line import Line, Role
+from catenary.meshgen.line import Line, Wire
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects.build_model import build
@@ -53,9 +55,11 @@ def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
         If a dropper would be slack at rest or would have no length, or if lengths do not settle.
     """
     length = mesh.points[mesh.droppers[:, 0], 2] - mesh.points[mesh.droppers[:, 1], 2]
+    hanging: _HangingWires | None = None
     for _ in range(_MAX_PASSES):
         model = build(problem, mesh, length)
-        form = _form(model)
+        hanging = hanging or _HangingWires(model)
+        form = hanging.at_rest(model)
         _check(problem.line, mesh, form)
         geometric = form.height[mesh.droppers[:, 0]] - form.height[mesh.droppers[:, 1]]
         change = np.abs(geometric - length).max(initial=0.0)
@@ -69,96 +73,104 @@ def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
     )
 
 
-def _form(model: Model) -> Equilibrium:
-    mesh, line = model.mesh, model.problem.line
-    lower_wire, upper_wire = line.wires_of(Role.CONTACT)[0], line.wires_of(Role.MESSENGER)[0]
-    contact, messenger = mesh.wires[lower_wire.name], mesh.wires[upper_wire.name]
-    assert lower_wire.profile is not None
-    weighted = model.simulated.gravity != 0.0
-    height = np.zeros(mesh.n_nodes)
-    slope = np.zeros(mesh.n_nodes)
+class _HangingWires:
+    """The wires of a line between what holds them, factored; their loads may change.
 
-    lower = mesh.droppers[:, 1]
-    arms = mesh.steady_arms if line.steady_arms[0].kind.holds_height else mesh.steady_arms[:0]
-    held = np.concatenate([lower, arms, mesh.anchors[np.isin(mesh.anchors, contact)]])
-    target = model.simulated.target_height(lower_wire.profile, mesh.x(held))
-    load = model.weight.copy()
-    reaction = _rest_on(model, lower_wire.name, held, target, load, height, slope)
-    force = reaction[: lower.size] if weighted else np.zeros(lower.size)
-
-    np.add.at(load, model.dofs(mesh.droppers[:, 0]), -force)
-    top = upper_wire.top
-    ends = mesh.anchors[np.isin(mesh.anchors, messenger)]
-    # A support is a spring relaxed at the encumbrance: it gives way under the line's weight.
-    springs = (mesh.supports, line.supports[0].stiffness, top)
-    _rest_on(model, upper_wire.name, ends, np.full(ends.size, top), load, height, slope, springs)
-
-    stretched = height[mesh.droppers[:, 0]] - height[lower]
-    return Equilibrium(height, slope, force, stretched - force / model.dropper_stiffness)
-
-
-def _rest_on(
-    model: Model,
-    wire: str,
-    held: np.ndarray,
-    target: np.ndarray,
-    load: np.ndarray,
-    height: np.ndarray,
-    slope: np.ndarray,
-    springs: tuple[np.ndarray, float, float] | None = None,
-) -> np.ndarray:
-    """Let one wire rest at prescribed heights of some nodes; fills height and slope of its nodes.
-
-    ``springs`` are nodes, stiffness [N/m] and relaxed height [m] of springs to the ground.
-    Returns the upward forces [N] that hold ``held``, in their order.
+    Unknowns are height and slope at each node. Where a height is given, the upward force that holds
+    the wire there is unknown in its place; that of a dropper also pulls down its upper end.
     """
-    nodes = model.mesh.wires[wire]
-    length = np.diff(model.mesh.x(nodes))
-    data = model.problem.line.wire(wire)
-    band = _chain_band(elements.stiffness(length, data.bending_stiffness, data.tension))
-    place = np.full(model.mesh.n_nodes, -1)
-    place[nodes] = np.arange(nodes.size)
-    fixed = 2 * place[held]
-    own = np.stack([model.dofs(nodes, "w"), model.dofs(nodes, "theta_y")], axis=1).ravel()
-    own_load = load[own]
-    if springs is not None:
-        at, stiffness, relaxed = springs
-        band[3, 2 * place[at]] += stiffness
-        own_load[2 * place[at]] += stiffness * relaxed
-    free_band = band.copy()
-    prescribed = np.zeros(own.size)
-    prescribed[fixed] = target
-    right = own_load - _band_times(band, prescribed)
-    right[fixed] = target
-    for offset in range(band.shape[0]):
-        low = fixed[fixed >= offset]
-        free_band[3 - offset, low] = float(offset == 0)
-        high = fixed[fixed + offset < own.size]
-        free_band[3 - offset, high + offset] = float(offset == 0)
-    solution = linalg.solveh_banded(free_band, right)
-    height[nodes] = solution[0::2]
-    slope[nodes] = solution[1::2]
-    return (_band_times(band, solution) - own_load)[fixed]
+
+    def __init__(self, model: Model) -> None:
+        self._w = 2 * model.row_of_node
+        n = 2 * model.mesh.n_nodes
+        stiffness, self._spring_load = _assembled(model, self._w)
+        nodes, heights = _given_heights(model)
+        self._given = self._w[nodes]
+        self._heights = np.zeros(n)
+        self._heights[self._given] = heights
+        self._from_given = stiffness @ self._heights
+        # Without weight droppers carry nothing: what holds the lower wire pulls at nothing above.
+        self._weighted = model.simulated.gravity != 0.0
+        upper, lower = self._w[model.mesh.droppers if self._weighted else model.mesh.droppers[:0]].T
+        rows, columns = np.concatenate([self._given, upper]), np.concatenate([self._given, lower])
+        sign = np.repeat([-1.0, 1.0], [self._given.size, upper.size])
+        forces = sparse.csc_matrix((sign, (rows, columns)), shape=(n, n))
+        free = np.ones(n)
+        free[self._given] = 0.0
+        matrix = (stiffness @ sparse.diags(free) + forces).tocsc()
+        self._factor = sparse_linalg.splu(matrix, permc_spec="NATURAL")
+
+    def at_rest(self, model: Model) -> Equilibrium:
+        """The line at rest under the weights of ``model``, which may differ in them only."""
+        mesh, every = model.mesh, np.arange(model.mesh.n_nodes)
+        load = self._spring_load - self._from_given
+        load[self._w] += model.weight[model.dofs(every)]
+        load[self._w + 1] += model.weight[model.dofs(every, "theta_y")]
+        solution = self._factor.solve(load)
+        held_by = solution[self._given]
+        solution[self._given] = self._heights[self._given]
+        height, slope = solution[self._w], solution[self._w + 1]
+        n = mesh.droppers.shape[0]
+        force = held_by[:n] if self._weighted else np.zeros(n)
+        stretched = height[mesh.droppers[:, 0]] - height[mesh.droppers[:, 1]]
+        return Equilibrium(height, slope, force, stretched - force / model.dropper_stiffness)
 
 
-def _chain_band(matrices: np.ndarray) -> np.ndarray:
-    """Upper band, shape (4, 2 n + 2), of a chain of n elements assembled node by node."""
-    n = 2 * matrices.shape[0] + 2
-    band = np.zeros((4, n))
-    first = 2 * np.arange(matrices.shape[0])
-    for i in range(4):
-        for j in range(i, 4):
-            band[3 - (j - i), first + j] += matrices[:, i, j]
-    return band
+def _assembled(model: Model, w: np.ndarray) -> tuple[sparse.csc_matrix, np.ndarray]:
+    """Stiffness of wires, supports and clamps, and the load of relaxed supports.
+
+    ``w`` is the number of each node's height; that of its slope follows. A support is a spring
+    relaxed at its height: it gives way under the line's weight. Arms are without force at rest.
+    """
+    mesh, line = model.mesh, model.problem.line
+    n = 2 * mesh.n_nodes
+    load = np.zeros(n)
+    parts: list[tuple[np.ndarray, np.ndarray]] = []
+    for wire in line.wires:
+        first, second = mesh.elements(wire.name).T
+        length = mesh.x(second) - mesh.x(first)
+        dofs = np.stack([w[first], w[first] + 1, w[second], w[second] + 1], axis=1)
+        parts.append((dofs, elements.stiffness(length, wire.bending_stiffness, wire.tension)))
+    for number, supports in enumerate(line.supports):
+        dofs = w[mesh.supports[mesh.support_group == number]]
+        parts.append((dofs[:, None], np.full((dofs.size, 1, 1), supports.stiffness)))
+        relaxed = line.wire(supports.wire).points(np.array(supports.x))[:, 2]
+        np.add.at(load, dofs, supports.stiffness * relaxed)
+    at = [
+        np.concatenate(
+            [np.broadcast_to(dofs[axes], matrix.shape).ravel() for dofs, matrix in parts]
+        )
+        for axes in (np.s_[:, :, None], np.s_[:, None, :])
+    ]
+    values = np.concatenate([matrix.ravel() for _, matrix in parts])
+    return sparse.csc_matrix((values, (at[0], at[1])), shape=(n, n)), load
 
 
-def _band_times(band: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Product of a symmetric matrix in upper-band storage, shape (4, n), with ``x``, shape (n,)."""
-    result = band[3] * x
-    for offset in range(1, 4):
-        result[:-offset] += band[3 - offset, offset:] * x[offset:]
-        result[offset:] += band[3 - offset, offset:] * x[:-offset]
-    return np.asarray(result)
+def _given_heights(model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes with a given height, droppers' lower ends first, and the heights [m]."""
+    mesh, line = model.mesh, model.problem.line
+    nodes, heights = [mesh.droppers[:, 1]], [np.zeros(mesh.droppers.shape[0])]
+    for number, group in enumerate(line.droppers):
+        mine = mesh.dropper_group == number
+        heights[0][mine] = _wanted(model, line.wire(group.lower), mesh.droppers[mine, 1])
+    for number, arms in enumerate(line.steady_arms):
+        if arms.kind.holds_height:
+            nodes.append(mesh.steady_arms[mesh.arm_group == number])
+            heights.append(_wanted(model, line.wire(arms.wire), nodes[-1]))
+    for wire in line.wires:
+        nodes.append(mesh.anchors[np.isin(mesh.anchors, mesh.wires[wire.name])])
+        if wire.profile is None:
+            heights.append(np.array(wire.held_heights))
+        else:
+            heights.append(_wanted(model, wire, nodes[-1]))
+    return np.concatenate(nodes), np.concatenate(heights)
+
+
+def _wanted(model: Model, wire: Wire, nodes: np.ndarray) -> np.ndarray:
+    """Heights that nodes of a wire are to have, (n,) [m]."""
+    if wire.profile is None:
+        raise ValueError(f"nothing says at what height {wire.name} is to be held")
+    return model.simulated.target_height(wire.profile, model.mesh.x(nodes))
 
 
 def _check(line: Line, mesh: LineMesh, form: Equilibrium) -> None:
