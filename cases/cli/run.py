@@ -1,4 +1,4 @@
-"""The verbs ``run`` and ``restart``."""
+"""The verbs ``run``, ``restart`` and ``submit``."""
 
 from __future__ import annotations
 
@@ -151,3 +151,70 @@ def _end(result: RunOutcome, folder: Path, strict: bool) -> int:
         return console.BROKEN
     console.say(terminal_text.summary_text(result.summary, folder))
     return console.NOT_ACCEPTED if strict and result.accepted is False else console.DONE
+
+
+@app.command(
+    "submit",
+    help="Hand a run to SLURM: a job with time and memory from the plan, and jobs that continue it "
+    "where a limit of time or a lost node ends one.",
+    epilog="Example: catenary submit en50318_2002 -o results/en300 --ranks 4 --print > job.sh",
+)
+@console.guarded
+@console.serial
+def submit(
+    case: Case,
+    out: Out,
+    extras: MoreAndPetscOptions = None,
+    assignments: Assignments = None,
+    shortened: Shortened = False,
+    ranks: Annotated[int, typer.Option("--ranks", min=1, max=10**6, help="MPI ranks.")] = 1,
+    nodes: Annotated[int, typer.Option("--nodes", min=1, max=10**5, help="Computers.")] = 1,
+    minutes: Annotated[
+        int | None,
+        typer.Option(
+            "--minutes", min=5, max=10**5, help="Limit of a job; from the plan if absent."
+        ),
+    ] = None,
+    chain: Annotated[
+        int, typer.Option("--chain", min=0, max=1000, help="Jobs that may follow the first.")
+    ] = 9,
+    directives: Annotated[
+        list[str] | None,
+        typer.Option("--sbatch", metavar="OPTION", help="Option of sbatch; repeatable."),
+    ] = None,
+    before: Annotated[
+        list[str] | None,
+        typer.Option("--before", metavar="LINE", help="Line of shell before the run; repeatable."),
+    ] = None,
+    only_print: Annotated[
+        bool, typer.Option("--print", help="Print the script and submit nothing.")
+    ] = False,
+) -> None:
+    """Serial."""
+    import shutil
+    import subprocess
+
+    from catenary.cases.process.petsc_options import split_extras
+    from catenary.cases.run.plan import make_plan
+    from catenary.cases.run.slurm_script import Job, slurm_script
+    from catenary.cases.scene.load import load_scene
+
+    refuse_impossible(out)
+    more, options = split_extras(extras or [])
+    chosen = [*(assignments or []), *more]
+    plan = make_plan(load_scene(case, chosen, shortened))
+    words = [str(Path(case).absolute()) if Path(case).exists() else case]
+    words += ["--short"] if shortened else []
+    job = Job(ranks, nodes, minutes, chain, directives or [], before or [])
+    # The folder comes last, so that nothing is taken for a further assignment.
+    settings = [word for value in chosen for word in ("--set", value)]
+    script = slurm_script([*words, *settings], out, job, plan.march, plan.memory, options)
+    if only_print:
+        typer.echo(script, nl=False)
+        return
+    if shutil.which("sbatch") is None:
+        raise InputError("sbatch is not on this machine; --print shows the script instead")
+    done = subprocess.run(["sbatch"], input=script, text=True, capture_output=True, check=False)
+    if done.returncode:
+        raise InputError(f"sbatch refused the job: {' '.join(done.stderr.split())}")
+    console.say(done.stdout.strip())

@@ -1,0 +1,131 @@
+"""A SLURM script for a run: how many ranks, for how long, and a chain of jobs that goes on.
+
+Before the limit of its time SLURM sends a job SIGTERM; the run then ends with its next step, and
+the next job of the chain continues it. The next job waits until this one has failed, which a lost
+node does as well; SLURM takes it away when the run is done.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import shlex
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from catenary.solver.base.errors import InputError
+
+# How much longer than its estimate a job may take, what a start and a report take at most, and the
+# least that a job asks for [s].
+_SPARE, _AROUND, _LEAST = 3.0, 180.0, 600.0
+# How long before its limit a job is told to end: a step, a flush and the report [s].
+NOTICE = 120
+_GB = 1e9
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is wanted of a job.
+
+    Attributes
+    ----------
+    ranks, nodes : of MPI, and computers that they are spread over
+    minutes : limit of the job's time; None follows from the estimate
+    chain : jobs that may follow the first one
+    directives : further options of sbatch, such as ``--account=track``
+    before : lines of shell before the run, such as ``module load catenary``
+    """
+
+    ranks: int = 1
+    nodes: int = 1
+    minutes: int | None = None
+    chain: int = 9
+    directives: list[str] = field(default_factory=list)
+    before: list[str] = field(default_factory=list)
+
+
+def slurm_script(
+    words: list[str],
+    out: Path,
+    job: Job,
+    march_s: float,
+    memory: float,
+    petsc_options: list[str] | None = None,
+) -> str:
+    """The script of a run. Not collective.
+
+    Parameters
+    ----------
+    words : arguments of ``catenary run`` but the folder
+    out : folder of the results
+    march_s, memory : estimates of a plan on one rank [s], [B]
+    petsc_options : those after --, which a job that continues the run takes as well
+
+    Raises
+    ------
+    InputError
+        If there are more nodes than ranks, or a directive is none.
+    """
+    if job.nodes > job.ranks:
+        raise InputError(f"--nodes is {job.nodes}, more than the {job.ranks} ranks of --ranks")
+    for directive in job.directives:
+        if not re.fullmatch(r"--?[A-Za-z][\w-]*([= ]\S+)?", directive):
+            raise InputError(
+                f"--sbatch is {directive!r}; it takes one option of sbatch, such as --account=NAME"
+            )
+    minutes = job.minutes or limit_minutes(march_s / job.ranks)
+    name = re.sub(r"[^A-Za-z0-9_.-]", "_", f"catenary-{out.name or 'run'}")[:60]
+    a_node = math.ceil((1.2 * memory + 0.3 * _GB * job.ranks) / job.nodes / _GB)
+    options = [
+        f"--job-name={name}",
+        f"--nodes={job.nodes}",
+        f"--ntasks={job.ranks}",
+        "--cpus-per-task=1",
+        f"--mem={a_node}G",
+        f"--time={minutes // 60:02d}:{minutes % 60:02d}:00",
+        f"--signal=TERM@{NOTICE}",
+        "--open-mode=append",
+        *job.directives,
+    ]
+    return _SCRIPT.format(
+        options="\n".join(f"#SBATCH {option}" for option in options),
+        before="".join(f"{line}\n" for line in job.before),
+        out=shlex.quote(str(out.absolute())),
+        words=" ".join(map(shlex.quote, words)),
+        petsc=" " + " ".join(map(shlex.quote, ["--", *petsc_options])) if petsc_options else "",
+        chain=job.chain,
+    )
+
+
+def limit_minutes(march_s: float) -> int:
+    """Limit of a job whose march is estimated to take so long [s], in steps of five minutes."""
+    seconds = max(_LEAST, _SPARE * march_s + _AROUND + NOTICE)
+    return 5 * math.ceil(seconds / 300.0)
+
+
+_SCRIPT = """\
+#!/bin/bash
+{options}
+# Written by `catenary submit`. Each job continues the run where the one before it ended.
+set -u
+out={out}
+left=${{CATENARY_JOBS_LEFT:-{chain}}}
+next=
+if [ "$left" -gt 0 ]; then
+    next=$(CATENARY_JOBS_LEFT=$((left - 1)) sbatch --parsable --export=ALL \\
+        --kill-on-invalid-dep=yes --dependency="afternotok:$SLURM_JOB_ID" "$0")
+fi
+{before}\
+if [ -f "$out/run.h5" ]; then
+    srun catenary restart "$out"{petsc}
+else
+    srun catenary run {words} -o "$out"{petsc}
+fi
+code=$?
+# The next job is for a run that was interrupted or killed; others would end the same way again.
+interrupted() {{ [ "$code" -ge 128 ] || grep -qs '"outcome": "interrupted"' "$out/summary.json"; }}
+if [ -n "$next" ] && ! interrupted; then
+    scancel "$next"
+fi
+exit "$code"
+"""
