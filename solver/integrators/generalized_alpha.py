@@ -21,6 +21,7 @@ import numpy as np
 
 from catenary.solver.base import aligned_arrays
 from catenary.solver.integrators import alpha_kernels
+from catenary.solver.integrators.alpha_kernels import AlphaFactors
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps
 from catenary.solver.model.model import Model
@@ -45,37 +46,28 @@ class GeneralizedAlphaLine(LineIntegrator):
         ratio = (1.0 - force_weight) / (1.0 - mass_weight)
         super().__init__(comm, model, ownership, ratio * beta * dt**2, ratio * gamma * dt)
         self._known = aligned_arrays.zeros(ownership.n_local, 3)
-        self._coefficients = np.array(
-            [
-                dt,
-                ratio,
-                force_weight / (1.0 - mass_weight),
-                -mass_weight / (1.0 - mass_weight),
-                dt**2 * (0.5 - beta),
-                dt**2 * beta,
-                dt * (1.0 - gamma),
-                dt * gamma,
-                self._alpha_share,
-            ]
+        self._by = AlphaFactors(
+            dt=dt,
+            ratio=ratio,
+            known_of_balanced=force_weight / (1.0 - mass_weight),
+            known_of_own=-mass_weight / (1.0 - mass_weight),
+            position_of_own=dt**2 * (0.5 - beta),
+            position_of_known=dt**2 * beta,
+            velocity_of_own=dt * (1.0 - gamma),
+            velocity_of_known=dt * gamma,
+            damping_on_stiffness=self._alpha_share,
         )
 
     def _ahead(self) -> tuple[AlphaAhead, AlphaSteps] | None:
-        dt, ratio, from_balanced, from_own = map(float, self._coefficients[:4])
-        own_position, known_position, own_velocity, known_velocity, work = map(
-            float, self._coefficients[4:]
-        )
-        known = from_balanced + from_own * ratio, from_own
+        by = self._by
+        known = by.known_of_balanced + by.known_of_own * by.ratio, by.known_of_own
         # What b and p before a step do to displacement and velocity until its end.
-        position = tuple(
-            own_position * own + known_position * share
-            for own, share in zip((ratio, 1.0), known, strict=True)
-        )
-        velocity = tuple(
-            own_velocity * own + known_velocity * share
-            for own, share in zip((ratio, 1.0), known, strict=True)
-        )
+        shares = tuple(zip((by.ratio, 1.0), known, strict=True))
+        position = [by.position_of_own * a + by.position_of_known * p for a, p in shares]
+        velocity = [by.velocity_of_own * a + by.velocity_of_known * p for a, p in shares]
+        work = by.damping_on_stiffness
         balance = position[0] + work * velocity[0], position[1] + work * velocity[1]
-        if not self._proportional or abs(balance[0]) < _LEAST_SHARE * dt**2:
+        if not self._proportional or abs(balance[0]) < _LEAST_SHARE * by.dt**2:
             return None
         steps = AlphaSteps(
             known,
@@ -83,7 +75,7 @@ class GeneralizedAlphaLine(LineIntegrator):
             balance,
             self.position_factor,
             self.velocity_factor,
-            dt,
+            by.dt,
             work,
             self._beta_share,
         )
@@ -100,7 +92,7 @@ class GeneralizedAlphaLine(LineIntegrator):
             self.acceleration,
             self._known,
             self.operators.factor,
-            self._coefficients,
+            self._by,
         )
 
     def start(
@@ -110,7 +102,7 @@ class GeneralizedAlphaLine(LineIntegrator):
 
         The algorithm's acceleration is the same there.
         """
-        self._known[:] = (1.0 - self._coefficients[1]) * acceleration
+        self._known[:] = (1.0 - self._by.ratio) * acceleration
         super().start(displacement, velocity, acceleration)
 
     def state(self) -> Mapping[str, np.ndarray]:

@@ -18,6 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.solver.schemes import step_error_kernels
+from catenary.solver.schemes.step_error_kernels import Past, Tried
 
 # Steps before this one that the estimate looks at.
 _PAST = 3
@@ -27,16 +28,12 @@ class StepError:
     """The estimate for n contacts, with the depths that it remembers. On rank 0; not collective."""
 
     def __init__(self, n: int) -> None:
-        self._times = np.zeros(_PAST)
-        self._depths = np.zeros((_PAST, n))
-        self._forces = np.zeros(n)
+        self._past = Past(np.zeros(_PAST), np.zeros((_PAST, n)), np.zeros(n))
         self._known = 0
         # Compile, or load from Numba's cache, before the clock of a march starts.
-        nothing = np.zeros(n)
-        step_error_kernels.largest(
-            1.0, nothing, nothing, nothing, nothing, np.arange(3.0), self._depths, self._forces
-        )
-        step_error_kernels.remember(0.0, nothing, nothing, self._times, self._depths, self._forces)
+        nothing, past = np.zeros(n), self._past._replace(times=np.arange(float(_PAST)))
+        step_error_kernels.largest(Tried(1.0, nothing, nothing, nothing, nothing), past)
+        step_error_kernels.remember(0.0, nothing, nothing, past)
 
     def of(
         self,
@@ -56,27 +53,24 @@ class StepError:
         """
         if self._known < _PAST:
             return None
-        return float(
-            step_error_kernels.largest(
-                time, depth, force, stiffness, compliance, self._times, self._depths, self._forces
-            )
-        )
+        tried = Tried(time, depth, force, stiffness, compliance)
+        return float(step_error_kernels.largest(tried, self._past))
 
     def accept(self, time: float, depth: np.ndarray, force: np.ndarray) -> None:
         """Remember a step that was taken."""
-        step_error_kernels.remember(time, depth, force, self._times, self._depths, self._forces)
+        step_error_kernels.remember(time, depth, force, self._past)
         self._known = min(self._known + 1, _PAST)
 
     def state(self) -> np.ndarray:
         """All that is remembered, as one array of fixed length."""
-        return np.concatenate(
-            [[self._known], self._forces, self._times, self._depths.ravel()], dtype=float
-        )
+        times, depths, forces = self._past
+        return np.concatenate([[self._known], forces, times, depths.ravel()], dtype=float)
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
-        n = self._forces.size
+        times, depths, forces = self._past
+        n = forces.size
         self._known = int(state[0])
-        self._forces[:] = state[1 : 1 + n]
-        self._times[:] = state[1 + n : 1 + n + _PAST]
-        self._depths[:] = state[1 + n + _PAST :].reshape(self._depths.shape)
+        forces[:] = state[1 : 1 + n]
+        times[:] = state[1 + n : 1 + n + _PAST]
+        depths[:] = state[1 + n + _PAST :].reshape(depths.shape)

@@ -2,34 +2,70 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from catenary.solver.base.compiled import compiled
 
 
+class Past(NamedTuple):
+    """The latest steps, oldest first.
+
+    Attributes
+    ----------
+    times : (3,) their ends [s]
+    depths : (3, n) of n contacts [m]
+    forces : (n,) at the end of the last [N]
+    """
+
+    times: np.ndarray
+    depths: np.ndarray
+    forces: np.ndarray
+
+
+class Tried(NamedTuple):
+    """A step that is judged.
+
+    Attributes
+    ----------
+    time : its end [s]
+    depth, force, stiffness : (n,) found there [m], [N], [N/m], the latter of the law's tangent
+    compliance : (n,) what a force takes off the depth within the step [m/N]
+    """
+
+    time: float
+    depth: np.ndarray
+    force: np.ndarray
+    stiffness: np.ndarray
+    compliance: np.ndarray
+
+
 @compiled
-def largest(time, depth, force, stiffness, compliance, times, depths, forces):
-    """Largest error of a force; arguments as those of ``StepError.of`` and its own arrays."""
+def largest(tried, past):
+    """Largest error of a contact force [N]."""
+    times, depths, time = past.times, past.depths, tried.time
     largest = 0.0
-    for i in range(depth.size):
-        touched = forces[i] > 0.0
-        if touched or force[i] > 0.0:
-            first = (depth[i] - depths[2, i]) / (time - times[2])
+    for i in range(tried.depth.size):
+        before, now = past.forces[i], tried.force[i]
+        if before > 0.0 or now > 0.0:
+            first = (tried.depth[i] - depths[2, i]) / (time - times[2])
             second = (depths[2, i] - depths[1, i]) / (times[2] - times[1])
             third = (depths[1, i] - depths[0, i]) / (times[1] - times[0])
             change = (first - second) / (time - times[1])
             change -= (second - third) / (times[2] - times[0])
             missed = (time - times[2]) ** 2 / 6.0 * abs(change)
-            largest = max(largest, stiffness[i] * missed)
-        if touched != (force[i] > 0.0):
-            turned = np.sqrt(stiffness[i] * compliance[i])
-            largest = max(largest, turned * max(forces[i], force[i]))
+            largest = max(largest, tried.stiffness[i] * missed)
+        if (before > 0.0) != (now > 0.0):
+            turned = np.sqrt(tried.stiffness[i] * tried.compliance[i])
+            largest = max(largest, turned * max(before, now))
     return largest
 
 
 @compiled
-def remember(time, depth, force, times, depths, forces):
+def remember(time, depth, force, past):
     """Put a step behind those of the past, of which the oldest is forgotten."""
+    times, depths, forces = past
     for row in range(times.size - 1):
         times[row] = times[row + 1]
         depths[row] = depths[row + 1]
