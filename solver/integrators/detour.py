@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from catenary.solver.effects.all_effects import simulated
+from catenary.solver.model.loads import FunctionLoad
+from catenary.solver.model.model import Model
 from catenary.solver.model.unknowns import Unknowns
 from catenary.solver.problem.integrator_parameters import NEWMARK
 from catenary.solver.problem.problem import Damping, Numerics, Problem
@@ -12,6 +14,8 @@ from catenary.solver.problem.problem import Damping, Numerics, Problem
 # Time of a step in terms of one in two passes, as measured with the case ambrosio2012: part by
 # part with products and solves by stations, and with factors of PETSc.
 PARTS, LIBRARY = 2.4, 3.0
+# A short function of NumPy, called for each step.
+CALLED = 1.5
 
 
 class Detour(NamedTuple):
@@ -47,6 +51,12 @@ def method_detour(numerics: Numerics, damped_by_component: bool) -> str:
             "velocities within a step"
         )
     return ""
+
+
+def load_detour(model: Model) -> str:
+    """Why loads of a model take longer than they could, empty if they do not."""
+    names = [load.name for load in model.loads if isinstance(load, FunctionLoad)]
+    return f"the load {names[0]} is a Python function, called for each step" if names else ""
 
 
 def _is_damped_by_component(damping: Damping) -> bool:

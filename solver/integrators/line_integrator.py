@@ -41,6 +41,7 @@ class LineIntegrator(ABC):
     motion : LineState, the state as it is kept
     position_factor, velocity_factor : sigma [s2] and tau [s]
     operators : LineOperators
+    loads : LineLoads, None if there are none
     solution : the displacement as a PETSc vector, once ``fill_solution`` has filled it
     detour : why ``keep_ahead`` could not, None if it could; the same on all ranks
     """
@@ -73,8 +74,9 @@ class LineIntegrator(ABC):
         n = ownership.n_local
         gains = self.position_factor, self.velocity_factor
         self._passes: StationPasses | None = None
-        self._loads: LineLoads | None = None
-        self._lost: np.ndarray | None = None
+        self.loads: LineLoads | None = None
+        if model.loads:
+            self.loads = LineLoads(model.loads, self.operators.domain, model.constrained)
         self.detour: Detour | None = None
         self.motion = LineState(
             aligned_arrays.zeros(n, 2), aligned_arrays.zeros(n, 3), self.operators.answer, gains
@@ -88,38 +90,32 @@ class LineIntegrator(ABC):
         """What takes free steps in compiled code, None if these are taken in parts."""
         return self._passes
 
-    def lose(self, load: np.ndarray) -> None:
-        """Step under a constant ``load`` (n_dofs,) [N], [N m], which all ranks pass, from now on:
-        the balance that incidents have taken from the line. Before ``keep_ahead``."""
-        self._lost = load
+    def load_at(self, time: float) -> None:
+        """Take the loads of the step to ``time`` [s]. Not collective."""
+        if self.loads is not None:
+            self.loads.at(time)
 
-    def keep_ahead(self, loaded: bool = False) -> None:
+    def keep_ahead(self) -> None:
         """Keep the state one prediction ahead from now on, if method and operators allow it.
 
-        Of steps there are then only free ones, in two passes over the state. ``loaded`` tells
-        whether they will have loads. Collective.
+        Of steps there are then only free ones, in two passes over the state. Collective.
         """
         ahead = self._ahead()
         if ahead is None:
             self.detour = Detour("the method does not keep its state one prediction ahead", PARTS)
             return
         motion, steps = ahead
-        loads = None
-        if loaded or self._lost is not None:
-            loads = LineLoads(self._comm, self.ownership, self.operators.domain, self._lost)
-        values = np.zeros(0) if loads is None else loads.values
+        loads = np.zeros(0) if self.loads is None else self.loads.values
         parts, passes = self.operators.by_stations(not self._proportional), None
         if parts is not None:
             product, factors, read, rates, answer = parts
-            passes = StationPasses(product, factors, read, rates, values, answer, motion, steps)
+            passes = StationPasses(product, factors, read, rates, loads, answer, motion, steps)
         # A rank without stations has no passes; it keeps its state like the others.
         can = passes is not None or self.ownership.n_local == 0
         if not self._comm.allreduce(int(can), op=MPI.MIN):
             self.detour = Detour(self.operators.why_not_by_stations(), LIBRARY)
-            if loads is not None:
-                loads.destroy()
             return
-        self._passes, self._loads = passes, loads
+        self._passes = passes
         if passes is not None:
             passes.track_droppers(*self._droppers)
         motion.put(self.displacement, self.velocity, self.acceleration)
@@ -191,33 +187,29 @@ class LineIntegrator(ABC):
         if self._passes is not None:
             self._passes.track_droppers(ends, laws, tension)
 
-    def free_step(self, loads: Loads | None = None) -> None:
+    def free_step(self) -> None:
         """Take the step without contacts and slack droppers: in two passes, or by ``predict``,
-        ``free_acceleration`` and ``correct``. Collective; see there for ``loads``."""
+        ``free_acceleration`` and ``correct``. After ``load_at``. Collective."""
         if self._passes is not None:
-            if loads is not None:
-                assert self._loads is not None
-                self._loads.change(loads)
             if self._comm.size > 1:
                 self.operators.exchange()
             self._passes.step()
             return
         self.predict()
-        self.free_acceleration(loads)
+        self.free_acceleration()
         self.correct()
         state_kernels.tension(self.motion.read, *self._droppers)
 
-    def free_acceleration(self, loads: Loads | None = None) -> None:
-        """Fill the acceleration from the predictions and local loads. Collective.
+    def free_acceleration(self) -> None:
+        """Fill the acceleration from the predictions and loads. Collective.
 
-        ``loads`` are pairs of local unknowns and forces [N], None on all ranks if there are none
-        anywhere; contact and slack droppers are left out, so that ``correct`` must follow.
+        Contact and slack droppers are left out, so that ``correct`` must follow.
         """
         self.internal_forces()
-        self.solve(loads)
+        self.solve()
 
     def internal_forces(self) -> None:
-        """Right-hand side -C v - K d of the step, and constant loads; only right after ``predict``.
+        """Right-hand side -C v - K d of the step, and loads; only right after ``predict``.
 
         Collective.
         """
@@ -228,13 +220,15 @@ class LineIntegrator(ABC):
             np.negative(self.velocity, out=operators.factor)
             operators.exchange()
             operators.add_damping()
-        if self._lost is not None:
-            domain = operators.domain
-            operators.add_force(self._lost[domain.low : domain.high])
+        if self.loads is not None:
+            operators.add_force(self.loads.values)
 
     def solve(self, loads: Loads | None = None) -> None:
-        """Acceleration for the internal forces plus ``loads``, but for its part by damping on mass,
-        which ``correct`` takes off. May be called again for other loads. Collective."""
+        """Acceleration for the internal forces plus ``loads`` of contacts and droppers.
+
+        It lacks its part by damping on mass, which ``correct`` takes off. May be called again for
+        other loads. Collective.
+        """
         self.operators.solve(loads)
 
     def correct(self) -> None:
@@ -271,6 +265,4 @@ class LineIntegrator(ABC):
     def destroy(self) -> None:
         """Free all PETSc objects. Collective."""
         self.operators.destroy()
-        if self._loads is not None:
-            self._loads.destroy()
         self.solution.destroy()

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.solver.model import elements
-from catenary.solver.model.model import Block, Model, StepLoad, wire_elements
+from catenary.solver.model.loads import Load
+from catenary.solver.model.model import Block, Model, wire_elements
 from catenary.solver.problem.problem import Problem
 
 
@@ -68,10 +69,10 @@ class ModelBuilder:
             component, self.model.dofs(pairs, unknown), None, stiffness[:, None, None] * unit
         )
 
-    def add_step_load(self, load: StepLoad) -> None:
-        """A load that changes with time."""
-        self.model.step_loads.append(load)
-        self._n_terms += len(load.dofs)
+    def add_load(self, load: Load) -> None:
+        """A load in time, of one of the kinds in ``model/loads.py``."""
+        self.model.loads.append(load)
+        self._n_terms += len(load.unknowns)
 
     def hold(self, nodes: np.ndarray, unknown: str) -> None:
         """Hold an unknown of some nodes at its equilibrium value."""

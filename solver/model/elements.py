@@ -59,6 +59,15 @@ def uniform_load(length: np.ndarray) -> np.ndarray:
     return np.stack([half, moment, half, -moment], axis=1)
 
 
+def linear_load(length: np.ndarray) -> np.ndarray:
+    """Nodal forces and moments of a load per length that falls from one to zero along w, and of one
+    that rises from zero to one, shape (n, 4, 2) [m], [m2]."""
+    share = np.array([[7.0, 3.0], [3.0, 2.0], [3.0, 7.0], [-2.0, -3.0]])
+    share /= np.array([[20.0], [60.0], [20.0], [60.0]])
+    powers = np.stack([length, length**2, length, length**2], axis=1)
+    return np.asarray(powers[:, :, None] * share)
+
+
 def _matrix(*upper_rows: list[np.ndarray]) -> np.ndarray:
     """Symmetric matrices, shape (n, 4, 4), from the rows of their upper triangle."""
     n = upper_rows[0][0].shape[0]

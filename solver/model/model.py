@@ -7,7 +7,7 @@ by the effects, each of which adds its own through a ``ModelBuilder``.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,14 +17,8 @@ from catenary.solver.model.unknowns import Unknowns
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
 
-
-class StepLoad(Protocol):
-    """A load that changes with time: ``values(time)`` [N] or [N m] on the unknowns ``dofs``."""
-
-    dofs: np.ndarray
-
-    def values(self, time: float) -> np.ndarray:
-        """Load at ``time`` [s], shape as ``dofs``; called once a step on ranks that own any."""
+if TYPE_CHECKING:
+    from catenary.solver.model.loads import Load
 
 
 @dataclass(frozen=True)
@@ -56,7 +50,7 @@ class Model:
     dropper_stiffness, dropper_damping : (n_droppers,) [N/m], [N s/m], of the taut dropper
     released_damping : (n_droppers,) the part of ``dropper_damping`` that goes slack with the spring
     broken : (n_droppers,) droppers that carry nothing; what they weigh stays on their clamps
-    step_loads : loads that change with time
+    loads : beside those of contacts and droppers, from the start of the march on
     terms_of : effect name -> number of terms, laws and lifted limits that it contributes
     """
 
@@ -70,7 +64,7 @@ class Model:
     blocks: list[Block] = field(default_factory=list)
     constrained: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     weight: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    step_loads: list[StepLoad] = field(default_factory=list)
+    loads: list[Load] = field(default_factory=list)
     terms_of: dict[str, int] = field(default_factory=dict)
     broken: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 

@@ -16,7 +16,7 @@ from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.contact_problem.coupling import DIVERGED
 from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.problem.problem import Numerics
-from catenary.solver.schemes.scheme import Counters, LoadSource, StepController, StepRejected
+from catenary.solver.schemes.scheme import Counters, StepController, StepRejected
 
 # A correction that moves any of the line by more than this [m] will not come back.
 _FAR = 10.0
@@ -38,7 +38,6 @@ class FixedPoint:
     law: LawInSteps
     kept_ratio: float
     may_slacken: bool
-    loads: LoadSource
     counters: Counters = field(default_factory=Counters)
     judge: StepController | None = None
 
@@ -58,11 +57,11 @@ class FixedPoint:
         line.predict()
         self._predicted[0] = line.displacement
         self._predicted[1] = line.velocity
+        line.load_at(time)
         line.internal_forces()
         self.pantographs.move_to(time)
         self.interaction.locate()
         heads = self._heads_everywhere(time)
-        external = self.loads(time) or []
         force = self._force
         fixed = self.numerics.iterations
         for number in range(1, (fixed or self.numerics.max_iterations) + 1):
@@ -72,7 +71,7 @@ class FixedPoint:
             self._latest[1] = line.velocity
             np.copyto(line.displacement, self._predicted[0])
             np.copyto(line.velocity, self._predicted[1])
-            line.solve(external + self.interaction.loads(force, compensation))
+            line.solve(self.interaction.loads(force, compensation))
             line.correct()
             self.counters.rounds += 1
             # How far a fixed number of them has come is only asked after the last.

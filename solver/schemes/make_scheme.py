@@ -13,7 +13,6 @@ from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.contact_problem.coupling import make_coupling
 from catenary.solver.contact_problem.law_tangents import law_in_steps
 from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.integrators.line_loads import StepLoads
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
@@ -22,7 +21,7 @@ from catenary.solver.problem.problem import Placement, Problem
 from catenary.solver.schemes.fixed_point import FixedPoint
 from catenary.solver.schemes.monolithic_system import WholeSystem
 from catenary.solver.schemes.one_solve import OneSolve
-from catenary.solver.schemes.scheme import LoadSource, Scheme
+from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.schemes.ts_alpha2 import TSAlpha2
 from catenary.solver.statics.after_incidents import ChangedLine
 from catenary.solver.statics.equilibrium import Equilibrium
@@ -67,8 +66,7 @@ class SchemeFactory:
         comm, model, train = self.comm, changed.model, problem.train
         numerics = problem.numerics
         in_parts = numerics.scheme != "one_solve" or numerics.coupling == "explicit"
-        loaded = bool(model.step_loads)
-        line = make_line(comm, model, self.ownership, numerics, changed.load, not in_parts, loaded)
+        line = make_line(comm, model, self.ownership, numerics, not in_parts)
         laws = model.simulated
         trailing = max(placement.behind for placement in train.placements)
         offsets = [x for placement in train.placements for x in placement.data.strip_offsets]
@@ -101,7 +99,7 @@ class SchemeFactory:
         band = np.zeros((0, 1)) if slack is None or slack.band is None else slack.band
         law = law_in_steps(problem, model.simulated, pantographs.n_contacts)
         coupling = make_coupling(law, model.simulated.kept_ratio, band, problem.numerics)
-        return OneSolve(self.comm, interaction, pantographs, coupling, self._loads(model))
+        return OneSolve(self.comm, interaction, pantographs, coupling)
 
     def _fixed_point(
         self, problem: Problem, model: Model, interaction: ForcesOnLine, pantographs: Pantographs
@@ -114,15 +112,11 @@ class SchemeFactory:
             law_in_steps(problem, model.simulated, pantographs.n_contacts),
             model.simulated.kept_ratio,
             model.simulated.slackening,
-            self._loads(model),
         )
 
     def _ts_alpha2(
         self, problem: Problem, model: Model, interaction: ForcesOnLine, pantographs: Pantographs
     ) -> Scheme:
-        system = WholeSystem(problem, model, self.form, self.nominal_height, self._loads(model))
+        loads = interaction.line.loads
+        system = WholeSystem(problem, model, self.form, self.nominal_height, loads)
         return TSAlpha2(self.comm, interaction, pantographs, system, problem.numerics)
-
-    def _loads(self, model: Model) -> LoadSource:
-        """This rank's part of the loads that change with time; without any, no calls are made."""
-        return StepLoads(model, self.ownership) if model.step_loads else lambda time: None

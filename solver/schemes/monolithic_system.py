@@ -18,12 +18,12 @@ from scipy import sparse
 
 from catenary.mbs.head.newmark_head import raised
 from catenary.mbs.lumped_data import LumpedData
+from catenary.solver.integrators.line_loads import LineLoads
 from catenary.solver.model.matrices import iterate_entries
 from catenary.solver.model.model import Model
 from catenary.solver.model.shape_functions import shape_slopes, shape_values
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Placement, Problem
-from catenary.solver.schemes.scheme import LoadSource
 from catenary.solver.statics.equilibrium import Equilibrium
 
 
@@ -43,7 +43,7 @@ class WholeSystem:
     Parameters
     ----------
     nominal_height : of a head under its static force at rest [m]
-    loads : of the line, unknowns and forces [N], at a time
+    loads : of the line, None if there are none
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class WholeSystem:
         model: Model,
         form: Equilibrium,
         nominal_height: Callable[[Placement], float],
-        loads: LoadSource,
+        loads: LineLoads | None,
     ) -> None:
         train, law = problem.train, model.simulated.contact
         assert isinstance(law, LinearLaw)
@@ -177,8 +177,9 @@ class WholeSystem:
         result = self._mass @ a + self._damping @ v + self._stiffness @ u
         grown = raised(time, self._train.raise_time)
         result[self._carriers] -= grown * self._static + self._base
-        for dofs, values in self._loads(time) or ():
-            np.subtract.at(result, dofs, values)
+        if self._loads is not None:
+            self._loads.at(time)
+            result[: self.n_line] -= self._loads.values
         force, _, meets = self.contacts(time, u, v)
         for f, (dofs, along, _) in zip(force, meets, strict=True):
             result[dofs] += f * along

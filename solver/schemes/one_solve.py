@@ -17,7 +17,7 @@ from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.contact_problem.complementarity import NOT_FINITE, InnerSolution
 from catenary.solver.contact_problem.coupling import Coupling
 from catenary.solver.contact_problem.force_exchange import Exchange, Reply, Verdict
-from catenary.solver.schemes.scheme import Counters, LoadSource, StepController, StepRejected
+from catenary.solver.schemes.scheme import Counters, StepController, StepRejected
 
 # First guesses of what droppers elsewhere may lose [N] and of contact forces [N]; both grow when
 # a step shows that they were too small, and that step is repeated.
@@ -39,7 +39,6 @@ class OneSolve:
     interaction: ForcesOnLine
     pantographs: Pantographs
     coupling: Coupling
-    loads: LoadSource
     counters: Counters = field(default_factory=Counters)
     judge: StepController | None = None
 
@@ -71,15 +70,16 @@ class OneSolve:
         interaction.place()
         events["LineColumns"].end()
         events["LineFree"].begin()
+        line.load_at(time)
         if self.coupling.extrapolates:
             line.predict()
             share = self._exchange.share
             interaction.heights(share.early_height, share.early_rate)
-            line.free_acceleration(self.loads(time))
+            line.free_acceleration()
             line.correct()
             interaction.droppers.tension()
         else:
-            line.free_step(self.loads(time))
+            line.free_step()
         events["LineFree"].end()
 
     def finish(self, time: float, stop: bool) -> bool:

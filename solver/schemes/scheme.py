@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from catenary.solver.contact.pantographs import Pantographs
-from catenary.solver.linear.step_operators import Loads
-
-# Loads at a time [s]; None on all ranks if there never are any.
-LoadSource = Callable[[float], Loads | None]
 
 
 @dataclass

@@ -33,6 +33,7 @@ from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.step_operators import LineOperators
 from catenary.solver.linear.unit_responses import Windows
 from catenary.solver.model import elements
+from catenary.solver.model.loads import ShapeLoad
 from catenary.solver.model.matrices import iterate_entries
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
@@ -87,6 +88,9 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
     np.add.at(load, ends, rest[:, None] * np.array([1.0, -1.0]))
     energy -= float((rest**2 / (2.0 * first.dropper_stiffness[broken])).sum())
     load[model.constrained] = 0.0
+    unbalanced = np.flatnonzero(load)
+    if unbalanced.size:
+        model.loads.append(ShapeLoad(unbalanced, load[unbalanced]))
     return ChangedLine(model, load, energy)
 
 
@@ -134,7 +138,7 @@ def acceleration_jump(
         np.add.at(force, ends[mine, side] - first, sign * compensation[mine])
     held = after.model.constrained[ownership.owned(after.model.constrained)] - first
     force[held] = 0.0
-    return _divided_by_mass(comm, ownership, after.model, force)
+    return divided_by_mass(comm, ownership, after.model, force)
 
 
 def _times(
@@ -151,10 +155,8 @@ def _times(
     return total
 
 
-def _divided_by_mass(
-    comm: Any, ownership: Ownership, model: Model, force: np.ndarray
-) -> np.ndarray:
-    """M^-1 ``force``, owned parts (n_local,). Collective."""
+def divided_by_mass(comm: Any, ownership: Ownership, model: Model, force: np.ndarray) -> np.ndarray:
+    """M^-1 ``force``, owned parts (n_local,) [m/s2], [rad/s2] of [N], [N m]. Collective."""
     only_mass = (1.0, 0.0, 0.0)
     windows = Windows(model.numbering, reach(model, only_mass))
     operators = LineOperators(comm, model, ownership, only_mass, windows)

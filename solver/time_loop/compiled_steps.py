@@ -35,7 +35,8 @@ class CompiledSteps:
     most : steps of the largest block
     times : (most,) of the steps of the latest block [s]
     rows : (most, width) what each of them shows; empty if nobody looks
-    taken : steps of the latest block that were taken, fewer than asked for if one broke
+    taken : steps of the latest block that were taken, fewer than asked for if one broke, or if
+        loads were not known for all of them
 
     Parameters
     ----------
@@ -56,6 +57,11 @@ class CompiledSteps:
         law = scheme.coupling.law.in_loop()
         assert records is not None and passes is not None and law is not None
         self._free = HeldCall(passes.kernel, passes.arguments)
+        loads = interaction.line.loads
+        self._loads = loads if loads is not None and loads.changes else None
+        self._loading: HeldCall | None = None
+        if self._loads is not None:
+            self._loading = HeldCall(self._loads.kernel, self._loads.arguments)
         self._records, self._law = records, law
         self._heads = np.zeros(2 * n * (1 + n))
         self._drives = np.zeros((self.most, pantographs.n, drive_width(max(pantographs.n_strips))))
@@ -66,7 +72,7 @@ class CompiledSteps:
         self._loop()  # compiled, or loaded, before the clock of a march starts
 
     def take(self, step: int, n_steps: int) -> None:
-        """Take ``n_steps`` <= ``most`` steps after the one of number ``step``.
+        """Take up to ``n_steps`` <= ``most`` steps after the one of number ``step``, one at least.
 
         Raises
         ------
@@ -76,6 +82,9 @@ class CompiledSteps:
         scheme, self.taken = self._scheme, 0
         times = self.times[:n_steps]
         np.multiply(np.arange(step + 1, step + 1 + n_steps), self._dt, out=times)
+        if self._loads is not None:
+            n_steps = self._loads.cover(times)
+            times = times[:n_steps]
         scheme.pantographs.fill_drives(times.tolist(), self._drives[:n_steps])
         while self.taken < n_steps:
             if self._take_on(n_steps):
@@ -126,6 +135,8 @@ class CompiledSteps:
             moving=pantographs.moving,
             placing=interaction.placing,
             free=self._free.address,
+            loading=(0, 0, 0) if self._loading is None else self._loading.address,
+            clock=np.zeros(1) if self._loads is None else self._loads.clock,
             records=self._records,
             heads=self._heads,
             responding=interaction.responding(scheme.share),
@@ -158,8 +169,6 @@ def compiled_steps(
         return None
     if scheme.coupling.law.in_loop() is None or scheme.pantographs.records() is None:
         return None
-    if scheme.loads(0.0) is not None:
-        return None  # loads that change with time
     if not showing.layout.in_loop:
         return None  # a channel that is a function
     return CompiledSteps(scheme, showing, dt, shows)

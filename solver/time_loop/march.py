@@ -42,6 +42,7 @@ from catenary.solver.statics.after_incidents import (
     ChangedLine,
     acceleration_jump,
     changed_line,
+    divided_by_mass,
     unchanged,
 )
 from catenary.solver.statics.elasticity import Elasticity
@@ -111,6 +112,7 @@ class March:
         )
         self._set_ups = SchemeFactory(comm, form, self.ownership, self._nominal_height)
         self._set_up(unchanged(model))
+        self._set_off(model)
         self._first_step = 0
         self._ahead = self._happening()
 
@@ -129,6 +131,17 @@ class March:
             self._pantographs,
             self._scheme,
         )
+
+    def _set_off(self, model: Model) -> None:
+        """Start with the acceleration by loads that act from the start on. Collective."""
+        line = self._line
+        if line.loads is None:
+            return
+        line.load_at(0.0)
+        force = line.loads.values[line.operators.domain.owned]
+        if self._comm.allreduce(int(force.any()), op=MPI.MAX):
+            still = np.zeros(force.size)
+            line.start(still, still, divided_by_mass(self._comm, self.ownership, model, force))
 
     def _in_levels(self, changed: ChangedLine, whole: Parts) -> Scheme:
         """The scheme of ``whole`` steps, with shorter ones where they are needed. Collective."""

@@ -33,6 +33,8 @@ class Steps(NamedTuple):
     superposing, compensating : of ``superpose`` and ``compensate`` after the forces
     showing : of ``kernels.show`` before what it fills
     free : address of the line's free step, see ``pointers.call_held``
+    loading : address of what finds loads that change with time, zeros if there are none
+    clock : (1,) the time that it reads [s]
     records : of all heads, ``head_records.HEAD``
     heads : (2 n + 2 n^2,) all strips as functions of the forces, see ``HeadState``
     law : numbers of the contact law, see ``report``
@@ -46,6 +48,8 @@ class Steps(NamedTuple):
     moving: tuple[Any, ...]
     placing: tuple[Any, ...]
     free: tuple[int, int, int]
+    loading: tuple[int, int, int]
+    clock: np.ndarray
     records: np.ndarray
     heads: np.ndarray
     responding: tuple[Any, ...]
@@ -109,9 +113,9 @@ def take(steps, times, drives, rows, counts, shows, first, n_steps):
     one is begun: up to its free step, as its forces are left to others.
     """
     steps, times, drives, rows = borrowed((steps, times, drives, rows))
-    speed, moving, placing, free, records, heads = steps[:6]
-    responding, solving, law, superposing, compensating = steps[6:11]
-    pushed, ends, of_step, outputs, showing, taps = steps[11:]
+    speed, moving, placing, free, loading, clock, records, heads = steps[:8]
+    responding, solving, law, superposing, compensating = steps[8:13]
+    pushed, ends, of_step, outputs, showing, taps = steps[13:]
     start, places = moving
     solution, depth, reported = solving[11], solving[12][0], law[3]
     motion, arms, shown, laws, kept = showing
@@ -123,6 +127,9 @@ def take(steps, times, drives, rows, counts, shows, first, n_steps):
         time = times[i]
         state_kernels.shift(start, places, speed * time)
         contact_kernels.place(*placing)
+        if loading[0] != 0:
+            clock[0] = time
+            call_held(loading)
         call_held(free)
         within = True
         for h in range(records.size):

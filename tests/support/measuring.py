@@ -90,10 +90,10 @@ def solve_free(matrix: sparse.csc_matrix, model: Model, right: np.ndarray) -> np
 
 
 @contextmanager
-def line_alone(model: Model, numerics: Numerics, loaded: bool = False) -> Iterator[LineIntegrator]:
-    """The time stepper of a line alone, all droppers taut; perhaps its steps have loads."""
+def line_alone(model: Model, numerics: Numerics) -> Iterator[LineIntegrator]:
+    """The time stepper of a line alone, all droppers taut."""
     ownership = distribute(model, COMM.size, COMM.rank)
-    line = make_line(COMM, model, ownership, numerics, loaded=loaded)
+    line = make_line(COMM, model, ownership, numerics)
     try:
         yield line
     finally:

@@ -151,7 +151,7 @@ def test_the_jacobian_is_the_derivative_of_the_residual() -> None:
     """Against central differences in random directions, with contact and with slack droppers."""
     problem, mesh = problem_and_mesh()
     model, form = find_form(problem, mesh)
-    system = WholeSystem(problem, model, form, lambda place: NOMINAL_HEIGHT, lambda time: [])
+    system = WholeSystem(problem, model, form, lambda place: NOMINAL_HEIGHT, None)
     rng = np.random.default_rng(1)
     u, v, a = np.zeros((3, system.n))
     u[system.n_line :] = form.height.max() + 0.02 - NOMINAL_HEIGHT

@@ -12,6 +12,7 @@ two, stable for every step, and the given spectral radius at infinite frequency.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -31,6 +32,7 @@ from small_lines import BARE, HANGING, bare_wires, en50318_line, mesh_of, numeri
 
 from catenary.meshgen.line import Conductor
 from catenary.solver.effects.build_model import build
+from catenary.solver.model.loads import ShapeLoad, table
 from catenary.solver.model.matrices import stiffness_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.problem.integrator_parameters import integration_of
@@ -105,20 +107,23 @@ def test_steps_are_those_of_the_definition(method: tuple[str, float], damping: D
     pulled = np.array([model.dofs(model.mesh.droppers[4, 1])])
     force = np.where(np.arange(n_steps + 1) > 50, 0.0, 200.0 * np.cos(np.arange(n_steps + 1)))
     force[0] = 0.0
+    course = table(dt * np.arange(n_steps + 1), force)
+    model = replace(model, loads=[ShapeLoad(pulled, np.ones(1), course)])
     loads = np.zeros((n_steps + 1, model.n_dofs))
     loads[:, pulled[0]] = force
     shape = np.zeros(model.n_dofs)
     shape[free] = linalg.solve(matrices[2], loads[1, free])
     zero = np.zeros(free.size)
     worst = scale = np.zeros(2)
-    with line_alone(model, settings(method, dt), loaded=True) as stepper:
+    with line_alone(model, settings(method, dt)) as stepper:
         # In two passes, but with products with C; a prediction may have no share of b at radius 0.
         in_passes = stepper.passes is not None
         assert in_passes == model.damping_is_proportional or method[1] == 0.0
         release(stepper, shape, np.zeros(model.n_dofs), model)
         expected = textbook(method, dt, matrices, (shape[free], zero), loads[:, free])
         for number, (d, v) in enumerate(expected, start=1):
-            stepper.free_step([(pulled, np.array([force[number]]))])
+            stepper.load_at(number * dt)
+            stepper.free_step()
             apart = stepper.displacement[free] - d, stepper.velocity[free] - v
             worst = np.maximum(worst, [np.abs(part).max() for part in apart])
             scale = np.maximum(scale, [np.abs(part).max() for part in (d, v)])

@@ -19,38 +19,22 @@ from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.builder import ModelBuilder
-from catenary.solver.model.elements import uniform_load
+from catenary.solver.model.loads import ShapeLoad, along
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.statics.equilibrium import find_form
 
 NAME = "lateral_wind"
+PLANE = ("v", "theta_z")
 WIND = 8.0  # [N/m] on both wires
-
-
-class Wind:
-    """A lateral load per length on all wires, full from the first step on."""
-
-    def __init__(self, builder: ModelBuilder) -> None:
-        model, mesh = builder.model, builder.mesh
-        dofs, values = [], []
-        for wire in (CONTACT_WIRE, MESSENGER_WIRE):
-            nodes = mesh.wires[wire]
-            v, theta = model.dofs(nodes, "v"), model.dofs(nodes, "theta_z")
-            dofs.append(np.stack([v[:-1], theta[:-1], v[1:], theta[1:]], axis=1))
-            values.append(WIND * uniform_load(np.diff(mesh.x(nodes))))
-        self.dofs = np.concatenate(dofs).ravel()
-        self._values = np.concatenate(values).ravel()
-
-    def values(self, time: float) -> np.ndarray:
-        return self._values if time > 0 else np.zeros_like(self._values)
 
 
 def build_lateral(builder: ModelBuilder) -> None:
     for wire in (CONTACT_WIRE, MESSENGER_WIRE):
-        builder.add_wire(wire, ("v", "theta_z"))
+        builder.add_wire(wire, PLANE)
+        unknowns, weights = along(builder.model, wire, PLANE)
+        builder.add_load(ShapeLoad(unknowns, weights @ np.full(weights.shape[1], WIND)))
     builder.hold(builder.mesh.anchors, "v")
-    builder.add_step_load(Wind(builder))
 
 
 LATERAL = Effect(
@@ -118,10 +102,10 @@ def test_four_unknowns_a_node_if_asked_for_and_two_otherwise(mesh: LineMesh) -> 
     assert with_wind.n_dofs == 4 * mesh.n_nodes
     assert without.unknowns == ("w", "theta_y")
     assert without.n_dofs == 2 * mesh.n_nodes
-    assert NAME not in without.terms_of and not without.step_loads
+    assert NAME not in without.terms_of and not without.loads
     n_elements = mesh.n_nodes - 2
-    # Lateral wires and one load on the four unknowns of each element.
-    assert with_wind.terms_of[NAME] == n_elements + 4 * n_elements
+    # Lateral wires, and a load on the two unknowns of each node.
+    assert with_wind.terms_of[NAME] == n_elements + 2 * mesh.n_nodes
     assert len(with_wind.blocks) == len(without.blocks) + 2
     assert with_wind.constrained.size == without.constrained.size + mesh.anchors.size
     assert not with_wind.weight[with_wind.dofs(np.arange(mesh.n_nodes), "v")].any()
@@ -160,8 +144,9 @@ def test_wind_deflects_a_wire_like_a_tensioned_beam(wire: str, mesh: LineMesh) -
     problem = scene(WHOLE | {NAME}, Damping(1e-4, 0.0125), 80.0, 1e-3)
     model, _ = find_form(problem, mesh)
     load = np.zeros(model.n_dofs)
-    (wind,) = model.step_loads
-    np.add.at(load, wind.dofs, wind.values(1.0))
+    for wind in model.loads:
+        assert isinstance(wind, ShapeLoad)
+        load[wind.unknowns] += wind.forces
     solution = solve_free(matrix_of(model, stiffness=1.0), model, load)
     nodes = mesh.wires[wire]
     expected, left_out = blown_out(problem.line.wire(wire), mesh.x(nodes))

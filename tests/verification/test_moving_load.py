@@ -29,6 +29,7 @@ from small_lines import (
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
+from catenary.solver.model.loads import FunctionLoad
 from catenary.solver.model.shape_functions import shape_values
 from catenary.solver.problem.contact_laws import LinearLaw
 
@@ -40,29 +41,24 @@ ROUNDING = 0.5
 SPEED = 0.4 * WAVE_SPEED
 
 
-class MovingForce:
+def moving_force(
+    builder: ModelBuilder, force: Callable[[float], float], place: Callable[[float], float]
+) -> None:
     """``force(t)`` [N] at ``place(t)`` [m] on the contact wire, as forces on its unknowns."""
+    model, nodes = builder.model, builder.mesh.wires[CONTACT_WIRE]
+    unknowns = np.stack([model.dofs(nodes), model.dofs(nodes, "theta_y")], axis=1).ravel()
+    x = model.mesh.x(nodes)
 
-    def __init__(
-        self,
-        builder: ModelBuilder,
-        force: Callable[[float], float],
-        place: Callable[[float], float],
-    ) -> None:
-        model, nodes = builder.model, builder.mesh.wires[CONTACT_WIRE]
-        self.dofs = np.stack([model.dofs(nodes), model.dofs(nodes, "theta_y")], axis=1).ravel()
-        self._x = model.mesh.x(nodes)
-        self._force, self._place = force, place
-
-    def values(self, time: float) -> np.ndarray:
-        x = self._place(time)
-        element = int(np.clip(np.searchsorted(self._x, x) - 1, 0, self._x.size - 2))
-        length = self._x[element + 1] - self._x[element]
-        result = np.zeros(self.dofs.size)
-        result[2 * element : 2 * element + 4] = self._force(time) * shape_values(
-            (x - self._x[element]) / length, length
-        )
+    def values(time: float) -> np.ndarray:
+        at = place(time)
+        element = int(np.clip(np.searchsorted(x, at) - 1, 0, x.size - 2))
+        length = x[element + 1] - x[element]
+        result = np.zeros(unknowns.size)
+        shape = shape_values((at - x[element]) / length, length)
+        result[2 * element : 2 * element + 4] = force(time) * shape
         return result
+
+    builder.add_load(FunctionLoad("moving_force", unknowns, values))
 
 
 def deflection(
@@ -83,7 +79,7 @@ def deflection(
         "a load that changes with time",
         "test",
         default=False,
-        build=lambda builder: builder.add_step_load(MovingForce(builder, force, place)),
+        build=lambda builder: moving_force(builder, force, place),
     )
     # A train that creeps along for as long as the run is to last; half a step saves the count of
     # steps from round-off.

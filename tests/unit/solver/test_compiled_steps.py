@@ -10,17 +10,28 @@ from typing import Any
 import numpy as np
 import paper_pantograph as paper
 import pytest
-from measuring import start_march
+from measuring import registered, start_march
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.vehicle.irregularity import Irregularity
 from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
-from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.solver.base import pointers
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.contact_problem import complementarity
+from catenary.solver.effects.effect import Effect
+from catenary.solver.integrators import line_loads
+from catenary.solver.model.builder import ModelBuilder
+from catenary.solver.model.loads import (
+    FieldLoad,
+    FunctionLoad,
+    ShapeLoad,
+    along,
+    harmonics,
+    table,
+)
 from catenary.solver.problem.contact_laws import KinematicLaw, LinearLaw
 from catenary.solver.problem.problem import Placement, Problem
 from catenary.solver.schemes.one_solve import OneSolve
@@ -262,3 +273,41 @@ def test_an_observer_that_looks_at_each_state_is_shown_each(mesh: LineMesh) -> N
     assert len(shown) == len(by_blocks.rows) == 201
     # The head meets the wire after a tenth of a second.
     assert by_blocks.blocks == [] and len(set(shown)) > 50
+
+
+def _loads(builder: ModelBuilder) -> None:
+    """One load of each kind, along the contact wire."""
+    unknowns, weights = along(builder.model, CONTACT_WIRE, ("w", "theta_y"))
+    x = builder.mesh.x(builder.mesh.wires[CONTACT_WIRE])
+    even = weights @ np.full(x.size, 3.0)
+    builder.add_load(ShapeLoad(unknowns, even))
+    builder.add_load(ShapeLoad(unknowns, even * 2.0, table([0.0, 0.05, 0.11], [0.0, 1.0, -1.0])))
+    builder.add_load(ShapeLoad(unknowns[::7], even[::7], harmonics([7.0], [5.0], [0.1])))
+
+    def fill(first: int, points: slice, slices: np.ndarray) -> None:
+        times = 0.013 * (first + np.arange(slices.shape[0]))
+        slices[:] = 4.0 * np.sin(0.1 * x[points] - 9.0 * times[:, None])
+
+    builder.add_load(FieldLoad(unknowns, weights, 0.013, fill))
+    one = builder.model.dofs(builder.mesh.wires[CONTACT_WIRE][50:52])
+    builder.add_load(FunctionLoad("slow", one, lambda time: np.array([9.0, 8.0]) * np.sin(time)))
+
+
+@pytest.mark.parametrize("slices", [3, 512])
+def test_loads_that_change_with_time_are_taken_in_the_loop(
+    slices: int, mesh: LineMesh, from_python: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(line_loads, "_MOST_SLICES", slices)
+    scene = problem("one")
+    with registered(Effect("loads", "loads", "loads", "test", False, build=_loads)):
+        loaded = replace(scene, effects=scene.effects | {"loads"})
+        expected, outcome = from_python(loaded, mesh)
+        rows = Rows()
+        found = run(loaded, mesh, rows)
+    assert found.outcome == outcome.outcome == "done"
+    assert "slow is a Python function" in found.detour
+    assert max(rows.blocks) > 1 and len(rows.rows) == 201
+    assert np.array_equal(rows.rows, expected.rows, equal_nan=True)
+    without = Rows()
+    run(scene, mesh, without)
+    assert np.nanmax(np.abs(np.array(without.rows) - np.array(rows.rows))) > 1.0

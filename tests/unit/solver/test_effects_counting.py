@@ -105,7 +105,7 @@ def test_a_bare_line_is_wires_droppers_and_supports(mesh: LineMesh) -> None:
     }
     assert model.constrained.size == 4
     assert not model.weight.any()
-    assert model.step_loads == []
+    assert model.loads == []
     assert not model.dropper_damping.any()
 
 

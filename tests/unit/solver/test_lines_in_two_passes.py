@@ -12,6 +12,7 @@ from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of
 
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.make_line import make_line
+from catenary.solver.model.loads import Load, ShapeLoad, table
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Damping, Numerics
@@ -34,10 +35,8 @@ def model(by_component: bool) -> Model:
     return find_form(problem, mesh_of(en50318_line(3), 3))[0]
 
 
-def line(
-    found: Model, method: Numerics, in_passes: bool, lost: np.ndarray | None, loaded: bool
-) -> LineIntegrator:
-    made = make_line(COMM, found, distribute(found, 1, 0), method, lost, in_passes, loaded)
+def line(found: Model, method: Numerics, in_passes: bool) -> LineIntegrator:
+    made = make_line(COMM, found, distribute(found, 1, 0), method, in_passes)
     assert (made.passes is not None) is in_passes
     return made
 
@@ -55,15 +54,22 @@ def test_two_passes_take_the_steps_of_their_parts(
     free = np.ones(found.n_dofs)
     free[found.constrained] = 0.0
     start = [rng.standard_normal(found.n_dofs) * free * scale for scale in (1e-3, 0.1, 10.0)]
-    lost = 50.0 * rng.standard_normal(found.n_dofs) * free if lossy else None
     pulled = np.flatnonzero(free)[::5]
+    times = np.arange(STEPS) * method.dt
+    loads: list[Load] = []
+    if lossy:
+        loads.append(ShapeLoad(np.arange(found.n_dofs), 50.0 * rng.standard_normal(found.n_dofs)))
+    if loaded:
+        course = table(times, 30.0 * (np.arange(STEPS) // 3))
+        loads.append(ShapeLoad(pulled, np.ones(pulled.size), course))
+    found = replace(found, loads=loads)
     states = []
     for in_passes in (True, False):
-        made = line(found, method, in_passes, lost, loaded)
+        made = line(found, method, in_passes)
         made.start(*start)
-        for number in range(STEPS):
-            force = np.full(pulled.size, 30.0 * (number // 3))
-            made.free_step([(pulled, force)] if loaded else None)
+        for time in times.tolist():
+            made.load_at(time)
+            made.free_step()
         states.append({name: values.copy() for name, values in made.state().items()})
         made.destroy()
     for name, values in states[0].items():
@@ -79,7 +85,7 @@ def test_a_line_kept_ahead_goes_on_bit_for_bit(method: Numerics, by_component: b
     rng = np.random.default_rng(6)
     free = np.ones(found.n_dofs)
     free[found.constrained] = 0.0
-    one, other = (line(found, method, True, None, False) for _ in range(2))
+    one, other = (line(found, method, True) for _ in range(2))
     one.start(*(rng.standard_normal(found.n_dofs) * free for _ in range(3)))
     for _ in range(5):
         one.free_step()

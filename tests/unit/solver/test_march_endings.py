@@ -14,6 +14,7 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
+from catenary.solver.model.loads import FunctionLoad
 from catenary.solver.problem.problem import Problem
 from catenary.solver.time_loop.observers import StepView
 
@@ -33,14 +34,14 @@ def problem(scheme: str = "one_solve", **changes: object) -> Problem:
     return replace(usual, **changes)
 
 
-class Explosion:
+def explosion(builder: ModelBuilder) -> None:
     """A load that is no number from some time on."""
 
-    def __init__(self, builder: ModelBuilder) -> None:
-        self.dofs = builder.model.dofs(builder.mesh.droppers[:1, 1])
-
-    def values(self, time: float) -> np.ndarray:
+    def values(time: float) -> np.ndarray:
         return np.array([np.nan if time > BREAKS_AT else 0.0])
+
+    at = builder.model.dofs(builder.mesh.droppers[:1, 1])
+    builder.add_load(FunctionLoad("explosion", at, values))
 
 
 EXPLODING = Effect(
@@ -49,7 +50,7 @@ EXPLODING = Effect(
     "nothing good",
     "test",
     default=False,
-    build=lambda builder: builder.add_step_load(Explosion(builder)),
+    build=explosion,
 )
 
 

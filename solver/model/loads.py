@@ -1,0 +1,156 @@
+"""Loads in time: forces on unknowns of a line beside those of contacts and droppers.
+
+Three kinds, by what is known ahead of the march: a shape times a function of time, a field sampled
+in space and time, and a function in Python. Compiled loops evaluate all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from catenary.solver.model import elements
+from catenary.solver.model.model import Model, wire_elements
+
+CONSTANT, TABLE, HARMONICS = range(3)
+
+
+class TimeFunction(NamedTuple):
+    """A function of time as numbers; made by ``constant``, ``table`` and ``harmonics``.
+
+    Attributes
+    ----------
+    kind : one of CONSTANT, TABLE, HARMONICS
+    numbers : of a constant its value; of a table all times, then all values; of harmonics the mean,
+        then angular frequency, amplitude and phase of each
+    """
+
+    kind: int
+    numbers: np.ndarray
+
+
+def constant(value: float = 1.0) -> TimeFunction:
+    """The same at all times."""
+    return TimeFunction(CONSTANT, np.array([value], dtype=float))
+
+
+def table(times: Sequence[float], values: Sequence[float]) -> TimeFunction:
+    """Linear between ``values`` at ascending ``times`` [s], the first before and the last after."""
+    at, found = np.array(times, dtype=float), np.array(values, dtype=float)
+    if at.size == 0 or at.shape != found.shape or (np.diff(at) <= 0.0).any():
+        raise ValueError("a table needs as many values as times, which ascend")
+    return TimeFunction(TABLE, np.concatenate([at, found]))
+
+
+def harmonics(
+    frequencies: Sequence[float],
+    amplitudes: Sequence[float],
+    phases: Sequence[float],
+    mean: float = 0.0,
+) -> TimeFunction:
+    """``mean`` + sum of amplitude cos(2 pi frequency t + phase), frequencies in [Hz]."""
+    omega = 2.0 * np.pi * np.array(frequencies, dtype=float)
+    waves = np.column_stack([omega, np.array(amplitudes, float), np.array(phases, float)])
+    return TimeFunction(HARMONICS, np.concatenate([[mean], waves.ravel()]))
+
+
+@dataclass(frozen=True)
+class ShapeLoad:
+    """``forces`` times a function of time.
+
+    Attributes
+    ----------
+    unknowns : (n,) numbers of unknowns, which may repeat
+    forces : (n,) [N], [N m]
+    factor : TimeFunction
+    """
+
+    unknowns: np.ndarray
+    forces: np.ndarray
+    factor: TimeFunction = constant()
+
+
+@dataclass(frozen=True)
+class FieldLoad:
+    """A field of points along the line and of time, such as a gust.
+
+    It is linear in time between slices at multiples of ``interval``. Slices are made by blocks,
+    ahead of the steps that need them; each rank makes those of the points along its own part.
+
+    Attributes
+    ----------
+    unknowns : (n,) numbers of unknowns
+    weights : (n, n_points) forces [N], [N m] of a unit of the field at each point, see ``along``
+    interval : between slices [s]
+    fill : ``fill(first, points, slices)`` fills ``slices`` (m, k) with the field at the points of
+        the slice ``points`` and at the times (first + i) ``interval``. It may be called for any
+        part in any order, and gives the same each time
+    """
+
+    unknowns: np.ndarray
+    weights: sparse.csr_matrix
+    interval: float
+    fill: Callable[[int, slice, np.ndarray], None]
+
+
+@dataclass(frozen=True)
+class FunctionLoad:
+    """A function in Python, called once a step: the slow way, told in log and report.
+
+    Attributes
+    ----------
+    name : what it is called in messages
+    unknowns : (n,) numbers of unknowns
+    values : forces [N], [N m] (n,) at a time [s]; depends on nothing else, since it may be called
+        ahead of the step, and on ranks that own any of the unknowns
+    """
+
+    name: str
+    unknowns: np.ndarray
+    values: Callable[[float], np.ndarray]
+
+
+Load = ShapeLoad | FieldLoad | FunctionLoad
+
+
+def along(
+    model: Model, wire: str, unknowns: tuple[str, str], points: np.ndarray | None = None
+) -> tuple[np.ndarray, sparse.csr_matrix]:
+    """Unknowns (n,) of a wire in a plane, and forces (n, n_points) of loads per length at points.
+
+    The load per length [N/m] is linear between ``points`` (n_points,) [m], which ascend, and
+    constant beyond them; without points they are the wire's nodes. It is taken at nodes, and linear
+    along each element. Forces are those that do the same work.
+    """
+    dofs, length = wire_elements(model, wire, unknowns)
+    nodes = model.mesh.wires[wire]
+    number = np.empty(model.mesh.n_nodes, dtype=np.int64)
+    number[nodes] = np.arange(nodes.size)
+    rows, row_of = np.unique(dofs, return_inverse=True)
+    forces = elements.linear_load(length)
+    at = np.broadcast_to(row_of.reshape(dofs.shape)[:, :, None], forces.shape)
+    column = np.broadcast_to(number[model.mesh.elements(wire)][:, None, :], forces.shape)
+    weights = sparse.coo_matrix(
+        (forces.ravel(), (at.ravel(), column.ravel())), shape=(rows.size, nodes.size)
+    ).tocsr()
+    if points is not None:
+        weights = weights @ _interpolation(model.mesh.x(nodes), points)
+    return rows, weights
+
+
+def _interpolation(x: np.ndarray, points: np.ndarray) -> sparse.csr_matrix:
+    """Values at ``x`` (n,) of what is linear between ``points`` (m,), as a matrix (n, m)."""
+    m = points.size
+    if m == 1:
+        return sparse.csr_matrix(np.ones((x.size, 1)))
+    low = np.clip(np.searchsorted(points, x, side="right") - 1, 0, m - 2)
+    share = np.clip((x - points[low]) / (points[low + 1] - points[low]), 0.0, 1.0)
+    i = np.arange(x.size)
+    return sparse.coo_matrix(
+        (np.concatenate([1.0 - share, share]), (np.tile(i, 2), np.concatenate([low, low + 1]))),
+        shape=(x.size, m),
+    ).tocsr()

@@ -1,0 +1,108 @@
+"""A line under loads of all kinds, on one rank and on all; a run that goes on from amid them.
+
+Run by ``mpirun -n N python -m mpi4py -m pytest tests/mpi``; on one rank it compares a run with
+itself.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from measuring import registered
+from mpi4py import MPI
+
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
+from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.solver.base.parallel import on_root
+from catenary.solver.effects.effect import Effect
+from catenary.solver.model.builder import ModelBuilder
+from catenary.solver.model.loads import FieldLoad, FunctionLoad, ShapeLoad, along, harmonics
+from catenary.solver.problem.incidents import DropperBreak
+from catenary.solver.statics.line_at_rest import line_at_rest_on_all
+from catenary.solver.time_loop.march import March
+from catenary.solver.time_loop.observers import Stage, StepView
+
+WORLD = MPI.COMM_WORLD
+# See test_same_answers.py.
+TOLERANCE = 1e-9
+SCENE = (
+    "line.n_spans=7",
+    "train.start_m=120",
+    "train.end_m=155",
+    "train.raise_time_s=0.1",
+    "evaluation.from_m=140",
+    "evaluation.to_m=150",
+)
+
+
+def blow(builder: ModelBuilder) -> None:
+    """One load of each kind, along all of both wires."""
+    for wire in (CONTACT_WIRE, MESSENGER_WIRE):
+        x = builder.mesh.x(builder.mesh.wires[wire])
+        unknowns, weights = along(builder.model, wire, ("w", "theta_y"))
+        builder.add_load(ShapeLoad(unknowns, weights @ np.full(x.size, 2.0)))
+        builder.add_load(
+            ShapeLoad(unknowns, weights @ np.cos(0.1 * x), harmonics([2.0], [3.0], [0.0]))
+        )
+
+        def fill(first: int, part: slice, slices: np.ndarray, x: np.ndarray = x) -> None:
+            times = 0.02 * (first + np.arange(slices.shape[0]))
+            slices[:] = np.sin(0.3 * x[part] - 20.0 * times[:, None])
+
+        builder.add_load(FieldLoad(unknowns, weights, 0.02, fill))
+    at = builder.model.dofs(builder.mesh.droppers[:, 1])
+    pull = np.linspace(1.0, 5.0, at.size)
+    builder.add_load(FunctionLoad("function", at, lambda time: pull * np.sin(30.0 * time)))
+
+
+class Watching:
+    """Keeps forces and energies of each state, and the checkpoint of one."""
+
+    def __init__(self, kept: int = -1) -> None:
+        self._kept = kept
+        self.checkpoint: dict[str, Any] | None = None
+        self.rows: list[np.ndarray] = []
+
+    def start(self, stage: Stage) -> None:
+        """Nothing is needed."""
+
+    def observe(self, view: StepView) -> None:
+        self.rows.append(np.array([*view.contact_force, *view.energies()]))
+        if view.step == self._kept:
+            self.checkpoint = WORLD.bcast(view.checkpoint())
+
+    def finish(self, outcome: str) -> None:
+        assert outcome == "done"
+
+
+def test_loads_in_time_on_all_ranks() -> None:
+    scene = load_scene("en50318_2002", list(SCENE))
+    problem = problem_of(scene)
+    effects = problem.effects | {"loads", "dropper_break"}
+    mesh = on_root(WORLD, lambda: mesh_of(scene))
+    changed = {"effects": effects, "incidents": (DropperBreak(0.2, 180.0),)}
+    problem = problem.__class__(**{**problem.__dict__, **changed})
+    with registered(Effect("loads", "loads", "loads", "test", False, build=blow)):
+        rest = line_at_rest_on_all(problem, mesh, WORLD)
+        found = []
+        for comm in (MPI.COMM_SELF, WORLD):
+            watching = Watching(300)
+            with March(comm, *rest) as march:
+                march.run([watching])
+            found.append(watching)
+        again = Watching()
+        with March(WORLD, *rest) as march:
+            assert found[1].checkpoint is not None
+            march.restore(found[1].checkpoint)
+            march.run([again])
+    alone, shared = (np.array(watching.rows) for watching in found)
+    assert alone.shape == shared.shape
+    assert WORLD.rank > 0 or np.ptp(shared[:, 0]) > 50.0
+    # Contact forces are rank 0's, energies the line's.
+    own = slice(0 if WORLD.rank == 0 else 1, None)
+    scale = np.abs(alone).max(axis=0)
+    assert (np.abs(alone - shared).max(axis=0) < TOLERANCE * scale)[own].all()
+    assert np.array_equal(np.array(again.rows)[:, own], shared[300:, own])
