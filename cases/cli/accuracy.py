@@ -98,7 +98,7 @@ def accuracy(
         if found is None:
             console.complain("the study was interrupted; the same command continues it")
             return console.BROKEN
-        files = on_root(comm, lambda: accuracy_output.write(found, out, wanted))
+        files = on_root(comm, lambda: accuracy_output.write(found, out, wanted), takes_long=True)
     console.say("\n" + accuracy_output.as_text(found, wanted))
     console.say(
         f"\n{counted(len(ended), 'run')}, {found.wall:.0f} s\n" + "\n".join(map(str, files))

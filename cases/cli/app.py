@@ -152,7 +152,7 @@ def begin(
     comm = console.world()
     abort_on_unforeseen_error(comm)
     set_up_logging(comm, verbose, console.is_quiet())
-    what, options = read_before or on_root(comm, read)
+    what, options = read_before or on_root(comm, read, takes_long=True)
     arguments = as_arguments(scene_of(what).petsc.given(), options)
     start_petsc(arguments)
     return comm, what, arguments

@@ -107,7 +107,7 @@ def sweep(
     show = _names(plotted) or sweep_output.PLOTTED
     with held(out, comm, f"catenary sweep {case}"):
         ended = run_jobs(jobs, out, comm, RunOptions(force, arguments, console.say))
-        files = on_root(comm, lambda: sweep_output.write(out, name, ended, show))
+        files = on_root(comm, lambda: sweep_output.write(out, name, ended, show), takes_long=True)
     console.say("\n" + sweep_output.as_text(ended))
     console.say("\n" + "\n".join(str(path) for path in files))
     return verdict(ended, "sweep")

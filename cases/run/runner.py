@@ -265,7 +265,7 @@ def _at_rest(
 
     phase.next("the mesh was made")
     with phases("mesh"):
-        mesh: LineMesh = on_root(comm, phase.alone(make_mesh))
+        mesh: LineMesh = on_root(comm, phase.alone(make_mesh), takes_long=True)
     phase.next("the equilibrium was found")
     with phases("equilibrium"):
         return line_at_rest_on_all(problem, mesh, comm, phase.alone)
@@ -333,10 +333,10 @@ def _reported(order: _Order, outcome: Outcome) -> RunOutcome:
         return _report(order.out_dir, outcome, order.only_summary)
 
     if outcome.outcome != "done":
-        return on_root(order.comm, work)
+        return on_root(order.comm, work, takes_long=True)
     left = f"{order.result} is complete: `catenary report {order.out_dir}` writes the report again"
     with Phase(order.comm, "the report was written", left) as phase:
-        return on_root(order.comm, phase.alone(work))
+        return on_root(order.comm, phase.alone(work), takes_long=True)
 
 
 def _report(out_dir: Path, outcome: Outcome, only_summary: bool) -> RunOutcome:

@@ -123,7 +123,7 @@ def run(
     ended = run_jobs(plan.jobs, out_dir / RUNS, comm, options, measure=module.measure)
     if ended and ended[-1].outcome == "interrupted":
         return None, ended
-    text = on_root(comm, lambda: _conclude(plan, module, out_dir, ended, begin))
+    text = on_root(comm, lambda: _conclude(plan, module, out_dir, ended, begin), takes_long=True)
     return text, ended
 
 

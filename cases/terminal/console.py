@@ -135,6 +135,6 @@ def serial(command: Callable[..., int | None]) -> Callable[..., int | None]:
     def wrapped(*args: Any, **kwargs: Any) -> int | None:
         if not launched_by_mpirun():
             return command(*args, **kwargs)
-        return on_root(world(), lambda: command(*args, **kwargs))
+        return on_root(world(), lambda: command(*args, **kwargs), takes_long=True)
 
     return wrapped

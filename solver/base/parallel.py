@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import sys
+import time
 import traceback
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -16,13 +17,16 @@ from catenary.solver.base.errors import CatenaryError, RunBroken
 
 T = TypeVar("T")
 
+# Between two looks of a rank that waits for long work [s].
+_NAP = 2e-3
+
 NO_MEMORY = (
     "there is not enough memory left by the machine or a limit of the process; `catenary plan` "
     "tells what a run takes, and what was written stays readable"
 )
 
 
-def on_root(comm: Any, work: Callable[[], T]) -> T:
+def on_root(comm: Any, work: Callable[[], T], *, takes_long: bool = False) -> T:
     """Result of ``work()`` run on rank 0 only, given to all ranks; they all raise its error.
 
     Collective. Used for everything that touches files or gmsh: after it every rank knows whether
@@ -32,6 +36,8 @@ def on_root(comm: Any, work: Callable[[], T]) -> T:
     ----------
     comm : mpi4py communicator
     work : callable without arguments, its result must be picklable
+    takes_long : whether it takes far more than milliseconds: the other ranks then sleep until it is
+        done, where MPI would keep their cores busy
 
     Raises
     ------
@@ -49,12 +55,20 @@ def on_root(comm: Any, work: Callable[[], T]) -> T:
         except Exception as caught:  # every error must reach all ranks
             error = caught
     if comm.size > 1:
+        if takes_long:
+            _sleep_until_all_are_here(comm)
         result, carried = comm.bcast((result, _portable(error)), root=0)
         if carried is not None:
             raise error if error is not None else carried
     elif error is not None:
         raise error
     return result
+
+
+def _sleep_until_all_are_here(comm: Any) -> None:
+    arrival = comm.Ibarrier()
+    while not arrival.Test():
+        time.sleep(_NAP)
 
 
 def total(comm: Any, parts: np.ndarray) -> np.ndarray:

@@ -104,7 +104,7 @@ class Pantographs:
         self.joints_in_loop = any(has_joints(placement.data) for placement in train.placements)
         self.constraint_violation[:] = np.nan
         self.models: list[Pantograph] = []
-        on_root(comm, lambda: self._make_all(problem, simulated, nominal_height))
+        on_root(comm, lambda: self._make_all(problem, simulated, nominal_height), takes_long=True)
 
     @property
     def n(self) -> int:

@@ -74,5 +74,5 @@ def line_at_rest_on_all(
         rest = line_at_rest(problem, mesh)
         return rest.model.dropper_lengths, rest.form, rest.lift
 
-    lengths, form, lift = on_root(comm, alone(work))
+    lengths, form, lift = on_root(comm, alone(work), takes_long=True)
     return LineAtRest(problem, build(problem, mesh, lengths), form, lift)

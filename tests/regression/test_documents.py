@@ -28,7 +28,9 @@ from documents import (
     inline_commands,
     make_targets,
     numbers_agree,
+    plain_words,
 )
+from program import catenary
 
 from catenary.cases.cli.main import app
 from catenary.cases.scene.input.case_files import shipped
@@ -71,7 +73,11 @@ class Workshop:
     makers: dict[str, str]
 
     def call(self, command: str) -> subprocess.CompletedProcess[str]:
-        """Run a command as a user's shell does."""
+        """Run a command as a user's shell does, or, if it is one of ours alone, by its words."""
+        words = plain_words(command)
+        if words[:1] == ["catenary"]:
+            done = catenary(*words[1:], cwd=self.folder)
+            return subprocess.CompletedProcess(words, done.code, done.stdout, done.stderr)
         path = f"{self.folder / 'bin'}:{os.environ['PATH']}"
         return subprocess.run(
             ["bash", "-c", command],

@@ -71,6 +71,10 @@ def test_an_interrupted_run_is_continued(
     with Results(out) as results:
         assert results.outcome == "interrupted"
         assert results.n_steps == steps == results.checkpoint["step"]
-    again = catenary("restart", str(out), cwd=tmp_path, ranks=ranks_of_restart)
+    # With pictures, which ranks have nowhere else.
+    words = ["restart", str(out)]
+    again = catenary(*words, cwd=tmp_path, ranks=ranks_of_restart, pictures=ranks_of_restart > 1)
     assert again.code == 0, again.stderr
+    smallest = min(path.stat().st_size for path in out.glob("*.png"))
+    assert (smallest > 1000) is (ranks_of_restart > 1)
     assert_same_histories(out, uninterrupted)

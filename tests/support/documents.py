@@ -14,6 +14,7 @@ printed digit, a whole number exactly. A comment before a block tells what the t
 from __future__ import annotations
 
 import re
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +23,7 @@ _BLOCK = re.compile(
 )
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w]*\.\w)")
 _ELISION = "..."
+_OF_SHELLS = re.compile(r"[|&;<>()$`*?\[\]{}~!\"\\\n]")
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,13 @@ def blocks_of(text: str) -> list[Block]:
         Block(m["kind"], m["body"], m["note"] or "", text.count("\n", 0, m.start("body")))
         for m in _BLOCK.finditer(text)
     ]
+
+
+def plain_words(command: str) -> list[str]:
+    """Words of a command of which a shell makes nothing else; none if it would."""
+    command = command.replace("\\\n", " ")
+    bare = re.sub(r"'[^']*'|#.*", "", command)
+    return [] if _OF_SHELLS.search(bare) else shlex.split(command, comments=True)
 
 
 def inline_commands(text: str) -> list[str]:

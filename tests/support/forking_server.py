@@ -1,15 +1,15 @@
 """Runs command lines of the program, each in a process that is forked from this one.
 
-Packages that are imported here, none of which starts MPI, are not imported again by every process:
-that is most of what a short run costs. The program's own modules, PETSc, MPI and HDF5 are. Pictures
-of reports are laid out, but not painted unless ``pictures`` is true.
+What is imported here, none of which starts MPI, is not imported again by every process: that is
+most of what a short run costs. It is packages and the program's tables of scenes, with what they
+need; its other modules, PETSc, MPI and HDF5 are imported by each. Pictures of reports are laid out,
+but not painted unless ``pictures`` is true.
 
 A request is a line of JSON on standard input: ``words``, ``folder``, ``environment``, ``pictures``
 and the files ``stdout`` and ``stderr``. It is answered with the number of the process, and with its
 exit code when it has ended, negative for a signal.
 """
 
-import base64
 import gc
 import importlib
 import json
@@ -19,13 +19,8 @@ import sys
 PACKAGES = (
     "gmsh", "jinja2", "matplotlib.backends.backend_agg", "matplotlib.figure", "meshio", "numba",
     "pydantic", "scipy.integrate", "scipy.interpolate", "scipy.optimize", "scipy.signal",
-    "scipy.sparse.linalg", "tqdm", "typer",
+    "scipy.sparse.linalg", "tqdm", "typer", "catenary.cases.scene.load",
 )  # fmt: skip
-
-# A PNG file of one pixel.
-PIXEL = base64.b64decode(
-    b"iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGP4DwABAQEAsTj2FAAAAABJRU5ErkJggg=="
-)
 
 
 def answer(number: int) -> None:
@@ -54,6 +49,8 @@ for line in sys.stdin:
     request = json.loads(line)
     child = os.fork()
     if child == 0:
+        if not request["pictures"]:
+            importlib.import_module("unpainted")
         files = [os.devnull, request["stdout"], request["stderr"]]
         become(request["words"], request["folder"], request["environment"], files)
         break
@@ -65,8 +62,4 @@ else:
 # As in a process of its own, the program is the last that runs: what ends Python comes after it.
 from catenary.cases.cli.main import main  # noqa: E402
 
-if not request["pictures"]:
-    from catenary.postproc.report import figures
-
-    figures.png = lambda figure: PIXEL
 main()

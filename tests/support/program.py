@@ -52,6 +52,8 @@ SHORT_SCENE = (
 # Round-off of a solve, 1e-16, over 1e4 steps of a damped line; see tests/mpi/test_same_answers.py.
 SAME = 1e-9
 _ENTRY = "from catenary.cases.cli.main import main; main()"
+_UNPAINTED = f"import sys; sys.path[0] = {str(Path(__file__).parent)!r}; import unpainted; "
+_UNPAINTED += f"sys.path[0] = ''; {_ENTRY}"
 _MARK = "CATENARY_TEST_MARK"
 _PROC = Path("/proc")
 
@@ -91,7 +93,7 @@ class Program:
             if self.process.poll() is not None:
                 assert may_have_ended and what(), f"ended early: {self.process.communicate()}"
             assert time.monotonic() < end, f"not so after {self.limit} s"
-            time.sleep(0.01)
+            time.sleep(0.03)  # often enough, and the program needs the core
 
     def send(self, number: signal.Signals) -> None:
         """Send a signal to the process that was started, which is mpirun if there is one."""
@@ -148,20 +150,21 @@ def python(*words: str) -> list[str]:
 def catenary(*words: str, cwd: Path, ranks: int = 1, pictures: bool = False) -> Done:
     """Run the command line to its end; on one rank forked from ``forking_server.py``.
 
-    It then paints pictures only if they are looked at.
+    Pictures are painted only if they are looked at.
     """
     if ranks == 1:
         mark = uuid.uuid4().hex
         environment = {**os.environ, **RANKS_ENVIRONMENT, _MARK: mark}
         return _ended(*forks().run(list(words), cwd, environment, LIMIT, pictures), mark)
-    with started(python("-c", _ENTRY, *words), cwd, ranks) as program:
+    entry = _ENTRY if pictures else _UNPAINTED
+    with started(python("-c", entry, *words), cwd, ranks) as program:
         return program.end()
 
 
 @contextmanager
 def catenary_started(*words: str, cwd: Path, ranks: int = 1) -> Iterator[Program]:
-    """The command line, running."""
-    with started(python("-c", _ENTRY, *words), cwd, ranks) as program:
+    """The command line, running; pictures are not painted."""
+    with started(python("-c", _UNPAINTED, *words), cwd, ranks) as program:
         yield program
 
 

@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 import pytest
-from documents import blocks_of, difference, edited, inline_commands, numbers_agree
+from documents import (
+    blocks_of,
+    difference,
+    edited,
+    inline_commands,
+    numbers_agree,
+    plain_words,
+)
 
 PAGE = """
 See `catenary run CASE -o DIR` and `catenary plan`.
@@ -47,6 +54,25 @@ def test_a_here_document_belongs_to_its_command() -> None:
     (block,) = blocks_of("```\n$ python - <<'EOF'\nprint(1)\nEOF\n1\n```\n")
     (shown,) = block.shown()
     assert shown.command.endswith("EOF") and shown.output == "1"
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("catenary run x \\\n  -o y  # quick", ["catenary", "run", "x", "-o", "y"]),
+        (
+            "catenary run x --set 'a=[{b=\"$c\"}, 1]'",
+            ["catenary", "run", "x", "--set", 'a=[{b="$c"}, 1]'],
+        ),
+        ("catenary list | head", []),
+        ("catenary list > file", []),
+        ("catenary run x; catenary list", []),
+        ("catenary run x\ncatenary list", []),
+        ("python - <<'EOF'\nprint(\"it's\")\nEOF", []),
+    ],
+)
+def test_words_that_need_no_shell(command: str, words: list[str]) -> None:
+    assert plain_words(command) == words
 
 
 @pytest.mark.parametrize(

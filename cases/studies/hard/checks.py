@@ -47,7 +47,9 @@ def check_case(case: HardCase, world: Any, alone: Any, short: bool = False) -> l
     alone : a communicator of this process alone
     short : the case's short form; steps are halved once only then
     """
-    found: list[Criterion] = on_root(world, lambda: _check_alone(case, alone, short))
+    found: list[Criterion] = on_root(
+        world, lambda: _check_alone(case, alone, short), takes_long=True
+    )
     if world.size > 1:
         found = [*found, _ranks(case, world, alone, short)]
     return found
@@ -194,7 +196,9 @@ def _ranks(case: HardCase, world: Any, alone: Any, short: bool) -> Criterion:
     if case.kind == "free":
         n_steps = case.short_steps
         together = hard_runs.run_free(rest, world, n_steps)
-        one: Watched = on_root(world, lambda: hard_runs.run_free(rest, alone, n_steps))
+        one: Watched = on_root(
+            world, lambda: hard_runs.run_free(rest, alone, n_steps), takes_long=True
+        )
         apart = float(np.abs(together.energy / one.energy - 1.0).max())
         return _below(case, name, apart, case.ranks)
     together = hard_runs.run(rest, world)
@@ -209,7 +213,7 @@ def _ranks(case: HardCase, world: Any, alone: Any, short: bool) -> Criterion:
         apart = float(np.abs(together.force - one.force).max() / np.abs(one.force).max())
         return _below(case, name, apart, case.ranks)
 
-    result: Criterion = on_root(world, compare)
+    result: Criterion = on_root(world, compare, takes_long=True)
     return result
 
 
