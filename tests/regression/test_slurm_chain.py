@@ -16,7 +16,7 @@ from catenary.postproc.read.results import Results
 from catenary.solver.base.errors import InputError
 
 # Some four seconds of march, so that a signal meets it.
-SCENE = ["numerics.dt_s=5e-5", "output.field_every_s=0"]
+SCENE = ["numerics.dt_s=5e-5"]
 # Ends the first step of a job in its march, as SLURM does before a limit; lets others pass.
 SRUN = """#!/bin/bash
 if [ -e "$STAND_IN/interrupt" ]; then
