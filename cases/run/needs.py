@@ -21,7 +21,7 @@ from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.cost_model import estimate_march, estimate_memory
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.lumped_data import LumpedData
-from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
+from catenary.meshgen.mesh import LineMesh
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.integrators.detour import Detour, detour_of
@@ -88,7 +88,7 @@ def needs_of(
     """
     active = effects.active(problem)
     if not widths:
-        groups = effects.unknown_groups(active, (CONTACT_WIRE, MESSENGER_WIRE))
+        groups = effects.unknown_groups(active, problem.line.wires)
         widths = tuple(sum(map(len, group.values())) for group in groups)
     scheme = problem.numerics.scheme
     n_steps = max(1, math.floor(simulated_time(problem) / problem.numerics.dt + 1e-9))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from catenary.solver.effects import vertical_effects  # noqa: F401  (registers on import)
-from catenary.solver.effects.effect import Effect, registered
+from catenary.solver.effects.effect import Effect, NamedWire, registered
 from catenary.solver.model.unknowns import Group
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
@@ -30,7 +30,7 @@ def simulated(problem: Problem) -> Simulated:
     return laws
 
 
-def unknown_groups(effects: Iterable[Effect], wires: Iterable[str]) -> list[Group]:
+def unknown_groups(effects: Iterable[Effect], wires: Iterable[NamedWire]) -> list[Group]:
     """Unknowns that a set of effects needs of each wire, in groups: what one is the first to need.
 
     An unknown stands in the group of the effect that is the first to need it of any wire.
@@ -41,11 +41,11 @@ def unknown_groups(effects: Iterable[Effect], wires: Iterable[str]) -> list[Grou
     for effect in effects:
         if effect.unknowns_of_wire is None:
             continue
-        asked = {wire: effect.unknowns_of_wire(wire) for wire in wires}
+        asked = {wire.name: effect.unknowns_of_wire(wire) for wire in wires}
         new = dict.fromkeys(name for own in asked.values() for name in own if name not in place)
         place.update(dict.fromkeys(new, len(groups)))
         if new:
-            groups.append(dict.fromkeys(wires, ()))
+            groups.append(dict.fromkeys(asked, ()))
         for wire, own in asked.items():
             for name in own:
                 group = groups[place[name]]

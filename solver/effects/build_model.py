@@ -47,4 +47,5 @@ def build(
 
 def numbering_of(problem: Problem, mesh: LineMesh) -> Unknowns:
     """The unknowns that the effects of a problem need on a mesh. Not collective."""
-    return number_unknowns(mesh, effects.unknown_groups(effects.active(problem), mesh.wires))
+    groups = effects.unknown_groups(effects.active(problem), problem.line.wires)
+    return number_unknowns(mesh, groups)

@@ -11,9 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
+    from catenary.meshgen.line import Role
     from catenary.solver.model.builder import ModelBuilder
     from catenary.solver.problem.problem import Problem
     from catenary.solver.problem.simulated import Simulated
@@ -24,6 +25,16 @@ class Limit(Enum):
 
     WAVE_SPEED = "the train is slower than the waves of the contact wire"
     ONE_PANTOGRAPH = "the train has one pantograph"
+
+
+class NamedWire(Protocol):
+    """What an effect sees of a wire, such as ``meshgen.line.Wire``."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def role(self) -> Role: ...
 
 
 @dataclass(frozen=True)
@@ -37,8 +48,8 @@ class Effect:
     adds : the terms that it adds, in words
     source : paper, standard or equation number
     default : whether a scene that says nothing simulates it
-    unknowns_of_wire : unknowns that it needs at the nodes of a wire, by its name; those of one
-        plane together, e.g. ("w", "theta_y")
+    unknowns_of_wire : unknowns that it needs at the nodes of a wire, by its name and role; those of
+        one plane together, e.g. ("w", "theta_y")
     requires : effects without which it makes no sense
     always : True for what no scene can leave out
     applies : whether the problem holds anything for it to act on
@@ -53,7 +64,7 @@ class Effect:
     adds: str
     source: str
     default: bool
-    unknowns_of_wire: Callable[[str], tuple[str, ...]] | None = None
+    unknowns_of_wire: Callable[[NamedWire], tuple[str, ...]] | None = None
     requires: tuple[str, ...] = ()
     always: bool = False
     applies: Callable[[Problem], bool] = lambda problem: True

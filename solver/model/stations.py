@@ -45,7 +45,7 @@ def stations_of(mesh: LineMesh, most_nodes: int) -> Stations:
     ``most_nodes`` is how many there may be in a station with more nodes of a wire than one.
     """
     places = _places(mesh)
-    if all((np.diff(places[nodes]) == 1).all() for nodes in mesh.wires.values()):
+    if all((np.diff(places[nodes]) == 1).all() for nodes in _pieces(mesh)):
         return _by_places(mesh, places)
     station = _by_gaps(mesh)
     if station is not None:
@@ -62,23 +62,33 @@ def stations_of(mesh: LineMesh, most_nodes: int) -> Stations:
 def _by_places(mesh: LineMesh, places: np.ndarray) -> Stations:
     """Places as stations.
 
-    A station has the slots of wires that pass it or one beside it, so that both have whatever may
-    join them.
+    Each piece of a wire takes a slot for itself. A station has the slots of pieces that pass it or
+    one beside it, so that both have whatever may join them.
     """
     n_stations = int(places.max(initial=-1)) + 1
-    passes = [(int(places[nodes[0]]), int(places[nodes[-1]])) for nodes in mesh.wires.values()]
-    slot_of_wire = np.zeros(len(passes), dtype=np.int64)
+    slot_of_node = np.zeros(mesh.n_nodes, dtype=np.int64)
     last_of_slot: list[int] = []
-    for wire in sorted(range(len(passes)), key=lambda number: passes[number][0]):
-        first, last = passes[wire]
+    passed: list[tuple[int, int, int]] = []
+    for nodes in sorted(_pieces(mesh), key=lambda nodes: int(places[nodes[0]])):
+        first, last = int(places[nodes[0]]), int(places[nodes[-1]])
         free = (slot for slot, end in enumerate(last_of_slot) if end < first - 2)
         slot = next(free, len(last_of_slot))
         last_of_slot[slot : slot + 1] = [last]
-        slot_of_wire[wire] = slot
+        slot_of_node[nodes] = slot
+        passed.append((slot, first, last))
     present = np.zeros((n_stations, len(last_of_slot)), dtype=bool)
-    for slot, (first, last) in zip(slot_of_wire, passes, strict=True):
+    for slot, first, last in passed:
         present[max(first - 1, 0) : last + 2, slot] = True
-    return Stations(places, slot_of_wire[_wire_of_node(mesh)], present, True)
+    return Stations(places, slot_of_node, present, True)
+
+
+def _pieces(mesh: LineMesh) -> list[np.ndarray]:
+    """Nodes of each piece of each wire."""
+    return [
+        piece
+        for wire, nodes in mesh.wires.items()
+        for piece in np.split(nodes, mesh.breaks.get(wire, []))
+    ]
 
 
 def _by_gaps(mesh: LineMesh) -> np.ndarray | None:

@@ -13,7 +13,7 @@ import pytest
 from measuring import COMM, check, march, matrix_of, registered, solve_free
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.meshgen.line import Conductor
+from catenary.meshgen.line import Conductor, Role
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.effect import Effect, register
@@ -59,7 +59,7 @@ OF_CONTACT_WIRE = Effect(
     "lateral unknowns and one wire",
     "test",
     default=False,
-    unknowns_of_wire=lambda wire: ("v", "theta_z") if wire == CONTACT_WIRE else (),
+    unknowns_of_wire=lambda wire: ("v", "theta_z") if wire.role is Role.CONTACT else (),
     build=build_sideways,
 )
 

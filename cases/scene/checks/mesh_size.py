@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from catenary.cases.scene.convert.line import span_lengths
 from catenary.cases.scene.cost_model import estimate_memory, estimate_meshing
 from catenary.cases.scene.input.faults import Fault
+from catenary.meshgen.line import Role
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.effects import all_effects as effects
 
@@ -20,6 +21,14 @@ if TYPE_CHECKING:
 MOST_NODES = 4_000_000
 # From here on a mesh takes longer than one waits without a word.
 MANY_NODES = 50_000
+
+
+class _Wire(NamedTuple):
+    name: str
+    role: Role
+
+
+_WIRES = (_Wire(CONTACT_WIRE, Role.CONTACT), _Wire(MESSENGER_WIRE, Role.MESSENGER))
 
 
 class Size(NamedTuple):
@@ -55,7 +64,7 @@ def size_of(scene: Scene) -> Size | None:
     switches = scene.switches()
     chosen = (effect for name, effect in effects.registry().items() if switches[name])
     nodes = 2 * nodes_of_a_wire
-    groups = effects.unknown_groups(chosen, (CONTACT_WIRE, MESSENGER_WIRE))
+    groups = effects.unknown_groups(chosen, _WIRES)
     unknowns = nodes_of_a_wire * sum(len(own) for group in groups for own in group.values())
     return Size(scene.line.n_spans, droppers, nodes, unknowns)
 

@@ -70,7 +70,7 @@ def vertical(mesh: LineMesh) -> Group:
 
 def joined(mesh: LineMesh) -> np.ndarray:
     """Pairs of nodes that elements and droppers join."""
-    wires = [np.column_stack([nodes[:-1], nodes[1:]]) for nodes in mesh.wires.values()]
+    wires = [mesh.elements(wire) for wire in mesh.wires]
     return np.concatenate([*wires, mesh.droppers])
 
 
@@ -202,3 +202,17 @@ def test_rare_make_ups_are_filled_up() -> None:
     check(mesh, found)
     assert len(found.make_ups) == MOST_MAKE_UPS and found.width == 12
     assert max(map(len, found.make_ups)) == 12
+
+
+def test_pieces_of_one_wire_take_a_slot_one_after_the_other() -> None:
+    mesh = with_wire(with_wire(paired(), STITCH, 10, 20), "second", 60, 75)
+    both = {name: nodes for name, nodes in mesh.wires.items() if name != "second"}
+    both[STITCH] = np.concatenate([mesh.wires[STITCH], mesh.wires["second"]])
+    mesh = replace(mesh, wires=both, breaks={STITCH: np.array([10])})
+    found = number_unknowns(mesh, [vertical(mesh)], padded=False)
+    check(mesh, found)
+    assert found.in_stations and found.width == 6
+    assert np.count_nonzero(np.diff(found.starts) == 6) == 12 + 17
+    # Without word of the break its element would join stations far apart.
+    torn = number_unknowns(replace(mesh, breaks={}), [vertical(mesh)])
+    assert not torn.in_stations
