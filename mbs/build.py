@@ -1,4 +1,4 @@
-"""A running pantograph from the data of its model: the one place that knows all models."""
+"""A running pantograph from the data of its model: the only place with all models."""
 
 from __future__ import annotations
 

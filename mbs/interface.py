@@ -1,4 +1,4 @@
-"""What the coupling asks of a pantograph, whatever its model: lumped masses or a multibody system.
+"""Interface of pantographs to the coupling, for lumped masses and multibody systems.
 
 Heights are measured like the line's, z up [m]; contact forces are >= 0 in compression and push
 the head down. A head touches the wire with s strips, mostly one. A pantograph lives on rank 0 and

@@ -2,7 +2,8 @@
 
 The part of the lift that acts goes over to another one by half a cosine, as it does while a
 pantograph is raised; a negative part pulls down. Models have no housing of their own: once the head
-has gone down by a stated way it is caught, gives up its speed at once, and goes with the base.
+has gone down by a stated way it is caught. Its speed relative to the base falls to zero at once,
+and it moves with the base.
 """
 
 from __future__ import annotations

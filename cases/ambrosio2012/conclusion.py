@@ -179,7 +179,7 @@ def _runs_of(runs: Mapping[str, StudyRun], table: Mapping[str, Any], reading: st
 
 
 def _of(run: StudyRun | None, separation: float | None = None, named: bool = True) -> Run | None:
-    """The figures of a run that the statements ask for; None if it broke or lacks statistics."""
+    """The figures of a run that the statements need; None if it broke or lacks statistics."""
     if run is None or not run.ended.done:
         return None
     summary, measured = run.ended.summary, run.ended.measured

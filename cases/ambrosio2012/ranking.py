@@ -28,7 +28,7 @@ class Row(NamedTuple):
 
 
 class _Asked(NamedTuple):
-    """What a statement asks of a single pantograph, and whether a variation would satisfy it."""
+    """A statement's criterion for one pantograph, and whether a variation would satisfy it."""
 
     what: str
     unit: str
@@ -100,7 +100,7 @@ def table(ranked: Sequence[Row]) -> StudyTable:
 
 
 def movers(number: int, ranked: Sequence[Row]) -> str:
-    """Which variations move most what a statement asks for, as sentences; "" if none can say."""
+    """The variations that move a statement's criterion most, as sentences; "" without any."""
     asked = _ASKED.get(number)
     if asked is None or len(ranked) < 2:
         return ""

@@ -58,7 +58,7 @@ class Slack(NamedTuple):
 
 @dataclass(frozen=True)
 class Run:
-    """What the statements ask of a run.
+    """The figures of a run that the statements judge.
 
     Attributes
     ----------

@@ -107,7 +107,7 @@ Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more.")]
 
 
 def _version(wanted: bool) -> None:
-    """Print all versions and end, if that is wanted."""
+    """Print all versions and end, with ``--version``."""
     if wanted:
         from catenary.cases.process.versions import versions_text
 

@@ -1,6 +1,6 @@
 """What the shell completes: names of shipped cases, keys after ``--set``, words that a key takes.
 
-The command line asks for it with every press of the tabulator key: nothing here imports more than a
+Called at every press of the tabulator key: nothing here imports more than a
 list does, and an error only means that nothing is completed.
 """
 

@@ -1,4 +1,4 @@
-"""The verb ``hard``: runs the collection of hard cases and tells which limits they keep."""
+"""The verb ``hard``: runs the collection of hard cases and prints which limits they keep."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def main() -> None:
         sys.exit(console.BAD_INPUT)
     if launched_by_mpirun():
         # From here on the end of each rank waits for the others', so that a sentence of rank 0
-        # is out before the launcher sees the exit code of another.
+        # is out before the launcher gets the exit code of another.
         console.world()
     command: Any = typer.main.get_command(app)
     try:

@@ -132,7 +132,7 @@ def restart(
 
 
 def _teller(folder: Path) -> Callable[[str], None]:
-    """What says how a run ended unless it is done. Not collective."""
+    """Prints how a run ended unless it is done. Not collective."""
 
     def tell(outcome: str) -> None:
         if outcome == "interrupted":

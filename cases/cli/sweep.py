@@ -145,7 +145,7 @@ def run_study(
 
 
 def verdict(ended: Sequence[Ended], what: str) -> int:
-    """The exit code; says which variants broke. Not collective."""
+    """The exit code; prints which variants broke. Not collective."""
     if ended and ended[-1].outcome == "interrupted":
         console.complain(f"the {what} was interrupted; the same command continues it")
         return console.BROKEN

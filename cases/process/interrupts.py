@@ -20,7 +20,7 @@ from catenary.solver.base.errors import RunBroken
 
 T = TypeVar("T")
 
-# Ctrl-C, an end asked for, a lost connection, what batch systems send before a limit is reached.
+# Ctrl-C, kill, a lost connection, what batch systems send before a limit is reached.
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGUSR1", "SIGUSR2", "SIGXCPU")
 STOPPING = tuple(getattr(signal, name) for name in NAMES if hasattr(signal, name))
 # A terminal that closes and its shell both send a SIGHUP: a signal that is repeated within this
@@ -29,7 +29,7 @@ _SAME = 0.5
 
 
 class Stopped(BaseException):
-    """A signal asks the process to end. No library takes it for an error of its own."""
+    """A signal that ends the process. No library takes it for an error of its own."""
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
@@ -127,7 +127,7 @@ class Phase:
         self._scope = _raised() if comm.size == 1 else _remembered()
 
     def next(self, doing: str) -> None:
-        """Say what is done from here on. Collective; raises ``Interrupted`` on all ranks."""
+        """Name what is done from here on. Collective; raises ``Interrupted`` on all ranks."""
         self._agree()
         self._doing = doing
 

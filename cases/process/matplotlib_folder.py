@@ -19,7 +19,7 @@ def settle() -> None:
         if loop_cache.is_writable(base):
             os.environ[VARIABLE] = str(base / "matplotlib")
             return
-    # It takes a temporary folder for this process, and need not say so.
+    # It takes a temporary folder for this process; its warning is not needed.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import platform
 from importlib import metadata
 
-# Python packages that leave a record of their version, in the order in which they are told.
+# Python packages that leave a record of their version, in the order in which they are printed.
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "gmsh", "meshio", "pydantic", "typer")
 
 
 def versions() -> dict[str, str]:
     """Versions by name: Catenary, libraries with their Python packages, Python. Not collective.
 
-    Those of PETSc, MPI and HDF5 are what the libraries that are loaded say of themselves.
+    Those of PETSc, MPI and HDF5 are those that the loaded libraries report.
     """
     import h5py
     import mpi4py

@@ -2,8 +2,8 @@
 
 A lock is a file that is linked into place, which is one operation on local disks and over NFS. It
 names its process; where the kernel has ``flock`` the process also holds that. A lock that a dead
-process of this machine left is taken over. Of a process on another machine nobody can say that it
-is dead: its last sign of life is told, and the user removes the file.
+process of this machine left is taken over. Whether a process on another machine is dead cannot be
+found out: the message has its last sign of life, and the user removes the file.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from catenary.solver.base.errors import InputError
 from catenary.solver.base.parallel import on_root
 
 LOCK_FILE = ".catenary.lock"
-# Time between two signs of life [s], and after how many of them a lock looks left behind.
+# Time between two signs of life [s], and after how many of them a lock counts as left behind.
 HEARTBEAT = 30.0
 SILENT = 20
 _TRIES = 20
@@ -35,7 +35,7 @@ class FolderLock:
     Parameters
     ----------
     folder : made if it is not there, with its parents
-    command : what this process does, told to those who are refused
+    command : what this process does, for the message to others
 
     Raises
     ------
@@ -238,7 +238,7 @@ def _dead(old: int, owner: Owner | None, me: Owner) -> bool:
         return False
     if owner.same_processes(me):
         return not owner.alive
-    # Of containers on one kernel flock knows all; of another machine nobody does.
+    # flock covers all containers on one kernel, and no other machine.
     return me.before_restart(owner) or (owner.same_boot(me) and let_go)
 
 

@@ -22,7 +22,7 @@ class Owner:
     host, machine : name of the machine, and its number from ``/etc/machine-id``
     boot : number of the machine's last start
     space : the namespace of process numbers, which containers have of their own
-    pid, started : process, and when the kernel says it was started
+    pid, started : process, and its start by the kernel's clock
     command : what the process does, for the user
     since : when the lock was taken, in the machine's local time
     """
@@ -124,5 +124,5 @@ def _is_zombie(pid: int) -> bool:
 
 
 def _stat(pid: int) -> list[str]:
-    """What the kernel says of a process, from its state on; empty if unknown."""
+    """Fields of /proc/PID/stat from the state on; empty if unknown."""
     return _line(_PROC / f"{pid}/stat").rpartition(")")[2].split()

@@ -23,7 +23,7 @@ from catenary.solver.base.errors import InputError
 
 logger = logging.getLogger("catenary.run")
 
-# A run beyond one of these asks for --force.
+# A run beyond one of these needs --force.
 MOST_BYTES = 20e9
 MOST_SECONDS = 12 * 3600.0
 MOST_STEPS = 5_000_000

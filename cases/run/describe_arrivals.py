@@ -1,4 +1,4 @@
-"""What is told of waves from the ends of the line and of the run-in: plan, check, result file."""
+"""Sentences on waves from the ends of the line and on the run-in: plan, check, result file."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def arrival_warnings(scene: Scene) -> list[str]:
 
 
 def wave_line(problem: Problem) -> WaveLine:
-    """The line as long waves see it; hardware counts with its mean mass per length."""
+    """The line as a string for long waves; hardware counts with its mean mass per length."""
     line = problem.line
     masts = line.support_positions
     total = float(masts[-1] - masts[0])

@@ -1,4 +1,4 @@
-"""What is told of incidents: in the plan, the result file, the summary and the report."""
+"""Sentences on incidents for the plan, the result file, the summary and the report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is told of the train's pantographs: model, static force, actuator force, assembly."""
+"""Sentences on the train's pantographs: model, static force, actuator force, assembly."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def _strips_of(strips: Strips) -> str:
 
 
 def header_words(scene: Scene, problem: Problem) -> list[dict[str, str]]:
-    """What a result file says of each pantograph, in running order. Not collective."""
+    """Facts on each pantograph for a result file, in running order. Not collective."""
     return [
         {
             "kind": place.name,

@@ -51,7 +51,7 @@ class Plan:
     arrivals : sentences about run-in and waves from the ends of the line
     warnings : sentences about them, empty if the line is long enough
     dt, simulated : time step and simulated time [s]
-    halved : what is said of steps that adapt, empty if none do
+    halved : sentence on steps that adapt, empty if none do
     slack : what a slack dropper does, in words; empty if no dropper slackens
     memory : estimate of the resident memory on one rank [B]
     march : estimate of the wall time of the time loop on one rank [s]

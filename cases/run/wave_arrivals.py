@@ -12,17 +12,17 @@ from typing import NamedTuple
 
 from scipy import optimize
 
-# Share of an amplitude below which a reflected wave is not told as harmful [-].
+# Share of an amplitude below which a reflected wave counts as harmless [-].
 FELT = 1e-3
 # What the start of a run leaves in the contact force after a distance of D spans, on a line without
 # damping, is START_SHARE / D of the standard deviation; measured, see docs/guide.md.
 START_SHARE = 0.8
-# Above this share of the standard deviation the run-in is told to be short [-].
+# Above this share of the standard deviation the run-in counts as short [-].
 SHORT_RUN_IN = 0.2
 
 
 class WaveLine(NamedTuple):
-    """A line as long waves see it.
+    """A line as a string for long waves.
 
     Attributes
     ----------

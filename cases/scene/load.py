@@ -62,7 +62,7 @@ def load_scene(
 def scene_from(raw: dict[str, Any], origin: Origin, folder: Path | None = None) -> Scene:
     """The checked scene of a nested table, such as ``convert.course.resolved`` gives.
 
-    ``folder`` is where a relative ``mesh.file`` of the case file is looked for (one of the command
+    ``folder`` is the folder of a relative ``mesh.file`` of the case file (one of the command
     line is relative to the working directory) and whose name an unnamed case takes.
     """
     refuse_deep(raw, origin.file)

@@ -1,4 +1,4 @@
-"""The study of a case: many variants, and what they say of the statements of the case's source.
+"""The study of a case: many variants, and verdicts on the statements of the case's source.
 
 A case folder may hold a ``study.py`` with three functions:
 
@@ -50,7 +50,7 @@ class Plan:
 
 
 class StudyRun(NamedTuple):
-    """A run of a study as ``conclude`` sees it: how it ended, its scene, its results' folder."""
+    """A run of a study, as given to ``conclude``: how it ended, its scene, its results' folder."""
 
     ended: Ended
     scene: Scene

@@ -126,7 +126,7 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
 
 
 def serial(command: Callable[..., int | None]) -> Callable[..., int | None]:
-    """A command that runs on rank 0 only; under mpirun the others learn its result.
+    """A command that runs on rank 0 only; under mpirun the others get its result.
 
     Collective under mpirun. Its error is raised on all ranks.
     """

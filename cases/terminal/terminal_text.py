@@ -21,7 +21,7 @@ def case_table(cases: Sequence[CaseEntry]) -> str:
 
 
 def summary_text(summary: Mapping[str, Any], folder: Path) -> str:
-    """The figures of a finished run that one wants to see at once.
+    """The most important figures of a finished run.
 
     Parameters
     ----------

@@ -168,7 +168,7 @@ class FullPantograph:
     def place(self, head_height: float, velocity: float = 0.0) -> None:
         """Put the pantograph where its head is at this height [m], without contact.
 
-        ``velocity`` [m/s]: upward, of head and arm, all other bodies as the joints want it. Both
+        ``velocity`` [m/s]: upward, of head and arm, all other bodies as the joints require. Both
         count from the line, also where the base moves.
 
         Raises
@@ -273,7 +273,7 @@ class FullPantograph:
 
     @contextmanager
     def _named(self) -> Iterator[None]:
-        """Say of which pantograph it is that breaks."""
+        """Add the pantograph's name to the error message."""
         try:
             yield
         except RunBroken as error:

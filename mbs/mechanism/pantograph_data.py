@@ -1,4 +1,4 @@
-"""A pantograph as a multibody system: what it is told by, and what a running one needs of it.
+"""A pantograph as a multibody system: its data, and what a running one is made from.
 
 The head stands on springs on one body, the arm, and everything else is a mechanism that raises
 the arm. Head and mechanism are taken apart: the head becomes a mass on a spring and a damper, the

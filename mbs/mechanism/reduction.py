@@ -68,7 +68,7 @@ class ReducedMechanism:
     def coefficients(self, carried: bool) -> tuple[np.ndarray, np.ndarray]:
         """Heights (n,) and, from each to the next, coefficients of the splines (n - 1, 4, 4).
 
-        The second index stands for mass, lift, damping and carried mass (zero unless asked for),
+        The second index stands for mass, lift, damping and carried mass (zero without ``carried``),
         the third for powers, the highest first.
         """
         last = np.zeros_like(self.masses)

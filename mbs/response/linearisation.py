@@ -254,7 +254,7 @@ def _separated(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Bases (k, .) of the motions that something acts on, and of those that nothing does.
 
-    With M = 1 the two do not know of each other.
+    With M = 1 the two are not coupled.
     """
     acting = []
     for matrix in (stiffness, stiffness.T, damping, damping.T, push[None, :]):

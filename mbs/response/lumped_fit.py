@@ -20,7 +20,7 @@ MOST_MASSES = 3
 # Bounds of masses [kg], stiffnesses [N/m] and dampings [N s/m]. A lower bound stands for "none".
 BOUNDS = ((1e-2, 1e3), (1e-3, 1e8), (1e-6, 1e6))
 N_STARTS = 24
-# An rms error below which no better start is looked for.
+# No further start is tried below this rms error.
 EXACT = 1e-8
 
 

@@ -23,7 +23,7 @@ from catenary.solver.base.errors import InputError
 
 
 class Force(Protocol):
-    """What a system of bodies asks of a force."""
+    """Interface of a force to a system of bodies."""
 
     @property
     def name(self) -> str: ...

@@ -43,7 +43,7 @@ TimeLaw = Callable[[float], Law]
 
 
 class Joint(Protocol):
-    """What a system of bodies asks of a joint."""
+    """Interface of a joint to a system of bodies."""
 
     @property
     def name(self) -> str: ...
@@ -213,7 +213,7 @@ class RevolutePrismatic:
     """Body j slides along its own axis and turns about an axis of body i: four rows.
 
     A massless piece between both turns on body i about ``turn_axis_i`` and lets body j slide along
-    ``slide_axis_j``; ``turn_axis_j`` is the axis of turning as body j sees it.
+    ``slide_axis_j``; ``turn_axis_j`` is the axis of turning in axes of body j.
     """
 
     name: str

@@ -65,7 +65,7 @@ class Reaction(NamedTuple):
 def independent_rows(jacobian: np.ndarray) -> np.ndarray:
     """Numbers of rows, from the first on, that are not combinations of rows before them.
 
-    Gram-Schmidt row by row, so that of several rows that say the same the first one is kept.
+    Gram-Schmidt row by row, so that the first of several dependent rows is kept.
     """
     return kernels.independent_rows(np.ascontiguousarray(jacobian), DEPENDENT)
 

@@ -80,7 +80,7 @@ class AugmentedLagrangian:
     penalty : a, relative to the masses that rows feel
     frequency, damping_ratio : omega [1/s] and mu of the violations
     tolerance : of the last change of the accelerations, relative
-    max_iterations : before it gives up
+    max_iterations : after which RunBroken is raised
     """
 
     penalty: float = 1e6

@@ -63,7 +63,7 @@ def integrate(
         raise InputError(f"Times of an integration must grow: {at}.")
     motion = project(system, start, at[0]) if correct else start
     motions, errors, n_evaluations = [motion], [(0.0, 0.0, 0.0)], 0
-    # A run without correction starts where it was told to.
+    # A run without correction starts from the given state.
     errors[0] = _errors(system, motion, motion.to_vector(), at[0])
     first_step: float | None = None
     for begin, end in zip(at[:-1], at[1:], strict=True):

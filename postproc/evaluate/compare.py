@@ -33,7 +33,7 @@ def compare(
     Parameters
     ----------
     first, second : result folders or files
-    records : what ``evaluate.guard`` found in each, None to look for damage here
+    records : what ``evaluate.guard`` found in each, None to check it here
 
     Raises
     ------

@@ -1,19 +1,19 @@
-"""Figures beside their limits, with as many digits as it takes to see which one is larger."""
+"""Figures beside their limits, with the digits that show which one is larger."""
 
 from __future__ import annotations
 
 import math
 
-# Digits beyond those asked for after which two numbers are told as they are.
+# Further digits after which two numbers are printed in full.
 _MOST_MORE = 9
 
 
 def decimals_that_tell(value: float | None, limit: float | None, fewest: int) -> int:
-    """Decimals with which a value and its limit are printed, so that different numbers look so.
+    """Decimals of a value and its limit with which different numbers print differently.
 
     Parameters
     ----------
-    value, limit : numbers in one unit; NaN and None ask for no more than ``fewest``
+    value, limit : numbers in one unit; NaN and None are printed with ``fewest``
     fewest : decimals where the two differ by enough [-]
     """
     if value is None or limit is None or not math.isfinite(value) or not math.isfinite(limit):

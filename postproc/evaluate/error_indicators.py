@@ -1,6 +1,6 @@
 """Error indicators of a run from its own record: how coarse are time step and mesh?
 
-Neither needs a second run. The time indicator looks at the force that was found, the mesh
+Neither needs a second run. The time indicator uses the computed force, the mesh
 indicator at the shortest waves that the elements carry. docs/accuracy.md compares both with true
 errors.
 """
@@ -51,7 +51,7 @@ _EARLIER = (
 
 @dataclass(frozen=True)
 class Indicators:
-    """What a run's record tells of its discretisation.
+    """Estimates of the discretisation errors of a run, from its record.
 
     Attributes
     ----------

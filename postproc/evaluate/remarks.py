@@ -1,4 +1,4 @@
-"""Remarks of the report: what a run's own settings decide, and a reader should know."""
+"""Remarks of the report: settings of a run that decide its results."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _about_iterations(results: Results) -> list[str]:
 
 
 def _about_sizes(results: Results) -> list[str]:
-    """That steps could not be made as short as their estimated error asks for."""
+    """That the shortest step was too long for the tolerance."""
     counted = results.attributes.get("inner_iterations", {})
     above = counted.get("steps_above_tolerance", 0)
     if not above:

@@ -1,8 +1,8 @@
 """Statistics of contact forces, uplifts and dropper forces as EN 50317 and EN 50318 define them.
 
 Contact forces are filtered over the whole record first and cut to the evaluation stretch then, so
-that the ends of the stretch see no end effects of the filter. Each pantograph is evaluated while
-it is itself within the stretch.
+that end effects of the filter do not reach the ends of the stretch. Each pantograph is evaluated
+while it is itself within the stretch.
 """
 
 from __future__ import annotations

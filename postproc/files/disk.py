@@ -24,7 +24,7 @@ MARGIN = 128 * 1024
 
 
 def plain(value: Any) -> Any:
-    """``value`` made of what JSON knows: NumPy types converted, NaN and infinity as None."""
+    """``value`` in types of JSON: NumPy types converted, NaN and infinity as None."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (set, frozenset)):

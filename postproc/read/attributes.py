@@ -1,4 +1,4 @@
-"""Reads the attributes of a result file against their table; what cannot be is told."""
+"""Reads the attributes of a result file against their table; reports what cannot be."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Looks for damage in a result file in a process of its own: HDF5 crashes at some damaged tables,
+"""Checks a result file for damage in a process of its own: HDF5 crashes at some damaged tables,
 and runs in circles at others.
 
 Not collective. ``python -m catenary.postproc.read.guard FILE`` prints what it found as JSON.

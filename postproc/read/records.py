@@ -22,9 +22,9 @@ from catenary.postproc.read.tables import damaged_rows
 
 # A time may be this share of a step off its place.
 _OFF = 1e-3
-# Times looked at in one go.
+# Times read at once.
 _TIMES = 1 << 16
-# Times that are looked at together.
+# Times that are checked together.
 _TIMES = 1 << 18
 
 

@@ -33,7 +33,7 @@ class Results:
     Parameters
     ----------
     path : the result file or the folder that holds it as ``run.h5``
-    records : what ``evaluate.guard`` found in it, None to look for damage here
+    records : what ``evaluate.guard`` found in it, None to check it here
 
     Raises
     ------

@@ -40,7 +40,7 @@ class SoundFile:
     Parameters
     ----------
     path : the result file
-    records : what ``scan`` found in it, None to scan it when records are first asked for
+    records : what ``scan`` found in it, None to scan it when records are first read
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class SoundFile:
     def __init__(self, path: Path, records: Records | None = None) -> None:
         self.path = path
         try:
-            # Without a lock, so that a run that is still going on can be looked at.
+            # Without a lock, so that a run can be read while it goes on.
             self._file = h5py.File(path, "r", locking=False)
         except HDF5_ERRORS as error:
             reason = " ".join(str(error).split())
@@ -112,7 +112,7 @@ class SoundFile:
         return [f"{self.path.name} is damaged: {_listed(damage)}; {_up_to(self.records.last)}."]
 
     def state(self) -> tuple[dict[str, Any], list[str]]:
-        """The latest sound state to continue from, and what is told of later ones.
+        """The latest sound state to continue from, and messages about later ones.
 
         Raises
         ------
@@ -150,7 +150,7 @@ class SoundFile:
             return True
         try:
             return path in self._file
-        except HDF5_ERRORS:  # `records` tells it
+        except HDF5_ERRORS:  # `records` reports it
             return False
 
     def __getitem__(self, path: str) -> Any:

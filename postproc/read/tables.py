@@ -97,7 +97,7 @@ def sound_parts(damaged: list[tuple[int, int]], start: int, stop: int) -> list[t
     return parts
 
 
-# Values looked at in one go.
+# Values checked at once.
 _BLOCK = 1 << 18
 
 

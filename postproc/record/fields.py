@@ -122,7 +122,7 @@ class FieldRecorder:
         if view.step % self._every == 0:
             self._uplift[len(self._buffered)] = view.node_uplift()
             self._buffered.append(view.time)
-        # The first snapshot is written at once: from then on there is something to look at.
+        # The first snapshot is written at once, so that ParaView can open the files.
         due = view.step == self._first_step or (view.step + 1) % self._flush_every == 0
         if len(self._buffered) == self._capacity or (due and self._buffered):
             self._flush()
@@ -246,7 +246,7 @@ class FieldRecorder:
         ]
 
     def _cut(self, stage: Stage) -> bool:
-        """Forget the snapshots from the stage's start on; False if the file is not as it was."""
+        """Drop the snapshots from the stage's start on; False if the file is not as it was."""
         try:
             if not survives(self._h5):
                 raise ValueError("HDF5 does not read it")
@@ -305,7 +305,7 @@ class FieldRecorder:
             self._describe()
 
     def _describe(self) -> None:
-        """Say in the XDMF file which snapshots are there."""
+        """List in the XDMF file the snapshots that are there."""
         if self._xdmf_text is None:
             size = self._n_nodes, self._cells.shape[0]
             of = self._xdmf, self._h5.name, *size, self._planned

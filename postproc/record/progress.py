@@ -25,9 +25,9 @@ logger = logging.getLogger("catenary.progress")
 
 # Wall time between two plain lines of a march, and from which a phase gets a line of its own [s].
 LINE_EVERY, LONG_PHASE = 10.0, 2.0
-# Wall time between two looks at the clock during a march, with a bar and without [s].
+# Wall time between two readings of the clock during a march, with a bar and without [s].
 _LOOK_AT_BAR, _LOOK_AT_LINES = 0.1, 1.0
-# So many times more steps than before may pass until the next look.
+# Steps until the next reading grow at most by this factor.
 _GROWTH = 2
 _NEVER = sys.maxsize
 
@@ -94,14 +94,14 @@ class Progress:
             )
 
     def next_state(self, step: int) -> int:
-        """The step of the next look at the clock."""
+        """The step of the next reading of the clock."""
         return max(step + 1, self._next_look)
 
     def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
         """Pass over steps."""
 
     def observe(self, view: StepView) -> None:
-        """Look at the clock now and then: most steps are passed over."""
+        """Read the clock now and then; most steps are passed over."""
         if view.step < self._next_look:
             return
         now, steps = self._clock(), view.step - self._step

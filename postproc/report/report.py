@@ -83,7 +83,7 @@ def write_report(
     ----------
     result_path : result file or its folder
     out_dir : folder that exists
-    records : what ``evaluate.guard`` found in the file, None to look for damage here
+    records : what ``evaluate.guard`` found in the file, None to check it here
 
     Raises
     ------

@@ -66,7 +66,7 @@ def flushed() -> Iterator[None]:
         yield
         return
     for kind in (np.float32, np.float64):
-        np.finfo(kind)  # which warns if it is first asked here
+        np.finfo(kind)  # whose first call warns here
     before = _exchange(_ALL, _TAKEN_FOR_ZERO)
     try:
         yield

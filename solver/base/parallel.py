@@ -29,8 +29,8 @@ NO_MEMORY = (
 def on_root(comm: Any, work: Callable[[], T], *, takes_long: bool = False) -> T:
     """Result of ``work()`` run on rank 0 only, given to all ranks; they all raise its error.
 
-    Collective. Used for everything that touches files or gmsh: after it every rank knows whether
-    the work failed, and all raise the same error, so that none waits for another.
+    Collective. Used for everything that touches files or gmsh: after a failure all
+    ranks raise the same error, so that none waits for another.
 
     Parameters
     ----------

@@ -35,6 +35,6 @@ class Event(NamedTuple):
 
 
 def event(name: str) -> Event:
-    """The event of a name of ``NAMES``; the same for all that ask for it. Not collective."""
+    """The event of a name of ``NAMES``; one event for each name. Not collective."""
     logged = PETSc.Log.Event(name)
     return Event(logged.begin, logged.end)

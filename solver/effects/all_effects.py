@@ -17,7 +17,7 @@ def registry() -> dict[str, Effect]:
 
 
 def active(problem: Problem) -> list[Effect]:
-    """The effects that ``problem`` asks for and has something for, in building order."""
+    """The effects of ``problem`` that have something to act on, in building order."""
     return [e for e in registry().values() if e.name in problem.effects and e.applies(problem)]
 
 

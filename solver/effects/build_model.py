@@ -21,7 +21,7 @@ def build(
 ) -> Model:
     """The model of a problem on a mesh, for given dropper lengths [m]. Not collective.
 
-    ``broken`` (n_droppers,) bool tells which droppers carry nothing; none if not given.
+    ``broken`` (n_droppers,) bool, droppers that carry nothing; none if not given.
     """
     active = effects.active(problem)
     row_of_node = np.empty(mesh.n_nodes, dtype=np.int64)

@@ -47,7 +47,7 @@ class Effect:
     title : what is simulated, for the plan and the report
     adds : the terms that it adds, in words
     source : paper, standard or equation number
-    default : whether a scene that says nothing simulates it
+    default : whether scenes simulate it by default
     unknowns_of_wire : unknowns that it needs at the nodes of a wire, by its name and role; those of
         one plane together, e.g. ("w", "theta_y")
     requires : effects without which it makes no sense

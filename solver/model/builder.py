@@ -1,4 +1,4 @@
-"""What an effect sees of a model under construction."""
+"""The model under construction, to which effects add their terms."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from catenary.solver.problem.problem import Problem
 
 
 class ModelBuilder:
-    """What an effect sees of a model under construction."""
+    """Collects terms of effects; ``finish`` gives the model."""
 
     def __init__(self, model: Model) -> None:
         self.model = model

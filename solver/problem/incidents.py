@@ -1,6 +1,6 @@
 """What may happen to a line during a run: droppers that break, wires that lose tension.
 
-Data only; `after_incidents` says what becomes of the line, `march` when. What may happen to a
+Data only; `after_incidents` changes the line, `march` decides when. What may happen to a
 pantograph stands with its placement (`mbs.lowering`).
 """
 

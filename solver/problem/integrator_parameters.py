@@ -28,7 +28,7 @@ class Integration(NamedTuple):
 
     @property
     def is_second_order(self) -> bool:
-        """Whether errors are of the order dt^2, which asks for gamma = 1/2 - a_m + a_f."""
+        """Whether errors are of the order dt^2, which requires gamma = 1/2 - a_m + a_f."""
         return abs(self.first_order_damping) < 1e-12
 
     @property

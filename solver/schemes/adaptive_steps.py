@@ -3,7 +3,7 @@
 The record keeps its step dt, on which filters and statistics rely. Within an interval steps have
 the size dt / 2^level. Each level has operators, columns, pantographs and a scheme of its own, made
 when it is first needed and kept. Level 0 holds the state whenever an interval ends, so that
-records, checkpoints and incidents know nothing of the others.
+records, checkpoints and incidents are independent of the others.
 
 A step is repeated with a shorter one if its estimated error is above the tolerance (`step_error`),
 or if it has no solution; which size is next is up to PETSc's TSAdapt (`ts_adapt`).
@@ -96,7 +96,7 @@ class StepLevels:
         def control() -> None:
             self._control = StepControl(self._tolerance, self._dt, smallest)
 
-        on_root(comm, control)  # options may be refused, which all ranks must know
+        on_root(comm, control)  # options may be refused, on all ranks
         self._take_in(0, whole)
 
     @property
@@ -124,7 +124,7 @@ class StepLevels:
             if answer is not None:
                 goes_on &= answer
                 done += size
-        # Observers look at level 0, from which a continued run starts: so does this one.
+        # Observers and checkpoints read level 0; this run continues from the same state.
         self._go_to(0)
         return goes_on
 
@@ -151,7 +151,7 @@ class StepLevels:
         return decision
 
     def set_level(self, level: int) -> None:
-        """Learn which level is wanted next. All ranks."""
+        """Set the level of the next step. All ranks."""
         self._wanted = level
 
     def state(self) -> np.ndarray:

@@ -1,7 +1,7 @@
 """How wrong a step makes the contact forces: an estimate from depths that are known anyway.
 
 Average acceleration misses h^3 / 12 times the third derivative of a motion in a step of h. At a
-contact the motion is the depth, of which a march knows the latest values. With the second
+contact the motion is the depth, whose latest values a march has. With the second
 derivatives a, twice the divided differences, of this step and the one before, the depth is wrong by
 h^2 / 12 (a_n - a_n-1) (Zienkiewicz and Xie 1991, for beta = 1/4), and the force by this times the
 stiffness of the contact. What changes within a step (a landing, a kink of the force) is thereby
@@ -20,7 +20,7 @@ import numpy as np
 from catenary.solver.schemes import step_error_kernels
 from catenary.solver.schemes.step_error_kernels import Past, Tried
 
-# Steps before this one that the estimate looks at.
+# Steps before this one that the estimate needs.
 _PAST = 3
 
 

@@ -64,7 +64,7 @@ def largest(tried, past):
 
 @compiled
 def remember(time, depth, force, past):
-    """Put a step behind those of the past, of which the oldest is forgotten."""
+    """Append a step to those of the past and drop the oldest."""
     times, depths, forces = past
     for row in range(times.size - 1):
         times[row] = times[row + 1]

@@ -47,7 +47,7 @@ class StepControl:
     Raises
     ------
     InputError
-        If PETSc refuses an option, or one says what the scene says.
+        If PETSc refuses an option, or one gives what the scene gives.
     """
 
     def __init__(self, tolerance: float, longest: float, smallest: float) -> None:

@@ -50,7 +50,7 @@ class Audience:
         return min((one.next_state(step) for one in self._blockwise), default=_NEVER)
 
     def show(self, view: Callable[[], StepView]) -> None:
-        """Show a state, which is looked at if there is anybody; RunBroken if one cannot go on."""
+        """Show a state to the observers; RunBroken if one cannot go on."""
         if self._observers:
             self._event.begin()
             try:
@@ -63,7 +63,7 @@ class Audience:
             self._after()
 
     def show_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        """Show the rows of steps whose states nobody needs; see ``BlockObserver``."""
+        """Show the rows of steps whose states no observer needs; see ``BlockObserver``."""
         if not times.size:
             return
         self._event.begin()
@@ -74,7 +74,7 @@ class Audience:
             self._event.end()
 
     def finish(self, outcome: str) -> str:
-        """Tell all how the march ended; return how it ended after that.
+        """Call the ``finish`` of all observers; return how the march ended after that.
 
         An observer that breaks now changes a good end to its sentence for those that follow.
         """

@@ -121,7 +121,7 @@ class BlockObserver(Observer, Protocol):
     def next_state(self, step: int) -> int:
         """The next step after ``step`` that ``observe`` has to show, as it needs more than the row.
 
-        Asked when all steps up to ``step`` are shown.
+        Called when all steps up to ``step`` are shown.
         """
 
     def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:

@@ -1,4 +1,4 @@
-"""Steps as PETSc's TS of type ``python`` asks for them: one at a time, or a block of them."""
+"""Context of PETSc's TS of type ``python``: takes one step at a time, or a block of them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Stepper:
     Attributes
     ----------
     step_number : of the last good step
-    stopped : whether the scheme wanted no further step
+    stopped : whether the scheme has ended the march
     broken : the sentence of what broke, empty if nothing did
     """
 
@@ -86,7 +86,7 @@ class Stepper:
         )
 
     def _step(self, stop: bool) -> bool:
-        """Take one step and show it; False if the scheme wants no further one."""
+        """Take one step and show it; False if it is the last."""
         number = self.step_number + 1
         # Times are multiples of dt, not sums, so that a long run does not drift.
         time = number * self._dt
@@ -99,7 +99,7 @@ class Stepper:
         return goes_on
 
     def _take(self, blocks: CompiledSteps, ts: PETSc.TS) -> None:
-        """Take as many steps as nobody looks between, and show them."""
+        """Take steps up to the next state that an observer needs, and show them."""
         first = self.step_number
         until = min(self._end, self._audience.next_state(first))
         n_steps = min(until - first, blocks.most, self._most)
@@ -113,7 +113,7 @@ class Stepper:
         self._most = max(1, min(_GROWTH * self._most, allowed))
         taken = blocks.taken
         self.step_number = first + taken
-        # A state can be looked at after the last step only, if that is not amid the next one.
+        # A state can be read after the last step only, if that is not amid the next one.
         passed = taken if broken is not None else taken - 1
         self._audience.show_rows(first + 1, blocks.times[:passed], blocks.rows[:passed])
         if broken is not None:

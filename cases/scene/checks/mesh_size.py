@@ -70,7 +70,7 @@ def size_of(scene: Scene) -> Size | None:
 
 
 def _droppers_in(table: DropperTable, span: float) -> int:
-    """Droppers of a span of that length [m]; none if the table does not say."""
+    """Droppers of a span of that length [m]; none if the table has no such pattern."""
     if table.positions_m is not None:
         return len(table.positions_m)
     for pattern in table.patterns or []:

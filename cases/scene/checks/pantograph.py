@@ -1,4 +1,4 @@
-"""Whether the train's pantographs can be what their tables say."""
+"""Whether the tables of the train's pantographs are possible."""
 
 from __future__ import annotations
 

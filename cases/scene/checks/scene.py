@@ -1,4 +1,4 @@
-"""What types and bounds cannot see: whether line, train, evaluation and effects fit together.
+"""Whether line, train, evaluation and effects fit together, beyond types and bounds.
 
 Every check yields a ``Fault`` for each thing that is wrong: its sentence names the key, its value,
 what is allowed and where the key was written. A check that needs what another one found wrong is
@@ -64,7 +64,7 @@ def faults_of(scene: Scene) -> list[Fault]:
     if found.nothing_by(_pantograph_names, scene):
         found.nothing_by(check_pantographs, scene)
         found.nothing_by(check_scheme, scene)
-    # What is too large is not even made, and what follows from a wrong unit is not told.
+    # What is too large is not made, and what follows from a wrong unit is not reported.
     sound = found.nothing_by(size_faults, scene) and found.nothing_by(usual_faults, scene)
     line = _line(scene, found) if sound else None
     if line is None:
@@ -75,7 +75,7 @@ def faults_of(scene: Scene) -> list[Fault]:
         found.nothing_by(_raising, scene)
     if found.faults:
         return found.faults
-    # What may need the machinery of multibody systems stands last: other faults are told at once.
+    # What may need multibody systems stands last: other faults are reported at once.
     if found.nothing_by(check_mechanisms, scene, line):
         found.nothing_by(check_requirements_of_defaults, scene)
         found.nothing_by(check_vehicle, scene, line)

@@ -1,4 +1,4 @@
-"""What the scheme ts_alpha2, a second opinion on plain scenes, does not know."""
+"""What the scheme ts_alpha2 does not support; it is an independent check of plain scenes."""
 
 from __future__ import annotations
 

@@ -182,7 +182,7 @@ def _farthest(scene: Scene, line: LineData, number: int) -> tuple[float, float]:
         from catenary.mbs.vehicle.base_motion import BaseMotion
 
         base = BaseMotion(vehicle_of(scene.vehicle), start, speed)
-    # Extremes are at supports, unless the vehicle sways: then every 0.25 m and 20 ms are looked at.
+    # Extremes are at supports, unless the vehicle sways: then every 0.25 m and 20 ms are sampled.
     supports = line.support_positions
     times = np.concatenate(
         [[0.0, duration], *((supports - start - one) / speed for one in offsets)]

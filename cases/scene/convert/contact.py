@@ -16,7 +16,7 @@ _EXPONENT = 1.5
 
 
 def contact_law_of(table: ContactTable, static_force: float) -> ContactLaw:
-    """The law that a table asks for.
+    """The law of a table.
 
     ``static_force`` [N] is the force at which Hertz's spring has the secant ``stiffness_N_per_m``.
     """

@@ -1,4 +1,4 @@
-"""From a scene's incidents to what the solver and the pantographs know of them, in SI units."""
+"""From a scene's incidents to those of the line and of the pantographs, in SI units."""
 
 from __future__ import annotations
 

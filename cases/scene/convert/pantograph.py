@@ -74,7 +74,7 @@ def static_force(name: str, table: PantographTable, speed_km_h: float) -> float 
 
 
 def wanted_force(table: PantographTable, speed_km_h: float) -> float | None:
-    """Static force [N] that a table asks for at a speed, None if it has none for it."""
+    """Static force [N] of a table at a speed, None if it has none for it."""
     if table.static_force_N is not None:
         return table.static_force_N
     if table.static_force_by_speed is None:

@@ -23,7 +23,7 @@ class SceneError(InputError):
 
     Attributes
     ----------
-    faults : at least one, the most telling first, at most ``MOST_TOLD``
+    faults : at least one, the most likely cause first, at most ``MOST_TOLD``
     more : how many others there are
     """
 

@@ -84,5 +84,5 @@ def _pairs(path: Path, where: str) -> list[list[float]]:
 
 
 def _named(name: str) -> str:
-    """A file's name, whole as long as it can be one: its end tells most."""
+    """A file's name, whole if it can be one, otherwise its end."""
     return f'"{name}"' if len(name) <= _LONGEST_NAME and name.isprintable() else shown(name)

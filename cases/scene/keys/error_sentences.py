@@ -33,7 +33,7 @@ def refuse(origin: Origin, key: str, value: object, why: str) -> NoReturn:
 
 
 def unknown_key(key: str, where: str, known: list[str]) -> str:
-    """The sentence for a key that the scene does not know."""
+    """The sentence for an unknown key."""
     near = nearest(key, known)
     if key.startswith("petsc."):
         hint = f"; did you mean {near}?" if near and near.startswith("petsc.") else ""
@@ -47,7 +47,7 @@ def _or(listed: str) -> str:
     return " or ".join(listed.rsplit(", ", 1))
 
 
-# What pydantic's error types ask for, completed with the error's own limits.
+# What pydantic's error types require, completed with the error's own limits.
 _WANTED: dict[str, Callable[[dict[str, Any]], str]] = {
     "greater_than": lambda c: f"must be greater than {c['gt']:g}",
     "greater_than_equal": lambda c: f"must be at least {c['ge']:g}",

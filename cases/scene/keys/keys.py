@@ -1,4 +1,4 @@
-"""All keys that a scene knows, and the nearest known one to a misspelt key."""
+"""All keys of a scene, and the nearest one to a misspelt key."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ def nearest(key: str, known: list[str]) -> str | None:
 
 
 def _without_unit(name: str) -> str:
-    """A key's last part as one types it who forgets the unit at its end."""
+    """A key's last part without the unit at its end."""
     return next((name.removesuffix(end) for end in SUFFIXES if name.endswith(end)), name)
 
 

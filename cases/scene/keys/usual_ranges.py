@@ -57,7 +57,7 @@ def usual_range(key: str) -> tuple[float, float] | None:
 
 
 def unit_guess(key: str, value: float) -> str:
-    """What is said of a number whose unit is probably another one, "" if that is not so."""
+    """The sentence on a number whose unit is probably another one, "" for others."""
     usual, unit = usual_range(key), unit_of(key)
     # Sideways and below there are negative numbers, of which only the size can be a slip.
     size = abs(value) if key.startswith(_SIGNED) else value

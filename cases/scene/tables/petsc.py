@@ -90,7 +90,7 @@ class PetscTable(Table):
         return self.model_dump(exclude_none=True)
 
 
-# What is said of every other option.
+# The end of the sentence on any other option.
 ELSEWHERE = (
     "is no PETSc option that a scene may give: solver options with bounded values only; all others "
     "stand on the command line after --"

@@ -1,4 +1,4 @@
-"""What runs of different settings say of accuracy: errors, orders, Pareto front, advice.
+"""Accuracy from runs of different settings: errors, orders, Pareto front, advice.
 
 Pure functions on figures that are there already; ``cases/studies/accuracy/runs.py`` makes the runs.
 """
@@ -16,7 +16,7 @@ from catenary.solver.base.errors import InputError
 
 
 class Quantity(NamedTuple):
-    """A figure whose error is looked at: its key in a summary, its unit, and the figure of the
+    """A figure whose error is measured: its key in a summary, its unit, and the figure of the
     reference that makes 100 %."""
 
     key: str

@@ -214,7 +214,7 @@ def _alpha(integrator: str, radius: float) -> Level:
 
 
 def _ts_alpha2(radius: float) -> Level:
-    """PETSc's own stepper, which runs on one rank and knows plain scenes only."""
+    """PETSc's own stepper, which runs on one rank and takes plain scenes only."""
     own = _alpha("generalized_alpha", radius).assignments[len(_ONE_SOLVE) :]
     keys = ("numerics.coupling=", "numerics.iterations=", "numerics.scheme=ts_alpha2")
     return Level(f"ts_alpha2_{radius:g}", (*keys, *own))

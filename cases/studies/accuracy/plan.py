@@ -1,4 +1,4 @@
-"""Which runs ``catenary accuracy`` needs: each setting once, whichever axes ask for it."""
+"""Which runs ``catenary accuracy`` needs: each setting once, whichever axes need it."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def make_plan(
     ------
     InputError
         If the case itself or a reference is wrong. A level that is not possible for it is left
-        out, and told.
+        out, and reported.
     """
     overrides = [*overrides, *_ALWAYS]
     scene = load_scene(case, overrides, shortened)

@@ -28,7 +28,7 @@ _SAME = 1e-4
 
 
 class Criterion(NamedTuple):
-    """What was measured: ``value`` must lie on the side of ``limit`` that ``passed`` tells."""
+    """A figure and its limit; ``passed`` if ``value`` lies on the right side of ``limit``."""
 
     case: str
     name: str

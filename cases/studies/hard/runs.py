@@ -50,7 +50,7 @@ class Watched:
     time : (n,) [s]; position, force, height, wire : (n, n_pantographs) [m], [N], [m], [m]
     taut : (n, n_droppers) whether a dropper carries anything; only on one rank
     energy : (n,) of the line [J]; work : (n,) of the contact forces on it since the start [J];
-        both empty unless asked for
+        both empty without ``with_work``
     damping_terms : (n,) what numerical damping adds to the energy in the balance [J], see
         `LineBalance`; empty like these
     one_switch : the most that one dropper may have made in one switch [J], see `LineBalance`
@@ -148,7 +148,7 @@ class LineBalance:
     def damping_terms(self, states: Mapping[str, np.ndarray], taut: np.ndarray) -> np.ndarray:
         """What numerical damping adds to the energy of states (k, n_dofs) each [J], shape (k,).
 
-        ``taut`` (k, n_droppers) tells which droppers carry anything.
+        ``taut`` (k, n_droppers) are the droppers that carry anything.
         """
         found = np.zeros(taut.shape[0])
         for of, matrix in self._terms:

@@ -121,5 +121,5 @@ def _key(name: str) -> str:
 
 
 def _list(values: tuple[float, ...]) -> str:
-    # TOML wants a point or an exponent in a float, and takes an integer for one as well.
+    # A float of TOML has a point or an exponent, and takes an integer for one as well.
     return "[" + ", ".join(f"{value:.6g}" for value in values) + "]"

@@ -23,7 +23,7 @@ UNMOVED = 1e-6
 
 
 class Range(NamedTuple):
-    """Frequencies asked for: from ``low`` to ``high`` [Hz], ``n_points`` of them, geometric.
+    """Frequencies of the table: from ``low`` to ``high`` [Hz], ``n_points`` of them, geometric.
 
     ``fit_low`` [Hz]: a lumped model is fitted from there on.
     """

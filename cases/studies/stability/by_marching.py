@@ -46,7 +46,7 @@ class Bench:
     comm: Any
 
     def problem(self, coupling: str, stiffness: float, head_mass: float, dt: float) -> Problem:
-        """A head [kg] on a contact [N/m], for as many steps of ``dt`` [s] as tell stability."""
+        """A head [kg] on a contact [N/m], for as many steps of ``dt`` [s] as show stability."""
         usual = self.rest.problem
         height = float(rest_height(self.rest, np.array([self.x]))[0])
         data = LumpedData(
@@ -118,7 +118,7 @@ class Bench:
 
 
 class _Growth:
-    """Observer that tells whether a contact force has passed a bound [N]."""
+    """Observer that checks whether a contact force has passed a bound [N]."""
 
     def __init__(self, bound: float) -> None:
         self._bound = bound

@@ -38,7 +38,7 @@ STABLE = 1.0 + 1e-6
 
 @dataclass(frozen=True)
 class PointModel:
-    """The line as a force on one point of the contact wire sees it.
+    """The line reduced to one point of the contact wire.
 
     ``stiffness`` and ``damping`` (n, n) for a mass matrix of ones; ``load`` (n,) of a unit force,
     and height there of unit displacements [1/sqrt(kg)].
@@ -117,7 +117,7 @@ def lightest_place(model: Model, wire: ContactWire, low: float, high: float) -> 
 
 
 def point_model(model: Model, load: np.ndarray, n_vectors: int = N_VECTORS) -> PointModel:
-    """The line as a force with this ``load`` (n_dofs,) sees it. Not collective."""
+    """The line reduced to a force with this ``load`` (n_dofs,). Not collective."""
     mass, stiffness, damping = matrices(model)
     factor = splu(mass)
     start = factor.solve(load)

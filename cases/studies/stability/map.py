@@ -48,10 +48,10 @@ _LINEAR = (
     "effects.residual_dropper_stiffness=false",
     "effects.dropper_slackening=false",
 )
-# Steps that are looked at [s], and how closely a limit is found by marching.
+# Steps of the map [s], and how closely a limit is found by marching.
 STEPS_RANGE = (1e-5, MAX_DT)
 RESOLUTION = 0.02
-# Theory is asked for longer ones too, so that curves leave the map where they do.
+# Theory covers longer ones too, so that curves leave the map where they do.
 _THEORY_RANGE = (STEPS_RANGE[0], 4.0 * MAX_DT)
 # First change of an iterate in depths at the start: slopes of an element are some 3 / m of it.
 _START = 10.0

@@ -102,7 +102,7 @@ def _cell(value: Any) -> Any:
 
 
 def as_text(ended: Sequence[Ended]) -> str:
-    """The table for a terminal: the figures that one wants to see at once."""
+    """The table for a terminal: the most important figures."""
     width = max(len(one.variant.name) for one in ended)
     lines = [
         f"{'variant':{width}}  {'pantograph':12}{'mean':>8}{'std':>8}{'max':>8}{'min':>8}  [N]"

@@ -116,7 +116,7 @@ def _run(
 
 
 def _leave_record(job: Job, folder: Path, measure: Measure | None, wall: float) -> dict[str, Any]:
-    """Take the measures and write what tells a later sweep that this one is done."""
+    """Take the measures and write the record by which a later sweep skips this run."""
     measured: dict[str, Any] = {}
     if measure is not None:
         with Results(folder) as results:
@@ -187,7 +187,7 @@ def _refuse_other_run(folder: Path, wanted: dict[str, Any]) -> None:
 
 
 def _figures(ended: Ended) -> str:
-    """The figures of a variant that one wants to see at once, or what broke."""
+    """The most important figures of a variant, or what broke."""
     if not ended.done:
         return f"BROKE: {ended.outcome}"
     parts = []

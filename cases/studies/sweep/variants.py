@@ -156,7 +156,7 @@ def _with_own_folders(variants: list[Variant]) -> list[Variant]:
     for variant in variants:
         name = slug(variant.name)
         number = 2
-        while name.lower() in taken:  # some file systems do not tell capitals
+        while name.lower() in taken:  # some file systems ignore case
             name = f"{slug(variant.name)}-{number}"
             number += 1
         taken.add(name.lower())
@@ -190,7 +190,7 @@ def read_named(path: Path) -> dict[str, list[str]]:
 
 
 def check_keys(variants: Sequence[Variant], where: str) -> None:
-    """Raise InputError if an assignment of a variant has a key that the scene does not know."""
+    """Raise InputError if an assignment of a variant has an unknown key."""
     from catenary.cases.scene.scene import Scene
 
     known = known_keys(Scene)
