@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from catenary.meshgen.line import Role, Wire
+from catenary.solver.effects.all_effects import simulated
 from catenary.solver.problem.contact_laws import ContactLaw, HertzLaw, LinearLaw
 from catenary.solver.problem.integrator_parameters import Integration, integration_of
 from catenary.solver.time_loop.channels import PANTOGRAPH, RUN
@@ -95,7 +96,7 @@ def _contact(source: Derivation) -> Wire:
 
 
 def _damping(source: Derivation, component: str) -> tuple[float, float]:
-    own = source.problem.damping
+    own = simulated(source.problem).damping
     return own.per_component.get(component, (own.alpha, own.beta))
 
 
@@ -238,6 +239,12 @@ FACTS: dict[str, Fact] = {
             (_damping(source, group.name)[0] for group in source.problem.line.droppers),
             default=0.0,
         ),
+    ),
+    "slack_stiffness_share": Fact(
+        "-",
+        "share of its stiffness that a pushed dropper keeps, 1 where droppers do not slacken",
+        lambda source: simulated(source.problem).kept_ratio,
+        high=1.0,
     ),
     "static_force": Fact(
         "N",

@@ -267,7 +267,11 @@ def _droppers(results: Results) -> DropperStatistics:
     lowest, highest = results.extremes("dropper_force")
     evaluated = _inside(x, results.evaluation)
     # Droppers that may push, or that carry nothing at rest, do not slacken at zero force.
-    slackens = any(name == "dropper_slackening" for name, *_ in results.attributes["effects_on"])
+    kept = results.fact("slack_stiffness_share")
+    slackens = kept < 1.0
+    if np.isnan(kept):  # a file without this fact, of a version with one effect for it
+        on = results.attributes["effects_on"]
+        slackens = any(name == "dropper_slackening" for name, *_ in on)
     return DropperStatistics(
         x,
         highest,

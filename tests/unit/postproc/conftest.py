@@ -107,7 +107,7 @@ def make_problem(line: Line, n_pantographs: int, **changes: Any) -> Problem:
         numerics=Numerics(changes["dt"], "one_solve", 0.25, 0.5, 1e-6, 1e-6, 10),
         evaluation=EVALUATION,
         residual_stiffness_ratio=0.0,
-        effects=frozenset(),
+        effects=frozenset({"structural_damping", "dropper_slackening"}),
     )
 
 

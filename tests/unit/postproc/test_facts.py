@@ -22,6 +22,7 @@ from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.lumped_data import LumpedData
 from catenary.postproc.channels.facts import FACTS, facts_of
 from catenary.postproc.evaluate.error_indicators import as_table, indicate
+from catenary.postproc.evaluate.statistics import evaluate
 from catenary.postproc.files.checked import seal_arrays
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.report import write_report
@@ -110,6 +111,19 @@ def test_damping_of_a_component_goes_before_that_of_the_line(
     assert found["contact_wire_mass_damping"] == 0.0125
 
 
+def test_what_is_not_simulated_is_no_fact(problem: Problem, derived: Any) -> None:
+    """Neither damping nor the stiffness of slack droppers that the scene leaves out."""
+    assert derived(problem)["slack_stiffness_share"] == 0.0
+    keeping = problem.effects | {"residual_dropper_stiffness"}
+    kept = replace(problem, effects=keeping, residual_stiffness_ratio=0.01)
+    assert derived(kept)["slack_stiffness_share"] == 0.01
+    found = derived(replace(problem, effects=frozenset()))
+    assert found["slack_stiffness_share"] == 1.0
+    damping = "contact_wire_stiffness_damping", "contact_wire_mass_damping"
+    for name in (*damping, "dropper_stiffness_damping"):
+        assert derived(problem)[name] > found[name] == 0.0
+
+
 def test_the_shortest_step_is_a_power_of_two_of_the_record_s(
     problem: Problem, derived: Any
 ) -> None:
@@ -175,6 +189,18 @@ def test_an_earlier_file_with_an_impossible_step_is_refused(
         file.attrs["dt_s"] = 0.0
     with pytest.raises(InputError, match=r'attribute "dt_s" holds 0 in place of 1e-12 to 1000 s'):
         Results(path)
+
+
+def test_droppers_of_a_file_without_their_share_slacken_by_its_effects(
+    run_folder: Path, tmp_path: Path
+) -> None:
+    path = Path(shutil.copy(run_folder / "run.h5", tmp_path))
+    with h5py.File(path, "r+") as file:
+        del file["facts/slack_stiffness_share"]
+        seal_arrays(file["facts"], {own: values[()] for own, values in file["facts"].items()})
+    with Results(path) as results, Results(run_folder) as before:
+        slackened = evaluate(before).droppers.n_slackened
+        assert evaluate(results).droppers.n_slackened == slackened > 0
 
 
 @pytest.mark.parametrize("name", ["stiffest_dropper", "mass_weight"])
