@@ -7,9 +7,10 @@ how they are compiled.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from catenary.solver.contact.line_response import COUPLINGS, FLAGS, NUMBER, TENSION
 from catenary.solver.integrators.state_kernels import (
     compiled,
     displacement_at,
@@ -17,6 +18,7 @@ from catenary.solver.integrators.state_kernels import (
     velocity_at,
 )
 from catenary.solver.model.shape_functions import shape_slopes, shape_values
+from catenary.solver.model.switching_links import LinkArrays
 
 # A node of the contact wire: where it is along the track [m]; of its unknowns (w, theta_y) the
 # numbers on this rank, 0 where another rank owns them, whether this one does, and what they are at
@@ -52,6 +54,37 @@ TOUCH = np.dtype(
         ("filled", np.int64, (2,)),
     ]
 )
+
+
+class Answers(NamedTuple):
+    """The line's accelerations by a unit force at each of n contacts.
+
+    ``by_force`` (n, n_local); their derivatives along the track, ``slope`` of the same shape, or
+    without columns where no law needs rates.
+    """
+
+    by_force: np.ndarray
+    slope: np.ndarray
+
+
+class Gains(NamedTuple):
+    """What answers are worth within a step: of an acceleration ``position`` [s2] and ``velocity``
+    [s]; the ``train_speed`` [m/s] of the convective part of rates; how far off links answer to a
+    force, ``reach`` [m]."""
+
+    train_speed: float
+    position: float
+    velocity: float
+    reach: float
+
+
+class Followed(NamedTuple):
+    """Links that a rank follows: their ``numbers`` (n,) in the line, ``links`` (``LinkArrays``) and
+    ``reserve`` (n,) [N], as a free step leaves it."""
+
+    numbers: np.ndarray
+    links: LinkArrays
+    reserve: np.ndarray
 
 
 @compiled
@@ -98,31 +131,30 @@ def clear(answer, low, high):
 
 
 @compiled
-def place(x, nodes, data, touches, answers, slope_answers):
-    """Make ``touches`` those at places ``x`` (n,) [m], and ``answers`` (n, n_local) the line's
-    accelerations by a unit force at each.
+def place(x, nodes, data, touches, answers):
+    """Make ``touches`` those at places ``x`` (n,) [m], and ``answers`` those to forces there.
 
-    ``slope_answers`` are the answers' derivatives along the track, left alone if it has no columns;
     ``data`` holds the columns of the nodes.
     """
+    by_force, slope = answers
     for i in range(x.size):
         low, high = touches[i].filled
-        clear(answers[i], low, high)
-        if slope_answers.shape[1] > 0:
-            clear(slope_answers[i], low, high)
+        clear(by_force[i], low, high)
+        if slope.shape[1] > 0:
+            clear(slope[i], low, high)
     locate(x, nodes, touches)
     for i in range(x.size):
         touch = touches[i]
-        low, high = answers.shape[1], 0
+        low, high = by_force.shape[1], 0
         for side in range(2):
             node = nodes[touch.element + side]
             if node.width == 0:
                 continue
             by_height, by_slope = touch.whole_value[2 * side], touch.whole_value[2 * side + 1]
-            add_columns(node, data, by_height, by_slope, answers[i])
-            if slope_answers.shape[1] > 0:
+            add_columns(node, data, by_height, by_slope, by_force[i])
+            if slope.shape[1] > 0:
                 by_height, by_slope = touch.whole_slope[2 * side], touch.whole_slope[2 * side + 1]
-                add_columns(node, data, by_height, by_slope, slope_answers[i])
+                add_columns(node, data, by_height, by_slope, slope[i])
             low = min(low, node.begin)
             high = max(high, node.begin + node.width)
         touch.filled[0], touch.filled[1] = min(low, high), high
@@ -156,151 +188,117 @@ def answer_at(local, weights, answer):
 
 
 @compiled
-def meet(
-    motion,
-    touches,
-    train_speed,
-    position_factor,
-    velocity_factor,
-    answers,
-    slope_answers,
-    numbers,
-):
-    """A rank's share of heights, rates and what forces change of both; ``numbers`` as for
-    ``inner_kernels.gap``.
+def meet(motion, touches, gains, answers, line):
+    """A rank's share of heights, rates and what forces add to both, into ``line`` (``Affine``).
 
-    Returns whether heights and rates are numbers.
+    Returns whether heights and rates are finite.
     """
-    n = touches.size
-    height, rate, by_force, rate_by_force = parts(numbers, n)
-    heights(motion, touches, train_speed, height, rate)
+    by_force, by_slope = answers
+    heights(motion, touches, gains.train_speed, line.place, line.rate)
     total = 0.0
-    for i in range(n):
+    for i in range(touches.size):
         touch = touches[i]
-        total += height[i] + rate[i]
-        for j in range(n):
-            by_value = answer_at(touch.local, touch.value, answers[j])
-            by_force[i, j] = position_factor * by_value
-            if slope_answers.shape[1] > 0:
-                by_slope = answer_at(touch.local, touch.slope, answers[j])
-                rate_by_force[i, j] = (
-                    train_speed * position_factor * by_slope + velocity_factor * by_value
+        total += line.place[i] + line.rate[i]
+        for j in range(touches.size):
+            by_value = answer_at(touch.local, touch.value, by_force[j])
+            line.by_force[i, j] = gains.position * by_value
+            if by_slope.shape[1] > 0:
+                along = answer_at(touch.local, touch.slope, by_slope[j])
+                line.rate_by_force[i, j] = (
+                    gains.train_speed * gains.position * along + gains.velocity * by_value
                 )
     return np.isfinite(total)
 
 
 @in_line
-def n_beyond(force, margin):
-    """How many forces are below a margin, or no numbers."""
+def n_beyond(reserve, margin):
+    """How many reserves are below a margin, or not finite."""
     count = 0
-    for d in range(force.size):
-        count += not (margin <= force[d] < np.inf)
+    for d in range(reserve.size):
+        count += not (margin <= reserve[d] < np.inf)
     return count
 
 
-@compiled
-def watch(
-    force,
-    limits,
-    numbers,
-    ends,
-    laws,
-    touches,
-    reach,
-    answers,
-    slope_answers,
-    train_speed,
-    position_factor,
-    velocity_factor,
-    rows,
-):
-    """Number of droppers whose tension may fall below a margin; a row each, as far as they fit.
+@in_line
+def spread(link, links, answer):
+    """Stretch of a link in an answer (n_local,)."""
+    unknowns, weights, _ = links
+    link = np.uint64(link)
+    total = weights[link, 0] * answer[np.uint64(unknowns[link, 0])]
+    total += weights[link, 1] * answer[np.uint64(unknowns[link, 1])]
+    for k in range(2, unknowns.shape[1]):
+        total += weights[link, k] * answer[unknowns[link, k]]
+    return total
 
-    ``force`` (n,) is their tension if they could push; they stand in the order along the track.
-    Contact i may press with up to ``limits[i]``, and touches those within ``reach`` of it; the last
-    of the limits is the margin. -1 if a tension is no number.
+
+@compiled
+def watch(followed, bounds, touches, answers, gains, rows):
+    """Number of links that may switch within ``bounds``; a row each, as far as they fit.
+
+    ``followed`` links stand in the order along the track, with their reserve without contact
+    forces. Contacts touch those within reach. -1 if a reserve is not finite.
     """
-    count, n, uses_rate = 0, touches.size, slope_answers.shape[1] > 0
-    margin = limits[n]
+    numbers, links, reserve = followed
+    by_force, by_slope = answers
+    laws, limits, margin = links.law, bounds.force, bounds.loss[0]
+    count, n, uses_rate = 0, touches.size, by_slope.shape[1] > 0
     low, high = touches[0].x, touches[0].x
     for i in range(1, n):
         low, high = min(low, touches[i].x), max(high, touches[i].x)
-    first = np.searchsorted(laws[:, 3], low - reach)
-    last = np.searchsorted(laws[:, 3], high + reach, side="right")
+    first = np.searchsorted(laws.place, low - gains.reach)
+    last = np.searchsorted(laws.place, high + gains.reach, side="right")
     # Mostly none is near its margin by itself: then those beyond reach are not looked at.
     begin, end = first, last
-    if n_beyond(force, margin):
-        begin, end = 0, force.size
+    if n_beyond(reserve, margin):
+        begin, end = 0, reserve.size
     for d in range(begin, end):
-        # Also true for what is no number.
-        candidate = not (margin <= force[d] < np.inf)
+        # Also true for NaN.
+        candidate = not (margin <= reserve[d] < np.inf)
         if not (candidate or first <= d < last):
             continue
-        if not np.isfinite(force[d]):
+        if not np.isfinite(reserve[d]):
             return -1
-        per_acceleration = laws[d, 1] * position_factor + laws[d, 2] * velocity_factor
-        upper, lower = ends[d, 0], ends[d, 1]
+        law = laws[d]
+        if law.released == 0.0:
+            continue
+        per_acceleration = law.stiffness * gains.position + law.damping * gains.velocity
         if not candidate:
             for i in range(n):
-                if abs(laws[d, 3] - touches[i].x) <= reach:
-                    spread = answers[i, upper] - answers[i, lower]
-                    if force[d] + per_acceleration * spread * limits[i] < margin:
+                if abs(law.place - touches[i].x) <= gains.reach:
+                    change = per_acceleration * spread(d, links, by_force[i])
+                    if reserve[d] + change * limits[i] < margin:
                         candidate = True
                         break
         if not candidate:
             continue
-        if count < rows.shape[0]:
-            row = rows[count]
-            row[NUMBER], row[TENSION] = numbers[d], force[d]
+        if count < rows.number.size:
+            rows.number[count], rows.reserve[count] = numbers[d], reserve[d]
             for i in range(n):
-                spread = answers[i, upper] - answers[i, lower]
-                row[COUPLINGS + i] = per_acceleration * spread
-                row[COUPLINGS + n + i] = position_factor * spread
-                row[COUPLINGS + 2 * n + i] = 0.0
+                apart = spread(d, links, by_force[i])
+                rows.reaction[count, i] = per_acceleration * apart
+                rows.lift[count, i] = gains.position * apart
+                rows.rise[count, i] = 0.0
                 if uses_rate:
-                    slopes = slope_answers[i, upper] - slope_answers[i, lower]
-                    row[COUPLINGS + 2 * n + i] = (
-                        velocity_factor * spread + train_speed * position_factor * slopes
+                    along = spread(d, links, by_slope[i])
+                    rows.rise[count, i] = (
+                        gains.velocity * apart + gains.train_speed * gains.position * along
                     )
         count += 1
     return count
 
 
 @compiled
-def respond(
-    motion,
-    touches,
-    train_speed,
-    position_factor,
-    velocity_factor,
-    reach,
-    answers,
-    slope_answers,
-    limits,
-    numbers,
-    ends,
-    laws,
-    force,
-    summed,
-    rows,
-):
-    """A rank's share of the inner problem, see ``LineResponse``; droppers as for ``watch``."""
-    n = touches.size
-    finite = meet(
-        motion, touches, train_speed, position_factor, velocity_factor, answers, slope_answers,
-        summed[FLAGS : FLAGS + 2 * n * (1 + n)],
-    )  # fmt: skip
-    # What is no number anywhere is one at the next dropper in the step after.
+def respond(motion, touches, gains, answers, bounds, followed, share):
+    """A rank's share of the small problem; links as for ``watch``."""
+    finite = meet(motion, touches, gains, answers, share.line)
+    # A NaN elsewhere reaches the reserve of a link one step later and is caught there.
     count = -1
     if finite:
-        count = watch(
-            force, limits, numbers, ends, laws, touches, reach, answers, slope_answers,
-            train_speed, position_factor, velocity_factor, rows,
-        )  # fmt: skip
-    room = rows.shape[0]
-    summed[0] = min(max(count, 0), room)
-    summed[2] = count < 0
-    summed[3] = count if count > room else 0
+        count = watch(followed, bounds, touches, answers, gains, share.rows)
+    room, flags = share.rows.number.size, share.flags[0]
+    flags.rows = min(max(count, 0), room)
+    flags.broken = count < 0
+    flags.missing = count if count > room else 0
 
 
 @compiled
@@ -311,12 +309,13 @@ def superpose(force, answers, touches, motion, gains):
     ``LineState``, the former as it is read.
     """
     x, y, z, _ = motion
+    by_force = answers.by_force
     for i in range(force.size):
         f = force[i]
         if f != 0.0:
             low, high = touches[i].filled
             for j in range(low, high):
-                change = f * answers[i, j]
+                change = f * by_force[i, j]
                 z[j] += gains[2] * change
                 x[j] += gains[0] * change
                 y[j] += gains[1] * change
@@ -324,10 +323,10 @@ def superpose(force, answers, touches, motion, gains):
 
 @compiled
 def compensate(numbers, compensation, start, offset, data, motion, gains):
-    """Add the answers to compensations of some droppers to the state.
+    """Add the answers to compensations of some links to the state.
 
-    ``data[offset[d] : offset[d + 1]]`` is the column of dropper d from the local unknown
-    ``start[d]`` on; the rest as for ``superpose``.
+    ``data[offset[d] : offset[d + 1]]`` is the column of link d from the local unknown ``start[d]``
+    on; the rest as for ``superpose``.
     """
     x, y, z, _ = motion
     for k in range(numbers.size):
@@ -342,13 +341,6 @@ def compensate(numbers, compensation, start, offset, data, motion, gains):
 
 
 @compiled
-def parts(numbers, n):
-    """Depth, rate, by_force and rate_by_force of n contacts from what ``gap`` filled."""
-    compliances = numbers[2 * n :].reshape((2, n, n))
-    return numbers[:n], numbers[n : 2 * n], compliances[0], compliances[1]
-
-
-@compiled
 def write_outputs(force, reported, heads, depth, ends, outputs):
     """Contact force, head height and wire height of each pantograph, then the force of each strip.
 
@@ -357,13 +349,12 @@ def write_outputs(force, reported, heads, depth, ends, outputs):
     the means of their heights.
     """
     n = ends.size - 1
-    head_height, _, compliance, _ = parts(heads, force.size)
     for p in range(n):
         total, mean, mean_of_wire = 0.0, 0.0, 0.0
         for i in range(ends[p], ends[p + 1]):
-            height = head_height[i]
+            height = heads.place[i]
             for j in range(ends[p], ends[p + 1]):
-                height -= compliance[i, j] * force[j]
+                height -= heads.by_force[i, j] * force[j]
             total += reported[i]
             mean += height
             mean_of_wire += height - depth[i]

@@ -1,36 +1,118 @@
-"""The line's side of the inner problem, as a rank sends it."""
+"""The line's side of the small problem of a step, as a rank sends it.
+
+What travels between ranks stands in two arrays of numbers; kernels and Python take named views of
+them.
+"""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-# Columns of a row of a dropper that may slacken, before its 3 n numbers for n contacts.
-NUMBER, TENSION, COUPLINGS = 0, 1, 2
-# Numbers before the answers in ``LineResponse.summed``: droppers with a row, wish to stop, whether
-# something is no number, droppers that there is no room for.
-FLAGS = 4
+# What adds up over ranks besides answers: links with a row, wishes to stop, ranks that hold NaN or
+# infinity, links that there is no room for.
+FLAGS = np.dtype(
+    [
+        ("rows", np.float64),
+        ("stop", np.float64),
+        ("broken", np.float64),
+        ("missing", np.float64),
+    ]
+)
+N_FLAGS = FLAGS.itemsize // 8
+
+
+class Affine(NamedTuple):
+    """Heights and their rates at n contacts as affine functions of the contact forces.
+
+    ``place`` (n,) [m] and ``rate`` (n,) [m/s] without forces, ``by_force`` (n, n) [m/N] and
+    ``rate_by_force`` (n, n) [m/(N s)]: what forces add to those of a line, and take off those of
+    heads and off depths.
+    """
+
+    place: np.ndarray
+    rate: np.ndarray
+    by_force: np.ndarray
+    rate_by_force: np.ndarray
+
+
+def affine(numbers: np.ndarray, n: int) -> Affine:
+    """Views of 2 n + 2 n^2 ``numbers``, in which the four stand one after the other."""
+    squares = numbers[2 * n : 2 * n * (1 + n)].reshape(2, n, n)
+    return Affine(numbers[:n], numbers[n : 2 * n], squares[0], squares[1])
+
+
+class Rows(NamedTuple):
+    """Links that may switch, and how contacts and they act on each other; views of one array.
+
+    ``number`` (m,) of the link; ``reserve`` (m,) [N] without contact forces; for each contact
+    ``reaction`` (m, n) [-], what a unit force there adds to the reserve, ``lift`` (m, n) [m/N] and
+    ``rise`` (m, n) [m/(N s)], what a unit compensation takes off height and rate there.
+    """
+
+    number: np.ndarray
+    reserve: np.ndarray
+    reaction: np.ndarray
+    lift: np.ndarray
+    rise: np.ndarray
+
+
+def rows_of(numbers: np.ndarray, n: int) -> Rows:
+    """Views of ``numbers`` (capacity, 2 + 3 n) for n contacts."""
+    couplings = (numbers[:, 2 + k * n : 2 + (k + 1) * n] for k in range(3))
+    return Rows(numbers[:, 0], numbers[:, 1], *couplings)
+
+
+class Bounds(NamedTuple):
+    """Within which forces whatever switches has a row: contact forces up to ``force`` (n,) [N], and
+    compensations elsewhere that take up to ``loss`` (1,) [N] off a reserve."""
+
+    force: np.ndarray
+    loss: np.ndarray
+
+
+class Coupled(NamedTuple):
+    """What the small problem needs of all links of the line, by their numbers.
+
+    ``band`` (n_links, 2 half + 1): ``band[e, d - e + half]`` is by how much a unit compensation of
+    link e takes off the reserve of link d; ``released`` (n_links,) share of what is beyond its
+    reserve that a link's compensation is; ``slackens`` (n_links,) whether it is one that slackens,
+    and no stop that closes; ``drop`` (n_links,) room to work, all zero before and after.
+    """
+
+    band: np.ndarray
+    released: np.ndarray
+    slackens: np.ndarray
+    drop: np.ndarray
+
+
+class Share(NamedTuple):
+    """What kernels fill in of a response: ``flags`` (1,) of ``FLAGS``, ``line`` and ``rows``."""
+
+    flags: np.ndarray
+    line: Affine
+    rows: Rows
 
 
 class LineResponse:
-    """Answers of the line to n contacts, and a row for each dropper that may slacken.
+    """Answers of the line to n contacts, and a row for each link that may switch.
 
     Attributes
     ----------
-    summed : everything that adds up over ranks, in one array; the others but ``rows`` are its views
-    height, rate : (n,) free wire height [m] and its total rate [m/s] at the contacts
-    height_by_force, rate_by_force : (n, n) B [m/N] and its rate [m/(N s)]
-    answers : (2 n + 2 n^2,) these four one after the other
+    summed : everything that adds up over ranks, in one array
+    line : Affine, free heights [m] and total rates [m/s] of the wire at the contacts; its views
     early_height, early_rate : (n,) what the line's motion extrapolates to, or (0,) if not asked
-    limits : (n + 1,) contact forces [N], and a margin [N] that slack droppers may take off others:
-        whatever goes slack within them has a row; kept by reference
-    rows : (capacity, 2 + 3 n): number of a dropper, tension T0 [N], and for the contacts Q [-], P
-        [m/N] and the rate of P [m/(N s)]
+    sent_rows : (capacity, 2 + 3 n) numbers of ``rows``
+    rows : Rows, its views
+    share : Share, what kernels fill in
+    bounds : Bounds; kept by reference
 
     Parameters
     ----------
-    n_contacts, capacity : how many contacts and droppers there is room for
+    n_contacts, capacity : how many contacts and links there is room for
     early : whether there is room for what the motion extrapolates to
-    limits : there are none if left out
+    bounds : there are none if left out
     """
 
     def __init__(
@@ -38,48 +120,42 @@ class LineResponse:
         n_contacts: int,
         capacity: int,
         early: bool = False,
-        limits: np.ndarray | None = None,
+        bounds: Bounds | None = None,
     ) -> None:
         n, n_early = n_contacts, n_contacts if early else 0
         self.n_contacts, self.capacity = n, capacity
-        sizes = (FLAGS, n, n, n * n, n * n, n_early, n_early)
+        sizes = (N_FLAGS, 2 * n * (1 + n), n_early, n_early)
         self.summed = np.zeros(sum(sizes))
-        parts = np.split(self.summed, np.cumsum(sizes)[:-1])
-        self._flags, self.height, self.rate = parts[:3]
-        self.height_by_force = parts[3].reshape(n, n)
-        self.rate_by_force = parts[4].reshape(n, n)
-        self.answers = self.summed[FLAGS : FLAGS + 2 * n * (1 + n)]
-        self.early_height, self.early_rate = parts[5:]
-        self.rows = np.zeros((capacity, COUPLINGS + 3 * n))
-        self.limits = np.full(n + 1, np.inf) if limits is None else limits
+        flags, answers, self.early_height, self.early_rate = np.split(
+            self.summed, np.cumsum(sizes)[:-1]
+        )
+        self.line = affine(answers, n)
+        self.sent_rows = np.zeros((capacity, 2 + 3 * n))
+        self.rows = rows_of(self.sent_rows, n)
+        self.share = Share(flags.view(FLAGS), self.line, self.rows)
+        self.bounds = bounds or Bounds(np.full(n, np.inf), np.full(1, np.inf))
 
     @property
     def count(self) -> int:
-        """Number of droppers that may slacken and have a row."""
-        return int(self._flags[0])
+        """Number of links that may switch and have a row."""
+        return int(self.summed[0])
+
+    @count.setter
+    def count(self, count: int) -> None:
+        self.summed[0] = count
 
     @property
     def flags(self) -> tuple[float, float, float, float]:
-        """The number of droppers with a row, whether a rank wants this step to be the last, whether
-        one holds something that is no number, and for how many droppers one had no room."""
-        count, stop, broken, missing = self._flags.tolist()
+        """The number of links with a row, whether a rank wants this step to be the last, whether
+        one holds NaN or infinity, and for how many links one had no room."""
+        count, stop, broken, missing = self.summed[:N_FLAGS].tolist()
         return count, stop, broken, missing
 
     def put_stop(self, stop: bool) -> None:
         """Say whether this rank wants this step to be the last."""
-        self._flags[1] = stop
+        self.summed[1] = stop
 
     @property
-    def droppers(self) -> np.ndarray:
-        """Numbers of the droppers with a row (m,)."""
-        return self.rows[: self.count, NUMBER].astype(np.int64)
-
-    @property
-    def tension(self) -> np.ndarray:
-        """T0 (m,) [N]."""
-        return self.rows[: self.count, TENSION]
-
-    def couplings(self, kind: int) -> np.ndarray:
-        """Q, P or the rate of P, for ``kind`` 0, 1 or 2, shape (m, n)."""
-        begin = COUPLINGS + kind * self.n_contacts
-        return self.rows[: self.count, begin : begin + self.n_contacts]
+    def links(self) -> np.ndarray:
+        """Numbers of the links with a row (m,)."""
+        return self.rows.number[: self.count].astype(np.int64)

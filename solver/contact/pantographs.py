@@ -149,7 +149,7 @@ class Pantographs:
         if self.joints_in_loop:
             self.look_at_joints()
         contact_kernels.write_outputs(
-            contact_force, reported, self._heads.numbers, depth, self.ends, self.of_step
+            contact_force, reported, self._heads.affine, depth, self.ends, self.of_step
         )
 
     def records(self) -> np.ndarray | None:

@@ -1,14 +1,16 @@
-"""The small dense problem of a step: contact forces and slack droppers, solved exactly.
+"""The small dense problem of a step: contact forces and switching links, solved exactly.
 
 All forces act through the line's and the pantographs' compliance within the step:
 
     h_i = h0_i + sum_j B_ij f_j - sum_d P_di s_d          wire height at contact i
     z_i = z0_i - sum_j C_ij f_j                           height of a strip of the head
-    T_d = T0_d + sum_j Q_dj f_j - sum_e G_de s_e          what dropper d would carry if it pushed
+    R_d = R0_d + sum_j Q_dj f_j - sum_e G_de s_e          reserve of link d
     f_i = max(0, law(delta_i, delta_i')),  delta = z - h  contact law
-    s_d = (1 - r) max(0, -T_d)                            compensation of a slack dropper (2.7)
+    s_d = released_d max(0, -R_d)                         compensation of a link (2.7)
 
-T_d is the tension, or that of the spring alone where dampers of slack droppers are kept in action.
+The reserve of a dropper is the tension that it would carry if it pushed, or that of its spring
+alone where dampers of slack droppers are kept in action; a share r of its stiffness may be kept,
+released = 1 - r. Stops and others with a gap: `model.switching_links`.
 
 With the law linear, or replaced by its tangent, this is a linear complementarity problem. Its
 matrix is a P-matrix, so that it has one solution, unless the convective part of a contact damper
@@ -20,15 +22,16 @@ found: Newton's method, which for a convex spring comes from one side and cannot
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from catenary.solver.base.bound import bound
 from catenary.solver.base.errors import NotConverged, RunBroken
 from catenary.solver.contact.head_states import Heads
-from catenary.solver.contact.line_response import LineResponse
+from catenary.solver.contact.line_response import Affine, Coupled, LineResponse, affine
 from catenary.solver.contact_problem import complementarity_kernels
+from catenary.solver.contact_problem.complementarity_kernels import SmallProblem, Unknowns
 from catenary.solver.contact_problem.law_tangents import LawInSteps
 
 # Mostly one or two rounds are needed; a set that cycles shows within a few.
@@ -41,19 +44,17 @@ _USUAL_TANGENTS = 12
 _ROUNDING = 8.0 * np.finfo(float).eps
 # What there is to say of a step that holds something that is no number.
 NOT_FINITE = "it has no finite solution; try a smaller numerics.dt_s"
-# Answers that no loop works on yet.
-_NOTHING: tuple[np.ndarray, np.ndarray] = (np.zeros(0), np.zeros(0))
-# Droppers that the arrays have room for at first.
+# Links that the arrays have room for at first.
 _FIRST_ROOM = 32
 
 
 class InnerSolution(NamedTuple):
     """What a step's forces are; the arrays are overwritten by the next step.
 
-    ``contact_force`` (n,) [N]; ``compensation`` (m,) [N] of the droppers with a row; ``depth`` (n,)
+    ``contact_force`` (n,) [N]; ``compensation`` (m,) [N] of the links with a row; ``depth`` (n,)
     [m] and its ``rate`` (n,) [m/s] at the contacts; ``rounds`` of all iterations; ``pivoted``
-    whether an active set cycled, so that pivoting had to find it; ``complete`` whether all droppers
-    that are slack had a row, the limits of the line's response being large enough.
+    whether an active set cycled, so that pivoting had to find it; ``complete`` whether all links
+    that have switched had a row, the bounds of the line's response being large enough.
     """
 
     contact_force: np.ndarray
@@ -70,20 +71,14 @@ class Gap:
 
     Attributes
     ----------
-    depth, rate : (n,) without forces [m], [m/s]
-    depth_by_force, rate_by_force : (n, n) what forces take off them [m/N], [m/(N s)]
-    numbers : (2 n + 2 n^2,) these four one after the other
+    affine : Affine of depths [m], their rates [m/s] without forces, and what forces take off them
     found : (2, n) depths and rates under the forces looked at last
     found_depth, found_rate : (n,) its rows
     line : whose answers these are
     """
 
     def __init__(self, n: int) -> None:
-        self._n = n
-        self.numbers = np.zeros(2 * n * (1 + n))
-        self.depth, self.rate = self.numbers[:n], self.numbers[n : 2 * n]
-        compliances = self.numbers[2 * n :].reshape(2, n, n)
-        self.depth_by_force, self.rate_by_force = compliances
+        self.affine = affine(np.zeros(2 * n * (1 + n)), n)
         self.found = np.zeros((2, n))
         self.found_depth, self.found_rate = self.found
         self.line = LineResponse(n, 0)
@@ -97,7 +92,7 @@ class Gap:
             If one of them is no number; it would compare as out of contact and go unnoticed.
         """
         self.line = line
-        if not complementarity_kernels.gap(heads.numbers, line.answers, self._n, self.numbers):
+        if not complementarity_kernels.subtract(heads.affine, line.line, self.affine):
             raise RunBroken(NOT_FINITE)
 
     def under(self, force: np.ndarray, slack: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -109,19 +104,20 @@ class Gap:
         RunBroken
             If one of them is no number: what was to give the forces has no solution.
         """
-        rows, found = self.line.rows, self.found
-        if not complementarity_kernels.under(self.numbers, rows, slack.size, force, slack, found):
+        rows = self.line.rows
+        if not complementarity_kernels.under(self.affine, rows, force, slack, self.found):
             raise RunBroken(NOT_FINITE)
         return self.found_depth, self.found_rate
 
     def rounding(self, force: np.ndarray, slack: np.ndarray) -> np.ndarray:
         """What depths [m] and rates [m/s] of ``under`` may be wrong by, (2, n)."""
-        pushed, line = np.abs(force), self.line
-        depth = np.abs(self.depth) + np.abs(self.depth_by_force) @ pushed
-        rate = np.abs(self.rate) + np.abs(self.rate_by_force) @ pushed
-        if slack.size:
-            depth += np.abs(line.couplings(1)).T @ np.abs(slack)
-            rate += np.abs(line.couplings(2)).T @ np.abs(slack)
+        pushed, m = np.abs(force), slack.size
+        size = Affine(*map(np.abs, self.affine))
+        depth = size.place + size.by_force @ pushed
+        rate = size.rate + size.rate_by_force @ pushed
+        if m:
+            depth += np.abs(self.line.rows.lift[:m]).T @ np.abs(slack)
+            rate += np.abs(self.line.rows.rise[:m]).T @ np.abs(slack)
         return _ROUNDING * np.stack([depth, rate])
 
 
@@ -133,23 +129,22 @@ class InnerProblem:
     Parameters
     ----------
     law : LawInSteps
-    kept_ratio : share r of its stiffness that a slack dropper keeps
-    band : (n_droppers, 2 half + 1), ``band[e, d - e + half]`` is G_de [-]; (0, 1) if droppers do
-        not slacken
+    coupled : all links of the line; none if no link switches
 
     Attributes
     ----------
     pivoted : whether an active set has cycled since this was last set to False
+    unknowns : room for the problem, another one when more links need some
     """
 
-    def __init__(self, law: LawInSteps, kept_ratio: float, band: np.ndarray) -> None:
+    def __init__(self, law: LawInSteps, coupled: Coupled) -> None:
         self.law = law
         self.gap = Gap(law.n)
         self._no_rounding = np.zeros((2, law.n))
-        self._released = 1.0 - kept_ratio
-        self._band, self._drop = band, np.zeros(band.shape[0])
+        self.coupled = coupled
         self.pivoted = False
         self._room = -1
+        self._bound_to: tuple[Affine | None, LineResponse | None]
         self._make_room(_FIRST_ROOM)
 
     def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
@@ -168,16 +163,15 @@ class InnerProblem:
     def slack_under(self, line: LineResponse, force: np.ndarray) -> np.ndarray:
         """Compensations (m,) [N] under given contact forces (n,) [N]."""
         n, m = self.law.n, line.count
-        if not m or not complementarity_kernels.any_pushed(line.rows, m, n, force):
+        if not m or not complementarity_kernels.any_switched(line.rows, m, force):
             return np.zeros(m)
         if m > self._room:
             self._make_room(m)
-        push = np.zeros((2, n))
-        complementarity_kernels.couple(
-            line.rows, m, n, self._released, self._band, push, self._matrix, self._right
-        )
-        matrix = self._matrix[n : n + m, n : n + m].copy()
-        right = self._right[n : n + m] - self._released * (line.couplings(0) @ force)
+        _, matrix, right, _ = self.unknowns
+        none = np.zeros(n)
+        complementarity_kernels.couple(line.rows, m, self.coupled, none, none, matrix, right)
+        right = right[n : n + m] - matrix[n : n + m, :n] @ force
+        matrix = matrix[n : n + m, n : n + m].copy()
         always, solution = np.zeros(m, dtype=bool), np.zeros(m)
         rounds = complementarity_kernels.settle(matrix, right, always, solution, _MAX_ROUNDS)
         if rounds <= 0:
@@ -186,10 +180,10 @@ class InnerProblem:
         return solution
 
     def covers(self, line: LineResponse, force: np.ndarray, slack: np.ndarray) -> bool:
-        """Whether all droppers that are slack under forces (n,) and compensations (m,) [N] had a
+        """Whether all links that have switched under forces (n,) and compensations (m,) [N] had a
         row."""
         return not complementarity_kernels.leaves_out(
-            force, slack, line.rows, line.limits, self._band, self._drop
+            force, slack, line.rows, line.bounds, self.coupled
         )
 
     def _with_law(self, line: LineResponse, heads: Heads) -> InnerSolution:
@@ -197,7 +191,7 @@ class InnerProblem:
         gap, law = self.gap, self.law
         # Without a force heads stand highest: from there Newton's method comes from one side.
         gap.put(line, heads)
-        law.linearise(gap.depth, gap.rate)
+        law.linearise(gap.affine.place, gap.affine.rate)
         rounds = 0
         for number in range(_MAX_TANGENTS):
             found = self._with_tangents(line, heads)
@@ -219,73 +213,62 @@ class InnerProblem:
         if m > self._room:
             self._make_room(m)
         gap.line = line
-        if self._bound_to[0] is not heads.numbers or self._bound_to[1] is not line.rows:
-            self._bind(heads, line)
+        if self._bound_to[0] is not heads.affine or self._bound_to[1] is not line:
+            # Mostly they are those of the step before.
+            self._bound_to = heads.affine, line
+            self._solve = bound(complementarity_kernels.solve, self.problem(heads.affine, line))
         rounds, size, finite, complete = self._solve()
+        always, matrix, right, solution = self.unknowns
+        force = solution[:n]
         if rounds <= 0:
             self.pivoted = True
-            matrix, right = self._matrix[:size, :size].copy(), self._right[:size].copy()
-            rounds = _pivot(matrix, right, self._always[:size], self._solution[:size]) - rounds
-            force = self._solution[:n]
-            if size == n and m and complementarity_kernels.any_pushed(line.rows, m, n, force):
-                size, rounds = self._with_all(line, rounds)
-            gap.under(force, self._solution[n:size])
-            complete = self.covers(line, force, self._solution[n:size])
+            rounds = self._pivot(size) - rounds
+            if size == n and m and complementarity_kernels.any_switched(line.rows, m, force):
+                # Contacts alone needed pivoting, too.
+                tangents, size = self.law.tangents, n + m
+                complementarity_kernels.couple(
+                    line.rows, m, self.coupled, tangents.by_depth, tangents.by_rate, matrix, right
+                )
+                rounds += self._pivot(size)
+            gap.under(force, solution[n:size])
+            complete = self.covers(line, force, solution[n:size])
         elif not finite:
             raise RunBroken(NOT_FINITE)
-        slack = self._solution[n:size] if size > n else self._no_slack
+        slack = solution[n:size]
         depth, rate = gap.found_depth, gap.found_rate
-        return InnerSolution(self._force, slack, depth, rate, rounds, self.pivoted, complete)
+        return InnerSolution(force, slack, depth, rate, rounds, self.pivoted, complete)
 
-    def _with_all(self, line: LineResponse, rounds: int) -> tuple[int, int]:
-        """Unknowns and rounds by pivoting, droppers included, where contacts alone needed it."""
-        n, size = self.law.n, self.law.n + line.count
-        complementarity_kernels.couple(
-            line.rows, line.count, n, self._released, self._band, self.law.tangents[2:],
-            self._matrix, self._right,
-        )  # fmt: skip
-        matrix, right = self._matrix[:size, :size].copy(), self._right[:size].copy()
-        rounds += _pivot(matrix, right, self._always[:size], self._solution[:size])
-        return size, rounds
-
-    def _bind(self, heads: Heads, line: LineResponse) -> None:
-        """Let the compiled loop work on these answers, mostly those of the step before."""
-        self._bound_to = heads.numbers, line.rows
-        self._solve = bound(complementarity_kernels.solve, *self.solving(heads.numbers, line))
-
-    def solving(self, heads: np.ndarray, line: LineResponse) -> tuple[Any, ...]:
-        """Arguments of ``inner_kernels.solve``; some are others when more droppers need room.
-
-        ``heads`` (2 n + 2 n^2,) are the numbers of a ``HeadState``.
-        """
-        return (
-            heads,
-            line.summed,
-            line.rows,
-            line.limits,
-            self.gap.numbers,
-            self.law.tangents,
-            self._released,
-            self._band,
-            self._always,
-            self._matrix,
-            self._right,
-            self._solution,
-            self.gap.found,
-            self._drop,
-            _MAX_ROUNDS,
+    def _pivot(self, size: int) -> int:
+        """Rounds that pivoting needs for the first ``size`` unknowns, whose solution it finds."""
+        always, matrix, right, solution = self.unknowns
+        return _pivot(
+            matrix[:size, :size].copy(), right[:size].copy(), always[:size], solution[:size]
         )
 
-    def _make_room(self, n_droppers: int) -> None:
+    def problem(self, heads: Affine, line: LineResponse) -> SmallProblem:
+        """Arguments of the kernel; ``unknowns`` are others when more links need room."""
+        return SmallProblem(
+            heads=heads,
+            line=line.line,
+            gap=self.gap.affine,
+            flags=line.share.flags,
+            rows=line.rows,
+            bounds=line.bounds,
+            tangents=self.law.tangents,
+            coupled=self.coupled,
+            unknowns=self.unknowns,
+            found=self.gap.found,
+            max_rounds=_MAX_ROUNDS,
+        )
+
+    def _make_room(self, n_links: int) -> None:
         n = self.law.n
-        self._room = max(n_droppers, 2 * self._room)
+        self._room = max(n_links, 2 * self._room)
         size = n + self._room
-        self._matrix, self._right = np.zeros((size, size)), np.zeros(size)
-        self._solution = np.zeros(size)
-        self._force, self._no_slack = self._solution[:n], self._solution[:0]
-        self._always = np.zeros(size, dtype=bool)
-        self._always[:n] = self.law.pulls
-        self._bound_to = _NOTHING
+        always = np.zeros(size, dtype=bool)
+        always[:n] = self.law.pulls
+        self.unknowns = Unknowns(always, np.zeros((size, size)), np.zeros(size), np.zeros(size))
+        self._bound_to = None, None
 
 
 def _pivot(matrix: np.ndarray, right: np.ndarray, always: np.ndarray, solution: np.ndarray) -> int:

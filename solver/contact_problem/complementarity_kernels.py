@@ -1,40 +1,92 @@
-"""The compiled loops of the inner problem: contact forces, slack droppers, contact laws.
+"""The compiled loops of the small problem: contact forces, switching links, contact laws.
 
 Not collective; see `complementarity` for the equations, `base.compiled` for how they are compiled.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from catenary.solver.base.compiled import compiled
-from catenary.solver.contact.contact_kernels import parts
-from catenary.solver.contact.line_response import COUPLINGS, FLAGS, NUMBER, TENSION
+from catenary.solver.contact.line_response import Affine, Bounds, Coupled, Rows
+
+
+class Tangents(NamedTuple):
+    """own f = offset + by_depth d + by_rate d' at n contacts, with depth d and rate d' of the gap
+    under forces f; (n,) each [-], [N], [N/m], [N s/m]."""
+
+    own: np.ndarray
+    offset: np.ndarray
+    by_depth: np.ndarray
+    by_rate: np.ndarray
+
+
+class Unknowns(NamedTuple):
+    """Room for the small problem with up to k unknowns: the contact forces, then compensations.
+
+    ``always`` (k,) tells which may have any sign.
+    """
+
+    always: np.ndarray
+    matrix: np.ndarray
+    right: np.ndarray
+    solution: np.ndarray
+
+
+class SmallProblem(NamedTuple):
+    """Arguments of ``solve``.
+
+    Attributes
+    ----------
+    heads, line, gap : Affine at the contacts of both sides, and of the depths between them
+    flags : (1,) of ``line_response.FLAGS``, of which the number of rows is read
+    rows : Rows of links that may switch
+    bounds : Bounds of these rows
+    tangents : of the contact law
+    coupled : all links
+    unknowns : room for the problem, in which the solution is left
+    found : (2, n) depths and rates at the contacts under the solution
+    max_rounds : of the active-set iteration
+    """
+
+    heads: Affine
+    line: Affine
+    gap: Affine
+    flags: np.ndarray
+    rows: Rows
+    bounds: Bounds
+    tangents: Tangents
+    coupled: Coupled
+    unknowns: Unknowns
+    found: np.ndarray
+    max_rounds: int
 
 
 @compiled
-def gap(heads, line, n, numbers):
-    """Depths and rates at n contacts without forces, and what forces take off them.
+def subtract(heads, line, gap):
+    """Depths and rates at the contacts without forces, and what forces take off them, into ``gap``.
 
-    Three arrays (2 n + 2 n^2,) of heights, rates, and what forces change of both: of ``heads``,
-    ``line``, and of the gap between them. Returns whether all of it are numbers.
+    Returns whether all of it is finite.
     """
-    total = 0.0
-    for i in range(numbers.size):
-        numbers[i] = heads[i] - line[i] if i < 2 * n else heads[i] + line[i]
-        total += numbers[i]
+    total, n = 0.0, gap.place.size
+    for i in range(n):
+        gap.place[i] = heads.place[i] - line.place[i]
+        gap.rate[i] = heads.rate[i] - line.rate[i]
+        total += gap.place[i] + gap.rate[i]
+        for j in range(n):
+            gap.by_force[i, j] = heads.by_force[i, j] + line.by_force[i, j]
+            gap.rate_by_force[i, j] = heads.rate_by_force[i, j] + line.rate_by_force[i, j]
+            total += gap.by_force[i, j] + gap.rate_by_force[i, j]
     return np.isfinite(total)
 
 
 @compiled
-def press(numbers, tangents, push, softness):
-    """Right-hand side and matrix of the contact forces when no dropper is slack.
-
-    ``tangents`` (4, n) are own f = offset + by_depth d + by_rate d' at each contact, with depth d
-    and rate d' of the gap under forces f.
-    """
+def press(gap, tangents, push, softness):
+    """Right-hand side and matrix of the contact forces when no link has switched."""
     own, offset, by_depth, by_rate = tangents
-    depth, rate, by_force, rate_by_force = parts(numbers, own.size)
+    depth, rate, by_force, rate_by_force = gap
     for i in range(depth.size):
         push[i] = offset[i] + by_depth[i] * depth[i] + by_rate[i] * rate[i]
         for j in range(depth.size):
@@ -43,8 +95,9 @@ def press(numbers, tangents, push, softness):
 
 
 @compiled
-def hertz(depth, rate, speed, stiffness, exponent, hysteresis, offset, by_depth, by_rate, force):
+def hertz(depth, rate, speed, stiffness, exponent, hysteresis, tangents, force):
     """Tangents of f = K d^n (1 + chi d' / d0') at each contact, with f and what f is less them."""
+    _, offset, by_depth, by_rate = tangents
     for i in range(depth.size):
         d = depth[i]
         if d <= 0.0:
@@ -62,37 +115,38 @@ def hertz(depth, rate, speed, stiffness, exponent, hysteresis, offset, by_depth,
 
 
 @compiled
-def any_pushed(rows, count, n, force):
-    """Whether contact forces alone leave any of the droppers in compression."""
+def any_switched(rows, count, force):
+    """Whether contact forces alone take any of the links beyond its reserve."""
     for d in range(count):
-        value = rows[d, TENSION]
-        for i in range(n):
-            value += rows[d, COUPLINGS + i] * force[i]
+        value = rows.reserve[d]
+        for i in range(force.size):
+            value += rows.reaction[d, i] * force[i]
         if value < 0.0:
             return True
     return False
 
 
 @compiled
-def couple(rows, count, n, released, band, push, matrix, right):
-    """The rows and columns of slack droppers beside those of the contacts, which stand there.
+def couple(rows, count, coupled, by_depth, by_rate, matrix, right):
+    """The rows and columns of links beside those of the n contacts, which stand there.
 
-    ``band[e, d - e + half]`` is by how much a unit compensation of dropper e takes off the
-    tension of dropper d; ``push`` (2, n) holds what depth and rate are worth at each contact.
+    ``by_depth`` and ``by_rate`` (n,) are what depth and rate are worth at each contact.
     """
+    band, n = coupled.band, by_depth.size
     half = band.shape[1] // 2
     for d in range(count):
-        row = n + d
-        right[row] = -released * rows[d, TENSION]
+        row, number = n + d, int(rows.number[d])
+        released = coupled.released[number]
+        right[row] = -released * rows.reserve[d]
         for i in range(n):
-            matrix[row, i] = released * rows[d, COUPLINGS + i]
-            lifted, rising = rows[d, COUPLINGS + n + i], rows[d, COUPLINGS + 2 * n + i]
-            matrix[i, row] = -(push[0, i] * lifted + push[1, i] * rising)
+            matrix[row, i] = released * rows.reaction[d, i]
+            matrix[i, row] = -(by_depth[i] * rows.lift[d, i] + by_rate[i] * rows.rise[d, i])
         for e in range(count):
-            offset = int(rows[d, NUMBER]) - int(rows[e, NUMBER]) + half
+            other = int(rows.number[e])
+            offset = number - other + half
             value = 0.0
             if 0 <= offset < band.shape[1]:
-                value = -released * band[int(rows[e, NUMBER]), offset]
+                value = -released * band[other, offset]
             matrix[row, n + e] = value
         matrix[row, row] += 1.0
 
@@ -180,96 +234,82 @@ def settle(matrix, right, always, solution, max_rounds):
 
 
 @compiled
-def under(numbers, rows, count, force, slack, found):
+def under(gap, rows, force, compensation, found):
     """Fill ``found`` (2, n): depths and rates at the contacts under forces and compensations.
 
-    Returns whether all of them are numbers.
+    Returns whether all of them are finite.
     """
-    n, total = found.shape[1], 0.0
-    depth, rate, by_force, rate_by_force = parts(numbers, n)
-    for i in range(n):
-        d, r = depth[i], rate[i]
-        for j in range(n):
-            d -= by_force[i, j] * force[j]
-            r -= rate_by_force[i, j] * force[j]
-        for k in range(count):
-            d += rows[k, COUPLINGS + n + i] * slack[k]
-            r += rows[k, COUPLINGS + 2 * n + i] * slack[k]
+    total = 0.0
+    for i in range(force.size):
+        d, r = gap.place[i], gap.rate[i]
+        for j in range(force.size):
+            d -= gap.by_force[i, j] * force[j]
+            r -= gap.rate_by_force[i, j] * force[j]
+        for k in range(compensation.size):
+            d += rows.lift[k, i] * compensation[k]
+            r += rows.rise[k, i] * compensation[k]
         found[0, i], found[1, i] = d, r
         total += d + r
     return np.isfinite(total)
 
 
 @compiled
-def leaves_out(force, slack, rows, limits, band, drop):
-    """Whether a dropper without a row may have gone slack, as the ``limits`` were too small.
+def leaves_out(force, compensation, rows, bounds, coupled):
+    """Whether a link without a row may have switched, as the ``bounds`` were too small.
 
-    That is, a contact force is beyond its limit or compensations (``slack.size``,) take more than
-    the margin, the last of the limits, off a dropper elsewhere. ``drop`` (n_droppers,) is room to
-    work, all zero before and after.
+    That is, a contact force is beyond its limit or compensations (m,) take more than the limit off
+    the reserve of a link elsewhere.
     """
+    band, drop = coupled.band, coupled.drop
     half, n = band.shape[1] // 2, drop.size
     if n == 0:
         return False
     for i in range(force.size):
-        if force[i] > limits[i]:
+        if force[i] > bounds.force[i]:
             return True
     largest = 0.0
-    for k in range(slack.size):
-        if slack[k] != 0.0:
-            e = int(rows[k, NUMBER])
+    for k in range(compensation.size):
+        if compensation[k] != 0.0:
+            e = int(rows.number[k])
             for d in range(max(0, e - half), min(n, e + half + 1)):
-                drop[d] += slack[k] * band[e, d - e + half]
-    for k in range(slack.size):
-        drop[int(rows[k, NUMBER])] = 0.0
-    for k in range(slack.size):
-        if slack[k] != 0.0:
-            e = int(rows[k, NUMBER])
+                if coupled.released[d] > 0.0:
+                    drop[d] += compensation[k] * band[e, d - e + half]
+    for k in range(compensation.size):
+        drop[int(rows.number[k])] = 0.0
+    for k in range(compensation.size):
+        if compensation[k] != 0.0:
+            e = int(rows.number[k])
             for d in range(max(0, e - half), min(n, e + half + 1)):
                 largest = max(largest, drop[d])
                 drop[d] = 0.0
-    return largest > limits[force.size]
+    return largest > bounds.loss[0]
 
 
 @compiled
-def solve(
-    heads,
-    line,
-    rows,
-    limits,
-    numbers,
-    tangents,
-    released,
-    band,
-    always,
-    matrix,
-    right,
-    solution,
-    found,
-    drop,
-    max_rounds,
-):
+def solve(problem):
     """Contact forces and compensations for a law's tangents: rounds needed, and unknowns used.
 
-    ``line`` is ``LineResponse.summed``, ``heads`` and ``numbers`` are those of ``gap``. ``found``
-    (2, n) becomes depths and rates at the contacts; returned last are whether all of them are
-    finite, and whether all droppers that are slack had a row, see ``leaves_out``.
+    Returned last are whether depths and rates under them are finite, and whether all links that
+    have switched had a row, see ``leaves_out``.
 
-    If no contact force pushes a dropper together there are n unknowns, else n + ``count``. Rounds
-    are not positive if the active set did not settle; the problem then stands in ``matrix`` and
-    ``right``.
+    If no contact force takes a link beyond its reserve there are n unknowns, else n + the number of
+    rows. Rounds are not positive if the active set did not settle; the problem then stands in
+    matrix and right-hand side.
     """
-    n, count = tangents.shape[1], int(line[0])
-    finite = gap(heads, line[FLAGS : FLAGS + numbers.size], n, numbers)
-    press(numbers, tangents, right, matrix)
-    rounds = settle(matrix[:n, :n], right[:n], always[:n], solution[:n], max_rounds)
+    heads, line, gap, flags, rows, bounds, tangents, coupled, unknowns, found, rounds = problem
+    always, matrix, right, solution = unknowns
+    n, count, max_rounds = gap.place.size, int(flags[0].rows), rounds
+    finite = subtract(heads, line, gap)
+    press(gap, tangents, right, matrix)
+    force = solution[:n]
+    rounds = settle(matrix[:n, :n], right[:n], always[:n], force, max_rounds)
     size = n
-    if rounds > 0 and any_pushed(rows, count, n, solution):
-        couple(rows, count, n, released, band, tangents[2:], matrix, right)
+    if rounds > 0 and any_switched(rows, count, force):
+        couple(rows, count, coupled, tangents.by_depth, tangents.by_rate, matrix, right)
         size = n + count
         rounds = settle(
             matrix[:size, :size], right[:size], always[:size], solution[:size], max_rounds
         )
-    finite &= under(numbers, rows, size - n, solution, solution[n:], found)
-    complete = not leaves_out(solution[:n], solution[n:size], rows, limits, band, drop)
+    finite &= under(gap, rows, force, solution[n:size], found)
+    complete = not leaves_out(force, solution[n:size], rows, bounds, coupled)
     return rounds, size, finite, complete

@@ -18,7 +18,7 @@ import numpy as np
 
 from catenary.solver.base.errors import NotConverged, RunBroken
 from catenary.solver.contact.head_states import Heads
-from catenary.solver.contact.line_response import LineResponse
+from catenary.solver.contact.line_response import Coupled, LineResponse
 from catenary.solver.contact_problem.complementarity import InnerProblem, InnerSolution
 from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.problem.problem import Numerics
@@ -168,11 +168,9 @@ class Iterated:
         )
 
 
-def make_coupling(
-    law: LawInSteps, kept_ratio: float, band: np.ndarray, numerics: Numerics
-) -> Coupling:
-    """The coupling that the numerics ask for; ``kept_ratio`` and ``band`` as for `InnerProblem`."""
-    inner = InnerProblem(law, kept_ratio, band)
+def make_coupling(law: LawInSteps, coupled: Coupled, numerics: Numerics) -> Coupling:
+    """The coupling that the numerics ask for; ``coupled`` as for `InnerProblem`."""
+    inner = InnerProblem(law, coupled)
     if numerics.coupling == "explicit":
         return Explicit(inner)
     if numerics.coupling == "iterated":

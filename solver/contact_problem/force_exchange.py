@@ -1,7 +1,7 @@
 """The step's messages: every rank's share of the inner problem to rank 0, the forces back.
 
 One reduction to rank 0 and one broadcast of fixed size a step, whatever the number of ranks; what
-a rank sends besides are rows of droppers that may slacken, if it owns any. Both also carry the wish
+a rank sends besides are rows of links that may switch, if it owns any. Both also carry the wish
 to stop and the news of a failure, so that all ranks leave the loop at the same step.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 from mpi4py import MPI
 
 from catenary.solver.base.petsc_events import event
-from catenary.solver.contact.line_response import LineResponse
+from catenary.solver.contact.line_response import Bounds, LineResponse
 
 _FIRST_CAPACITY = 32
 # Numbers before the forces in a reply, and the tag of rows.
@@ -34,15 +34,15 @@ class Verdict(IntEnum):
 
 
 class Reply(NamedTuple):
-    """Rank 0's answer: verdict, contact forces (n,) [N], slack droppers and compensations [N].
+    """Rank 0's answer: verdict, contact forces (n,) [N], switched links and compensations [N].
 
-    ``room`` is how many droppers a rank needs room for, with the verdict ``ENLARGE``; ``level`` is
+    ``room`` is how many links a rank needs room for, with the verdict ``ENLARGE``; ``level`` is
     that of the next step, where steps adapt.
     """
 
     verdict: Verdict
     contact_force: np.ndarray
-    droppers: np.ndarray = _NO_NUMBERS
+    links: np.ndarray = _NO_NUMBERS
     compensation: np.ndarray = _NO_FORCES
     room: int = 0
     level: int = 0
@@ -59,22 +59,22 @@ class Exchange:
     Parameters
     ----------
     early : whether shares hold what the line extrapolates to
-    limits : those of all shares, see ``LineResponse``
+    bounds : those of all shares, see ``LineResponse``
     """
 
-    def __init__(self, comm: Any, n_contacts: int, early: bool, limits: np.ndarray) -> None:
+    def __init__(self, comm: Any, n_contacts: int, early: bool, bounds: Bounds) -> None:
         self._comm = comm
         self._n = n_contacts
-        self._early, self._limits = early, limits
+        self._early, self._bounds = early, bounds
         self.messages = self.bytes_sent = 0
         self._reduce, self._reply = event("ContactReduce"), event("ContactReply")
         self.enlarge(_FIRST_CAPACITY)
 
     def enlarge(self, capacity: int) -> None:
-        """Make room for at least ``capacity`` droppers a rank."""
+        """Make room for at least ``capacity`` links a rank."""
         n = self._n
-        self.share = LineResponse(n, capacity, self._early, self._limits)
-        self._merged = LineResponse(n, capacity, self._early, self._limits)
+        self.share = LineResponse(n, capacity, self._early, self._bounds)
+        self._merged = LineResponse(n, capacity, self._early, self._bounds)
         self._answer = np.zeros(_HEAD + n + 2 * capacity)
         # Said once how long they are and of what, messages cost half a microsecond less.
         self._told = _message(self._answer)
@@ -93,7 +93,7 @@ class Exchange:
         self._count(share.summed.nbytes)
         if not is_root:
             if share.count:
-                rows = share.rows[: share.count]
+                rows = share.sent_rows[: share.count]
                 comm.Send(rows, dest=0, tag=_ROWS)
                 self._count(rows.nbytes)
         else:
@@ -110,23 +110,23 @@ class Exchange:
         self._reply.begin()
         room = (answer.size - _HEAD - n) // 2
         if reply is not None:
-            count = reply.droppers.size
+            count = reply.links.size
             # One by one: numpy takes longer over a tuple than the rest of this.
             answer[0], answer[1] = reply.verdict, count
             answer[2], answer[3] = reply.room, reply.level
             answer[_HEAD : _HEAD + n] = reply.contact_force
             if 0 < count <= room:
-                answer[_HEAD + n : _HEAD + n + count] = reply.droppers
+                answer[_HEAD + n : _HEAD + n + count] = reply.links
                 answer[_HEAD + n + count : _HEAD + n + 2 * count] = reply.compensation
         comm.Bcast(self._told, root=0)
         self._count(answer.nbytes)
         count = int(answer[1])
         pairs = answer[_HEAD + n : _HEAD + n + 2 * count]
         if count > room:
-            # More slack droppers at once than a rank reports: rare, and sent in a second message.
+            # More switched links at once than a rank reports: rare, and sent in a second message.
             pairs = np.zeros(2 * count)
             if reply is not None:
-                pairs[:count], pairs[count:] = reply.droppers, reply.compensation
+                pairs[:count], pairs[count:] = reply.links, reply.compensation
             comm.Bcast(pairs, root=0)
             self._count(pairs.nbytes)
         self._reply.end()
@@ -152,26 +152,25 @@ class Exchange:
         if total == 0:
             return
         if total > merged.capacity:
-            larger = LineResponse(self._n, 2 * total, self._early, self._limits)
+            larger = LineResponse(self._n, 2 * total, self._early, self._bounds)
             larger.summed[:] = merged.summed
             self._merged = merged = larger
             self._sums = self._sums[0], _message(larger.summed)
         end = share.count
-        merged.rows[:end] = share.rows[:end]
+        merged.sent_rows[:end] = share.sent_rows[:end]
         missing = total - end
         if not missing:
             return
         parts, status = {}, MPI.Status()
         while missing > 0:
             comm.Probe(source=MPI.ANY_SOURCE, tag=_ROWS, status=status)
-            rows = np.empty(
-                (status.Get_count(MPI.DOUBLE) // share.rows.shape[1], share.rows.shape[1])
-            )
+            width = share.sent_rows.shape[1]
+            rows = np.empty((status.Get_count(MPI.DOUBLE) // width, width))
             comm.Recv(rows, source=status.Get_source(), tag=_ROWS)
             parts[status.Get_source()] = rows
             missing -= len(rows)
         for source in sorted(parts):
-            merged.rows[end : end + len(parts[source])] = parts[source]
+            merged.sent_rows[end : end + len(parts[source])] = parts[source]
             end += len(parts[source])
 
 

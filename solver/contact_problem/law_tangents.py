@@ -12,6 +12,7 @@ import numpy as np
 
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.contact_problem import complementarity_kernels
+from catenary.solver.contact_problem.complementarity_kernels import Tangents
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
@@ -29,13 +30,13 @@ class LawInSteps(Protocol):
     Attributes
     ----------
     n : number of contacts
-    tangents : (4, n), rows own [-], offset [N], by_depth [N/m] and by_rate [N s/m]
+    tangents : Tangents
     is_linear : whether the tangents are the law
     pulls : whether forces below zero are part of the law
     """
 
     n: int
-    tangents: np.ndarray
+    tangents: Tangents
     is_linear: bool
     pulls: bool
 
@@ -87,9 +88,9 @@ class _Tangents:
 
     def __init__(self, n: int, own: float, by_depth: float, by_rate: float, pulls: bool) -> None:
         self.n = n
-        self.tangents = np.zeros((4, n))
-        self.tangents[0] = own
-        self.tangents[2:] = [[by_depth], [by_rate]]
+        self.tangents = Tangents(
+            np.full(n, own), np.zeros(n), np.full(n, by_depth), np.full(n, by_rate)
+        )
         self.pulls = pulls
 
     def linearise(self, depth: np.ndarray, rate: np.ndarray) -> None:
@@ -97,7 +98,7 @@ class _Tangents:
 
     def force(self, depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """Spring and damper (n,) [N]."""
-        return np.asarray(self.tangents[2] * depth + self.tangents[3] * rate)
+        return np.asarray(self.tangents.by_depth * depth + self.tangents.by_rate * rate)
 
     def agrees(self, force: np.ndarray, rounding: np.ndarray) -> bool:
         """Always."""
@@ -153,9 +154,7 @@ class HertzInSteps(_Tangents):
             law.stiffness,
             law.exponent,
             law.hysteresis,
-            self.tangents[1],
-            self.tangents[2],
-            self.tangents[3],
+            self.tangents,
             self._force,
         )
 
@@ -168,7 +167,8 @@ class HertzInSteps(_Tangents):
         """Whether law and tangents give the same forces."""
         law = np.maximum(self._force, 0.0)
         within = _TOLERANCE * (1.0 + law)
-        within += ((_KNOWN + rounding) * self.tangents[2:]).sum(axis=0)
+        depth, rate = _KNOWN + rounding
+        within += depth * self.tangents.by_depth + rate * self.tangents.by_rate
         return bool((np.abs(law - force) <= within).all())
 
     def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:

@@ -21,10 +21,7 @@ def _vertical(builder: ModelBuilder) -> None:
     mesh, line = builder.mesh, builder.problem.line
     for wire in reversed(line.wires):
         builder.add_wire(wire.name)
-    stiffness = builder.model.dropper_stiffness
-    for number, droppers in enumerate(line.droppers):
-        mine = mesh.dropper_group == number
-        builder.add_links(droppers.name, mesh.droppers[mine], "w", stiffness[mine])
+    builder.add_droppers()
     for number, supports in enumerate(line.supports):
         nodes = mesh.supports[mesh.support_group == number]
         builder.add_springs(supports.name, nodes, "w", supports.stiffness)

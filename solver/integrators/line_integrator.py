@@ -27,6 +27,7 @@ from catenary.solver.linear.step_operators import LineOperators, Loads
 from catenary.solver.linear.unit_responses import Windows
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
+from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
 
 
 class LineIntegrator(ABC):
@@ -81,7 +82,7 @@ class LineIntegrator(ABC):
         self.motion = LineState(
             aligned_arrays.zeros(n, 2), aligned_arrays.zeros(n, 3), self.operators.answer, gains
         )
-        self.track_droppers(np.zeros((0, 2), np.int64), np.zeros((0, 4)), np.zeros(0))
+        self.track_links(NO_LINKS, np.zeros(0))
         # PETSc's time loop wants the solution as a vector; it wraps our array.
         self.solution = PETSc.Vec().createWithArray(self.displacement, size=(n, None), comm=comm)
 
@@ -117,7 +118,7 @@ class LineIntegrator(ABC):
             return
         self._passes = passes
         if passes is not None:
-            passes.track_droppers(*self._droppers)
+            passes.track_links(*self._links)
         motion.put(self.displacement, self.velocity, self.acceleration)
         self.motion = motion
 
@@ -177,15 +178,14 @@ class LineIntegrator(ABC):
         """Continue from what ``state`` returned, here or elsewhere, or from an ``exact_state``."""
         self.motion.take(state)
 
-    def track_droppers(self, ends: np.ndarray, laws: np.ndarray, tension: np.ndarray) -> None:
-        """Fill ``tension`` (n,) [N] at the end of each ``free_step``, see ``kernels.tension``.
+    def track_links(self, links: LinkArrays, reserve: np.ndarray) -> None:
+        """Fill ``reserve`` (n,) [N] at the end of each ``free_step``, see `state_kernels.reserves`.
 
-        The droppers stand in the order along the track. Without this there are none. Not
-        collective.
+        The links stand in the order along the track. Without this there are none. Not collective.
         """
-        self._droppers = ends, laws, tension
+        self._links = links, reserve
         if self._passes is not None:
-            self._passes.track_droppers(ends, laws, tension)
+            self._passes.track_links(links, reserve)
 
     def free_step(self) -> None:
         """Take the step without contacts and slack droppers: in two passes, or by ``predict``,
@@ -198,7 +198,7 @@ class LineIntegrator(ABC):
         self.predict()
         self.free_acceleration()
         self.correct()
-        state_kernels.tension(self.motion.read, *self._droppers)
+        state_kernels.reserves(self.motion.read, *self._links)
 
     def free_acceleration(self) -> None:
         """Fill the acceleration from the predictions and loads. Collective.

@@ -1,4 +1,4 @@
-"""The loops of a time step over a line, compiled by Numba: state updates and droppers.
+"""The loops of a time step over a line, compiled by Numba: state updates and links.
 
 Each works on this rank's arrays and knows nothing of MPI or PETSc. Not collective.
 """
@@ -85,47 +85,76 @@ def velocities(motion, result):
         result[i] = velocity_at(i, motion)
 
 
-@in_line
-def tension_of(dropper, motion, ends, laws):
-    """Tension of one of the droppers of ``tension`` [N]."""
-    # Unsigned, so that no index is asked whether it counts from the end.
-    dropper = np.uint64(dropper)
-    upper, lower = np.uint64(ends[dropper, 0]), np.uint64(ends[dropper, 1])
-    stretch = displacement_at(upper, motion) - displacement_at(lower, motion)
-    speed = velocity_at(upper, motion) - velocity_at(lower, motion)
-    return laws[dropper, 0] + laws[dropper, 1] * stretch + laws[dropper, 2] * speed
+@compiled
+def reserves_within(motion, links, begin, end, result):
+    """Reserves of the links from ``begin`` to ``end``, as ``reserves``."""
+    x, y, z, shares = motion
+    unknowns, weights, laws = links
+    s0, s1, s2, s3, s4 = shares[0], shares[1], shares[2], shares[3], shares[4]
+    if unknowns.shape[1] == 2:
+        # Droppers alone, mostly: without a loop over unknowns this takes half the time.
+        for number in range(begin, end):
+            # Unsigned, so that no index is checked for counting from the end.
+            link = np.uint64(number)
+            i, j = np.uint64(unknowns[link, 0]), np.uint64(unknowns[link, 1])
+            u, v = weights[link, 0], weights[link, 1]
+            of_x, of_y, of_z = u * x[i] + v * x[j], u * y[i] + v * y[j], u * z[i] + v * z[j]
+            law = laws[link]
+            stretch, speed = s0 * of_x + s1 * of_y + s2 * of_z, s3 * of_y + s4 * of_z
+            result[link] = law.rest + law.stiffness * stretch + law.damping * speed
+        return
+    for one in range(begin, end):
+        of_x, of_y, of_z = 0.0, 0.0, 0.0
+        for k in range(unknowns.shape[1]):
+            at, u = unknowns[one, k], weights[one, k]
+            of_x, of_y, of_z = of_x + u * x[at], of_y + u * y[at], of_z + u * z[at]
+        law = laws[one]
+        stretch, speed = s0 * of_x + s1 * of_y + s2 * of_z, s3 * of_y + s4 * of_z
+        result[one] = law.rest + law.stiffness * stretch + law.damping * speed
 
 
 @compiled
-def tension(motion, ends, laws, result):
-    """Tension N0 + k e + c e' of droppers as if they could push [N].
+def reserves(motion, links, result):
+    """What is left to each of ``links`` until it switches [N]: for a dropper its tension as if it
+    could push.
 
-    ``ends`` (n, 2) holds local unknowns of upper and lower end, ``laws`` (n, 4) rest force,
-    stiffness, damping and place; ``motion`` is ``LineState.read``.
+    ``links`` are ``LinkArrays`` of local unknowns; ``motion`` is ``LineState.read``.
     """
-    for d in range(ends.shape[0]):
-        result[d] = tension_of(d, motion, ends, laws)
+    reserves_within(motion, links, 0, result.size, result)
 
 
 @compiled
-def energy_of_pushing(motion, ends, laws):
-    """Elastic energy that the droppers of ``tension`` would hold by pushing, were they springs."""
+def energy_of_switching(motion, links):
+    """What elastic energy lacks where ``links`` have switched [J], were they springs."""
     energy = 0.0
-    for d in range(ends.shape[0]):
-        upper, lower = ends[d, 0], ends[d, 1]
-        stretch = displacement_at(upper, motion) - displacement_at(lower, motion)
-        pushing = min(laws[d, 0] + laws[d, 1] * stretch, 0.0)
-        energy += pushing**2 / (2.0 * laws[d, 1])
+    unknowns, weights, laws = links
+    for link in range(laws.size):
+        law, stretch = laws[link], 0.0
+        for k in range(unknowns.shape[1]):
+            stretch += weights[link, k] * displacement_at(unknowns[link, k], motion)
+        beyond = min(law.rest + law.stiffness * stretch, 0.0)
+        energy -= law.released * beyond**2 / (2.0 * law.stiffness)
     return energy
 
 
 @compiled
-def show(motion, arms, ends, laws, kept, uplift, force):
-    """Displacement at the unknowns ``arms``, and the tension of droppers that keep the share
-    ``kept`` of what they would push [N]."""
+def forces(motion, links, result):
+    """Force of each of ``links`` [N], positive where it pulls."""
+    reserves_within(motion, links, 0, result.size, result)
+    laws = links.law
+    for link in range(result.size):
+        law = laws[link]
+        share = law.carried
+        if result[link] < 0.0:
+            share -= law.released
+        result[link] *= share
+
+
+@compiled
+def show(motion, arms, droppers, others, other_force, uplift, dropper_force):
+    """Displacement at the unknowns ``arms``, force of ``droppers`` and of ``others`` [N]."""
     for i in range(arms.size):
         uplift[i] = displacement_at(arms[i], motion)
-    tension(motion, ends, laws, force)
-    for d in range(force.size):
-        if force[d] < 0.0:
-            force[d] *= kept
+    forces(motion, droppers, dropper_force)
+    if other_force.size:
+        forces(motion, others, other_force)

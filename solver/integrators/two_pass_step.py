@@ -15,10 +15,11 @@ import numpy as np
 from catenary.solver.base.bound import bound
 from catenary.solver.base.pointers import borrowed
 from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps, PredictedLineState, Steps
-from catenary.solver.integrators.state_kernels import compiled, in_line, tension_of
+from catenary.solver.integrators.state_kernels import compiled, in_line, reserves_within
 from catenary.solver.linear.lanes import add, add_scaled, load, pitch, remembers, store, zero
 from catenary.solver.linear.station_factors import StationFactors, eliminate, meet, substitute
 from catenary.solver.linear.station_products import StationProduct, read_station, row_sums
+from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
 
 # Unknowns of a stretch of the pass back, after which its droppers are looked at: large enough for
 # memory to be read ahead, 64 kB of each array, which a cache next to a processor holds.
@@ -31,7 +32,7 @@ class StationPasses:
     Attributes
     ----------
     kernel, arguments : the compiled function of a step, and the tuple that it is called with, for
-        compiled loops that take steps themselves. ``track_droppers`` replaces the tuple
+        compiled loops that take steps themselves. ``track_links`` replaces the tuple
 
     Parameters
     ----------
@@ -67,12 +68,12 @@ class StationPasses:
         self._stretch = max(1, _STRETCH // layout.pitch)
         self._place = low, high, self._stretch, layout.pitch
         self._parts = multiplied, factored, loads, answer, (*motion.read, known), changes
-        self.track_droppers(np.zeros((0, 2), np.int64), np.zeros((0, 4)), np.zeros(0))
+        self.track_links(NO_LINKS, np.zeros(0))
 
-    def track_droppers(self, ends: np.ndarray, laws: np.ndarray, tension: np.ndarray) -> None:
-        """Fill ``tension`` on the way back, as ``LineIntegrator.track_droppers``."""
-        droppers = ends, laws, tension, pulled(*self._place, ends), self._stretch
-        self.kernel, self.arguments = forth_and_back, (*self._parts, droppers)
+    def track_links(self, links: LinkArrays, reserve: np.ndarray) -> None:
+        """Fill ``reserve`` on the way back, as ``LineIntegrator.track_links``."""
+        followed = links, reserve, left_behind(*self._place, links.unknowns), self._stretch
+        self.kernel, self.arguments = forth_and_back, (*self._parts, followed)
         self._step = bound(self.kernel, *self.arguments)
 
     def step(self) -> None:
@@ -183,49 +184,54 @@ def forth(multiplied, factored, loads, answer):
     meet(factored, middle, right, answer)
 
 
-@compiled
-def pulled(low, high, stretch, width, ends):
-    """Droppers that the pass back has left behind with each stretch, (n_stretches + 1, 2).
+@in_line
+def is_within(unknowns, begin, end):
+    """Whether all of a link's unknowns are in [begin, end)."""
+    return begin <= unknowns.min() and unknowns.max() < end
 
-    They are those from the first of both numbers to the second, and have both ``ends`` among what
-    is known by then. ``width`` unknowns of a station stand together, so that few wait for the next.
+
+@compiled
+def left_behind(low, high, stretch, width, unknowns):
+    """Links that the pass back has left behind with each stretch, (n_stretches + 1, 2).
+
+    They are those from the first of both numbers to the second, and have all their ``unknowns``
+    (n, m) among what is known by then. ``width`` unknowns of a station stand together, so that few
+    wait for the next.
     """
-    n, own, pairs = ends.shape[0], high - low, (high - low - 1) // 2
+    n, own, pairs = unknowns.shape[0], high - low, (high - low - 1) // 2
     middle = own // 2
     ranges = np.empty((1 + (pairs + stretch - 1) // stretch + 1, 2), dtype=np.int64)
-    first = last = np.searchsorted(ends[:, 0], width * middle)
+    first = last = np.searchsorted(unknowns[:, 0], width * middle)
     ranges[0] = first
     for number in range(1, ranges.shape[0]):
         reach = min(number * stretch, pairs)
         begin, end = width * (middle - reach), width * (middle + reach + 1)
         if number == ranges.shape[0] - 1:
             begin, end = 0, width * own
-        while first > 0 and begin <= ends[first - 1].min() and ends[first - 1].max() < end:
+        while first > 0 and is_within(unknowns[first - 1], begin, end):
             first -= 1
-        while last < n and begin <= ends[last].min() and ends[last].max() < end:
+        while last < n and is_within(unknowns[last], begin, end):
             last += 1
         ranges[number, 0], ranges[number, 1] = first, last
     return ranges
 
 
 @in_line
-def pull(number, motion, droppers):
-    """Find the tension of droppers that a stretch of the pass back has left behind."""
-    ends, laws, tension, ranges, _ = droppers
+def follow(number, motion, followed):
+    """Find the reserve of links that a stretch of the pass back has left behind."""
+    links, reserve, ranges, _ = followed
     before, now = ranges[number - 1], ranges[number]
-    for dropper in range(now[0], before[0]):
-        tension[dropper] = tension_of(dropper, motion[:4], ends, laws)
-    for dropper in range(before[1], now[1]):
-        tension[dropper] = tension_of(dropper, motion[:4], ends, laws)
+    reserves_within(motion[:4], links, now[0], before[0], reserve)
+    reserves_within(motion[:4], links, before[1], now[1], reserve)
 
 
 @compiled
-def back(factored, motion, answer, changes, droppers):
+def back(factored, motion, answer, changes, followed):
     """Take the rank's own motion on from what ``forth`` has left in ``answer``, and find the
-    tension of its droppers, which come with their ranges of ``pulled``."""
-    factored, motion, answer, droppers = borrowed((factored, motion, answer, droppers))
+    reserve of its links, which come with their ranges of ``left_behind``."""
+    factored, motion, answer, followed = borrowed((factored, motion, answer, followed))
     layout, _, _, low, high = factored
-    stretch = droppers[4]
+    stretch = followed[3]
     middle, pairs = (low + high) // 2, (high - low - 1) // 2
     x = y = load(layout, answer, pitch(layout) * np.uint64(middle))
     go_on(layout, middle - low, x, motion, changes)
@@ -236,17 +242,17 @@ def back(factored, motion, answer, changes, droppers):
             y = substitute(factored, middle + k, y, answer)
             go_on(layout, middle - k - low, x, motion, changes)
             go_on(layout, middle + k - low, y, motion, changes)
-        pull(number, motion, droppers)
+        follow(number, motion, followed)
         number += 1
     # One more towards the start of the line, if there is an even number of them.
     for i in range(middle - pairs - 1, low - 1, -1):
         x = substitute(factored, i, x, answer)
         go_on(layout, i - low, x, motion, changes)
-    pull(number, motion, droppers)
+    follow(number, motion, followed)
 
 
 @compiled
-def forth_and_back(multiplied, factored, loads, answer, motion, changes, droppers):
+def forth_and_back(multiplied, factored, loads, answer, motion, changes, followed):
     """Both passes."""
     forth(multiplied, factored, loads, answer)
-    back(factored, motion, answer, changes, droppers)
+    back(factored, motion, answer, changes, followed)

@@ -77,21 +77,24 @@ def compute(
     dofs: np.ndarray,
     coefficients: np.ndarray,
     x: np.ndarray,
+    half_length: np.ndarray | None = None,
 ) -> ShortColumns:
     """Columns for the right-hand sides with ``coefficients`` on ``dofs``, both (n, m). Collective.
 
-    ``x`` (n,) [m] is where each of them stands; ``solve_for`` that of ``LineOperators``.
+    ``x`` (n,) [m] is where each of them stands, ``half_length`` (n,) [m] how far they reach to both
+    sides of it, zero if left out; ``solve_for`` that of ``LineOperators``.
     """
     n = x.size
     start = np.zeros(n, dtype=np.int64)
     values: list[np.ndarray] = [np.zeros(0)] * n
-    groups = _groups_apart(x, 2.0 * windows.reach)
+    half = np.zeros(n) if half_length is None else half_length
+    groups = _groups_apart(x, 2.0 * (windows.reach + half.max(initial=0.0)))
     largest = np.zeros((2, len(groups)))
     for number, group in enumerate(groups):
         array = solve_for(dofs[group].ravel(), coefficients[group].ravel())
         largest[0, number] = np.abs(array).max(initial=0.0)
         for column in group:
-            low, high = windows.around(x[column], x[column])
+            low, high = windows.around(x[column] - half[column], x[column] + half[column])
             low = min(max(low, ownership.first), ownership.last) - ownership.first
             high = min(max(high, ownership.first), ownership.last) - ownership.first
             start[column] = low

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from catenary.meshgen.mesh import DROPPERS
 from catenary.solver.model import elements
+from catenary.solver.model.links import BOTH, PULLS, Direction, Links, between_nodes, law
 from catenary.solver.model.loads import Load
 from catenary.solver.model.model import Block, Model, wire_elements
 from catenary.solver.problem.problem import Problem
@@ -60,14 +62,36 @@ class ModelBuilder:
             hanging = values if hanging_mass is None else hanging_mass
             self._hanging.append((dofs, np.broadcast_to(np.asarray(hanging), nodes.shape)))
 
-    def add_links(
-        self, component: str, pairs: np.ndarray, unknown: str, stiffness: np.ndarray
-    ) -> None:
-        """Springs between pairs of nodes, shape (n, 2) and (n,) [N/m]."""
-        unit = np.array([[1.0, -1.0], [-1.0, 1.0]])
-        self._add_block(
-            component, self.model.dofs(pairs, unknown), None, stiffness[:, None, None] * unit
-        )
+    def add_links(self, component: str, direction: Direction, law: np.ndarray) -> Links:
+        """Links with directions and laws as `model.links` makes them.
+
+        Those that act one way are followed in the time loop; what stands open at rest is no part of
+        K. Their forces at rest are the rest shape's: no weight is added here.
+
+        Raises
+        ------
+        ValueError
+            If further links of one sign are named like the droppers, whose channel they are not of.
+        """
+        model, links = self.model, Links(component, direction, law)
+        if model.droppers is not None and component == model.droppers.component:
+            if (law["acts"] != BOTH).any():
+                raise ValueError(f"links of one sign need a name of their own, not {component}")
+        model.links.append(links)
+        self._add_block(component, direction.unknowns, None, links.stiffness_matrices)
+        return links
+
+    def add_droppers(self) -> None:
+        """The droppers of the mesh; those of each group are a component of their own."""
+        model, mesh = self.model, self.mesh
+        laws = law(mesh.x(mesh.droppers[:, 1]), model.dropper_stiffness, acts=PULLS)
+        model.droppers = Links(DROPPERS, between_nodes(model, mesh.droppers), laws)
+        model.links.append(model.droppers)
+        matrices = model.droppers.stiffness_matrices
+        for number, group in enumerate(self.problem.line.droppers):
+            mine = mesh.dropper_group == number
+            unknowns = model.droppers.direction.unknowns[mine]
+            self._add_block(group.name, unknowns, None, matrices[mine])
 
     def add_load(self, load: Load) -> None:
         """A load in time, of one of the kinds in ``model/loads.py``."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from catenary.meshgen.line import Role
 from catenary.meshgen.mesh import LineMesh
+from catenary.solver.model.links import Links
 from catenary.solver.model.unknowns import Unknowns
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
@@ -50,7 +51,9 @@ class Model:
     dropper_stiffness, dropper_damping : (n_droppers,) [N/m], [N s/m], of the taut dropper
     released_damping : (n_droppers,) the part of ``dropper_damping`` that goes slack with the spring
     broken : (n_droppers,) droppers that carry nothing; what they weigh stays on their clamps
-    loads : beside those of contacts and droppers, from the start of the march on
+    loads : beside those of contacts and links, from the start of the march on
+    links : droppers, and whatever else was added as links
+    droppers : those of the mesh, in its order; they only pull where they may slacken
     terms_of : effect name -> number of terms, laws and lifted limits that it contributes
     """
 
@@ -62,6 +65,8 @@ class Model:
     row_of_node: np.ndarray
     dropper_lengths: np.ndarray
     blocks: list[Block] = field(default_factory=list)
+    links: list[Links] = field(default_factory=list)
+    droppers: Links | None = None
     constrained: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     weight: np.ndarray = field(default_factory=lambda: np.zeros(0))
     loads: list[Load] = field(default_factory=list)

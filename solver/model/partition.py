@@ -1,4 +1,4 @@
-"""Which rank owns which part of the line: contiguous runs of stations, cut between droppers."""
+"""Which rank owns which part of the line: contiguous runs of stations, cut between links."""
 
 from __future__ import annotations
 
@@ -49,17 +49,18 @@ def distribute(model: Model, n_ranks: int, rank: int) -> Ownership:
     """Cut a line into ``n_ranks`` runs that take nearly the same time. Not collective.
 
     They are of nearly equal size but for rank 0, which has fewer nodes of a long line because it
-    moves the pantographs besides. A cut never separates nodes of one station nor the two ends of a
-    dropper, so that dropper forces need no communication. Ranks beyond the number of stations own
+    moves the pantographs besides. A cut never separates nodes of one station nor the unknowns of a
+    link, so that forces of links need no communication. Ranks beyond the number of stations own
     nothing.
     """
-    numbering, droppers = model.numbering, model.mesh.droppers
+    numbering = model.numbering
     n_stations = numbering.low.size
-    ends = np.sort(numbering.station_of(droppers), axis=1)
-    # +1 where a dropper's range of stations begins to forbid cuts, -1 where it ends.
+    # +1 where a link's range of stations begins to forbid cuts, -1 where it ends.
     steps = np.zeros(n_stations + 2)
-    np.add.at(steps, ends[:, 0] + 1, 1)
-    np.add.at(steps, ends[:, 1] + 1, -1)
+    for links in model.links:
+        stations = np.searchsorted(numbering.starts, links.direction.unknowns, side="right") - 1
+        np.add.at(steps, stations.min(axis=1) + 1, 1)
+        np.add.at(steps, stations.max(axis=1) + 1, -1)
     cuts = np.flatnonzero(np.cumsum(steps)[: n_stations + 1] == 0)
     nodes_of_station = model.mesh.n_nodes / n_stations
     long = model.mesh.n_nodes >= _LONG * PANTOGRAPH_NODES * n_ranks

@@ -26,7 +26,7 @@ _FAR = 10.0
 class FixedPoint:
     """The paper's correction: eqs. (2.4) to (2.7) repeated until the iterates agree.
 
-    Contact forces and the compensation of slack droppers are evaluated from the latest iterate
+    Contact forces and the compensation of switched links are evaluated from the latest iterate
     and the whole system is solved again. With a fixed number of ``numerics.iterations`` a step
     goes on with what they have reached; those above the tolerances are counted.
     """
@@ -36,8 +36,6 @@ class FixedPoint:
     pantographs: Pantographs
     numerics: Numerics
     law: LawInSteps
-    kept_ratio: float
-    may_slacken: bool
     counters: Counters = field(default_factory=Counters)
     judge: StepController | None = None
 
@@ -98,7 +96,7 @@ class FixedPoint:
         self, judge: StepController, time: float, depth: np.ndarray, force: np.ndarray, heads: Heads
     ) -> None:
         """Raise StepRejected on all ranks if the step is not to be taken. Collective."""
-        stiffness = self.law.tangents[2]
+        stiffness = self.law.tangents.by_depth
         # Of the line's compliance this scheme knows nothing.
         yielding = heads.height_compliance.diagonal()
         decision = on_root(self.comm, lambda: judge.decide(time, depth, force, stiffness, yielding))
@@ -148,11 +146,9 @@ class FixedPoint:
         return (new if self.law.pulls else np.maximum(new, 0.0)), depth, speed
 
     def _compensation(self) -> np.ndarray:
-        """Forces that cancel what owned droppers push (eq. 2.7), as far as it is released [N]."""
-        if not self.may_slacken:
-            return np.zeros(0)
-        tension = self.interaction.droppers.tension()
-        return np.asarray((1.0 - self.kept_ratio) * np.maximum(0.0, -tension))
+        """Compensations of owned links in the latest iterate (eq. 2.7) [N]."""
+        links = self.interaction.links
+        return links.compensation() if links.table.switches else np.zeros(0)
 
     def _settled(self) -> bool:
         line, numerics = self.interaction.line, self.numerics

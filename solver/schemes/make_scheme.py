@@ -6,8 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
+from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.contact_problem.coupling import make_coupling
@@ -16,6 +15,7 @@ from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
+from catenary.solver.model.switching_links import switching_links
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.problem import Placement, Problem
 from catenary.solver.schemes.fixed_point import FixedPoint
@@ -82,7 +82,7 @@ class SchemeFactory:
             pantographs.contact_place,
             train.speed,
             uses_rate,
-            laws.slackening,
+            switching_links(model, self.form.dropper_force),
         )
         scheme_of: dict[str, Callable[[Problem, Model, ForcesOnLine, Pantographs], Scheme]] = {
             "one_solve": self._one_solve,
@@ -95,10 +95,10 @@ class SchemeFactory:
     def _one_solve(
         self, problem: Problem, model: Model, interaction: ForcesOnLine, pantographs: Pantographs
     ) -> Scheme:
-        slack = interaction.slack_coupling
-        band = np.zeros((0, 1)) if slack is None or slack.band is None else slack.band
+        links = interaction.link_coupling
+        coupled = no_links() if links is None else links.coupled
         law = law_in_steps(problem, model.simulated, pantographs.n_contacts)
-        coupling = make_coupling(law, model.simulated.kept_ratio, band, problem.numerics)
+        coupling = make_coupling(law, coupled, problem.numerics)
         return OneSolve(self.comm, interaction, pantographs, coupling)
 
     def _fixed_point(
@@ -110,8 +110,6 @@ class SchemeFactory:
             pantographs,
             problem.numerics,
             law_in_steps(problem, model.simulated, pantographs.n_contacts),
-            model.simulated.kept_ratio,
-            model.simulated.slackening,
         )
 
     def _ts_alpha2(

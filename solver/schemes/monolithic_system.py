@@ -1,12 +1,12 @@
 """Line and lumped pantographs as one nonlinear system of second order, for PETSc's own steppers.
 
-    M u'' + C u' + K u + sum over slack droppers of s L - sum over contacts of f N = loads
+    M u'' + C u' + K u + sum over switched links of s L - sum over contacts of f N = loads
     m z'' + c z' + k z + f e = lift
 
-with f = k_c (z - h) + d_c (z' - h'), not below zero where contact can be lost, and s what a dropper
-would push, or its spring alone. Of the solver's step nothing is used here, neither predictions nor
-compliances nor the small problem of contacts and droppers: it is a second opinion. M, C and K are
-the model's.
+with f = k_c (z - h) + d_c (z' - h'), not below zero where contact can be lost, and s the
+compensation of a link, such as what a dropper would push. Of the solver's step nothing is used
+here, neither predictions nor compliances nor the small problem of contacts and links: it is a
+second opinion. M, C, K and the links' reserve are the model's.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from catenary.solver.integrators.line_loads import LineLoads
 from catenary.solver.model.matrices import iterate_entries
 from catenary.solver.model.model import Model
 from catenary.solver.model.shape_functions import shape_slopes, shape_values
+from catenary.solver.model.switching_links import switching_links
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Placement, Problem
 from catenary.solver.statics.equilibrium import Equilibrium
@@ -90,12 +91,14 @@ class WholeSystem:
         self._held = model.constrained
         self._set_matrices(model, data, ends)
 
-        self._ends = model.dofs(model.mesh.droppers)
-        self._dropper = (form.dropper_force, model.dropper_stiffness, model.released_damping)
-        self._pushed = 1.0 - model.simulated.kept_ratio
-        upper, lower = self._ends.T
-        pairs = [(i, j) for i in (upper, lower) for j in (upper, lower)]
-        self._dropper_at = np.stack([self._at(i, j) for i, j in pairs], axis=1)
+        links = switching_links(model, form.dropper_force).arrays
+        self._links = links.of(links.law["released"] > 0.0)
+        unknowns, weights, _ = self._links
+        m = unknowns.shape[1]
+        self._link_at = np.stack(
+            [self._at(unknowns[:, i], unknowns[:, j]) for i in range(m) for j in range(m)], axis=1
+        )
+        self._link_square = (weights[:, :, None] * weights[:, None, :]).reshape(-1, m * m)
 
     def _set_matrices(self, model: Model, data: list[LumpedData], ends: np.ndarray) -> None:
         """M, C and K on one pattern, which also holds each head beside all of the contact wire."""
@@ -164,13 +167,15 @@ class WholeSystem:
             meets.append((dofs, along, convective))
         return (force if self._pulls else np.maximum(force, 0.0)), depth, meets
 
-    def tension(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """What of all droppers goes slack, as if it could push [N], (n_droppers,)."""
-        rest, stiffness, damping = self._dropper
-        upper, lower = self._ends.T
-        return np.asarray(
-            rest + stiffness * (u[upper] - u[lower]) + damping * (v[upper] - v[lower])
-        )
+    def reserve(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Reserve of all links that switch [N], (n_links,)."""
+        unknowns, weights, law = self._links
+        stretch, speed = ((weights * values[unknowns]).sum(axis=1) for values in (u, v))
+        return np.asarray(law["rest"] + law["stiffness"] * stretch + law["damping"] * speed)
+
+    def n_slack(self, u: np.ndarray, v: np.ndarray) -> int:
+        """How many links are slack that were taut at rest."""
+        return int(((self.reserve(u, v) < 0.0) & (self._links.law["carried"] > 0.0)).sum())
 
     def residual(self, time: float, u: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """F(t, u, v, a), (n,) [N]; at held unknowns u itself."""
@@ -183,10 +188,9 @@ class WholeSystem:
         force, _, meets = self.contacts(time, u, v)
         for f, (dofs, along, _) in zip(force, meets, strict=True):
             result[dofs] += f * along
-        if self._pushed:
-            compensation = self._pushed * np.maximum(0.0, -self.tension(u, v))
-            np.add.at(result, self._ends[:, 0], compensation)
-            np.subtract.at(result, self._ends[:, 1], compensation)
+        unknowns, weights, law = self._links
+        compensation = law["released"] * np.maximum(0.0, -self.reserve(u, v))
+        np.add.at(result, unknowns, compensation[:, None] * weights)
         result[self._held] = u[self._held]
         return np.asarray(result)
 
@@ -195,17 +199,17 @@ class WholeSystem:
     ) -> np.ndarray:
         """dF/du + ``by_v`` dF/dv + ``by_a`` dF/da: values of the pattern's entries."""
         result = by_a * self._mass.data + by_v * self._damping.data + self._stiffness.data
-        law = self._law
+        contact = self._law
         force, _, meets = self.contacts(time, u, v)
         for f, (dofs, along, convective) in zip(force, meets, strict=True):
             if f > 0.0 or self._pulls:
-                by_u = (law.stiffness + by_v * law.damping) * along + law.damping * convective
+                by_u = (contact.stiffness + by_v * contact.damping) * along
+                by_u += contact.damping * convective
                 at = self._at(np.repeat(dofs, dofs.size), np.tile(dofs, dofs.size))
                 result[at] += np.outer(along, by_u).ravel()
-        if self._pushed:
-            _, stiffness, damping = self._dropper
-            slack = self.tension(u, v) < 0.0
-            change = self._pushed * (stiffness + by_v * damping)[slack]
-            signs = np.array([1.0, -1.0, -1.0, 1.0])
-            np.subtract.at(result, self._dropper_at[slack], change[:, None] * signs)
+        switched = self.reserve(u, v) < 0.0
+        law = self._links.law[switched]
+        change = law["released"] * (law["stiffness"] + by_v * law["damping"])
+        square = self._link_square[switched]
+        np.subtract.at(result, self._link_at[switched], change[:, None] * square)
         return np.asarray(result)

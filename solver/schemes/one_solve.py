@@ -12,24 +12,24 @@ from catenary.solver.base.parallel import on_root
 from catenary.solver.base.petsc_events import NAMES, event
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.head_states import Heads
-from catenary.solver.contact.line_response import LineResponse
+from catenary.solver.contact.line_response import Bounds, LineResponse
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.contact_problem.complementarity import NOT_FINITE, InnerSolution
 from catenary.solver.contact_problem.coupling import Coupling
 from catenary.solver.contact_problem.force_exchange import Exchange, Reply, Verdict
 from catenary.solver.schemes.scheme import Counters, StepController, StepRejected
 
-# First guesses of what droppers elsewhere may lose [N] and of contact forces [N]; both grow when
-# a step shows that they were too small, and that step is repeated.
+# First guesses of what reserves elsewhere may lose [N] and of contact forces [N]; both grow when a
+# step shows that they were too small, and that step is repeated.
 _FIRST_MARGIN = 5.0
 _FIRST_BOUND = 200.0
-# No tension is below it: no dropper is reported, but for one that is not finite.
+# No reserve is below it: no link is reported, but for one that is not finite.
 _NO_MARGIN = -np.finfo(float).max
 
 
 @dataclass
 class OneSolve:
-    """One solve for the free response, then the exact small problem of contacts and slack droppers.
+    """One solve for the free response, then the exact small problem of contacts and links.
 
     The columns of A^-1 that the forces act through are tabulated, so that superposition needs no
     second solve. Steps are taken as they come, unless a ``judge`` is put in.
@@ -44,11 +44,11 @@ class OneSolve:
 
     def __post_init__(self) -> None:
         n = self.pantographs.n_contacts
-        slackens = self.interaction.slack_coupling is not None
-        self._limits = np.append(
-            np.full(n, _FIRST_BOUND), _FIRST_MARGIN if slackens else _NO_MARGIN
+        switches = self.interaction.link_coupling is not None
+        self._bounds = Bounds(
+            np.full(n, _FIRST_BOUND), np.full(1, _FIRST_MARGIN if switches else _NO_MARGIN)
         )
-        self._exchange = Exchange(self.comm, n, self.coupling.extrapolates, self._limits)
+        self._exchange = Exchange(self.comm, n, self.coupling.extrapolates, self._bounds)
         self._respond = self.interaction.responder(self._exchange.share)
         self._none = np.zeros(n)
         self._found: InnerSolution | None = None
@@ -77,7 +77,7 @@ class OneSolve:
             interaction.heights(share.early_height, share.early_rate)
             line.free_acceleration()
             line.correct()
-            interaction.droppers.tension()
+            interaction.links.find_reserve()
         else:
             line.free_step()
         events["LineFree"].end()
@@ -92,7 +92,7 @@ class OneSolve:
             if reply.verdict == Verdict.REJECT:
                 raise StepRejected
         events["LineSuperpose"].begin()
-        interaction.superpose(reply.contact_force, reply.droppers, reply.compensation)
+        interaction.superpose(reply.contact_force, reply.links, reply.compensation)
         events["LineSuperpose"].end()
         events["PantoAdvance"].begin()
         if self.pantographs.joints_in_loop:
@@ -158,7 +158,8 @@ class OneSolve:
                 self._respond = interaction.responder(exchange.share)
                 exchange.share.early_height[:], exchange.share.early_rate[:] = early
             elif reply.verdict == Verdict.REPEAT:
-                self._limits *= 2.0
+                for bound in self._bounds:
+                    bound *= 2.0
                 self.counters.repeated_steps += 1
             else:
                 return reply
@@ -200,9 +201,9 @@ class OneSolve:
             if not found.complete:
                 return Reply(Verdict.REPEAT, self._none)
             if self.judge is not None:
-                yielding = heads.height_compliance.diagonal() + response.height_by_force.diagonal()
+                yielding = heads.height_compliance.diagonal() + response.line.by_force.diagonal()
                 accepted, level = self.judge.decide(
-                    time, found.depth, found.contact_force, law.tangents[2], yielding
+                    time, found.depth, found.contact_force, law.tangents.by_depth, yielding
                 )
                 if not accepted:
                     return Reply(Verdict.REJECT, self._none, level=level)
@@ -215,15 +216,16 @@ class OneSolve:
         self.counters.pivoted_steps += found.pivoted
         verdict = Verdict.ADVANCE_AND_STOP if wants_to_stop else Verdict.ADVANCE
         slack = found.compensation
-        n_slack = np.count_nonzero(slack)
-        if not n_slack:
+        n_switched = np.count_nonzero(slack)
+        if not n_switched:
             return Reply(verdict, found.contact_force, level=level)
-        self.counters.slack_dropper_steps += n_slack
-        droppers = response.droppers
-        if n_slack < slack.size:
-            pushed = slack != 0.0
-            droppers, slack = droppers[pushed], slack[pushed]
-        return Reply(verdict, found.contact_force, droppers, slack, level=level)
+        links = response.links
+        if n_switched < slack.size:
+            switched = slack != 0.0
+            links, slack = links[switched], slack[switched]
+        slackens = self.interaction.links.table.slackens
+        self.counters.slack_dropper_steps += int(np.count_nonzero(slackens[links]))
+        return Reply(verdict, found.contact_force, links, slack, level=level)
 
 
 def _alone(error: RunBroken) -> RunBroken:

@@ -185,7 +185,7 @@ class TSAlpha2:
         pantographs.wire_height[:] = pantographs.head_height - depth
         self.counters.steps += 1
         self.counters.rounds = self.counters.solves
-        self.counters.slack_dropper_steps += int((system.tension(self._u, self._v) < 0.0).sum())
+        self.counters.slack_dropper_steps += system.n_slack(self._u, self._v)
 
 
 def _integration(numerics: Numerics) -> tuple[float, float, float, float]:

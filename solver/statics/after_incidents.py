@@ -33,6 +33,7 @@ from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.step_operators import LineOperators
 from catenary.solver.linear.unit_responses import Windows
 from catenary.solver.model import elements
+from catenary.solver.model.links import Direction
 from catenary.solver.model.loads import ShapeLoad
 from catenary.solver.model.matrices import iterate_entries
 from catenary.solver.model.model import Model
@@ -84,8 +85,8 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
         np.add.at(load, dofs, -pull)
         energy += 0.5 * float((shape * pull).sum())
     rest = form.dropper_force[broken]
-    ends = model.dofs(mesh.droppers[broken])
-    np.add.at(load, ends, rest[:, None] * np.array([1.0, -1.0]))
+    unknowns, weights = _droppers(model, broken)
+    np.add.at(load, unknowns, rest[:, None] * weights)
     energy -= float((rest**2 / (2.0 * first.dropper_stiffness[broken])).sum())
     load[model.constrained] = 0.0
     unbalanced = np.flatnonzero(load)
@@ -128,17 +129,25 @@ def acceleration_jump(
     force -= _times(after.model, ownership, 0.0, 1.0, velocity)
     force += _times(before.model, ownership, 0.0, 1.0, velocity)
     new = after.model.broken & ~before.model.broken
-    ends = after.model.dofs(after.model.mesh.droppers[new])
-    stretch, rate = (values[ends[:, 0]] - values[ends[:, 1]] for values in (displacement, velocity))
+    unknowns, weights = _droppers(after.model, new)
+    stretch, rate = (
+        (weights * values[unknowns]).sum(axis=1) for values in (displacement, velocity)
+    )
     tension = form.dropper_force[new] + before.model.dropper_stiffness[new] * stretch
     tension += before.model.released_damping[new] * rate
     compensation = (1.0 - pushed_share) * np.maximum(0.0, -tension)
-    for side, sign in ((0, 1.0), (1, -1.0)):
-        mine = ownership.owned(ends[:, side])
-        np.add.at(force, ends[mine, side] - first, sign * compensation[mine])
+    mine = ownership.owned(unknowns[:, 0])
+    np.add.at(force, unknowns[mine] - first, compensation[mine, None] * weights[mine])
     held = after.model.constrained[ownership.owned(after.model.constrained)] - first
     force[held] = 0.0
     return divided_by_mass(comm, ownership, after.model, force)
+
+
+def _droppers(model: Model, which: np.ndarray) -> Direction:
+    """Directions of some of the droppers, ``which`` (n_droppers,) bool."""
+    assert model.droppers is not None
+    unknowns, weights = model.droppers.direction
+    return Direction(unknowns[which], weights[which])
 
 
 def _times(

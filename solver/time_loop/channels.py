@@ -7,7 +7,7 @@ date; a step in the compiled loop copies it as well.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -28,8 +28,8 @@ RUN = "run"
 class Sources(NamedTuple):
     """What channels take their values from, as it is for one part of a march.
 
-    ``arm_uplift`` [m] and ``dropper_force`` [N] are those of this rank; models of pantographs are
-    on rank 0 only.
+    ``arm_uplift`` [m] and ``dropper_force`` [N] are those of this rank, as ``link_force`` [N] of
+    further links of one sign, by component; models of pantographs are on rank 0 only.
     """
 
     pantographs: Pantographs
@@ -37,6 +37,7 @@ class Sources(NamedTuple):
     scheme: Scheme
     arm_uplift: np.ndarray
     dropper_force: np.ndarray
+    link_force: Mapping[str, np.ndarray]
 
 
 class Energies(NamedTuple):

@@ -15,6 +15,8 @@ from catenary.mbs.head.head_records import drive_width
 from catenary.solver.base.bound import bound
 from catenary.solver.base.petsc_events import event
 from catenary.solver.base.pointers import HeldCall, can_hold_calls
+from catenary.solver.contact.line_response import affine
+from catenary.solver.contact_problem.complementarity_kernels import SmallProblem
 from catenary.solver.contact_problem.coupling import Implicit
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
@@ -64,9 +66,10 @@ class CompiledSteps:
             self._loading = HeldCall(self._loads.kernel, self._loads.arguments)
         self._records, self._law = records, law
         self._heads = np.zeros(2 * n * (1 + n))
+        self._at_contacts = affine(self._heads, n)
         self._drives = np.zeros((self.most, pantographs.n, drive_width(max(pantographs.n_strips))))
         self._counts = np.zeros(2, dtype=np.int64)
-        self._bound_to = (0, 0)
+        self._bound_to: tuple[Any, Any] = None, None
         self._bound: Callable[[int, int], tuple[int, bool]]
         self._event = event("Steps")
         self._loop()  # compiled, or loaded, before the clock of a march starts
@@ -118,15 +121,15 @@ class CompiledSteps:
         """The compiled loop, on the arrays that the scheme has now."""
         coupling = self._scheme.coupling
         assert isinstance(coupling, Implicit)
-        solving = coupling.inner.solving(self._heads, self._scheme.share)
+        share, unknowns = self._scheme.share, coupling.inner.unknowns
         # A step may exchange these arrays for larger ones.
-        now = id(solving[2]), id(solving[9])
-        if now != self._bound_to:
-            self._bound_to, self._arguments = now, self._steps(solving)
+        if self._bound_to[0] is not share or self._bound_to[1] is not unknowns:
+            self._bound_to = share, unknowns
+            self._arguments = self._steps(coupling.inner.problem(self._at_contacts, share))
             self._bound = bound(step_kernels.take, *self._arguments, later=(0, 0))
         return self._bound
 
-    def _steps(self, solving: tuple[Any, ...]) -> tuple[Any, ...]:
+    def _steps(self, problem: SmallProblem) -> tuple[Any, ...]:
         """Arguments of the loop but its last two."""
         scheme = self._scheme
         pantographs, interaction = scheme.pantographs, scheme.interaction
@@ -140,11 +143,11 @@ class CompiledSteps:
             records=self._records,
             heads=self._heads,
             responding=interaction.responding(scheme.share),
-            solving=solving,
+            problem=problem,
             law=self._law,
             superposing=interaction.superposing,
             compensating=interaction.compensating,
-            pushed=np.zeros(solving[9].shape[0], dtype=np.int64),
+            switched=np.zeros(problem.unknowns.right.size, dtype=np.int64),
             ends=pantographs.ends,
             of_step=pantographs.of_step,
             outputs=pantographs.outputs,

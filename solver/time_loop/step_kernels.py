@@ -14,8 +14,8 @@ from catenary.mbs.head import head_records
 from catenary.solver.base.compiled import compiled
 from catenary.solver.base.pointers import borrowed, call_held, numbers_at
 from catenary.solver.contact import contact_kernels
-from catenary.solver.contact.line_response import NUMBER
 from catenary.solver.contact_problem import complementarity_kernels
+from catenary.solver.contact_problem.complementarity_kernels import SmallProblem
 from catenary.solver.integrators import state_kernels
 
 # Numbers of ``counts``, named as in `schemes.Counters`.
@@ -29,7 +29,8 @@ class Steps(NamedTuple):
     ----------
     speed : of the train [m/s]
     moving : start and places of contacts and pantographs, see ``kernels.shift``
-    placing, responding, solving : arguments of ``place``, ``respond`` and ``solve``
+    placing, responding : arguments of ``place`` and ``respond``
+    problem : SmallProblem of a step's forces
     superposing, compensating : of ``superpose`` and ``compensate`` after the forces
     showing : of ``kernels.show`` before what it fills
     free : address of the line's free step, see ``pointers.call_held``
@@ -39,7 +40,7 @@ class Steps(NamedTuple):
     heads : (2 n + 2 n^2,) all strips as functions of the forces, see ``HeadState``
     law : numbers of the contact law, see ``report``
     ends : of the contacts of each pantograph, see ``contact_kernels.write_outputs``
-    pushed : (m,) int, room for the numbers of slack droppers
+    switched : (m,) int, room for the numbers of links with a row
     outputs : outputs of the pantographs, of which ``of_step`` is filled by a step
     taps : (k,) int, addresses of the numbers of further channels, see ``RowLayout``
     """
@@ -53,11 +54,11 @@ class Steps(NamedTuple):
     records: np.ndarray
     heads: np.ndarray
     responding: tuple[Any, ...]
-    solving: tuple[Any, ...]
+    problem: SmallProblem
     law: tuple[Any, ...]
     superposing: tuple[Any, ...]
     compensating: tuple[Any, ...]
-    pushed: np.ndarray
+    switched: np.ndarray
     ends: np.ndarray
     of_step: np.ndarray
     outputs: np.ndarray
@@ -87,21 +88,21 @@ def report(time, force, law):
 
 
 @compiled
-def find_forces(time, solving, law, pushed, n, counts):
-    """Contact forces and compensations into arrays of ``solving``.
+def find_forces(time, problem, law, switched, n, counts):
+    """Contact forces and compensations into the solution of the problem.
 
-    Returns the number of droppers with a compensation, -1 if that is left to others.
+    Returns the number of links with a compensation, -1 if that is left to others.
     """
-    _, summed, rows, _, _, _, _, _, _, matrix, _, solution, _, _, _ = solving
-    if summed[2] or summed[3] or n + int(summed[0]) > matrix.shape[0]:
+    flags, solution = problem.flags[0], problem.unknowns.solution
+    if flags.broken or flags.missing or n + int(flags.rows) > solution.size:
         return -1
-    rounds, size, finite, complete = complementarity_kernels.solve(*solving)
+    rounds, size, finite, complete = complementarity_kernels.solve(problem)
     if rounds <= 0 or not finite or not complete or not report(time, solution[:n], law):
         return -1
     counts[ROUNDS] += rounds
     for k in range(size - n):
-        pushed[k] = int(rows[k, NUMBER])
-        counts[SLACK] += solution[n + k] != 0.0
+        switched[k] = int(problem.rows.number[k])
+        counts[SLACK] += solution[n + k] != 0.0 and problem.coupled.slackens[switched[k]]
     return size - n
 
 
@@ -114,14 +115,14 @@ def take(steps, times, drives, rows, counts, shows, first, n_steps):
     """
     steps, times, drives, rows = borrowed((steps, times, drives, rows))
     speed, moving, placing, free, loading, clock, records, heads = steps[:8]
-    responding, solving, law, superposing, compensating = steps[8:13]
-    pushed, ends, of_step, outputs, showing, taps = steps[13:]
+    responding, problem, law, superposing, compensating = steps[8:13]
+    switched, ends, of_step, outputs, showing, taps = steps[13:]
     start, places = moving
-    solution, depth, reported = solving[11], solving[12][0], law[3]
-    motion, arms, shown, laws, kept = showing
+    solution, depth, reported = problem.unknowns.solution, problem.found[0], law[3]
+    motion, arms, droppers, others, other_force = showing
     n, n_outputs = ends[-1], outputs.size
     n_arms = n_outputs + arms.size
-    n_shown = n_arms + shown.shape[0]
+    n_shown = n_arms + droppers.law.size
     force = solution[:n]
     for i in range(first, n_steps):
         time = times[i]
@@ -135,21 +136,20 @@ def take(steps, times, drives, rows, counts, shows, first, n_steps):
         for h in range(records.size):
             within &= head_records.predict(records[h], drives[i, h], heads, n)
         contact_kernels.respond(*responding)
-        n_slack = find_forces(time, solving, law, pushed, n, counts) if within else -1
-        if n_slack < 0:
+        m = find_forces(time, problem, law, switched, n, counts) if within else -1
+        if m < 0:
             return i - first, True
         contact_kernels.superpose(force, *superposing)
-        if n_slack:
-            slack = solution[n : n + n_slack]
-            contact_kernels.compensate(pushed[:n_slack], slack, *compensating)
+        if m:
+            contact_kernels.compensate(switched[:m], solution[n : n + m], *compensating)
         for h in range(records.size):
             head_records.move(records[h], force)
-        contact_kernels.write_outputs(force, reported, heads, depth, ends, of_step)
+        contact_kernels.write_outputs(force, reported, problem.heads, depth, ends, of_step)
         if shows:
             row = rows[i]
             row[:n_outputs] = outputs
             uplift, tension = row[n_outputs:n_arms], row[n_arms:n_shown]
-            state_kernels.show(motion, arms, shown, laws, kept, uplift, tension)
+            state_kernels.show(motion, arms, droppers, others, other_force, uplift, tension)
             for j in range(taps.size):
                 row[n_shown + j] = numbers_at(taps[j], 1)[0]
     return n_steps - first, False

@@ -6,12 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from catenary.meshgen.mesh import DROPPERS
 from catenary.solver.base.bound import bound
 from catenary.solver.base.errors import InputError
 from catenary.solver.base.parallel import on_root, total
+from catenary.solver.contact.followed_links import FollowedLinks
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.integrators import state_kernels
+from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.after_incidents import ChangedLine
 from catenary.solver.statics.equilibrium import Equilibrium
@@ -56,9 +59,6 @@ class Showing:
         self._pantographs = pantographs
         self._scheme = scheme
         self._line = interaction.line
-        self._slackens = model.simulated.slackening
-        # Share of what a dropper would push that acts.
-        self._kept_ratio = model.simulated.kept_ratio
         self._unbalanced = bool(line.load.any())
         first, owned = self._line.ownership.first, self._line.ownership.owned
         arms = model.dofs(model.mesh.steady_arms)
@@ -69,10 +69,11 @@ class Showing:
         self._node_rows = (model.dofs(self._owned_nodes) - first).astype(np.int64)
         self._node_uplift = np.zeros(self._node_rows.size)
         n_outputs, n_arms = pantographs.outputs.size, self._arm_rows.size
-        n_droppers = interaction.droppers.shown.size
-        self._shown = np.zeros(n_outputs + n_arms + n_droppers)
+        self._owned_droppers, droppers = interaction.links.shown(DROPPERS)
+        self._shown = np.zeros(n_outputs + n_arms + self._owned_droppers.size)
         _, uplift, tension = np.split(self._shown, [n_outputs, n_outputs + n_arms])
-        self._sources = Sources(pantographs, interaction, scheme, uplift, tension)
+        others, other_force, by_name = _further_links(interaction.links)
+        self._sources = Sources(pantographs, interaction, scheme, uplift, tension, by_name)
         self.layout = RowLayout(self._sources, self._shown)
         self._view = StepView(
             step=0,
@@ -88,9 +89,9 @@ class Showing:
         self.showing = (
             self._line.motion.read,
             self._arm_rows,
-            interaction.droppers.shown_ends,
-            interaction.droppers.shown_laws,
-            self._kept_ratio,
+            droppers,
+            others,
+            other_force,
         )
         self._show = bound(state_kernels.show, *self.showing, uplift, tension)
 
@@ -107,7 +108,7 @@ class Showing:
             arm_x=mesh.x(mesh.steady_arms),
             dropper_x=mesh.x(mesh.droppers[:, 1]),
             owned_arms=self._owned_arms,
-            owned_droppers=self._interaction.droppers.shown,
+            owned_droppers=self._owned_droppers,
             node_points=points,
             owned_nodes=self._owned_nodes,
             n_strips=self._pantographs.n_strips,
@@ -197,9 +198,7 @@ class Showing:
         if self._unbalanced:
             load = self._changed.load[self._line.ownership.first : self._line.ownership.last]
             parts[1] -= load @ self._line.displacement
-        if self._slackens:
-            pushing = self._interaction.droppers.energy_of_pushing()
-            parts[1] -= (1.0 - self._kept_ratio) * pushing
+        parts[1] += self._interaction.links.energy_of_switching()
         kinetic, elastic = total(self._comm, parts).tolist()
         return kinetic, elastic + self._changed.energy if self._unbalanced else elastic
 
@@ -228,6 +227,20 @@ class Showing:
         for i, pantograph in enumerate(pantographs.models):
             result[f"pantograph_{i}"] = pantograph.state()
         return result
+
+
+def _further_links(
+    links: FollowedLinks,
+) -> tuple[LinkArrays, np.ndarray, dict[str, np.ndarray]]:
+    """Owned links of one sign beside droppers, room for their forces [N], and that by component."""
+    names = [name for name in links.table.components if name != DROPPERS]
+    parts = [links.shown(name)[1] for name in names]
+    if not parts:
+        return NO_LINKS, np.zeros(0), {}
+    ends = np.cumsum([part.law.size for part in parts])
+    force = np.zeros(ends[-1])
+    by_name = dict(zip(names, np.split(force, ends[:-1]), strict=True))
+    return LinkArrays(*map(np.concatenate, zip(*parts, strict=True))), force, by_name
 
 
 def _like(checkpoint: dict[str, Any], name: str, wanted: np.ndarray) -> np.ndarray:

@@ -33,12 +33,23 @@ def hermite(length: float) -> list[Polynomial]:
     ]
 
 
+@dataclass(frozen=True)
+class DenseLink:
+    """A link that only pulls: ``terms`` are wire, place [m] and weight of what its stretch is made
+    of, then stiffness [N/m] and the gap at rest [m], None if it is taut there without a force."""
+
+    terms: tuple[tuple[str, float, float], ...]
+    stiffness: float
+    gap: float | None = None
+
+
 @dataclass
 class DenseLine:
     """Contact wire, messenger wire and one lumped pantograph of two masses.
 
     Unknowns are w and dw/dx of each mesh node by its number, then the masses' heights, head first.
     ``dampers_act`` tells whether a slack dropper keeps its damper, ``share`` what it keeps besides.
+    ``further`` links only pull; in sets they follow the droppers.
     """
 
     problem: Problem
@@ -46,6 +57,7 @@ class DenseLine:
     form: Equilibrium
     dampers_act: bool
     share: float = 0.0
+    further: tuple[DenseLink, ...] = ()
     tried: int = 0
     acting: frozenset[int] = frozenset()
     state: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -74,7 +86,18 @@ class DenseLine:
         (droppers,), (supports,), (arms,) = line.droppers, line.supports, line.steady_arms
         assert droppers.kind.stiffness is not None
         self.k = droppers.kind.stiffness
-        stiffness += self.k * self.pull.T @ self.pull
+        self.n_droppers = n_droppers = len(self.pull)
+        own = [self.direction(link)[None] for link in self.further]
+        self.pull = np.concatenate([self.pull, *own])
+        # Of each link: stiffness, force at rest, whether it stands open there.
+        springs = [link.stiffness for link in self.further]
+        self.spring = np.append(np.full(n_droppers, self.k), springs)
+        rests = [-link.stiffness * (link.gap or 0.0) for link in self.further]
+        self.rest = np.append(self.form.dropper_force, rests)
+        self.open = np.zeros(self.spring.size, dtype=bool)
+        self.open[n_droppers:] = [link.gap is not None for link in self.further]
+        taut = np.where(self.open, 0.0, self.spring)
+        stiffness += (self.pull.T * taut) @ self.pull
         for nodes, value in (
             (mesh.supports, supports.stiffness),
             (mesh.steady_arms, arms.kind.stiffness),
@@ -82,7 +105,7 @@ class DenseLine:
             stiffness[2 * nodes, 2 * nodes] += value
         alpha, beta = self.problem.damping.alpha, self.problem.damping.beta
         damping = alpha * stiffness + beta * mass
-        self.c = alpha * self.k
+        self.alpha = alpha
         kind = self.problem.train.placements[0].data
         assert isinstance(kind, LumpedData)
         (k1, k2), (c1, c2) = kind.stiffnesses, kind.dampings
@@ -95,6 +118,21 @@ class DenseLine:
         self.load[-1] = place.static_force + k2 * (place.nominal_height + place.static_force / k1)
         self.free = np.setdiff1d(np.arange(self.size), 2 * mesh.anchors)
         self.matrices = mass, damping, stiffness
+
+    def direction(self, link: DenseLink) -> np.ndarray:
+        """Stretch of a link as weights of all unknowns."""
+        result = np.zeros(self.size)
+        for wire, x, weight in link.terms:
+            nodes = self.mesh.wires[wire]
+            places = self.mesh.points[nodes, 0]
+            e = int(np.searchsorted(places, x)) - 1
+            values = [f(x - places[e]) for f in hermite(places[e + 1] - places[e])]
+            for side in (0, 1):
+                node = nodes[e + side]
+                result[[2 * node, 2 * node + 1]] += weight * np.array(
+                    values[2 * side : 2 * side + 2]
+                )
+        return result
 
     def meets(self, x: float) -> tuple[np.ndarray, float]:
         """How the depth of the head at ``x`` [m] follows from the unknowns: direction and rest."""
@@ -113,7 +151,7 @@ class DenseLine:
         return direction, float(rest)
 
     def step(self, x: float, every_set: bool = False) -> tuple[float, np.ndarray]:
-        """A step of average acceleration to a head at ``x`` [m]: contact and dropper forces [N].
+        """A step of average acceleration to a head at ``x`` [m]: forces of contact and links [N].
 
         ``every_set`` tries all sets and counts in ``tried`` those that fit; otherwise the search
         begins at the set of the step before and ends at the first that fits.
@@ -126,32 +164,38 @@ class DenseLine:
         law = self.problem.contact.stiffness  # type: ignore[union-attr]
         step = mass + dt / 2 * damping + dt**2 / 4 * stiffness
         right = self.load - damping @ v - stiffness @ d
-        c = 0.0 if self.dampers_act else self.c
-        worth = (1.0 - self.share) * (self.k * dt**2 / 4 + c * dt / 2)
-        known = self.form.dropper_force + self.pull @ (self.k * d + c * v)
+        kept = np.append(np.full(self.n_droppers, self.share), np.zeros(len(self.further)))
+        c = self.alpha * self.spring
+        if self.dampers_act:
+            c[: self.n_droppers] = 0.0
+        # What an acceleration is worth in a link's force, and what acting changes of it.
+        worth = self.spring * dt**2 / 4 + c * dt / 2
+        change = np.where(self.open, 1.0, kept - 1.0)
+        known = self.rest + self.spring * (self.pull @ d) + c * (self.pull @ v)
         found: list[tuple[frozenset[int], np.ndarray, np.ndarray, float]] = []
         for acts in self._sets():
             matrix, force = step.copy(), right.copy()
             for number in acts - {-1}:
                 pull = self.pull[number]
-                matrix -= worth * np.outer(pull, pull)
-                force += (1.0 - self.share) * known[number] * pull
+                matrix += change[number] * worth[number] * np.outer(pull, pull)
+                force -= change[number] * known[number] * pull
             if -1 in acts:
                 matrix += law * dt**2 / 4 * np.outer(direction, direction)
                 force -= law * (direction @ d + rest) * direction
             new = np.zeros(self.size)
             new[self.free] = np.linalg.solve(matrix[np.ix_(self.free, self.free)], force[self.free])
-            tension = known + (self.k * dt**2 / 4 + c * dt / 2) * self.pull @ new
+            tension = known + worth * (self.pull @ new)
             depth = float(direction @ (d + dt**2 / 4 * new) + rest)
-            slack = {number for number in range(tension.size) if tension[number] < 0.0}
-            if slack | ({-1} if depth > 0.0 else set()) == acts:
+            beyond = np.where(self.open, tension > 0.0, tension < 0.0)
+            switched = set(np.flatnonzero(beyond).tolist())
+            if switched | ({-1} if depth > 0.0 else set()) == acts:
                 found.append((acts, new, tension, depth))
                 if not every_set:
                     break
         self.tried = len(found)
         self.acting, new, tension, depth = found[0]
         self.state = np.array([d + dt**2 / 4 * new, v + dt / 2 * new, new])
-        return law * max(depth, 0.0), np.where(tension < 0.0, self.share * tension, tension)
+        return law * max(depth, 0.0), np.where(tension < 0.0, kept * tension, tension)
 
     def _sets(self) -> Iterator[frozenset[int]]:
         """All sets of slack droppers and of -1, the contact; those near the latest one first."""

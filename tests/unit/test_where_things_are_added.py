@@ -23,6 +23,7 @@ from catenary.solver.base.errors import InputError
 from catenary.solver.effects.build_model import build
 from catenary.solver.effects.effect import Effect, Limit, register, unregister
 from catenary.solver.model.builder import ModelBuilder
+from catenary.solver.model.links import between_nodes, law
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
@@ -36,7 +37,8 @@ RISE = 0.03  # [m]
 def _link(builder: ModelBuilder) -> None:
     wires = builder.mesh.wires
     pair = np.array([[wires[MESSENGER_WIRE][3], wires[CONTACT_WIRE][3]]])
-    builder.add_links("droppers", pair, "w", np.array([STIFFNESS]))
+    place = builder.mesh.x(pair[:, 1])
+    builder.add_links("droppers", between_nodes(builder.model, pair), law(place, STIFFNESS))
 
 
 @pytest.fixture

@@ -160,7 +160,7 @@ def test_the_jacobian_is_the_derivative_of_the_residual() -> None:
     v[:] = 1e-3 * rng.standard_normal(system.n)
     u[model.constrained] = v[model.constrained] = 0.0
     assert system.contacts(0.2, u, v)[0][0] > 100.0
-    slack = system.tension(u, v) < 0
+    slack = system.reserve(u, v) < 0
     assert slack.any() and not slack.all()
     by_v, by_a = 2.0 / 1e-3, 4.0 / 1e-6
     values = system.jacobian(0.2, u, v, by_v, by_a)

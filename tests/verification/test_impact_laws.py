@@ -19,6 +19,7 @@ from scipy.optimize import brentq
 
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
+from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact_problem.complementarity import InnerProblem
@@ -39,7 +40,7 @@ class Bounce:
     def __post_init__(self) -> None:
         data = LumpedData((MASS,), (0.0,), (0.0,))
         self.ball = LumpedPantograph(data, self.lift, 0.0, raise_time=0.0, dt=self.dt)
-        self.inner = InnerProblem(self.law, 0.0, np.zeros((0, 1)))
+        self.inner = InnerProblem(self.law, no_links())
         self.heads = Heads(1)
         self.time, self.depth, self.force = 0.0, 0.0, 0.0
 
@@ -57,7 +58,7 @@ class Bounce:
         self.heads.height_compliance[:] = head.height_compliance
         self.heads.velocity_compliance[:] = head.velocity_compliance
         line = LineResponse(1, 0)
-        line.height[:] = wire
+        line.line.place[:] = wire
         found = self.inner.solve(line, self.heads)
         self.ball.advance(found.contact_force)
         self.law.accept(self.time, found.depth, found.rate, found.contact_force)

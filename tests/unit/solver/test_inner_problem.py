@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.head_states import Heads
-from catenary.solver.contact.line_response import LineResponse
+from catenary.solver.contact.line_response import Coupled, LineResponse
 from catenary.solver.contact_problem import complementarity
 from catenary.solver.contact_problem.complementarity import InnerProblem, InnerSolution
 from catenary.solver.contact_problem.law_tangents import HertzInSteps, LinearInSteps
@@ -20,14 +21,14 @@ from catenary.solver.problem.contact_laws import HertzLaw, LinearLaw
 EPS = np.finfo(float).eps
 
 
-def band_of(coupling: np.ndarray) -> np.ndarray:
-    """Couplings G (m, m) as a band: ``band[e, d - e + half]`` is G_de."""
+def coupled(coupling: np.ndarray, kept: float = 0.0) -> Coupled:
+    """Links that slacken with couplings G (m, m) as a band: ``band[e, d - e + half]`` is G_de."""
     m = len(coupling)
     half = max(m - 1, 0)
     band = np.zeros((m, 2 * half + 1))
     for e in range(m):
         band[e, half - e : half - e + m] = coupling[:, e]
-    return band
+    return Coupled(band, np.full(m, 1.0 - kept), np.ones(m, dtype=bool), np.zeros(m))
 
 
 @dataclass
@@ -43,17 +44,17 @@ class Case:
 
     def solve(self) -> InnerSolution:
         law = LinearInSteps(self.law, self.heads.n, pulls=not self.may_lose_contact)
-        return InnerProblem(law, self.kept, band_of(self.coupling)).solve(self.line, self.heads)
+        return InnerProblem(law, coupled(self.coupling, self.kept)).solve(self.line, self.heads)
 
     def violation(self, found: InnerSolution) -> float:
         """Largest difference between the two sides of the definitions in the module's docstring."""
         line, force, slack = self.line, found.contact_force, found.compensation
         # No dropper is pushed where there are no compensations.
         slack = slack if slack.size else np.zeros(line.count)
-        by_force, by_slack, rate_by_slack = (line.couplings(kind) for kind in range(3))
-        height = line.height + line.height_by_force @ force - by_slack.T @ slack
-        rate = line.rate + line.rate_by_force @ force - rate_by_slack.T @ slack
-        tension = line.tension + by_force @ force - self.coupling @ slack
+        free, rows = line.line, line.rows
+        height = free.place + free.by_force @ force - rows.lift.T @ slack
+        rate = free.rate + free.rate_by_force @ force - rows.rise.T @ slack
+        tension = rows.reserve + rows.reaction @ force - self.coupling @ slack
         heads = self.heads
         depth = heads.height - heads.height_compliance @ force - height
         closing = heads.velocity - heads.velocity_compliance @ force - rate
@@ -84,14 +85,14 @@ def make_case(
     between = droppers.T @ inverse @ contacts
     among_droppers = droppers.T @ inverse @ droppers
     line = LineResponse(n, m)
-    line.height[:], line.rate[:] = rng.normal(size=(2, n))
-    line.height_by_force[:] = position * among_contacts
-    line.rate_by_force[:] = velocity * among_contacts
-    line.summed[0] = m
-    line.rows[:, 0], line.rows[:, 1] = np.arange(m), rng.normal(size=m)
-    line.couplings(0)[:] = per_acceleration[:, None] * between
-    line.couplings(1)[:] = position * between
-    line.couplings(2)[:] = velocity * between
+    line.line.place[:], line.line.rate[:] = rng.normal(size=(2, n))
+    line.line.by_force[:] = position * among_contacts
+    line.line.rate_by_force[:] = velocity * among_contacts
+    line.count = m
+    line.rows.number[:], line.rows.reserve[:] = np.arange(m), rng.normal(size=m)
+    line.rows.reaction[:] = per_acceleration[:, None] * between
+    line.rows.lift[:] = position * between
+    line.rows.rise[:] = velocity * between
     heads = Heads(n)
     heads.height[:], heads.velocity[:] = rng.normal(size=(2, n))
     # Strips of one head move each other.
@@ -148,10 +149,10 @@ def test_a_problem_that_cycles_is_handed_to_the_pivoting() -> None:
     matrix = np.array([[1.0, -3.0, 2.0], [3.0, 1.0, 0.0], [-3.0, -2.0, 1.0]])
     right = np.array([1.0, -2.0, 3.0])
     line = LineResponse(0, 3)
-    line.summed[0] = 3
-    line.rows[:, 0], line.rows[:, 1] = np.arange(3), -right
+    line.count = 3
+    line.rows.number[:], line.rows.reserve[:] = np.arange(3), -right
     law = LinearInSteps(LinearLaw(1.0, 0.0), 0, pulls=False)
-    found = InnerProblem(law, 0.0, band_of(np.eye(3) - matrix)).solve(line, Heads(0))
+    found = InnerProblem(law, coupled(np.eye(3) - matrix)).solve(line, Heads(0))
     solutions = []
     for acts in itertools.product([False, True], repeat=3):
         index = np.flatnonzero(acts)
@@ -167,11 +168,11 @@ def test_a_problem_that_cycles_is_handed_to_the_pivoting() -> None:
 def one_contact(height: float, may_lose_contact: bool = True) -> InnerSolution:
     """A head at 0 m with a compliance of 2e-5 m/N under a wire at ``height`` with 3e-5 m/N."""
     line = LineResponse(1, 0)
-    line.height[:], line.height_by_force[:] = height, 3e-5
+    line.line.place[:], line.line.by_force[:] = height, 3e-5
     heads = Heads(1)
     heads.height_compliance[:] = 2e-5
     law = LinearInSteps(LinearLaw(5e4, 0.0), 1, pulls=not may_lose_contact)
-    return InnerProblem(law, 0.0, np.zeros((0, 1))).solve(line, heads)
+    return InnerProblem(law, no_links()).solve(line, heads)
 
 
 def test_one_contact_has_its_closed_form() -> None:
@@ -194,11 +195,11 @@ def test_slow_impacts_with_much_hysteresis_find_their_force() -> None:
     for _ in range(500):
         law = HertzInSteps(HertzLaw(1.4e8, 1.5, 5.9, rng.uniform(0.01, 0.05)), 1)
         line, heads = LineResponse(1, 0), Heads(1)
-        line.height[:], line.rate[:] = rng.uniform(4.5, 5.5), rng.uniform(-2.0, 2.0)
-        heads.height[:] = line.height + rng.uniform(0.0, 0.03)
-        heads.velocity[:] = line.rate + rng.uniform(-1.0, 3.0)
+        line.line.place[:], line.line.rate[:] = rng.uniform(4.5, 5.5), rng.uniform(-2.0, 2.0)
+        heads.height[:] = line.line.place + rng.uniform(0.0, 0.03)
+        heads.velocity[:] = line.line.rate + rng.uniform(-1.0, 3.0)
         heads.height_compliance[:], heads.velocity_compliance[:] = 1.1e-5, 5.4e-3
-        found = InnerProblem(law, 0.0, band_of(np.zeros((0, 0)))).solve(line, heads)
+        found = InnerProblem(law, coupled(np.zeros((0, 0)))).solve(line, heads)
         depth, rate = float(found.depth[0]), float(found.rate[0])
         push = 1.4e8 * max(depth, 0.0) ** 1.5 * (1.0 + 5.9 * rate / law.state()[0])
         # A hundred times what the tangents are held to.
@@ -217,16 +218,16 @@ def test_contacts_beside_droppers_that_lost_much_find_their_force() -> None:
     line, heads = LineResponse(2, 4), Heads(2)
     heads.height[:] = 0.06553267579229338, 0.6174776988587802
     heads.velocity[:] = 47.7164242666449, 471.445653584825
-    line.height_by_force[:] = [
+    line.line.by_force[:] = [
         [1.3360861603284938e-05, -4.7728306948933854e-09],
         [-4.7728306948933738e-09, 1.3496489520333944e-05],
     ]
-    line.rate_by_force[:] = [
+    line.line.rate_by_force[:] = [
         [4.166943311109159e-03, 1.877413449708056e-10],
         [-4.178905455472464e-06, 3.993942428118032e-03],
     ]
-    line.summed[0] = 4
-    line.rows[:] = [
+    line.count = 4
+    line.sent_rows[:] = [
         [0, -3.2008731e6, -9.9e-8, -4.8402539e-5, -1.31e-13, -6.4280368e-11, -7.8e-15, -6.85045e-9],
         [1, -3.8134575e6, -5.63e-4, -1.12034647e-1, -7.475e-10, -1.48786168e-7, -4.499e-10,
          -1.23383328e-4],
@@ -234,7 +235,7 @@ def test_contacts_beside_droppers_that_lost_much_find_their_force() -> None:
          -1.25252735e-5, -3.9237e-8],
         [3, -4.2196754e6, -5.36e-6, -1.3957e-8, -7.123e-12, -1.8535e-14, -5.42768e-9, -1.6156e-11],
     ]  # fmt: skip
-    found = InnerProblem(law, 0.0, band_of(np.zeros((4, 4)))).solve(line, heads)
+    found = InnerProblem(law, coupled(np.zeros((4, 4)))).solve(line, heads)
     force = law.force(found.depth, found.rate)
     print(found.contact_force, force, found.rounds)
     # Known to 1e-12 m/s, the rounding of 470, on a slope of 5e6 N s/m.

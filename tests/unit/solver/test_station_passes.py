@@ -11,10 +11,13 @@ from catenary.solver.integrators.line_state import LineState, PredictedLineState
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.linear.station_factors import station_factors
 from catenary.solver.linear.station_products import station_product
+from catenary.solver.model.switching_links import RESERVE, LinkArrays
 
 RNG = np.random.default_rng(11)
 STEPS = Steps(0.1, 0.002, 0.05, 0.3, 0.0025, 0.05, 0.4)
-LAWS = RNG.standard_normal((2000, 4))
+LAWS = np.zeros(2000, dtype=RESERVE)
+for name in ("rest", "stiffness", "damping"):
+    LAWS[name] = RNG.standard_normal(LAWS.size)
 # Numbers of order one; the order of a sum differs.
 ROUND_OFF = 1e-13
 
@@ -57,7 +60,7 @@ def compare(
     factors.solve(force, solution)
     state_kernels.correct(*expected, *STEPS[4:])
 
-    # Droppers at every third station, whose ends may be at different ones.
+    # Links at every third station, whose ends may be at different ones.
     upper = np.arange(0, n_own, 3)
     lower = np.minimum(upper + RNG.integers(0, 2, upper.size), n_own - 1)
     ends = b * np.column_stack([upper, lower]) + [b // 2, 0]
@@ -67,11 +70,12 @@ def compare(
     motion = PredictedLineState(read[b:-b][own], np.zeros(b * n_own), answer[own], shown, STEPS)
     motion.put(displacement, velocity, answer[own].copy())
     passes = StationPasses(product, factors, read, read, loads, answer, motion, STEPS)
-    passes.track_droppers(ends, LAWS[: len(ends)], tension)
+    links = LinkArrays(ends, RNG.standard_normal(ends.shape), LAWS[: len(ends)])
+    passes.track_links(links, tension)
     passes.step()
     found = motion.displacement, motion.velocity, answer[own], tension
     plain = LineState(*expected, (0.0, 0.0)).read
-    state_kernels.tension(plain, ends, LAWS, pulls)
+    state_kernels.reserves(plain, links, pulls)
     for one, other in zip(found, (*expected, pulls), strict=True):
         assert np.abs(one - other).max(initial=0.0) < ROUND_OFF * np.abs(other).max(initial=1.0)
 

@@ -15,6 +15,7 @@ from petsc4py import PETSc
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
 from catenary.solver.base.errors import InputError, NotConverged, RunBroken
+from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact_problem.complementarity import InnerProblem
@@ -30,7 +31,6 @@ from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.equilibrium import find_form
 from catenary.solver.time_loop.march import Outcome
 
-NO_DROPPERS = np.zeros((0, 1))
 LINE = en50318_line(2)
 
 
@@ -39,9 +39,9 @@ def pressed(
 ) -> tuple[InnerProblem, LineResponse, Heads]:
     """A contact ``depth`` [m] deep without force, which takes ``by_force`` [m/N] off it."""
     line, heads = LineResponse(1, 0, early=True), Heads(1)
-    line.height[:], line.height_by_force[:] = -depth, by_force
-    line.rate_by_force[:] = rate_by_force
-    return InnerProblem(law, 0.0, NO_DROPPERS), line, heads
+    line.line.place[:], line.line.by_force[:] = -depth, by_force
+    line.line.rate_by_force[:] = rate_by_force
+    return InnerProblem(law, no_links()), line, heads
 
 
 def test_contacts_without_a_common_solution_are_told() -> None:

@@ -1,0 +1,148 @@
+"""Links that switch under way: those of a rank, and how they act on each other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from catenary.solver.contact.contact_kernels import Followed
+from catenary.solver.contact.line_response import Coupled
+from catenary.solver.integrators import state_kernels
+from catenary.solver.integrators.line_integrator import LineIntegrator
+from catenary.solver.linear import unit_responses
+from catenary.solver.model.switching_links import LinkArrays, LinkTable
+
+
+class FollowedLinks:
+    """The links that this rank owns, with their reserve: of droppers the tension as if they could
+    push.
+
+    Those that are broken take no part; they are only shown, carrying nothing. Of dampers that go on
+    acting when springs are slack nothing is here: they are a part of the line's damping.
+
+    Attributes
+    ----------
+    table : LinkTable of the whole line
+    numbers : (n,) numbers in the table of those that may carry
+    links : LinkArrays of these, with local unknowns
+    reserve : (n,) what was found last, here or by a free step of the line [N]
+    """
+
+    def __init__(self, table: LinkTable, line: LineIntegrator) -> None:
+        self.table = table
+        mine = line.ownership.owned(table.arrays.unknowns[:, 0])
+        self._mine = mine
+        self._local = table.arrays._replace(unknowns=table.arrays.unknowns - line.ownership.first)
+        self.numbers = np.flatnonzero(mine & ~table.broken)
+        self.links = self._local.of(self.numbers)
+        self.reserve = np.zeros(self.numbers.size)
+        self._line = line
+        line.track_links(self.links, self.reserve)
+
+    @property
+    def followed(self) -> Followed:
+        """The same as kernels take it."""
+        return Followed(self.numbers, self.links, self.reserve)
+
+    def shown(self, component: str) -> tuple[np.ndarray, LinkArrays]:
+        """Numbers among those of its component, and arrays, of all links that this rank owns,
+        broken ones included."""
+        numbers = self.table.of_component(component)
+        numbers = numbers[self._mine[numbers]]
+        return self.table.index[numbers], self._local.of(numbers)
+
+    def find_reserve(self) -> np.ndarray:
+        """Reserve in the line's present motion [N], shape (n,), overwritten by the next call."""
+        state_kernels.reserves(self._line.motion.read, self.links, self.reserve)
+        return self.reserve
+
+    def compensation(self) -> np.ndarray:
+        """Compensations in the line's present motion [N], (n,) (eq. 2.7)."""
+        released = self.links.law["released"]
+        return np.asarray(released * np.maximum(0.0, -self.find_reserve()))
+
+    def energy_of_switching(self) -> float:
+        """What elastic energy of the line lacks where owned links have switched, were they springs:
+        slack droppers hold less than K makes of them, and closed stops more than nothing [J]."""
+        return float(state_kernels.energy_of_switching(self._line.motion.read, self.links))
+
+    def loads(self, compensation: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Local unknowns and forces of compensations (n,) [N] of all of them."""
+        acting = np.flatnonzero(compensation)
+        unknowns, weights, _ = self.links.of(acting)
+        forces = -compensation[acting][:, None] * weights
+        return [(unknowns[:, k], forces[:, k]) for k in range(unknowns.shape[1])] * bool(
+            acting.size
+        )
+
+
+def link_columns(comm: Any, table: LinkTable, line: LineIntegrator) -> unit_responses.ShortColumns:
+    """Columns of A^-1 for unit compensations of all links. Collective."""
+    return unit_responses.compute(
+        comm,
+        line.operators.solve_for,
+        line.ownership,
+        line.windows,
+        table.arrays.unknowns,
+        table.arrays.weights,
+        table.arrays.law["place"],
+        table.half_length,
+    )
+
+
+def no_links() -> Coupled:
+    """A line without links that switch."""
+    return Coupled(np.zeros((0, 1)), np.zeros(0), np.zeros(0, dtype=bool), np.zeros(0))
+
+
+class LinkCoupling:
+    """How the compensation of one link changes the reserve of another, on rank 0.
+
+    Collective to make. G_de = (k sigma + c tau)_d L_d^T A^-1 L_e [-], k and c being those of the
+    reserve.
+
+    Attributes
+    ----------
+    coupled : Coupled, whose band are the G_de; without any link on other ranks
+    """
+
+    def __init__(
+        self,
+        comm: Any,
+        followed: FollowedLinks,
+        columns: unit_responses.ShortColumns,
+        line: LineIntegrator,
+    ) -> None:
+        self.coupled = no_links()
+        table, links = followed.table, followed.links
+        x = table.arrays.law["place"]
+        distance = line.windows.reach + 2.0 * table.half_length.max(initial=0.0)
+        n = x.size
+        far = np.searchsorted(x, x + distance, side="right") - 1 - np.arange(n)
+        half = int(far.max(initial=0))
+        band = np.zeros((n, 2 * half + 1))
+        scratch = np.zeros(line.ownership.n_local)
+        law = links.law
+        per_acceleration = law["stiffness"] * line.position_factor
+        per_acceleration += law["damping"] * line.velocity_factor
+        own_x = law["place"]
+        for e in range(n):
+            values = columns.values[e]
+            if values.size == 0:
+                continue
+            filled = slice(int(columns.start[e]), int(columns.start[e]) + values.size)
+            scratch[filled] = values
+            low, high = own_x.searchsorted([x[e] - distance, x[e] + distance])
+            near = slice(int(low), int(high))
+            unknowns, weights, _ = links.of(near)
+            spread = (weights * scratch[unknowns]).sum(axis=1)
+            offset = followed.numbers[near] - e + half
+            inside = (offset >= 0) & (offset < band.shape[1])
+            band[e, offset[inside]] = (per_acceleration[near] * spread)[inside]
+            scratch[filled] = 0.0
+        if comm.size > 1:
+            band = comm.reduce(band, root=0)
+        if band is not None:
+            released, slackens = table.arrays.law["released"].copy(), table.slackens
+            self.coupled = Coupled(band, released, slackens, np.zeros(n))

@@ -1,0 +1,142 @@
+"""Links: droppers, clamps, arms, stops, each a direction in the line's unknowns and a law.
+
+The stretch of a link is e = L d, a sum of m displacements times weights. Its law is
+T = rest + k e + c e', and it acts on the unknowns with -L T. A link that only pulls has no T < 0,
+one that only pushes no T > 0. With a gap a link stands open at rest: it is then no part of K.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from catenary.solver.model.shape_functions import shape_values
+
+if TYPE_CHECKING:
+    from catenary.solver.model.model import Model
+
+# Which forces a link has: tension and compression, or one of both.
+BOTH, PULLS, PUSHES = 0, 1, 2
+# Force at rest [N], of an open link that of its spring drawn on through the gap; stiffness [N/m];
+# damping [N s/m] beside that of its component; place along the track [m]; which forces it has;
+# whether it stands open at rest.
+LAW = np.dtype(
+    [
+        ("rest", np.float64),
+        ("stiffness", np.float64),
+        ("damping", np.float64),
+        ("place", np.float64),
+        ("acts", np.int64),
+        ("open", np.bool_),
+    ]
+)
+
+
+class Direction(NamedTuple):
+    """Directions L of n links: ``weights`` (n, m) of displacements of ``unknowns`` (n, m)."""
+
+    unknowns: np.ndarray
+    weights: np.ndarray
+
+
+@dataclass(frozen=True)
+class Links:
+    """Links of one component of the line.
+
+    Attributes
+    ----------
+    component : its name, which decides on damping (``line.damping.per_component``)
+    direction : Direction of each
+    law : (n,) records of ``LAW``
+    """
+
+    component: str
+    direction: Direction
+    law: np.ndarray
+
+    @property
+    def stiffness_matrices(self) -> np.ndarray:
+        """k L L^T of each, shape (n, m, m) [N/m]; zero of those that stand open."""
+        weights = self.direction.weights
+        stiffness = np.where(self.law["open"], 0.0, self.law["stiffness"])
+        return np.asarray(stiffness[:, None, None] * weights[:, :, None] * weights[:, None, :])
+
+
+def at_nodes(model: Model, nodes: np.ndarray, unknown: str = "w") -> Direction:
+    """Stretch that is the displacement of a node each, ``nodes`` (n,): links to the ground."""
+    unknowns = model.dofs(nodes, unknown)[:, None]
+    return Direction(unknowns, np.ones(unknowns.shape))
+
+
+def between_nodes(model: Model, pairs: np.ndarray, unknown: str = "w") -> Direction:
+    """Displacement of the first node less that of the second, ``pairs`` (n, 2)."""
+    unknowns = model.dofs(pairs, unknown)
+    return Direction(unknowns, np.broadcast_to(np.array([1.0, -1.0]), unknowns.shape))
+
+
+def at_places(
+    model: Model, wire: str, x: np.ndarray, plane: tuple[str, str] = ("w", "theta_y")
+) -> Direction:
+    """Deflection of a wire at places ``x`` (n,) [m], which may be between its nodes.
+
+    By the Hermite functions of the element there, in a ``plane`` of deflection and slope.
+    """
+    nodes = model.mesh.wires[wire]
+    at = model.mesh.x(nodes)
+    element = np.clip(np.searchsorted(at, x) - 1, 0, at.size - 2)
+    length = np.diff(at)[element]
+    weights = [
+        shape_values(xi, h) for xi, h in zip((x - at[element]) / length, length, strict=True)
+    ]
+    ends = nodes[element[:, None] + [0, 1]]
+    unknowns = np.stack([model.dofs(ends, name) for name in plane], axis=2).reshape(-1, 4)
+    return Direction(unknowns, np.reshape(weights, (-1, 4)))
+
+
+def difference(upper: Direction, lower: Direction) -> Direction:
+    """Stretch of links from ``lower`` to ``upper`` places."""
+    return Direction(
+        np.concatenate([upper.unknowns, lower.unknowns], axis=1),
+        np.concatenate([upper.weights, -lower.weights], axis=1),
+    )
+
+
+def law(
+    place: np.ndarray,
+    stiffness: float | np.ndarray,
+    rest: float | np.ndarray = 0.0,
+    acts: int = BOTH,
+    damping: float | np.ndarray = 0.0,
+    gap: float | np.ndarray | None = None,
+) -> np.ndarray:
+    """Laws of n links as records of ``LAW``.
+
+    Parameters
+    ----------
+    place : (n,) along the track [m]
+    stiffness : [N/m], > 0
+    rest : force at rest [N], > 0 in tension, which the rest shape is found with
+    acts : ``BOTH``, ``PULLS`` or ``PUSHES``
+    damping : [N s/m] of open links; those of K have that of their component only
+    gap : stretch [m] by which an open link of one sign is away from acting at rest, >= 0; None for
+        links of K
+
+    Raises
+    ------
+    ValueError
+        If a link with a gap acts both ways or has a force at rest, or one of K has damping.
+    """
+    if gap is None and np.any(damping):
+        raise ValueError("links without a gap have the damping of their component")
+    if gap is not None and (acts == BOTH or np.any(rest) or np.any(np.asarray(gap) < 0.0)):
+        raise ValueError("a link with a gap >= 0 acts one way and carries nothing at rest")
+    result = np.zeros(np.shape(place), dtype=LAW)
+    result["place"], result["stiffness"] = place, stiffness
+    result["damping"], result["acts"] = damping, acts
+    result["rest"] = rest
+    if gap is not None:
+        sign = -1.0 if acts == PULLS else 1.0
+        result["rest"], result["open"] = sign * np.asarray(stiffness) * gap, True
+    return result

@@ -1,0 +1,160 @@
+"""Links whose force is followed in the time loop, in one table in their order along the track.
+
+A link of one sign switches where its force would change sign. Its *reserve* R is what is left until
+then: the tension of a dropper, or what an open stop lacks to press. A link of K with R < 0 gets a
+compensation s = released max(0, -R) beside what K does; for an open link, which K does not hold,
+s = max(0, -R) is its force. Both act on the unknowns with -L s, so that the time loop treats both
+alike: R = rest + k e + c e' with rest, k and c of an open link the negative ones of its law.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from catenary.solver.model.links import BOTH, PUSHES, Links
+from catenary.solver.model.model import Model
+
+# Reserve at rest [N] and what it gains from stretch [N/m] and its rate [N s/m], as long as the link
+# is what it is at rest; place along the track [m]; what of -R > 0 is the compensation; what of R is
+# force: all of it of a link of K, nothing of an open one.
+RESERVE = np.dtype(
+    [
+        ("rest", np.float64),
+        ("stiffness", np.float64),
+        ("damping", np.float64),
+        ("place", np.float64),
+        ("released", np.float64),
+        ("carried", np.float64),
+    ]
+)
+
+
+class LinkArrays(NamedTuple):
+    """n links as kernels take them: ``unknowns`` (n, m) and ``weights`` (n, m) of their direction,
+    ``law`` (n,) records of ``RESERVE``."""
+
+    unknowns: np.ndarray
+    weights: np.ndarray
+    law: np.ndarray
+
+    def of(self, which: np.ndarray | slice) -> LinkArrays:
+        """Some of them."""
+        return LinkArrays(self.unknowns[which], self.weights[which], self.law[which])
+
+
+NO_LINKS = LinkArrays(np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros(0, RESERVE))
+
+
+@dataclass(frozen=True)
+class LinkTable:
+    """All links that are followed, the same on every rank, in order of place.
+
+    Attributes
+    ----------
+    arrays : LinkArrays, in a number all over the line
+    components : names of components
+    component, index : (n,) which of these each is of, and its number there
+    broken : (n,) whether it carries nothing any longer
+    half_length : (n,) how far its unknowns are from its place [m]
+    switches : whether any of them does
+    """
+
+    arrays: LinkArrays
+    components: tuple[str, ...]
+    component: np.ndarray
+    index: np.ndarray
+    broken: np.ndarray
+    half_length: np.ndarray
+
+    @property
+    def switches(self) -> bool:
+        return bool(self.arrays.law["released"].any())
+
+    @property
+    def slackens(self) -> np.ndarray:
+        """(n,) whether each is a link of K that slackens, and no open one that closes."""
+        return np.asarray(self.arrays.law["carried"] > 0.0)
+
+    def of_component(self, name: str) -> np.ndarray:
+        """Numbers of a component's links, in its own order."""
+        if name not in self.components:
+            return np.zeros(0, dtype=np.int64)
+        numbers = np.flatnonzero(self.component == self.components.index(name))
+        return numbers[np.argsort(self.index[numbers])]
+
+
+def switching_links(model: Model, dropper_force: np.ndarray) -> LinkTable:
+    """Droppers, and all links of one sign; ``dropper_force`` (n_droppers,) at rest [N]. Not
+    collective."""
+    parts: list[LinkArrays] = []
+    names: list[str] = []
+    broken: list[np.ndarray] = []
+    free = np.ones(model.n_dofs)
+    free[model.constrained] = 0.0
+    for links in model.links:
+        if links is model.droppers:
+            arrays = _droppers(model, links, dropper_force)
+            out = model.broken
+        else:
+            arrays = _one_sign(model, links)
+            out = np.zeros(arrays.law.size, dtype=bool)
+        # A force on an unknown that is held moves nothing.
+        parts.append(arrays._replace(weights=arrays.weights * free[arrays.unknowns]))
+        names.append(links.component)
+        broken.append(out)
+    # Two at least, which kernels take without a loop.
+    m = max((part.unknowns.shape[1] for part in parts), default=2)
+    m = max(m, 2)
+    parts = [_padded(part, m) for part in parts]
+    arrays = LinkArrays(*(np.concatenate(same) for same in zip(*parts, strict=True)))
+    order = np.argsort(arrays.law["place"], kind="stable")
+    sizes = [part.law.size for part in parts]
+    distinct = tuple(dict.fromkeys(names))
+    component = np.repeat([distinct.index(name) for name in names], sizes)
+    index = np.zeros(component.size, dtype=np.int64)
+    for number in range(len(distinct)):
+        own = component == number
+        index[own] = np.arange(np.count_nonzero(own))
+    arrays = arrays.of(order)
+    x = model.numbering.as_vector(model.mesh.points[:, :1])
+    half_length = np.abs(x[arrays.unknowns] - arrays.law["place"][:, None]).max(axis=1)
+    out = np.concatenate(broken)[order]
+    return LinkTable(arrays, distinct, component[order], index[order], out, half_length)
+
+
+def _droppers(model: Model, links: Links, force: np.ndarray) -> LinkArrays:
+    law = np.zeros(links.law.size, dtype=RESERVE)
+    law["rest"] = np.where(model.broken, 0.0, force)
+    law["stiffness"], law["damping"] = links.law["stiffness"], model.released_damping
+    law["place"], law["carried"] = links.law["place"], 1.0
+    law["released"] = 1.0 - model.simulated.kept_ratio
+    return LinkArrays(*links.direction, law)
+
+
+def _one_sign(model: Model, links: Links) -> LinkArrays:
+    """Those of a set that act one way, turned so that they pull."""
+    given = links.law["acts"] != BOTH
+    own = links.law[given]
+    turned = np.where(own["acts"] == PUSHES, -1.0, 1.0)
+    law = np.zeros(own.size, dtype=RESERVE)
+    # The reserve of a link of K is its force, of an open one what that lacks.
+    sign = np.where(own["open"], -1.0, 1.0)
+    alpha, _ = model.damping_of(links.component)
+    law["rest"] = sign * turned * own["rest"]
+    law["stiffness"] = sign * own["stiffness"]
+    law["damping"] = sign * (own["damping"] + alpha * own["stiffness"])
+    law["place"], law["released"] = own["place"], 1.0
+    law["carried"] = ~own["open"]
+    weights = turned[:, None] * links.direction.weights[given]
+    return LinkArrays(links.direction.unknowns[given], weights, law)
+
+
+def _padded(links: LinkArrays, m: int) -> LinkArrays:
+    """The same with m unknowns each: their first one again, without weight."""
+    more = m - links.unknowns.shape[1]
+    unknowns = np.pad(links.unknowns, ((0, 0), (0, more)), mode="edge")
+    weights = np.pad(links.weights, ((0, 0), (0, more)))
+    return LinkArrays(unknowns.astype(np.int64), weights, links.law)
