@@ -141,17 +141,17 @@ def go_on_by_alpha(layout, at, solution, motion, changes):
 
 
 @in_line
-def eliminate_row(multiplied, factored, loads, station, states, outward, answer):
+def eliminate_row(multiplied, factored, loads, station, before, states, outward, answer):
     """``eliminate`` with the right-hand side from a row of the product, and of ``loads`` if there
-    are any; ``states`` are what ``read_station`` gives before, at and after the station."""
-    before, here, after = states
-    positions, velocities = (before[0], here[0], after[0]), (before[1], here[1], after[1])
+    are any; ``states`` are what ``read_station`` gives to the start, at and to the end of it."""
+    to_start, here, to_end = states
+    positions, velocities = (to_start[0], here[0], to_end[0]), (to_start[1], here[1], to_end[1])
     sums = row_sums(multiplied, station, positions, velocities)
     if loads.size > 0:
         layout = factored[0]
         load_here = load(layout, loads, pitch(layout) * np.uint64(station))
         sums = add(sums[0], load_here), sums[1]
-    return eliminate(factored, sums, station, outward, answer)
+    return eliminate(factored, sums, station, before, outward, answer)
 
 
 @compiled
@@ -168,18 +168,19 @@ def forth(multiplied, factored, loads, answer):
         j = n - 1 - i
         after, ahead = read_station(multiplied, i + 1), read_station(multiplied, j - 1)
         states, others = (before, here, after), (ahead, there, beyond)
-        left = eliminate_row(multiplied, factored, loads, i, states, left, answer)
-        right = eliminate_row(multiplied, factored, loads, j, others, right, answer)
+        last, following = max(i - 1, 0), min(j + 1, n - 1)
+        left = eliminate_row(multiplied, factored, loads, i, last, states, left, answer)
+        right = eliminate_row(multiplied, factored, loads, j, following, others, right, answer)
         before, here, beyond, there = here, after, there, ahead
     for j in range(n - 1 - pairs, middle, -1):
         ahead = read_station(multiplied, j - 1)
-        others = ahead, there, beyond
-        right = eliminate_row(multiplied, factored, loads, j, others, right, answer)
+        others, following = (ahead, there, beyond), min(j + 1, n - 1)
+        right = eliminate_row(multiplied, factored, loads, j, following, others, right, answer)
         beyond, there = there, ahead
     for i in range(pairs, middle + 1):
         after = read_station(multiplied, i + 1)
-        states = before, here, after
-        left = eliminate_row(multiplied, factored, loads, i, states, left, answer)
+        states, last = (before, here, after), max(i - 1, 0)
+        left = eliminate_row(multiplied, factored, loads, i, last, states, left, answer)
         before, here = here, after
     meet(factored, middle, right, answer)
 

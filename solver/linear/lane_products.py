@@ -106,6 +106,36 @@ add_beside = _product(
 )
 
 
+@inlined
+def add_transposed(typing_context, layout, total, numbers, skipped, x):
+    """``total`` plus the transpose of a block for ``add_whole`` times x; the layout turns."""
+
+    def generate(context, builder, signature, arguments):
+        _, total, numbers, skipped, x = arguments
+        terms = signature.args[0].layout.whole_terms
+        data, lane = builder.gep(numbers, [skipped]), np.arange(x.type.count)
+        # What the block's rows and columns are exchanged by; one register holds all lanes.
+        sums = {0: total}
+        for term, (source, target) in enumerate(zip(terms.sources, terms.targets, strict=True)):
+            stored = _stored(builder, data, term * lane.size, lane.size)
+            product = builder.fmul(stored, gathered(builder, [x], target), flags=FUSED)
+            turned = int(source[0])
+            before = sums.get(turned)
+            sums[turned] = product if before is None else builder.fadd(before, product, flags=FUSED)
+        parts = [gathered(builder, [one], lane ^ turned) for turned, one in sums.items()]
+        while len(parts) > 1:
+            parts = [builder.fadd(*parts[k : k + 2]) for k in range(0, len(parts), 2)]
+        return parts[0]
+
+    return total(layout, total, numbers, skipped, x), generate
+
+
+def _stored(builder: Any, data: Any, at: int, size: int) -> Any:
+    """Numbers of a block from ``at`` on."""
+    place = builder.gep(data, [ir.Constant(ir.IntType(64), at)])
+    return builder.load(builder.bitcast(place, vector_type(size).as_pointer()), align=8)
+
+
 def _add_terms(builder: Any, sums: list[Any], data: Any, x: Any, terms: Terms) -> None:
     """Add all terms of a block stored at ``data`` times x to two ``sums``, which are replaced."""
     n_lanes = x.type.count
@@ -116,8 +146,7 @@ def _add_terms(builder: Any, sums: list[Any], data: Any, x: Any, terms: Terms) -
     for term, (source, number) in enumerate(zip(sources, terms.sums, strict=True)):
         for register, (first, size) in enumerate(register_ranges(n_lanes)):
             factor = gathered(builder, factors, source[first : first + size])
-            place = builder.gep(data, [ir.Constant(ir.IntType(64), term * n_lanes + first)])
-            stored = builder.load(builder.bitcast(place, vector_type(size).as_pointer()), align=8)
+            stored = _stored(builder, data, term * n_lanes + first, size)
             product = builder.fmul(stored, factor, flags=FUSED)
             total = parts[number][register]
             parts[number][register] = builder.fadd(total, product, flags=FUSED)

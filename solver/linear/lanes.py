@@ -99,6 +99,9 @@ beside_size = _constant(
 remembers = _constant(
     lambda layout: layout.remembers, "Whether steps need an acceleration known before."
 )
+shares = _constant(
+    lambda layout: layout.shares, "Whether factors keep one block for both ways between stations."
+)
 is_damped = _constant(lambda layout: layout.damped, "Whether a product with K is one with C too.")
 
 

@@ -16,9 +16,19 @@ from catenary.solver.base.compiled import compiled, in_line
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.base.pointers import borrowed
 from catenary.solver.linear import station_products
-from catenary.solver.linear.lane_products import add_whole, numbers_from, sums_from, total_of
-from catenary.solver.linear.lanes import load, pitch, store, whole_size, zero
+from catenary.solver.linear.lane_products import (
+    add_transposed,
+    add_whole,
+    numbers_from,
+    sums_from,
+    total_of,
+)
+from catenary.solver.linear.lanes import load, pitch, shares, store, whole_size, zero
 from catenary.solver.linear.station_layout import Layout
+
+# Bytes of factors from which on they share blocks: more would leave no room for the state in a
+# cache next to a processor, of 1 to 2 MB; a product with a transpose waits some longer.
+LARGE = 2**19
 
 
 class StationFactors:
@@ -28,10 +38,10 @@ class StationFactors:
     ----------
     layout : Layout
     kinds : (n,) kind of each station
-    blocks : of each kind -B S^-1 with its block B towards the end of the line that elimination
-        starts from and the S of the station there, its own S^-1, and -S^-1 times its block
-        towards the middle, packed by the layout; S is a diagonal block after elimination. In the
-        middle the third is the first towards the other end
+    blocks : of each kind S^-1, -S^-1 B with its block B towards the middle, and, unless the
+        layout shares these, the transpose of the second of the station before it in elimination,
+        which that multiplies with; packed by the layout. S is a diagonal block after elimination.
+        In the middle the second is for elimination from the other end
     low, high : range of stations in whose middle elimination ends
     n_stations, n_kinds : in the matrix, and how many have different factors
     """
@@ -80,9 +90,11 @@ def station_factors(
     high = n if high is None else high
     factors = np.zeros((n, 3, layout.pitch, layout.pitch))
     factorise(blocks, (low + high) // 2, factors)
-    kinds, numbers = station_products.by_kinds(
-        layout.packed(factors, layout.whole_terms).reshape(n, -1)
-    )
+    packed = layout.packed(factors, layout.whole_terms)
+    kinds, numbers = station_products.by_kinds(packed.reshape(n, -1))
+    if numbers.nbytes > LARGE and layout.turns:
+        layout = layout.sharing()
+        kinds, numbers = station_products.by_kinds(packed[:, :2].reshape(n, -1))
     return StationFactors(layout, kinds, numbers, low, high)
 
 
@@ -95,25 +107,25 @@ def factorise(blocks, middle, factors):
     for i in range(middle):
         pivot = own[i].copy()
         if i > 0:
-            factors[i, 0] = factors[i - 1, 2].T
-            pivot += to_start[i] @ factors[i - 1, 2]
-        invert(pivot, factors[i, 1])
-        factors[i, 2] = -(factors[i, 1] @ to_end[i])
+            factors[i, 2] = factors[i - 1, 1].T
+            pivot += to_start[i] @ factors[i - 1, 1]
+        invert(pivot, factors[i, 0])
+        factors[i, 1] = -(factors[i, 0] @ to_end[i])
     for i in range(n - 1, middle, -1):
         pivot = own[i].copy()
         if i < n - 1:
-            factors[i, 0] = factors[i + 1, 2].T
-            pivot += to_end[i] @ factors[i + 1, 2]
-        invert(pivot, factors[i, 1])
-        factors[i, 2] = -(factors[i, 1] @ to_start[i])
+            factors[i, 2] = factors[i + 1, 1].T
+            pivot += to_end[i] @ factors[i + 1, 1]
+        invert(pivot, factors[i, 0])
+        factors[i, 1] = -(factors[i, 0] @ to_start[i])
     pivot = own[middle].copy()
     if middle > 0:
-        factors[middle, 0] = factors[middle - 1, 2].T
-        pivot += to_start[middle] @ factors[middle - 1, 2]
+        factors[middle, 2] = factors[middle - 1, 1].T
+        pivot += to_start[middle] @ factors[middle - 1, 1]
     if middle < n - 1:
-        factors[middle, 2] = factors[middle + 1, 2].T
-        pivot += to_end[middle] @ factors[middle + 1, 2]
-    invert(pivot, factors[middle, 1])
+        factors[middle, 1] = factors[middle + 1, 1].T
+        pivot += to_end[middle] @ factors[middle + 1, 1]
+    invert(pivot, factors[middle, 0])
 
 
 @compiled
@@ -136,19 +148,23 @@ def invert(pivot, inverse):
 def factors_of(factored, station):
     """Where the blocks of a station are."""
     layout, kinds, blocks, _, _ = factored
-    return numbers_from(
-        blocks, np.uint64(3) * whole_size(layout) * np.uint64(kinds[np.uint64(station)])
-    )
+    # Indices are unsigned, which spares a check for negative ones.
+    kind = np.uint64(kinds[np.uint64(station)])
+    n_blocks = np.uint64(2) if shares(layout) else np.uint64(3)
+    return numbers_from(blocks, n_blocks * whole_size(layout) * kind)
 
 
 @in_line
-def eliminate(factored, sums, station, outward, answer):
+def eliminate(factored, sums, station, before, outward, answer):
     """Leave in ``answer`` what the right-hand side of a station, as ``sums``, is after those
-    ``outward`` of it are eliminated."""
+    ``outward`` of it are eliminated, of which ``before`` is the last."""
     layout = factored[0]
-    numbers = factors_of(factored, station)
-    left = total_of(layout, add_whole(layout, sums, numbers, np.uint64(0), outward))
-    # Indices are unsigned, which spares a check for negative ones.
+    if shares(layout):
+        numbers, total = factors_of(factored, before), total_of(layout, sums)
+        left = add_transposed(layout, total, numbers, whole_size(layout), outward)
+    else:
+        numbers, skipped = factors_of(factored, station), np.uint64(2) * whole_size(layout)
+        left = total_of(layout, add_whole(layout, sums, numbers, skipped, outward))
     store(layout, answer, pitch(layout) * np.uint64(station), left)
     return left
 
@@ -157,13 +173,18 @@ def eliminate(factored, sums, station, outward, answer):
 def meet(factored, middle, towards_end, answer):
     """Unknowns of the middle station from what ``answer`` holds of it and what is left of the one
     beside it, ``towards_end`` of the line."""
-    layout = factored[0]
+    layout, kinds = factored[0], factored[1]
     here = pitch(layout) * np.uint64(middle)
-    size, numbers = whole_size(layout), factors_of(factored, middle)
-    sums = sums_from(layout, load(layout, answer, here))
-    left = total_of(layout, add_whole(layout, sums, numbers, np.uint64(2) * size, towards_end))
-    sums = sums_from(layout, zero(layout))
-    own = total_of(layout, add_whole(layout, sums, numbers, size, left))
+    numbers, left = factors_of(factored, middle), load(layout, answer, here)
+    if shares(layout):
+        beyond = factors_of(factored, min(middle + 1, kinds.size - 1))
+        left = add_transposed(layout, left, beyond, whole_size(layout), towards_end)
+    else:
+        sums = sums_from(layout, left)
+        left = total_of(layout, add_whole(layout, sums, numbers, whole_size(layout), towards_end))
+    own = total_of(
+        layout, add_whole(layout, sums_from(layout, zero(layout)), numbers, np.uint64(0), left)
+    )
     store(layout, answer, here, own)
     return own
 
@@ -172,10 +193,10 @@ def meet(factored, middle, towards_end, answer):
 def substitute(factored, station, inward, answer):
     """Unknowns of a station from what ``answer`` holds of it and the unknowns ``inward`` of it."""
     layout = factored[0]
-    size, numbers = whole_size(layout), factors_of(factored, station)
+    numbers = factors_of(factored, station)
     left = load(layout, answer, pitch(layout) * np.uint64(station))
-    sums = add_whole(layout, sums_from(layout, zero(layout)), numbers, size, left)
-    return total_of(layout, add_whole(layout, sums, numbers, np.uint64(2) * size, inward))
+    sums = add_whole(layout, sums_from(layout, zero(layout)), numbers, np.uint64(0), left)
+    return total_of(layout, add_whole(layout, sums, numbers, whole_size(layout), inward))
 
 
 @in_line
@@ -202,14 +223,14 @@ def solve(factored, right, answer):
     n, middle = kinds.size, (low + high) // 2
     pairs = min(middle, n - 1 - middle)
     x, y = zero(layout), zero(layout)
-    for k in range(pairs):
-        x = eliminate(factored, right_side(factored, right, k), k, x, answer)
-        j = n - 1 - k
-        y = eliminate(factored, right_side(factored, right, j), j, y, answer)
+    for i in range(pairs):
+        j = n - 1 - i
+        x = eliminate(factored, right_side(factored, right, i), i, max(i - 1, 0), x, answer)
+        y = eliminate(factored, right_side(factored, right, j), j, min(j + 1, n - 1), y, answer)
     for i in range(pairs, middle + 1):
-        x = eliminate(factored, right_side(factored, right, i), i, x, answer)
+        x = eliminate(factored, right_side(factored, right, i), i, max(i - 1, 0), x, answer)
     for j in range(n - 1 - pairs, middle, -1):
-        y = eliminate(factored, right_side(factored, right, j), j, y, answer)
+        y = eliminate(factored, right_side(factored, right, j), j, min(j + 1, n - 1), y, answer)
     x = y = meet(factored, middle, y, answer)
     for k in range(1, pairs + 1):
         x = substitute_into(factored, middle - k, x, answer)

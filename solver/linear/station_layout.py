@@ -52,6 +52,7 @@ class Layout:
         and those beside it; all of them by default
     damped : whether a product with K is one with C as well
     remembers : whether steps need an acceleration known before, as the generalized-alpha method's
+    shares : whether factors keep one block for both ways between two stations; only if it turns
 
     Attributes
     ----------
@@ -67,6 +68,7 @@ class Layout:
         beside: tuple[int, ...] | None = None,
         damped: bool = False,
         remembers: bool = False,
+        shares: bool = False,
     ) -> None:
         self.widths = tuple(widths)
         self._plane = min(lanes for lanes in LANES if lanes >= max(self.widths))
@@ -78,6 +80,7 @@ class Layout:
         self.n_lanes = self._plane * len(self.widths)
         # Columns where there are fewer of these than of differences.
         self.turns = self._plane <= REGISTER and max(self.widths) > self._plane - 2
+        self.shares = bool(shares) and self.turns
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Layout) and self.key == other.key
@@ -88,11 +91,15 @@ class Layout:
     @property
     def key(self) -> tuple[object, ...]:
         """All that makes a layout."""
-        return self.widths, self.own, self.beside, self.damped, self.remembers
+        return self.widths, self.own, self.beside, self.damped, self.remembers, self.shares
 
     def remembering(self) -> Layout:
         """The same for steps that need an acceleration known before."""
-        return Layout(self.widths, self.own, self.beside, self.damped, remembers=True)
+        return Layout(self.widths, self.own, self.beside, self.damped, True, self.shares)
+
+    def sharing(self) -> Layout:
+        """The same for factors that keep one block for both ways, if there can be such."""
+        return Layout(self.widths, self.own, self.beside, self.damped, self.remembers, True)
 
     @cached_property
     def unknowns(self) -> np.ndarray:

@@ -8,6 +8,7 @@ from repeating_line import layout, line
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
+from catenary.solver.linear import station_factors as module
 from catenary.solver.linear.station_factors import station_factors
 from catenary.solver.linear.station_layout import WIDEST, Layout
 from catenary.solver.linear.station_products import layout_of, neighbours, station_product
@@ -39,6 +40,21 @@ def test_factors_and_products_of_any_width(widths: tuple[int, ...], joined: bool
     assert lanes.widths == widths
     assert (lanes.beside == (0, 1)) is (not joined or max(widths) == 2)
     compare_product(matrix, 0, lanes)
+
+
+@pytest.mark.parametrize("widths", [(2,), (3,), (4,), (8,), (4, 4)])
+@pytest.mark.parametrize("n_stations", [1, 2, 3, 40])
+def test_large_factors_keep_one_block_for_both_ways(
+    n_stations: int, widths: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    matrix = line(n_stations, widths=widths, joined=True)
+    apart = station_factors(matrix, layout(matrix))
+    monkeypatch.setattr(module, "LARGE", 0)
+    shared = station_factors(matrix, layout(matrix))
+    assert apart is not None and shared is not None
+    assert shared.layout.shares and not apart.layout.shares
+    assert 3 * shared.blocks.size <= 2 * apart.blocks.size
+    compare_factors(n_stations, 0, n_stations, widths)
 
 
 def compare_factors(
