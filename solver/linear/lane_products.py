@@ -108,10 +108,12 @@ add_beside = _product(
 
 @inlined
 def add_transposed(typing_context, layout, total, numbers, skipped, x):
-    """``total`` plus the transpose of a block for ``add_whole`` times x; the layout turns."""
+    """``total`` plus the transpose of a block for ``add_whole`` times x; the layout shares such."""
 
     def generate(context, builder, signature, arguments):
         _, total, numbers, skipped, x = arguments
+        if not signature.args[0].layout.shares:
+            return total  # never called then
         terms = signature.args[0].layout.whole_terms
         data, lane = builder.gep(numbers, [skipped]), np.arange(x.type.count)
         # What the block's rows and columns are exchanged by; one register holds all lanes.
