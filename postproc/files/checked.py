@@ -17,6 +17,8 @@ from typing import Any
 import h5py
 import numpy as np
 
+from catenary.postproc.files.array_writes import put_attribute
+
 # The oldest format of HDF5 whose object headers, links and attributes carry checksums. The next
 # one marks a file as open for writing: after a kill nobody could open it.
 FORMAT_BOUNDS = ("v108", "v108")
@@ -37,9 +39,9 @@ def set_attribute(place: h5py.HLObject, name: str, value: Any) -> None:
     if isinstance(value, str):
         encoded = value.encode()
         kind = h5py.string_dtype("utf-8", max(1, len(encoded)))
-        place.attrs.create(name, np.array(encoded, dtype=kind))
+        put_attribute(place, name, np.array(encoded, dtype=kind))
     else:
-        place.attrs[name] = value
+        put_attribute(place, name, np.asarray(value))
 
 
 def text_of(value: Any) -> Any:
@@ -87,7 +89,7 @@ def broken_seals(place: h5py.HLObject, values: Mapping[str, Any]) -> list[str]:
 
 def seal_arrays(group: h5py.Group, arrays: Mapping[str, Any]) -> None:
     """Store one checksum of the arrays of a group, ``arrays`` by name."""
-    group.attrs[ARRAYS_SUM] = sum_of_arrays(arrays)
+    put_attribute(group, ARRAYS_SUM, np.asarray(sum_of_arrays(arrays)))
 
 
 def sum_of_arrays(arrays: Mapping[str, Any]) -> int:

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 import h5py
 import numpy as np
 
+from catenary.postproc.files.array_writes import put_array
 from catenary.postproc.files.checked import seal_arrays, sum_is_kept
 
 GROUP, ROWS = "extremes", "rows"
@@ -29,10 +30,7 @@ def store_extremes(file: h5py.File, n_rows: int, extremes: Mapping[str, np.ndarr
     place = group.require_group(_SLOTS[int(np.argmin(counts))])
     arrays = {**extremes, ROWS: np.array(n_rows, dtype=np.int64)}
     for name, values in arrays.items():
-        if name in place:
-            place[name][...] = values
-        else:
-            place[name] = values
+        put_array(place, name, values)
     seal_arrays(place, arrays)
 
 

@@ -21,6 +21,7 @@ import numpy as np
 from catenary.postproc.channels.facts import FACTS
 from catenary.postproc.channels.header import Header
 from catenary.postproc.channels.line_record import GZIP, GZIP_LEVEL, LineRecord
+from catenary.postproc.files.array_writes import append_rows, grow, put_array
 from catenary.postproc.files.checked import (
     FORMAT_BOUNDS,
     create_checked,
@@ -134,7 +135,6 @@ class ResultFile:
                     _create_growing(self._file, name, channel, columns, shapes[name], record)
             # Kept open: closing a dataset writes what is left of it, and h5py ignores errors there.
             self._growing = {name: self._file[name] for name in table}
-            self._complete = self._file[COMPLETE]
             set_attribute(self._file, "outcome", RUNNING)
             self._file.flush()
             self._reserve()
@@ -162,16 +162,14 @@ class ResultFile:
         """
         for name, block in blocks.items():
             dataset = self._growing[name]
-            start = dataset.shape[0]
-            dataset.resize(start + block.shape[0], axis=0)
-            dataset[start:] = block
+            append_rows(dataset, dataset.id.shape[0], block)
         self._append_line(line)
         store_extremes(self._file, self._growing["time"].shape[0], line.extremes)
-        self._file.flush()
-        self._complete[...] = _rows(self._file)
-        self._file.flush()
+        self._settle()
+        put_array(self._file, COMPLETE, _rows(self._growing))
         if state is not None:
             self._store(state)
+        self._file.flush()
         self._reserve()
         if not self._begun:
             os.replace(self._made_as, self._path)
@@ -214,13 +212,13 @@ class ResultFile:
         edges = self._record.within(line.position)
         for name, values in line.values.items():
             dataset = self._growing[f"line_channels/{name}"]
-            dataset.resize(start + line.time.size, axis=0)
             if edges is None:
-                dataset[start:] = values
-            elif values.size:
+                append_rows(dataset, start, values)
+                continue
+            grow([dataset], start + line.time.size)
+            if values.size:
                 write_window(dataset, start, values, self._x[name], edges)
-        self._growing[LINE_TIME].resize(start + line.time.size, axis=0)
-        self._growing[LINE_TIME][start:] = line.time
+        append_rows(self._growing[LINE_TIME], start, line.time)
 
     def abandon(self) -> None:
         """Close the file without writing to it, after a write has failed."""
@@ -241,12 +239,16 @@ class ResultFile:
             for name in set(place) - set(state):  # of the line as it was before an incident
                 del place[name]
             for name, value in state.items():
-                _replace(place, name, value)
+                put_array(place, name, value)
             seal_arrays(place, state)
-            self._file.flush()
+            self._settle()
             set_attribute(group, "latest", slot)
-        self._file.flush()
         self._n_states += 1
+
+    def _settle(self) -> None:
+        """Let what follows be written after what is there; all the same until there is a file."""
+        if self._begun:
+            self._file.flush()
 
     def _reserve(self) -> None:
         handle = self._file.id.get_vfd_handle()
@@ -292,7 +294,8 @@ def _write_head(
         create_checked(file, name, array)
     facts = file.create_group("facts")
     for name, value in header.facts.items():
-        dataset = facts.create_dataset(name, data=value)
+        put_array(facts, name, value)
+        dataset = facts[name]
         set_attribute(dataset, "unit", FACTS[name].unit)
         set_attribute(dataset, "meaning", FACTS[name].meaning)
     seal_arrays(facts, header.facts)
@@ -325,9 +328,9 @@ def _create_growing(
     set_attribute(dataset, "meaning", channel.meaning)
 
 
-def _rows(file: h5py.File) -> list[int]:
+def _rows(tables: Mapping[str, h5py.Dataset]) -> list[int]:
     """Rows of the channels, of the energies and of the line's channels."""
-    return [file[name].shape[0] if name in file else 0 for name in _CLOCKS]
+    return [tables[name].shape[0] if name in tables else 0 for name in _CLOCKS]
 
 
 def complete_rows(file: h5py.File) -> list[int]:
@@ -374,17 +377,5 @@ def _cut(file: h5py.File, time: float) -> None:
                 told = "%s is damaged: its records %d to %d are lost"
                 logger.warning(told, path, keep - lost, keep - 1)
     counted = _rows(file)
-    _replace(file, COMPLETE, counted)
+    put_array(file, COMPLETE, counted)
     drop_extremes(file, counted[0])
-
-
-def _replace(group: h5py.Group, name: str, value: Any) -> None:
-    """Overwrite in place if shape and type are the same, so that the file does not grow."""
-    array = np.asarray(value)
-    old = group.get(name)
-    if old is not None and old.shape == array.shape and old.dtype == array.dtype:
-        old[...] = array
-        return
-    if old is not None:
-        del group[name]
-    group.create_dataset(name, data=value)

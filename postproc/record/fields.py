@@ -110,9 +110,12 @@ class FieldRecorder:
         self._guarded(lambda: self._open(stage), stage.start_time)
 
     def next_state(self, step: int) -> int:
-        """The step of the next snapshot, or flush."""
-        snapshot = step - step % self._every + self._every
-        return min(snapshot, next_flush(step, self._flush_every))
+        """The step of the next flush."""
+        return next_flush(step, self._flush_every)
+
+    def next_motion(self, step: int) -> int:
+        """The step of the next snapshot."""
+        return step - step % self._every + self._every
 
     def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
         """Pass over steps between two snapshots."""

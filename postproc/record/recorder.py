@@ -24,6 +24,7 @@ from catenary.solver.base.parallel import on_root
 from catenary.solver.time_loop import channels
 from catenary.solver.time_loop.observers import Stage, StepView
 
+_NEVER = 2**62
 # What a run leaves that breaks before its first step.
 _NOTHING = "nothing was written, and results of an earlier run are as they were"
 
@@ -125,13 +126,21 @@ class Recorder:
             self._flush(view)
 
     def next_state(self, step: int) -> int:
-        """The step of the next flush or record of the energies."""
+        """The step of the next flush, or record of energies that need more than the motion."""
         if not self._flushed_once:
             return step + 1
         following = next_flush(step, self._flush_every)
-        if self._energy_every:
-            following = min(following, step - step % self._energy_every + self._energy_every)
+        if not channels.energies_follow_motion():
+            following = min(following, self._next_energies(step))
         return following
+
+    def next_motion(self, step: int) -> int:
+        """The step of the next record of the energies."""
+        return self._next_energies(step)
+
+    def _next_energies(self, step: int) -> int:
+        every = self._energy_every
+        return step - step % every + every if every else _NEVER
 
     def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
         """Copy steps between two states into the buffers."""
@@ -178,7 +187,7 @@ class Recorder:
     def _make_room(self, columns: Mapping[str, slice]) -> None:
         """Make a buffer for each channel, so that a flush copies nothing."""
         for name, part in columns.items():
-            self._kept[name] = part, np.zeros((self._flush_every, part.stop - part.start))
+            self._kept[name] = part, np.empty((self._flush_every, part.stop - part.start))
 
     def _columns(self, name: str) -> np.ndarray:
         """What is kept of a channel here, shape (rows, columns); the buffer itself."""

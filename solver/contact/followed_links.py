@@ -62,10 +62,13 @@ class FollowedLinks:
         released = self.links.law["released"]
         return np.asarray(released * np.maximum(0.0, -self.find_reserve()))
 
-    def energy_of_switching(self) -> float:
+    def energy_of_switching(self, displacement: np.ndarray) -> float:
         """What elastic energy of the line lacks where owned links have switched, were they springs:
-        slack droppers hold less than K makes of them, and closed stops more than nothing [J]."""
-        return float(state_kernels.energy_of_switching(self._line.motion.read, self.links))
+        slack droppers hold less than K makes of them, and closed stops more than nothing [J].
+
+        ``displacement`` (n_local,) of the line [m].
+        """
+        return float(state_kernels.energy_of_switching(displacement, self.links))
 
     def loads(self, compensation: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Local unknowns and forces of compensations (n,) [N] of all of them."""

@@ -248,12 +248,16 @@ class LineIntegrator(ABC):
 
     def energies(self) -> tuple[float, float]:
         """Kinetic and elastic energy relative to equilibrium, all droppers taut [J]. Collective."""
-        kinetic, elastic = total(self._comm, self.energy_parts()).tolist()
+        parts = self.energy_parts(self.displacement, self.velocity)
+        kinetic, elastic = total(self._comm, parts).tolist()
         return kinetic, elastic
 
-    def energy_parts(self) -> np.ndarray:
-        """What this rank adds to each of ``energies`` [J], shape (2,). Collective."""
-        operators, displacement, velocity = self.operators, self.displacement, self.velocity
+    def energy_parts(self, displacement: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """What this rank adds to each of ``energies`` in a motion (n_local,) [J], shape (2,).
+
+        Collective.
+        """
+        operators = self.operators
         ahead = operators.factor.copy()
         np.copyto(operators.factor, velocity)
         kinetic = 0.5 * operators.square("mass")

@@ -72,13 +72,6 @@ def displacements(motion, result):
 
 
 @compiled
-def displacements_of(unknowns, motion, result):
-    """Displacements at some of a rank's unknowns; ``motion`` as ``LineState.read``."""
-    for i in range(unknowns.size):
-        result[i] = displacement_at(unknowns[i], motion)
-
-
-@compiled
 def velocities(motion, result):
     """Fill in all of a rank's velocities; ``motion`` as ``LineState.read``."""
     for i in range(result.size):
@@ -124,14 +117,14 @@ def reserves(motion, links, result):
 
 
 @compiled
-def energy_of_switching(motion, links):
+def energy_of_switching(displacement, links):
     """What elastic energy lacks where ``links`` have switched [J], were they springs."""
     energy = 0.0
     unknowns, weights, laws = links
     for link in range(laws.size):
         law, stretch = laws[link], 0.0
         for k in range(unknowns.shape[1]):
-            stretch += weights[link, k] * displacement_at(unknowns[link, k], motion)
+            stretch += weights[link, k] * displacement[unknowns[link, k]]
         beyond = min(law.rest + law.stiffness * stretch, 0.0)
         energy -= law.released * beyond**2 / (2.0 * law.stiffness)
     return energy

@@ -8,7 +8,13 @@ import numpy as np
 
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.base.petsc_events import event
-from catenary.solver.time_loop.observers import BlockObserver, Observer, Stage, StepView
+from catenary.solver.time_loop.observers import (
+    BlockObserver,
+    MotionObserver,
+    Observer,
+    Stage,
+    StepView,
+)
 
 _NEVER = 2**62
 
@@ -25,6 +31,8 @@ class Audience:
     def __init__(self, observers: Sequence[Observer], after: Callable[[], None] | None) -> None:
         self._observers = observers
         self._blockwise = [one for one in observers if isinstance(one, BlockObserver)]
+        self._of_motion = [one for one in self._blockwise if isinstance(one, MotionObserver)]
+        self._of_rows = [one for one in self._blockwise if not isinstance(one, MotionObserver)]
         self._after = after
         self._event = event("Show")
 
@@ -49,6 +57,10 @@ class Audience:
             return step + 1
         return min((one.next_state(step) for one in self._blockwise), default=_NEVER)
 
+    def next_motion(self, step: int) -> int:
+        """The next step after ``step`` whose motion has to be kept; see ``MotionObserver``."""
+        return min((one.next_motion(step) for one in self._of_motion), default=_NEVER)
+
     def show(self, view: Callable[[], StepView]) -> None:
         """Show a state to the observers; RunBroken if one cannot go on."""
         if self._observers:
@@ -70,6 +82,17 @@ class Audience:
         try:
             for observer in self._blockwise:
                 observer.observe_rows(first_step, times, rows)
+        finally:
+            self._event.end()
+
+    def show_motion(self, view: StepView, times: np.ndarray, rows: np.ndarray) -> None:
+        """Show a step of which the motion was kept, to others its row: the only one of ``rows``."""
+        self._event.begin()
+        try:
+            for observer in self._of_motion:
+                observer.observe(view)
+            for other in self._of_rows:
+                other.observe_rows(view.step, times, rows)
         finally:
             self._event.end()
 

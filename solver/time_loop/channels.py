@@ -77,6 +77,8 @@ class Channel:
         may be empty elsewhere. A function () -> (columns,) is called after each step, which then
         are taken one by one. None for clocks
     energy : for one of ``ENERGIES``: the value of this rank's, collective
+    of_motion : whether an energy follows from ``kinetic`` and ``elastic`` alone, not from the
+        sources: a compiled loop then does not end its block for it
     when : whether a run with this train has it
     essential : whether a result file without it, or from its first damaged row on, is of no use
     may_be_nan : whether NaN is a value
@@ -89,6 +91,7 @@ class Channel:
     per: str
     values: Callable[[Sources], np.ndarray | Callable[[], np.ndarray]] | None = None
     energy: Callable[[Energies], float] | None = None
+    of_motion: bool = False
     when: Callable[[Train], bool] = lambda train: True
     essential: bool = False
     may_be_nan: bool = False
@@ -200,6 +203,7 @@ ENERGIES: dict[str, Channel] = {
             "kinetic energy of the line",
             RUN,
             energy=lambda now: now.kinetic,
+            of_motion=True,
             essential=True,
             own_picture=True,
         ),
@@ -209,6 +213,7 @@ ENERGIES: dict[str, Channel] = {
             "elastic energy of the line relative to its equilibrium at the start",
             RUN,
             energy=lambda now: now.elastic,
+            of_motion=True,
             essential=True,
             own_picture=True,
         ),
@@ -225,6 +230,11 @@ def train_channels(train: Train | None = None) -> tuple[Channel, ...]:
     """Channels of pantographs and strips: all, or those that a run with this train has."""
     own = (channel for channel in CHANNELS.values() if not channel.of_line)
     return tuple(channel for channel in own if train is None or channel.when(train))
+
+
+def energies_follow_motion() -> bool:
+    """Whether all energies can be taken from a motion that was kept."""
+    return all(channel.of_motion for channel in ENERGIES.values() if channel.energy is not None)
 
 
 def energies_of(now: Energies) -> tuple[float, ...]:

@@ -6,7 +6,7 @@ something is no number, is finished by the scheme itself, from where the loop ha
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,9 @@ from catenary.solver.time_loop.step_views import Showing
 
 # What rows of a block may take, so that it stays in the caches [B], and the most of them.
 _BLOCK_BYTES, _MOST_ROWS = 2**19, 512
+# The same of motions that are kept. A step of a line of which not one fits takes far longer than
+# the end of a block.
+_MOTION_BYTES, _MOST_MOTIONS = 2**21, 16
 
 
 class CompiledSteps:
@@ -39,6 +42,7 @@ class CompiledSteps:
     rows : (most, width) what each of them shows; empty if nobody looks
     taken : steps of the latest block that were taken, fewer than asked for if one broke, or if
         loads were not known for all of them
+    most_motions : steps of a block of which the motion can be kept
 
     Parameters
     ----------
@@ -53,6 +57,11 @@ class CompiledSteps:
         self.rows = np.zeros((self.most if shows else 0, width))
         self.times = np.zeros(self.most)
         self.taken = 0
+        n = scheme.interaction.line.ownership.n_local
+        self.most_motions = min(_MOST_MOTIONS, _MOTION_BYTES // (16 * n)) if shows else 0
+        self._motions = np.zeros((self.most_motions, 2, n))
+        # Of each step the number of the motion that keeps it, -1 if none does.
+        self._kept = np.full(self.most, -1)
         pantographs, interaction = scheme.pantographs, scheme.interaction
         n = pantographs.n_contacts
         records, passes = pantographs.records(), interaction.line.passes
@@ -74,8 +83,10 @@ class CompiledSteps:
         self._event = event("Steps")
         self._loop()  # compiled, or loaded, before the clock of a march starts
 
-    def take(self, step: int, n_steps: int) -> None:
+    def take(self, step: int, n_steps: int, kept: Sequence[int] = ()) -> None:
         """Take up to ``n_steps`` <= ``most`` steps after the one of number ``step``, one at least.
+
+        Of those of the indices ``kept``, at most ``most_motions``, the motion is kept.
 
         Raises
         ------
@@ -88,6 +99,9 @@ class CompiledSteps:
         if self._loads is not None:
             n_steps = self._loads.cover(times)
             times = times[:n_steps]
+        self._kept[:n_steps] = -1
+        for number, at in enumerate(kept):
+            self._kept[at] = number
         scheme.pantographs.fill_drives(times.tolist(), self._drives[:n_steps])
         while self.taken < n_steps:
             if self._take_on(n_steps):
@@ -96,12 +110,30 @@ class CompiledSteps:
                 if self._shows:
                     number = step + self.taken + 1
                     self.rows[self.taken] = self._showing.view(number, time).row
+                    self._keep_motion(int(self._kept[self.taken]))
                 self.taken += 1
 
     def last_view(self, step: int) -> StepView:
         """The state after the latest block, ``step`` being the number of its last step."""
         last = self.taken - 1
         return self._showing.view_of(step, float(self.times[last]), self.rows[last])
+
+    def motion_view(self, step: int, at: int, number: int) -> StepView:
+        """What is left of a step in the midst of the latest block, see ``MotionObserver``.
+
+        Parameters
+        ----------
+        step : its number
+        at : its index in the block
+        number : of the kept motion
+        """
+        motion = self._motions[number, 0], self._motions[number, 1]
+        return self._showing.view_of(step, float(self.times[at]), self.rows[at], motion)
+
+    def _keep_motion(self, number: int) -> None:
+        if number >= 0:
+            line = self._scheme.interaction.line
+            self._motions[number] = line.displacement, line.velocity
 
     def _take_on(self, n_steps: int) -> bool:
         """Go on with a block as far as the loop can; whether the scheme has to finish a step."""
@@ -154,7 +186,8 @@ class CompiledSteps:
             showing=self._showing.showing,
             taps=self._showing.layout.taps,
         )
-        return steps, self.times, self._drives, self.rows, self._counts, self._shows
+        kept = self._kept, self._motions
+        return steps, self.times, self._drives, self.rows, kept, self._counts, self._shows
 
 
 def compiled_steps(

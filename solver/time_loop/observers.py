@@ -61,8 +61,7 @@ class StepView:
     step, time : number of the step (0 is the initial state) and its time [s]
     row : (n,) the values of all channels one after another
     columns : where in the row each channel is, by name
-    node_uplift : () -> (n owned nodes,) vertical displacement [m], overwritten by the next call;
-        not collective
+    node_uplift : () -> (n owned nodes,) vertical displacement [m]; not collective
     line_state : () -> displacement, velocity and acceleration of the rank's unknowns, by these
         names; not collective
     energies : () -> the values of ``channels.ENERGIES`` but the time, kinetic and elastic energy of
@@ -109,6 +108,18 @@ class Observer(Protocol):
 
     def finish(self, outcome: str) -> None:
         """After the last step: "done", "interrupted" or the sentence of what broke."""
+
+
+@runtime_checkable
+class MotionObserver(Observer, Protocol):
+    """A `BlockObserver` that at some steps needs ``node_uplift`` or ``energies`` and no more.
+
+    A block goes on behind them. It is shown these steps by ``observe``; what else a view has, the
+    row excepted, is refused.
+    """
+
+    def next_motion(self, step: int) -> int:
+        """The next step after ``step`` of which that is needed; asked for any step."""
 
 
 @runtime_checkable

@@ -107,13 +107,17 @@ def find_forces(time, problem, law, switched, n, counts):
 
 
 @compiled
-def take(steps, times, drives, rows, counts, shows, first, n_steps):
+def take(steps, times, drives, rows, kept_motions, counts, shows, first, n_steps):
     """Take the steps from ``first`` on of ``n_steps`` to ``times`` [s], with ``drives`` of heads.
 
-    If ``shows``, ``rows`` take what each shows. Returns how many were taken, and whether the next
-    one is begun: up to its free step, as its forces are left to others.
+    If ``shows``, ``rows`` take what each shows. ``kept_motions`` holds of each the number of the
+    motion that keeps it, -1 if none does, and the motions (m, 2, n_local).
+
+    Returns how many were taken, and whether the next one is begun: up to its free step, as its
+    forces are left to others.
     """
-    steps, times, drives, rows = borrowed((steps, times, drives, rows))
+    steps, times, drives, rows, kept_motions = borrowed((steps, times, drives, rows, kept_motions))
+    motion_of, motions = kept_motions
     speed, moving, placing, free, loading, clock, records, heads = steps[:8]
     responding, problem, law, superposing, compensating = steps[8:13]
     switched, ends, of_step, outputs, showing, taps = steps[13:]
@@ -152,4 +156,8 @@ def take(steps, times, drives, rows, counts, shows, first, n_steps):
             state_kernels.show(motion, arms, droppers, others, other_force, uplift, tension)
             for j in range(taps.size):
                 row[n_shown + j] = numbers_at(taps[j], 1)[0]
+            number = motion_of[i]
+            if number >= 0:
+                state_kernels.displacements(motion, motions[number, 0])
+                state_kernels.velocities(motion, motions[number, 1])
     return n_steps - first, False

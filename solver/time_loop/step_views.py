@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -67,7 +68,6 @@ class Showing:
         nodes = np.arange(model.mesh.n_nodes)
         self._owned_nodes = nodes[owned(model.dofs(nodes))]
         self._node_rows = (model.dofs(self._owned_nodes) - first).astype(np.int64)
-        self._node_uplift = np.zeros(self._node_rows.size)
         n_outputs, n_arms = pantographs.outputs.size, self._arm_rows.size
         self._owned_droppers, droppers = interaction.links.shown(DROPPERS)
         self._shown = np.zeros(n_outputs + n_arms + self._owned_droppers.size)
@@ -75,13 +75,14 @@ class Showing:
         others, other_force, by_name = _further_links(interaction.links)
         self._sources = Sources(pantographs, interaction, scheme, uplift, tension, by_name)
         self.layout = RowLayout(self._sources, self._shown)
+        self._kept_motion: tuple[np.ndarray, np.ndarray] | None = None
         self._view = StepView(
             step=0,
             time=0.0,
             row=np.zeros(self.layout.width),
             columns=self.layout.columns,
-            node_uplift=self._uplift_of_nodes,
-            line_state=self._line.state,
+            node_uplift=lambda: self._displacement()[self._node_rows],
+            line_state=self._line_state,
             energies=self._energies,
             checkpoint=self._checkpoint,
         )
@@ -117,7 +118,7 @@ class Showing:
 
     def view(self, step: int, time: float) -> StepView:
         """The state after a step; the same object each time."""
-        view, outputs = self._view, self._pantographs.outputs
+        view, outputs, self._kept_motion = self._view, self._pantographs.outputs, None
         view.step, view.time = step, time
         self._shown[: outputs.size] = outputs
         self._show()
@@ -125,9 +126,18 @@ class Showing:
         self.layout.fill(view.row)
         return view
 
-    def view_of(self, step: int, time: float, row: np.ndarray) -> StepView:
-        """The state after a step that a compiled loop has shown as ``row`` of a view."""
-        view = self._view
+    def view_of(
+        self,
+        step: int,
+        time: float,
+        row: np.ndarray,
+        motion: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> StepView:
+        """The state after a step that a compiled loop has shown as ``row`` of a view.
+
+        If it was not the latest one, ``motion`` is what is left of it: displacement and velocity.
+        """
+        view, self._kept_motion = self._view, motion
         view.step, view.time = step, time
         view.row[:] = row
         self._shown[:] = row[: self._shown.size]
@@ -180,10 +190,18 @@ class Showing:
         for i, pantograph in enumerate(self._pantographs.models):
             _like(checkpoint, f"pantograph_{i}", pantograph.state())
 
-    def _uplift_of_nodes(self) -> np.ndarray:
-        """Vertical displacements of the rank's nodes [m]; overwritten when asked for again."""
-        state_kernels.displacements_of(self._node_rows, self._line.motion.read, self._node_uplift)
-        return self._node_uplift
+    def _displacement(self) -> np.ndarray:
+        """That of the rank's unknowns after the step that is shown."""
+        kept = self._kept_motion
+        return self._line.displacement if kept is None else kept[0]
+
+    def _line_state(self) -> Mapping[str, np.ndarray]:
+        self._refuse_kept_motion()
+        return self._line.state()
+
+    def _refuse_kept_motion(self) -> None:
+        if self._kept_motion is not None:
+            raise RuntimeError("of this step only the motion was kept, see `MotionObserver`")
 
     def _energies(self) -> tuple[float, ...]:
         """The energies that are recorded, in the order of their table. Collective."""
@@ -194,16 +212,19 @@ class Showing:
 
         Collective. After an incident it is that of what is left of the line; see `after_incidents`.
         """
-        parts = self._line.energy_parts()
+        displacement, kept = self._displacement(), self._kept_motion
+        velocity = self._line.velocity if kept is None else kept[1]
+        parts = self._line.energy_parts(displacement, velocity)
         if self._unbalanced:
             load = self._changed.load[self._line.ownership.first : self._line.ownership.last]
-            parts[1] -= load @ self._line.displacement
-        parts[1] += self._interaction.links.energy_of_switching()
+            parts[1] -= load @ displacement
+        parts[1] += self._interaction.links.energy_of_switching(displacement)
         kinetic, elastic = total(self._comm, parts).tolist()
         return kinetic, elastic + self._changed.energy if self._unbalanced else elastic
 
     def _checkpoint(self) -> dict[str, Any] | None:
         """Everything needed to continue after the step shown last, on rank 0. Collective."""
+        self._refuse_kept_motion()
         line, pantographs = self._line, self._pantographs
         whole = {
             name: self._comm.gather(values.copy(), root=0)

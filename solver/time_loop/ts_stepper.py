@@ -103,9 +103,10 @@ class Stepper:
         first = self.step_number
         until = min(self._end, self._audience.next_state(first))
         n_steps = min(until - first, blocks.most, self._most)
+        n_steps, kept = self._motions_of(blocks, first, n_steps)
         begin, broken = clock.perf_counter(), None
         try:
-            blocks.take(first, n_steps)
+            blocks.take(first, n_steps, kept)
         except RunBroken as error:
             broken = error
         spent = clock.perf_counter() - begin
@@ -115,11 +116,35 @@ class Stepper:
         self.step_number = first + taken
         # A state can be read after the last step only, if that is not amid the next one.
         passed = taken if broken is not None else taken - 1
-        self._audience.show_rows(first + 1, blocks.times[:passed], blocks.rows[:passed])
+        self._show_passed(blocks, first, passed, kept)
         if broken is not None:
             raise self._told(broken) from broken
         self._audience.show(lambda: blocks.last_view(self.step_number))
         ts.setStepNumber(self.step_number - 1)  # PETSc adds one
+
+    def _motions_of(self, blocks: CompiledSteps, first: int, n_steps: int) -> tuple[int, list[int]]:
+        """Steps of a block after step ``first`` that wants ``n_steps``, and which of them keep the
+        motion; it ends where there is no room for a further one."""
+        kept: list[int] = []
+        at = self._audience.next_motion(first)
+        while at < first + n_steps:
+            if len(kept) == blocks.most_motions:
+                return at - first, kept
+            kept.append(at - first - 1)
+            at = self._audience.next_motion(at)
+        return n_steps, kept
+
+    def _show_passed(self, blocks: CompiledSteps, first: int, passed: int, kept: list[int]) -> None:
+        """Show the first ``passed`` steps of a block, behind which the line has gone."""
+        begin, audience = 0, self._audience
+        for number, at in enumerate(kept):
+            if at >= passed:
+                break
+            audience.show_rows(first + 1 + begin, blocks.times[begin:at], blocks.rows[begin:at])
+            view, begin = blocks.motion_view(first + 1 + at, at, number), at + 1
+            audience.show_motion(view, blocks.times[at:begin], blocks.rows[at:begin])
+        times, rows = blocks.times[begin:passed], blocks.rows[begin:passed]
+        audience.show_rows(first + 1 + begin, times, rows)
 
     def _told(self, error: RunBroken) -> RunBroken:
         """The error of the next step with its time and place."""

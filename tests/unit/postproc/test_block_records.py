@@ -13,7 +13,7 @@ from catenary.postproc.channels.line_record import GZIP, LineRecord
 from catenary.postproc.record.fields import FieldRecorder
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
-from catenary.solver.time_loop.observers import BlockObserver
+from catenary.solver.time_loop.observers import BlockObserver, MotionObserver
 
 
 def drive_by_blocks(march: Any, *observers: BlockObserver, first: int, most: int) -> list[int]:
@@ -23,7 +23,9 @@ def drive_by_blocks(march: Any, *observers: BlockObserver, first: int, most: int
         observer.start(stage)
         observer.observe(march.view(step))
     while step < march.n_steps:
-        until = min(march.n_steps, step + most, *(one.next_state(step) for one in observers))
+        asked = [one.next_state(step) for one in observers]
+        asked += [one.next_motion(step) for one in observers if isinstance(one, MotionObserver)]
+        until = min(march.n_steps, step + most, *asked)
         views = [march.view(number) for number in range(step + 1, until + 1)]
         if len(views) > 1:
             rows = np.array([view.row for view in views[:-1]])

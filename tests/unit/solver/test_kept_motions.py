@@ -1,0 +1,122 @@
+"""Motions that blocks of steps keep for those who look later, against the same steps one by one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from measuring import start_march
+from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
+
+from catenary.meshgen.mesh import MESSENGER_WIRE
+from catenary.solver.contact_problem import complementarity
+from catenary.solver.problem.incidents import TensionLoss
+from catenary.solver.problem.problem import Problem
+from catenary.solver.time_loop import compiled_steps
+from catenary.solver.time_loop import march as time_loop
+from catenary.solver.time_loop.observers import Stage, StepView
+
+N_STEPS, EVERY = 250, 7
+
+
+class Looking:
+    """Takes energies and uplift at every seventh step, and rows of all."""
+
+    def __init__(self) -> None:
+        self.rows: list[np.ndarray] = []
+        self.energies: list[tuple[float, ...]] = []
+        self.uplift: list[np.ndarray] = []
+        self.refused = 0
+
+    def start(self, stage: Stage) -> None:
+        """Nothing is needed of the stage."""
+
+    def next_state(self, step: int) -> int:
+        return step - step % 64 + 64
+
+    def next_motion(self, step: int) -> int:
+        return step - step % EVERY + EVERY
+
+    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
+        assert first_step == len(self.rows)
+        self.rows += [row.copy() for row in rows]
+
+    def observe(self, view: StepView) -> None:
+        assert view.step == len(self.rows)
+        self.rows.append(view.row.copy())
+        if view.step % EVERY == 0:
+            self.energies.append(view.energies())
+            self.uplift.append(view.node_uplift().copy())
+        try:
+            view.checkpoint()
+        except RuntimeError:
+            self.refused += 1
+            with pytest.raises(RuntimeError, match="only the motion"):
+                view.line_state()
+
+    def finish(self, outcome: str) -> None:
+        assert outcome == "done"
+
+
+def problem(effects: frozenset[str] = frozenset(), **changes: Any) -> Problem:
+    usual = train(75.0, 90.0, 90.0 + N_STEPS * 0.075, raise_time=0.0)
+    return problem_of(
+        ac_simple_line(4), WHOLE | effects, train=usual, numerics=numerics(1e-3), **changes
+    )
+
+
+def watched(scene: Problem, *others: Any) -> Looking:
+    looking = Looking()
+    march, _ = start_march(scene, mesh_of(scene.line, 3))
+    with march:
+        march.run([looking, *others])
+    assert len(looking.rows) == N_STEPS + 1
+    assert len(looking.energies) == len(looking.uplift) == N_STEPS // EVERY + 1
+    return looking
+
+
+@pytest.mark.parametrize("way", ["loop", "left to the scheme", "no room", "one at a time"])
+@pytest.mark.parametrize("incident", [False, True])
+def test_kept_motions_are_those_of_single_steps(
+    way: str, incident: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After a loss of tension a load has its share in the energy, too."""
+    scene = problem()
+    if incident:
+        loss = TensionLoss(0.16, MESSENGER_WIRE, 0.9)
+        scene = problem(frozenset({"tension_loss"}), incidents=(loss,))
+    if way == "left to the scheme":
+        monkeypatch.setattr(complementarity, "_MAX_ROUNDS", 0)
+    elif way == "no room":
+        monkeypatch.setattr(compiled_steps, "_MOTION_BYTES", 0)
+    elif way == "one at a time":
+        monkeypatch.setattr(compiled_steps, "_MOST_MOTIONS", 1)
+    with monkeypatch.context() as patch:
+        patch.setattr(time_loop, "compiled_steps", lambda *arguments: None)
+        expected = watched(scene)
+    found = watched(scene)
+    assert expected.refused == 0 and (found.refused > 0) == (way != "no room")
+    assert np.array_equal(found.rows, expected.rows, equal_nan=True)
+    assert np.array_equal(found.energies, expected.energies)
+    assert np.array_equal(found.uplift, expected.uplift)
+    assert np.ptp([kinetic for kinetic, _ in found.energies]) > 0.0
+
+
+def test_those_who_need_rows_alone_get_each_once() -> None:
+    class Rows:
+        """Takes rows alone."""
+
+        def __init__(self) -> None:
+            self.rows: list[np.ndarray] = []
+
+        start, finish, next_state = Looking.start, Looking.finish, Looking.next_state
+        observe_rows = Looking.observe_rows
+
+        def observe(self, view: StepView) -> None:
+            assert view.checkpoint() is not None
+            self.rows.append(view.row.copy())
+
+    rows = Rows()
+    looking = watched(problem(), rows)
+    assert looking.refused > 0 and np.array_equal(rows.rows, looking.rows, equal_nan=True)
