@@ -152,12 +152,26 @@ def _details(key: Key) -> str:
     elif usual_range(key.name) is not None:
         low, high = usual_range(key.name) or (0.0, 0.0)
         lines.append(f"usual: {low:.12g} to {high:.12g}")
+    lines += _about_effect(key.name)
     wrapped = [
         textwrap.fill(line, 96, initial_indent="    ", subsequent_indent="      ")
         for line in lines
         if line
     ]
     return "\n".join([head, *wrapped])
+
+
+def _about_effect(name: str) -> list[str]:
+    """What an effect adds, requires and is taken from; nothing for other keys."""
+    effect = effects.registry().get(name.removeprefix("effects."))
+    if effect is None or not name.startswith("effects."):
+        return []
+    required = ", ".join(f"effects.{other}" for other in effect.requires)
+    return [
+        f"adds {effect.adds}",
+        f"requires {required}" if required else "",
+        f"source: {effect.source}",
+    ]
 
 
 def words_of(key: Key) -> list[str]:

@@ -144,10 +144,6 @@ class Results:
         clock = self._file[LINE_TIME if LINE_TIME in self._file else "time"]
         return np.asarray(clock[: self._line_length])
 
-    def times_of(self, name: str) -> np.ndarray:
-        """Times of the rows of a channel [s]."""
-        return self.line_time if name in channels.line_channels() else self.time
-
     def n_rows(self, name: str) -> int:
         """Rows of a channel; those of the line may be fewer than the steps."""
         return self._line_length if name in channels.line_channels() else self._length

@@ -121,6 +121,12 @@ def test_list_keys_names_every_key_and_every_effect() -> None:
     assert {f"effects.{name}" for name in effects.registry()} <= keys
 
 
+def test_details_of_an_effect_are_what_it_declares() -> None:
+    text = " ".join(invoke("list", "--keys", "effects.pre_sag").stdout.split())
+    effect = effects.registry()["pre_sag"]
+    assert f"adds {effect.adds} requires effects.gravity source: {effect.source}" in text
+
+
 @pytest.mark.parametrize("case", list(shipped()))
 def test_plan_names_all_effects_and_the_size(case: str) -> None:
     result = invoke("plan", case)

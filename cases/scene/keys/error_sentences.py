@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NoReturn
+from typing import Any
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from catenary.cases.scene.input.faults import MOST_TOLD, Fault, SceneError
+from catenary.cases.scene.input.faults import MOST_TOLD, Fault
 from catenary.cases.scene.input.origin import Origin, shown
 from catenary.cases.scene.input.plain_text import plain
 from catenary.cases.scene.keys.keys import is_known, known_keys, nearest, without_kinds
@@ -25,11 +25,6 @@ def refusal(origin: Origin, key: str, value: object, why: str) -> Fault:
     number = f"{value:g}" if isinstance(value, float) else shown(value)
     in_unit = f" {unit}" if unit else ""
     return Fault(key, f"{key} is {number}{in_unit} {origin.of(key)}; {why}")
-
-
-def refuse(origin: Origin, key: str, value: object, why: str) -> NoReturn:
-    """Raise the ``SceneError`` with the one fault that ``refusal`` gives."""
-    raise SceneError([refusal(origin, key, value, why)])
 
 
 def unknown_key(key: str, where: str, known: list[str]) -> str:
