@@ -14,6 +14,7 @@ from catenary.mbs.head.head_kernels import N_DRIVE, HeadArrays, NewmarkFactors
 from catenary.mbs.head.strips import HeadParts
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.interface import HeadState
+from catenary.solver.base.bound import bound
 
 
 class SteppedHead(ABC):
@@ -54,6 +55,10 @@ class SteppedHead(ABC):
         self._arrays = HeadArrays(
             self._touch, self._state, self._free, self._by_force, self._head.numbers
         )
+        self._extrapolate = bound(
+            head_kernels.extrapolate, self._newmark, self._arrays, self._early
+        )
+        self._take = bound(head_kernels.take, self._arrays, later=(np.zeros(s),))
 
     @property
     def position(self) -> np.ndarray:
@@ -111,12 +116,12 @@ class SteppedHead(ABC):
     def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Heights and velocities (s,) of the strips by Newmark's predictor (paper eq. 2.5)."""
         self._aim(time)
-        head_kernels.extrapolate(self._newmark, self._arrays, self._early)
+        self._extrapolate()
         return self._early[0], self._early[1]
 
     def advance(self, contact_force: np.ndarray) -> None:
         """Take the step predicted last with these contact forces (s,) [N]."""
-        head_kernels.take(self._arrays, contact_force)
+        self._take(contact_force)
 
     def state(self) -> np.ndarray:
         """Positions, velocities and accelerations, shape (3 n,)."""

@@ -14,12 +14,14 @@ product with K is enough. Source of (*): M. Arnold, O. Brüls, Multibody Syst. D
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from catenary.solver.base import aligned_arrays
+from catenary.solver.base.bound import bound
 from catenary.solver.integrators import alpha_kernels
 from catenary.solver.integrators.alpha_kernels import AlphaFactors
 from catenary.solver.integrators.line_integrator import LineIntegrator
@@ -86,7 +88,12 @@ class GeneralizedAlphaLine(LineIntegrator):
 
     def predict(self) -> None:
         """Turn displacement and velocity into what they are at the end of the step if b is zero."""
-        alpha_kernels.predict(
+        self._predict()
+
+    @cached_property
+    def _predict(self) -> Callable[[], None]:
+        return bound(
+            alpha_kernels.predict,
             self.displacement,
             self.velocity,
             self.acceleration,

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from catenary.solver.base.bound import bound
 from catenary.solver.schemes import step_error_kernels
 from catenary.solver.schemes.step_error_kernels import Past, Tried
 
@@ -30,10 +31,10 @@ class StepError:
     def __init__(self, n: int) -> None:
         self._past = Past(np.zeros(_PAST), np.zeros((_PAST, n)), np.zeros(n))
         self._known = 0
-        # Compile, or load from Numba's cache, before the clock of a march starts.
-        nothing, past = np.zeros(n), self._past._replace(times=np.arange(float(_PAST)))
-        step_error_kernels.largest(Tried(1.0, nothing, nothing, nothing, nothing), past)
-        step_error_kernels.remember(0.0, nothing, nothing, past)
+        self._tried = Tried(*np.zeros((4, n)))
+        arguments = self._tried, self._past
+        self._largest = bound(step_error_kernels.largest, *arguments, later=(0.0,))
+        self._remember = bound(step_error_kernels.remember, *arguments, later=(0.0,))
 
     def of(
         self,
@@ -53,12 +54,15 @@ class StepError:
         """
         if self._known < _PAST:
             return None
-        tried = Tried(time, depth, force, stiffness, compliance)
-        return float(step_error_kernels.largest(tried, self._past))
+        given = depth, force, stiffness, compliance
+        for array, values in zip(self._tried, given, strict=True):
+            array[:] = values
+        return float(self._largest(time))
 
     def accept(self, time: float, depth: np.ndarray, force: np.ndarray) -> None:
         """Remember a step that was taken."""
-        step_error_kernels.remember(time, depth, force, self._past)
+        self._tried.depth[:], self._tried.force[:] = depth, force
+        self._remember(time)
         self._known = min(self._known + 1, _PAST)
 
     def state(self) -> np.ndarray:

@@ -29,12 +29,10 @@ class Tried(NamedTuple):
 
     Attributes
     ----------
-    time : its end [s]
     depth, force, stiffness : (n,) found there [m], [N], [N/m], the latter of the law's tangent
     compliance : (n,) what a force takes off the depth within the step [m/N]
     """
 
-    time: float
     depth: np.ndarray
     force: np.ndarray
     stiffness: np.ndarray
@@ -42,9 +40,9 @@ class Tried(NamedTuple):
 
 
 @compiled
-def largest(tried, past):
-    """Largest error of a contact force [N]."""
-    times, depths, time = past.times, past.depths, tried.time
+def largest(tried, past, time):
+    """Largest error of a contact force by a step to ``time`` [N]."""
+    times, depths = past.times, past.depths
     largest = 0.0
     for i in range(tried.depth.size):
         before, now = past.forces[i], tried.force[i]
@@ -63,13 +61,13 @@ def largest(tried, past):
 
 
 @compiled
-def remember(time, depth, force, past):
-    """Append a step to those of the past and drop the oldest."""
+def remember(tried, past, time):
+    """Append a step to ``time`` to those of the past and drop the oldest."""
     times, depths, forces = past
     for row in range(times.size - 1):
         times[row] = times[row + 1]
         depths[row] = depths[row + 1]
     times[-1] = time
-    depths[-1] = depth
-    for i in range(depth.size):
-        forces[i] = force[i]
+    depths[-1] = tried.depth
+    for i in range(forces.size):
+        forces[i] = tried.force[i]
