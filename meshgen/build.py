@@ -81,6 +81,12 @@ def _places(line: Line, mesh: LineMesh) -> Iterator[tuple[str, np.ndarray, np.nd
         wanted = [x for piece in wire.pieces for x in (piece.x[0], piece.x[-1])]
         found = np.sort(mesh.x(np.concatenate([starts, ends])))
         yield f"ends of {wire.name}", found, np.array(wanted)
+    first = 0
+    for clamps in line.clamps:
+        pairs = mesh.clamps[first : first + len(clamps.x)]
+        first += len(clamps.x)
+        for side in (0, 1):
+            yield clamps.name, mesh.x(pairs[:, side]), np.array(clamps.x)
     for number, supports in enumerate(line.supports):
         nodes = mesh.supports[mesh.support_group == number]
         yield supports.name, mesh.x(nodes), np.array(supports.x)

@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from catenary.meshgen.line import Line
+from catenary.meshgen.line import End, Line
 from catenary.meshgen.mesh import (
     ANCHORS,
     CONTACT_WIRE,
@@ -41,19 +41,22 @@ class Names:
 
     Attributes
     ----------
-    wires : name -> number of pieces, from the contact wires upwards
+    wires : name -> how each of its ends is held, piece by piece, from the contact wires upwards
     droppers : groups of droppers
     steady_arms, supports : name -> name of the wire at which they are
+    clamps : names of upper and lower wire, and places along the track [m]; they have no group in
+        the file
     """
 
-    wires: dict[str, int]
+    wires: dict[str, tuple[bool, ...]]
     droppers: tuple[Joins, ...]
     steady_arms: dict[str, str]
     supports: dict[str, str]
+    clamps: tuple[tuple[str, str, tuple[float, ...]], ...] = ()
 
 
 SIMPLE = Names(
-    {CONTACT_WIRE: 1, MESSENGER_WIRE: 1},
+    {CONTACT_WIRE: (True, True), MESSENGER_WIRE: (True, True)},
     (Joins(DROPPERS, MESSENGER_WIRE, CONTACT_WIRE),),
     {STEADY_ARMS: CONTACT_WIRE},
     {SUPPORTS: MESSENGER_WIRE},
@@ -63,10 +66,14 @@ SIMPLE = Names(
 def names_of(line: Line) -> Names:
     """The groups of a line's mesh file."""
     return Names(
-        {wire.name: len(wire.pieces) for wire in line.wires},
+        {
+            wire.name: tuple(end is End.HELD for piece in wire.pieces for end in piece.ends)
+            for wire in line.wires
+        },
         tuple(Joins(group.name, group.upper, group.lower) for group in line.droppers),
         {group.name: group.wire for group in line.steady_arms},
         {group.name: group.wire for group in line.supports},
+        tuple((group.upper, group.lower, group.x) for group in line.clamps),
     )
 
 
@@ -100,9 +107,9 @@ def assemble(groups: Groups, names: Names, source: str) -> LineMesh:
         If the groups do not make a line; the sentence names the group and the place.
     """
     points, starts, wires = groups.points, {}, {}
-    for name, n_pieces in names.wires.items():
+    for name, held in names.wires.items():
         wires[name], starts[name] = _order_wire(
-            points, groups.lines[name], n_pieces, f"{source}: {name}"
+            points, groups.lines[name], len(held) // 2, f"{source}: {name}"
         )
     _check_apart(points, wires, source)
     droppers = [
@@ -116,9 +123,17 @@ def assemble(groups: Groups, names: Names, source: str) -> LineMesh:
                 raise InputError(
                     f"{source}: the {what} at {_at(points, stray[0])} is not a node of {wire}"
                 )
-    ends = [wires[name][at] for name in wires for at in (starts[name], starts[name] - 1)]
+    ends = [
+        _ends_of_pieces(wires[name], starts[name])[list(held)] for name, held in names.wires.items()
+    ]
     _check_anchors(points, np.concatenate(ends), groups.nodes[ANCHORS], source)
     return _renumber(groups, names, wires, starts, droppers)
+
+
+def _ends_of_pieces(nodes: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """First and last node of each piece of a wire, one after the other."""
+    lasts = np.append(starts[1:], nodes.size) - 1
+    return nodes[np.column_stack([starts, lasts]).ravel()]
 
 
 def _check_apart(points: np.ndarray, wires: dict[str, np.ndarray], source: str) -> None:
@@ -320,6 +335,10 @@ def _renumber(
     hanging, dropper_group = along(droppers, (0, 2))
     arms, arm_group = along([groups.nodes[name] for name in names.steady_arms])
     supports, support_group = along([groups.nodes[name] for name in names.supports])
+    clamps = [
+        np.column_stack([_nearest(points, wires[name], x) for name in (upper, lower)])
+        for upper, lower, x in names.clamps
+    ]
     return LineMesh(
         points=points[order],
         wires={name: number[nodes] for name, nodes in wires.items()},
@@ -331,4 +350,12 @@ def _renumber(
         arm_group=arm_group,
         support_group=support_group,
         breaks={name: at[1:] for name, at in starts.items() if at.size > 1},
+        clamps=number[np.concatenate([np.zeros((0, 2), dtype=np.int64), *clamps])],
     )
+
+
+def _nearest(points: np.ndarray, nodes: np.ndarray, x: tuple[float, ...]) -> np.ndarray:
+    """Of a wire's ``nodes`` in order of x those nearest to places ``x`` [m]."""
+    places = points[nodes, 0]
+    between = 0.5 * (places[1:] + places[:-1])
+    return np.asarray(nodes[np.searchsorted(between, np.array(x))])

@@ -66,7 +66,7 @@ def find_cuts(line: Line) -> Cuts:
     ends = [x for wire in line.wires for piece in wire.pieces for x in (piece.x[0], piece.x[-1])]
     places = [masts, np.array(ends)]
     places += [np.array(x) for group in line.droppers for x in (group.upper_x, group.lower_x)]
-    places += [np.array(group.x) for group in line.hardware]
+    places += [np.array(group.x) for group in (*line.hardware, *line.clamps)]
     x = np.concatenate(places)
     # Sorting is stable: of places that are one, a mast stays.
     x = x[np.argsort(x, kind="stable")]

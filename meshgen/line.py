@@ -28,9 +28,10 @@ class Role(StrEnum):
 
 
 class End(StrEnum):
-    """How a piece of wire ends: HELD in height by a tensioner or an anchor."""
+    """How a piece of wire ends: held in height by a tensioner, or carried by a clamp there."""
 
     HELD = "held"
+    CLAMPED = "clamped"
 
 
 @dataclass(frozen=True)
@@ -116,12 +117,15 @@ class Wire(Conductor):
     role : what it is there for
     pieces : where it runs, one piece or several by ascending x that do not overlap
     profile : heights wanted at its droppers' lower ends; None if none hangs it
+    taken : stretches (from, to, tension) over which wires that are clamped to it carry that much of
+        its tension, in ascending order [m], [m], [N]
     """
 
     name: str
     role: Role
     pieces: tuple[Piece, ...]
     profile: Profile | None = None
+    taken: tuple[tuple[float, float, float], ...] = ()
 
     @classmethod
     def of(
@@ -131,6 +135,7 @@ class Wire(Conductor):
         role: Role,
         pieces: tuple[Piece, ...],
         profile: Profile | None = None,
+        taken: tuple[tuple[float, float, float], ...] = (),
     ) -> Wire:
         """A wire made of a conductor."""
         return cls(
@@ -141,7 +146,17 @@ class Wire(Conductor):
             role,
             pieces,
             profile,
+            taken,
         )
+
+    def tension_at(self, x: np.ndarray | float) -> np.ndarray:
+        """Tension at positions ``x`` [m], shape as ``x`` [N]."""
+        tension = np.full(np.shape(x), self.tension)
+        if self.taken:
+            start, end, less = np.array(self.taken).T
+            which = np.clip(np.searchsorted(start, x, side="right") - 1, 0, None)
+            tension -= np.where((x >= start[which]) & (x < end[which]), less[which], 0.0)
+        return tension
 
     @property
     def length(self) -> float:
@@ -216,6 +231,26 @@ class Droppers:
 
 
 @dataclass(frozen=True)
+class Clamps:
+    """Clamps by which one wire hangs from another without a dropper: links that push as well.
+
+    Attributes
+    ----------
+    name : of their component in the damping
+    stiffness, mass : of each; half of the mass at either wire [N/m], [kg]
+    upper, lower : names of the wires
+    x : their places, ascending [m]
+    """
+
+    name: str
+    stiffness: float
+    mass: float
+    upper: str
+    lower: str
+    x: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class SteadyArm:
     """A steady arm hinged at its registration end and clamped to a wire.
 
@@ -262,7 +297,10 @@ class Line(Spans):
     ----------
     topology : name of what made it
     wires : from the contact wires upwards
-    droppers, steady_arms, supports : groups
+    droppers, steady_arms, supports, clamps : groups
+
+    Raises ValueError if names occur twice, a group names no wire, or droppers hang a wire without
+    wanted heights: a topology that makes such a line is wrong.
     """
 
     topology: str
@@ -270,6 +308,26 @@ class Line(Spans):
     droppers: tuple[Droppers, ...]
     steady_arms: tuple[SteadyArms, ...]
     supports: tuple[Supports, ...]
+    clamps: tuple[Clamps, ...] = ()
+
+    def __post_init__(self) -> None:
+        wires = {wire.name for wire in self.wires}
+        groups = [*self.droppers, *self.hardware, *self.clamps]
+        names = [wire.name for wire in self.wires] + [group.name for group in groups]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ValueError(f"topology {self.topology}: two parts have the name {twice[0]}")
+        asked = {part.wire for part in self.hardware}
+        asked |= {wire for part in self.droppers for wire in (part.upper, part.lower)}
+        asked |= {wire for part in self.clamps for wire in (part.upper, part.lower)}
+        unknown = sorted(asked - wires)
+        if unknown:
+            raise ValueError(f"topology {self.topology}: there is no wire {unknown[0]}")
+        for part in self.droppers:
+            if self.wire(part.lower).profile is None:
+                raise ValueError(
+                    f"topology {self.topology}: {part.name} hang {part.lower}, which has no profile"
+                )
 
     def wire(self, name: str) -> Wire:
         """The wire of that name; KeyError if there is none."""
@@ -286,6 +344,11 @@ class Line(Spans):
     def hardware(self) -> tuple[SteadyArms | Supports, ...]:
         """Groups of what stands at single places of wires: arms, then supports."""
         return (*self.steady_arms, *self.supports)
+
+    @property
+    def clamp_group(self) -> np.ndarray:
+        """Number of its group for each clamp, group by group."""
+        return np.repeat(np.arange(len(self.clamps)), [len(group.x) for group in self.clamps])
 
     @property
     def profiles(self) -> tuple[Profile, ...]:

@@ -38,6 +38,8 @@ class LineMesh:
         Wire ends held by the tensioners: no vertical motion.
     dropper_group, arm_group, support_group : (n,) int
         Number of the line's group that each belongs to; of the first one if not given.
+    clamps : (n_clamps, 2) int
+        Upper and lower node of each clamp, group by group.
     breaks : name -> (n,) int
         Places in ``wires[name]`` of the first nodes of all pieces but the first one; a wire that
         is not named is of one piece.
@@ -53,6 +55,7 @@ class LineMesh:
     arm_group: np.ndarray = field(default_factory=lambda: _NONE)
     support_group: np.ndarray = field(default_factory=lambda: _NONE)
     breaks: dict[str, np.ndarray] = field(default_factory=dict)
+    clamps: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
 
     def __post_init__(self) -> None:
         for name, members in (
@@ -74,7 +77,20 @@ class LineMesh:
 
     def elements(self, wire: str) -> np.ndarray:
         """First and second node of the elements of a wire, (n, 2), in order of x."""
-        nodes = self.wires[wire]
-        pairs = np.stack([nodes[:-1], nodes[1:]], axis=1)
-        breaks = self.breaks.get(wire)
-        return pairs if breaks is None else np.delete(pairs, breaks - 1, axis=0)
+        return elements_of(self.wires[wire], self.breaks.get(wire, _NONE))
+
+    def pieces(self, wire: str) -> list[np.ndarray]:
+        """Nodes of the pieces of a wire, in order of x."""
+        return np.split(self.wires[wire], self.breaks.get(wire, _NONE))
+
+
+def elements_of(nodes: np.ndarray, breaks: np.ndarray = _NONE) -> np.ndarray:
+    """First and second node of the elements of a wire, (n, 2), in order of x.
+
+    Parameters
+    ----------
+    nodes : (n,) of the wire in order of x
+    breaks : places in ``nodes`` of the first nodes of all pieces but the first one
+    """
+    pairs = np.stack([nodes[:-1], nodes[1:]], axis=1)
+    return np.delete(pairs, breaks - 1, axis=0) if breaks.size else pairs

@@ -299,6 +299,7 @@ def _observers(
             at_rest.mesh.wires,
             at_rest.mesh.droppers,
             every=recording.field_every,
+            breaks=at_rest.mesh.breaks,
             flush_every=flush_every,
             resume=order.resume,
             wait=True,

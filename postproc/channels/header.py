@@ -73,6 +73,8 @@ def line_datasets(
     }
     for name, nodes in mesh.wires.items():
         datasets[f"line/wires/{name}"] = np.asarray(nodes, dtype=np.int64)
+    for name, breaks in mesh.breaks.items():
+        datasets[f"line/breaks/{name}"] = np.asarray(breaks, dtype=np.int64)
     return datasets
 
 

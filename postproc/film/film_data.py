@@ -21,6 +21,7 @@ class FilmData:
     speed : of the train [m/s]
     points : (n_nodes, 3) nodes of the line at rest [m]
     wires : name -> nodes in order of x; ``contact`` names the one that pantographs touch
+    elements : name -> (n, 2) nodes of the wire's elements
     droppers : (n_droppers, 2) nodes
     supports : (n_supports,) masts along the track [m]
     time : (n,) [s]
@@ -34,6 +35,7 @@ class FilmData:
     points: np.ndarray
     wires: dict[str, np.ndarray]
     contact: str
+    elements: dict[str, np.ndarray]
     droppers: np.ndarray
     supports: np.ndarray
     time: np.ndarray
@@ -77,6 +79,7 @@ def film_data(results: Results) -> FilmData:
         results.line("node_points"),
         wires,
         lowest(wires, results.line("node_points")),
+        results.elements(),
         results.line("droppers"),
         results.line("support_x"),
         results.time,

@@ -48,9 +48,7 @@ class SideView:
         self.foot = float(data.rest_height(data.position.mean(axis=0)).min()) - BELOW_HEAD
         self._add_surroundings(plotter)
         flat = np.column_stack([points[:, 0], np.zeros(len(points)), scale.drawn(points[:, 2])])
-        pairs = np.concatenate(
-            [np.column_stack([nodes[:-1], nodes[1:]]) for nodes in data.wires.values()]
-        )
+        pairs = np.concatenate(list(data.elements.values()))
         self._wires = pyvista.PolyData(flat.copy(), lines=segments(pairs))
         self._wires["uplift"] = np.zeros(len(points))
         plotter.add_mesh(

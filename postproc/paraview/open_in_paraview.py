@@ -16,7 +16,7 @@ from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.paraview import scenery
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.fields import COMPONENTS
+from catenary.postproc.record.fields import component_numbers
 from catenary.solver.base.errors import InputError
 
 SCRIPT, FOLDER = "view.py", "paraview"
@@ -76,7 +76,7 @@ def _settings(
     largest = max(1e-4, *(float(np.abs(snapshots.uplift(number)).max()) for number in some))
     between = float(heights.max() - np.median(contact))
     fitting = max(height, round_down(_SHARE * between * height / largest))
-    components = {name: number for name, number in COMPONENTS.items()}
+    components = component_numbers(data.wires)
     first = data.row_at(float(times[0]))
     return {
         "folder": str((folder / FOLDER).absolute()),

@@ -6,16 +6,18 @@ import h5py
 import numpy as np
 
 from catenary.postproc.read.attributes import HDF5_ERRORS, is_there
-from catenary.postproc.read.file_schema import CONSTANTS, Constant, line_columns
+from catenary.postproc.read.file_schema import BREAKS, CONSTANTS, WIRE, Constant, line_columns
 
 
 def constant_faults(file: h5py.File) -> tuple[list[str], dict[str, int]]:
     """What is wrong with the constants of a file, and the sizes that their letters stand for."""
     faults: list[str] = []
     sizes: dict[str, int] = {}
-    wires = [f"line/wires/{name}" for name in _names(file, "line/wires")]
-    node = CONSTANTS["line/wires/contact_wire"]._replace(shape="*")
-    for path, declared in [*CONSTANTS.items(), *((w, node) for w in wires if w not in CONSTANTS)]:
+    wires = {f"line/wires/{name}": WIRE for name in _names(file, "line/wires")}
+    if not wires:
+        faults.append("line/wires has no wire")
+    breaks = {f"line/breaks/{name}": BREAKS for name in _names(file, "line/breaks")}
+    for path, declared in {**CONSTANTS, **wires, **breaks}.items():
         try:
             values = np.asarray(file[path][...])
         except HDF5_ERRORS:
@@ -78,16 +80,16 @@ def _between(file: h5py.File, sizes: dict[str, int]) -> list[str]:
     faults = []
     limits = {"line/droppers": sizes["N"], "line/dropper_span": sizes["M"] - 1}
     limits |= {f"line/wires/{name}": sizes["N"] for name in file["line/wires"]}
+    for name in _names(file, "line/breaks"):
+        limits[f"line/breaks/{name}"] = file[f"line/wires/{name}"].size
     for path, limit in limits.items():
         values = np.asarray(file[path][...])
         if values.size and int(values.max()) >= limit:
             faults.append(f"{path} names number {values.max()} of {limit}")
     if faults:
         return faults
-    x = np.asarray(file["line/node_points"][...])[np.asarray(file["line/wires/contact_wire"]), 0]
+    x = file["static/contact_x"][...]
     start, end = file["line/evaluation_range"][...]
-    if x.size < 2 or not (np.diff(x) > 0).all():
-        return ["the nodes of line/wires/contact_wire do not ascend"]
     if start >= x[-1] or end <= x[0]:
         return ["line/evaluation_range lies beyond the contact wire"]
     return []

@@ -193,6 +193,8 @@ ATTRIBUTES: dict[str, Attribute] = {
 
 # Letters: A arms, D droppers, N nodes, M masts, C nodes of the contact wire, E of the elasticity.
 _NUMBERS = Constant("D", 0, 1e12, whole=True)
+# Nodes of a wire, and where in them its further pieces begin.
+WIRE, BREAKS = _NUMBERS._replace(shape="*"), Constant("*", 1, 1e12, whole=True)
 CONSTANTS: dict[str, Constant] = {
     "line/arm_x": Constant("A"),
     "line/dropper_x": Constant("D"),
@@ -202,10 +204,9 @@ CONSTANTS: dict[str, Constant] = {
     "line/running_range": Constant("2"),
     "line/evaluation_range": Constant("2", ascending=True),
     "line/droppers": _NUMBERS._replace(shape="D2"),
-    "line/wires/contact_wire": _NUMBERS._replace(shape="C"),
     "static/dropper_length": Constant("D"),
     "static/dropper_force": Constant("D", -LARGEST["N"], LARGEST["N"]),
-    "static/contact_x": Constant("C"),
+    "static/contact_x": Constant("C", ascending=True),
     "static/contact_height": Constant("C"),
     "static/elasticity_x": Constant("E"),
     "static/elasticity": Constant("E"),

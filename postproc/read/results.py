@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from catenary.meshgen.mesh import elements_of
 from catenary.postproc.channels.line_record import LineRecord, from_table
 from catenary.postproc.files import block_reading
 from catenary.postproc.files.result_file import DONE, FORMAT, LINE_TIME, RUNNING, complete_rows
@@ -330,6 +331,15 @@ class Results:
     def wires(self) -> dict[str, np.ndarray]:
         """Node numbers of each wire in order of x."""
         return {name: np.asarray(nodes[...]) for name, nodes in self._file["line/wires"].items()}
+
+    def elements(self) -> dict[str, np.ndarray]:
+        """Nodes of the elements of each wire, (n, 2) each, in order of x."""
+        given = self._file["line/breaks"].items() if "line/breaks" in self._file else ()
+        breaks = {name: np.asarray(at[...]) for name, at in given}
+        none = np.zeros(0, dtype=np.int64)
+        return {
+            name: elements_of(nodes, breaks.get(name, none)) for name, nodes in self.wires().items()
+        }
 
     def static(self, name: str) -> np.ndarray:
         """A dataset of ``/static``, for instance ``dropper_length``."""

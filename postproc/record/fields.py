@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 from h5py import h5d, h5p, h5s, h5t
 
-from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.meshgen.mesh import DROPPERS, elements_of
 from catenary.postproc.files.disk import (
     MARGIN,
     broken_write,
@@ -37,7 +37,6 @@ from catenary.solver.time_loop.observers import Stage, StepView
 
 logger = logging.getLogger("catenary.fields")
 
-COMPONENTS = {CONTACT_WIRE: 0, MESSENGER_WIRE: 1, "droppers": 2}
 _MAX_BUFFER = 32 * 1024 * 1024
 # More than HDF5's tables take for a dataset (about 400) [bytes].
 _TABLES = 1024
@@ -56,6 +55,7 @@ class FieldRecorder:
         its folder is made
     wires : name -> (n,) int, nodes of each wire in order of x
     droppers : (n_droppers, 2) int, upper and lower node of each
+    breaks : name -> places in ``wires[name]`` where further pieces of the wire begin
     every : steps between two snapshots
     flush_every : steps after which what is kept in memory is written; if it is the ``Recorder``'s,
         which is to follow in the list of observers, a killed run can be continued without a gap
@@ -72,6 +72,7 @@ class FieldRecorder:
         droppers: np.ndarray,
         *,
         every: int,
+        breaks: Mapping[str, np.ndarray] | None = None,
         flush_every: int = 500,
         snapshots_per_flush: int = 50,
         resume: bool = False,
@@ -80,7 +81,7 @@ class FieldRecorder:
         self._comm = comm
         self._xdmf = Path(path_xdmf)
         self._h5 = self._xdmf.with_suffix(".h5")
-        self._cells, self._component = line_cells(wires, droppers)
+        self._cells, self._component = line_cells(wires, droppers, breaks or {})
         self._every = every
         self._flush_every = flush_every
         self._capacity = snapshots_per_flush
@@ -322,19 +323,22 @@ def _film_bytes(n_nodes: int, n_cells: int, n_snapshots: int) -> int:
     return mesh + n_snapshots * (4 * 4 * n_nodes + 8 + 2 * _TABLES) + MARGIN
 
 
+def component_numbers(wires: Iterable[str]) -> dict[str, int]:
+    """Number of each component: the wires in the order of their names, then the droppers."""
+    return {name: number for number, name in enumerate([*sorted(wires), DROPPERS])}
+
+
 def line_cells(
-    wires: Mapping[str, np.ndarray], droppers: np.ndarray
+    wires: Mapping[str, np.ndarray], droppers: np.ndarray, breaks: Mapping[str, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Line cells (n_cells, 2) int32 of wires and droppers, and component of each, (n_cells,) int32.
 
-    Components are numbered by ``COMPONENTS``; wires that it does not name follow. Not collective.
+    Not collective.
     """
-    numbers = dict(COMPONENTS)
-    parts = [(name, np.column_stack([nodes[:-1], nodes[1:]])) for name, nodes in wires.items()]
-    parts.append(("droppers", np.asarray(droppers).reshape(-1, 2)))
-    component = [
-        np.full(len(cells), numbers.setdefault(name, len(numbers))) for name, cells in parts
-    ]
+    none, numbers = np.zeros(0, dtype=np.int64), component_numbers(wires)
+    parts = [(name, elements_of(nodes, breaks.get(name, none))) for name, nodes in wires.items()]
+    parts.append((DROPPERS, np.asarray(droppers).reshape(-1, 2)))
+    component = [np.full(len(cells), numbers[name]) for name, cells in parts]
     return (
         np.concatenate([cells for _, cells in parts]).astype(np.int32),
         np.concatenate(component).astype(np.int32),

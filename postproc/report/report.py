@@ -268,7 +268,7 @@ def _violation_row(results: Results) -> list[tuple[str, str, list[str]]]:
 
 def _facts(results: Results) -> list[tuple[str, str]]:
     about = results.attributes
-    n_cells = sum(len(nodes) - 1 for nodes in results.wires().values())
+    n_cells = sum(len(pairs) for pairs in results.elements().values())
     facts = [
         (
             "line",

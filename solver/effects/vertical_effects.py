@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from catenary.mbs.roll import roll_of
 from catenary.solver.effects import target_heights
 from catenary.solver.effects.effect import Effect, Limit, register
+from catenary.solver.model.links import between_nodes, law
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
 from catenary.solver.problem.problem import Problem, slowest_wave_speed
@@ -25,6 +26,10 @@ def _vertical(builder: ModelBuilder) -> None:
     for number, supports in enumerate(line.supports):
         nodes = mesh.supports[mesh.support_group == number]
         builder.add_springs(supports.name, nodes, "w", supports.stiffness)
+    for number, clamps in enumerate(line.clamps):
+        pairs = mesh.clamps[line.clamp_group == number]
+        laws = law(mesh.x(pairs[:, 1]), clamps.stiffness)
+        builder.add_links(clamps.name, between_nodes(builder.model, pairs), laws)
     builder.hold(mesh.anchors, "w")
 
 
@@ -43,6 +48,10 @@ def _clamp_mass(builder: ModelBuilder) -> None:
         upper, lower = mesh.droppers[mesh.dropper_group == number].T
         builder.add_masses(droppers.upper, upper, droppers.kind.upper_clamp_mass)
         builder.add_masses(droppers.lower, lower, droppers.kind.lower_clamp_mass)
+    for number, clamps in enumerate(builder.problem.line.clamps):
+        pairs = mesh.clamps[builder.problem.line.clamp_group == number]
+        for name, side in ((clamps.upper, 0), (clamps.lower, 1)):
+            builder.add_masses(name, pairs[:, side], 0.5 * clamps.mass)
 
 
 def _arm_inertia(builder: ModelBuilder) -> None:
@@ -136,13 +145,16 @@ register(
 register(
     Effect(
         "clamp_mass",
-        "mass of the dropper clamps",
-        "lumped masses at both ends of the droppers",
+        "mass of clamps on the wires",
+        "lumped masses at both ends of droppers and clamps",
         "paper section 2 and Table 1",
         default=True,
-        applies=lambda p: any(
-            group.kind.upper_clamp_mass + group.kind.lower_clamp_mass > 0
-            for group in p.line.droppers
+        applies=lambda p: (
+            any(group.mass > 0 for group in p.line.clamps)
+            or any(
+                group.kind.upper_clamp_mass + group.kind.lower_clamp_mass > 0
+                for group in p.line.droppers
+            )
         ),
         build=_clamp_mass,
     )

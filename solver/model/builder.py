@@ -27,11 +27,12 @@ class ModelBuilder:
         """Bending and tension of a wire in the plane of two unknowns; its mass and weight."""
         dofs, length = wire_elements(self.model, wire, unknowns)
         data = self.problem.line.wire(wire)
+        tension = data.tension_at(self.mesh.x(self.mesh.elements(wire)).mean(axis=1))
         self._add_block(
             wire,
             dofs,
             elements.mass(length, data.mass_per_length),
-            elements.stiffness(length, data.bending_stiffness, data.tension),
+            elements.stiffness(length, data.bending_stiffness, tension),
         )
         if unknowns[0] == "w":
             load = data.mass_per_length * elements.uniform_load(length)

@@ -8,14 +8,16 @@ from __future__ import annotations
 import numpy as np
 
 
-def stiffness(length: np.ndarray, bending_stiffness: float, tension: float) -> np.ndarray:
+def stiffness(
+    length: np.ndarray, bending_stiffness: float, tension: float | np.ndarray
+) -> np.ndarray:
     """Element matrices K = EI K_L + F K_G of eq. (2.1).
 
     Parameters
     ----------
     length : ndarray, shape (n,) [m]
     bending_stiffness : EI [N m2]
-    tension : F [N], positive in tension
+    tension : F [N], positive in tension, of all elements or (n,) of each
 
     Returns
     -------

@@ -84,11 +84,7 @@ def _by_places(mesh: LineMesh, places: np.ndarray) -> Stations:
 
 def _pieces(mesh: LineMesh) -> list[np.ndarray]:
     """Nodes of each piece of each wire."""
-    return [
-        piece
-        for wire, nodes in mesh.wires.items()
-        for piece in np.split(nodes, mesh.breaks.get(wire, []))
-    ]
+    return [piece for wire in mesh.wires for piece in mesh.pieces(wire)]
 
 
 def _by_gaps(mesh: LineMesh) -> np.ndarray | None:
@@ -102,7 +98,7 @@ def _by_gaps(mesh: LineMesh) -> np.ndarray | None:
         index[nodes] = np.arange(nodes.size)
     droppers = mesh.droppers[np.argsort(mesh.x(mesh.droppers[:, 1]), kind="stable")]
     of_wire = _wire_of_node(mesh)[droppers]
-    if len(mesh.wires) != 2 or (np.sort(of_wire, axis=1) != [0, 1]).any():
+    if len(mesh.wires) != 2 or mesh.breaks or (np.sort(of_wire, axis=1) != [0, 1]).any():
         return None
     ends = {int(wire): index[droppers[of_wire == wire]] for wire in (0, 1)}
     sizes = [nodes.size - 1 for nodes in mesh.wires.values()]

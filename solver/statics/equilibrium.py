@@ -130,12 +130,17 @@ def _assembled(model: Model, w: np.ndarray) -> tuple[sparse.csc_matrix, np.ndarr
         first, second = mesh.elements(wire.name).T
         length = mesh.x(second) - mesh.x(first)
         dofs = np.stack([w[first], w[first] + 1, w[second], w[second] + 1], axis=1)
-        parts.append((dofs, elements.stiffness(length, wire.bending_stiffness, wire.tension)))
+        tension = wire.tension_at(0.5 * (mesh.x(first) + mesh.x(second)))
+        parts.append((dofs, elements.stiffness(length, wire.bending_stiffness, tension)))
     for number, supports in enumerate(line.supports):
         dofs = w[mesh.supports[mesh.support_group == number]]
         parts.append((dofs[:, None], np.full((dofs.size, 1, 1), supports.stiffness)))
         relaxed = line.wire(supports.wire).points(np.array(supports.x))[:, 2]
         np.add.at(load, dofs, supports.stiffness * relaxed)
+    for number, clamps in enumerate(line.clamps):
+        dofs = w[mesh.clamps[line.clamp_group == number]]
+        unit = clamps.stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        parts.append((dofs, np.broadcast_to(unit, (len(dofs), 2, 2))))
     at = [
         np.concatenate(
             [np.broadcast_to(dofs[axes], matrix.shape).ravel() for dofs, matrix in parts]

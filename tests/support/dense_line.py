@@ -15,7 +15,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from catenary.mbs.lumped_data import LumpedData
-from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
+from catenary.meshgen.line import Role
+from catenary.meshgen.mesh import LineMesh
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.equilibrium import Equilibrium
 
@@ -45,7 +46,7 @@ class DenseLink:
 
 @dataclass
 class DenseLine:
-    """Contact wire, messenger wire and one lumped pantograph of two masses.
+    """Wires with what joins them, and one lumped pantograph of two masses under the contact wire.
 
     Unknowns are w and dw/dx of each mesh node by its number, then the masses' heights, head first.
     ``dampers_act`` tells whether a slack dropper keeps its damper, ``share`` what it keeps besides.
@@ -67,9 +68,8 @@ class DenseLine:
         n = 2 * mesh.n_nodes
         self.size = n + 2
         mass, stiffness = np.zeros((2, self.size, self.size))
-        for wire in (CONTACT_WIRE, MESSENGER_WIRE):
-            data, nodes = line.wire(wire), mesh.wires[wire]
-            for left, right in zip(nodes[:-1], nodes[1:], strict=True):
+        for data in line.wires:
+            for left, right in mesh.elements(data.name):
                 length = mesh.points[right, 0] - mesh.points[left, 0]
                 place = 0.5 * length * (1.0 + _POINTS)
                 own = np.ix_(*2 * [[2 * left, 2 * left + 1, 2 * right, 2 * right + 1]])
@@ -78,31 +78,33 @@ class DenseLine:
                 bend = np.array([f.deriv(2)(place) for f in hermite(length)])
                 weights = 0.5 * length * _WEIGHTS
                 mass[own] += data.mass_per_length * (shape * weights) @ shape.T
-                stiffness[own] += data.tension * (slope * weights) @ slope.T
+                tension = data.tension_at(0.5 * mesh.points[[left, right], 0].sum())
+                stiffness[own] += tension * (slope * weights) @ slope.T
                 stiffness[own] += data.bending_stiffness * (bend * weights) @ bend.T
         self.pull = np.zeros((len(mesh.droppers), self.size))
         for row, (upper, lower) in zip(self.pull, mesh.droppers, strict=True):
             row[2 * upper], row[2 * lower] = 1.0, -1.0
-        (droppers,), (supports,), (arms,) = line.droppers, line.supports, line.steady_arms
-        assert droppers.kind.stiffness is not None
-        self.k = droppers.kind.stiffness
+        kinds = [group.kind.stiffness for group in line.droppers]
         self.n_droppers = n_droppers = len(self.pull)
         own = [self.direction(link)[None] for link in self.further]
         self.pull = np.concatenate([self.pull, *own])
         # Of each link: stiffness, force at rest, whether it stands open there.
         springs = [link.stiffness for link in self.further]
-        self.spring = np.append(np.full(n_droppers, self.k), springs)
+        self.spring = np.append(np.array(kinds, dtype=float)[mesh.dropper_group], springs)
         rests = [-link.stiffness * (link.gap or 0.0) for link in self.further]
         self.rest = np.append(self.form.dropper_force, rests)
         self.open = np.zeros(self.spring.size, dtype=bool)
         self.open[n_droppers:] = [link.gap is not None for link in self.further]
         taut = np.where(self.open, 0.0, self.spring)
         stiffness += (self.pull.T * taut) @ self.pull
-        for nodes, value in (
-            (mesh.supports, supports.stiffness),
-            (mesh.steady_arms, arms.kind.stiffness),
+        for nodes, group, values in (
+            (mesh.supports, mesh.support_group, [own.stiffness for own in line.supports]),
+            (mesh.steady_arms, mesh.arm_group, [own.kind.stiffness for own in line.steady_arms]),
         ):
-            stiffness[2 * nodes, 2 * nodes] += value
+            stiffness[2 * nodes, 2 * nodes] += np.array(values)[group]
+        for (upper, lower), number in zip(mesh.clamps, line.clamp_group, strict=True):
+            own = np.ix_(*2 * [[2 * upper, 2 * lower]])
+            stiffness[own] += line.clamps[number].stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])
         alpha, beta = self.problem.damping.alpha, self.problem.damping.beta
         damping = alpha * stiffness + beta * mass
         self.alpha = alpha
@@ -136,7 +138,8 @@ class DenseLine:
 
     def meets(self, x: float) -> tuple[np.ndarray, float]:
         """How the depth of the head at ``x`` [m] follows from the unknowns: direction and rest."""
-        nodes = self.mesh.wires[CONTACT_WIRE]
+        (contact,) = self.problem.line.wires_of(Role.CONTACT)
+        nodes = self.mesh.wires[contact.name]
         places = self.mesh.points[nodes, 0]
         e = int(np.searchsorted(places, x)) - 1
         functions = hermite(places[e + 1] - places[e])

@@ -145,6 +145,10 @@ def mesh_of(line: LineData | Line, elements_per_gap: int) -> LineMesh:
             for group in line.droppers
         ]
     )
+    clamps = [
+        np.column_stack([at(group.upper, group.x), at(group.lower, group.x)])
+        for group in line.clamps
+    ]
     arms, arm_group = together([at(group.wire, group.x) for group in line.steady_arms])
     supports, support_group = together([at(group.wire, group.x) for group in line.supports])
     return LineMesh(
@@ -158,6 +162,7 @@ def mesh_of(line: LineData | Line, elements_per_gap: int) -> LineMesh:
         arm_group=arm_group,
         support_group=support_group,
         breaks=breaks,
+        clamps=np.concatenate([np.zeros((0, 2), dtype=int), *clamps]),
     )
 
 

@@ -56,8 +56,8 @@ def test_wires_and_droppers_are_told_apart(tmp_path: Path, make_march: Any) -> N
 
 def test_other_wires_get_numbers_of_their_own() -> None:
     wires = {"stitch_wire": np.arange(3), "contact_wire": np.arange(3), "feeder": np.arange(2)}
-    _, component = fields.line_cells(wires, np.zeros((0, 2), dtype=int))
-    assert component.tolist() == [3, 3, 0, 0, 4]
+    _, component = fields.line_cells(wires, np.zeros((0, 2), dtype=int), {})
+    assert component.tolist() == [2, 2, 0, 0, 1]
 
 
 def test_files_are_valid_after_every_flush(tmp_path: Path, make_march: Any) -> None:
