@@ -26,10 +26,11 @@ from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.integrators.detour import Detour, detour_of
 from catenary.solver.problem.problem import Problem
+from catenary.solver.time_loop.single_steps import single_steps_of
 
-# Time between two flushes of the result file, each of which takes some 5 ms [s], and what may wait
-# for one in memory [B].
-FLUSH_EVERY = 0.5
+# Time between two flushes of the result file at full speed, each of which takes some 5 ms [s], and
+# what may wait for one in memory [B].
+FLUSH_EVERY = 0.2
 FLUSH_MEMORY = 1e8
 # Steps of a flush whose chunks are not too small.
 LEAST_FLUSH = 256
@@ -90,19 +91,24 @@ def needs_of(
     if not widths:
         groups = effects.unknown_groups(active, problem.line.wires)
         widths = tuple(sum(map(len, group.values())) for group in groups)
-    scheme = problem.numerics.scheme
+    scheme, n_substeps = problem.numerics.scheme, _substeps(problem)
     n_steps = max(1, math.floor(simulated_time(problem) / problem.numerics.dt + 1e-9))
     recording = recording_of(scene.output, problem, extent, n_steps)
     flush_every = scene.output.flush_every_steps or flush_cadence(problem, n_dofs, recording)
     return Needs(
         n_steps=n_steps,
         memory=estimate_memory(n_dofs, n_steps),
-        march=(1.0 if detour is None else detour.factor)
-        * estimate_march(n_dofs, n_steps, scheme, _substeps(problem), widths),
+        march=_slower(detour, n_substeps)
+        * estimate_march(n_dofs, n_steps, scheme, n_substeps, widths),
         files=estimate_files(scene, problem, recording, n_dofs, flush_every),
         recording=recording,
         detour=detour,
     )
+
+
+def _slower(detour: Detour | None, n_substeps: int) -> float:
+    """By how much a detour lengthens the march; substeps are counted by themselves."""
+    return 1.0 if detour is None or n_substeps else detour.factor
 
 
 def simulated_time(problem: Problem) -> float:
@@ -128,7 +134,7 @@ def needs_with_mesh(scene: Scene, mesh: LineMesh) -> Needs:
     """What a run on a mesh needs. Not collective."""
     problem = problem_of(scene)
     numbering = numbering_of(problem, mesh)
-    detour = detour_of(problem, numbering)
+    detour = detour_of(problem, numbering) or single_steps_of(problem)
     extent = extent_of(mesh)
     return needs_of(scene, problem, extent, numbering.n_unknowns, numbering.planes, detour)
 
@@ -167,7 +173,7 @@ def _substeps(problem: Problem) -> int:
 
 
 def flush_cadence(problem: Problem, n_dofs: int, recording: Recording) -> int:
-    """Steps between two flushes: about half a second of wall time, and what fits into memory.
+    """Steps between two flushes: about 0.2 s of wall time at full speed, and what fits into memory.
 
     Not so few that the file is made of small chunks, and whole chunks of them. The same on any
     number of ranks, so that their files are.

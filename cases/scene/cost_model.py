@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 # Cost model of the march on one rank, records included: overhead of a step, and time per unknown.
-# Runs of the case ambrosio2012 on 25, 100 and 1000 spans, 4.5e3 to 1.8e5 unknowns, on a two-core
+# Marches of the case ambrosio2012 on 25, 100 and 1000 spans, 4.5e3 to 1.8e5 unknowns, on a two-core
 # machine of 2026 (Debian 12, PETSc 3.18) lie within 40 % of it, and machines differ by a factor of
 # two; the plan calls it an estimate.
-STEP_OVERHEAD = 4.5e-5  # [s]
-STEP_PER_UNKNOWN = 4.8e-9  # [s]
+STEP_OVERHEAD = 1.4e-5  # [s]
+STEP_PER_UNKNOWN = 2.6e-9  # [s]
 # Time of a station by its unknowns in a plane, in terms of four; as in the benchmark of widths.
 STATION_COST = {2: 0.6, 4: 1.0, 6: 1.8, 8: 2.2, 10: 4.8, 12: 5.6, 16: 8.0}
-# The fixed-point scheme repeats the solve; 3 times the time of one_solve was measured.
-# PETSc's TSALPHA2 factors anew in every iteration; 26 times was measured.
-SCHEME_FACTOR = {"one_solve": 1.0, "fixed_point": 3.0, "ts_alpha2": 26.0}
+# The fixed-point scheme repeats the solve, and PETSc's TSALPHA2 factors anew in every iteration:
+# 240 and 1800 us were measured with the same case.
+SCHEME_FACTOR = {"one_solve": 1.0, "fixed_point": 9.0, "ts_alpha2": 70.0}
 # A substep of a pantograph with all its bodies: 0.21 to 0.38 ms were measured with the paper's
 # seven, by the way of keeping joints.
 ALL_BODIES_SUBSTEP = 3.0e-4  # [s]

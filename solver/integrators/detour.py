@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import NamedTuple
 
 from catenary.solver.effects.all_effects import simulated
@@ -11,21 +12,36 @@ from catenary.solver.model.unknowns import Unknowns
 from catenary.solver.problem.integrator_parameters import NEWMARK
 from catenary.solver.problem.problem import Damping, Numerics, Problem
 
-# Time of a step in terms of one in two passes, as measured with the case ambrosio2012: part by
-# part with products and solves by stations, and with factors of PETSc.
-PARTS, LIBRARY = 2.4, 3.0
+logger = logging.getLogger(__name__)
+
+# Time of a step in terms of one in the compiled loop, as measured with the case ambrosio2012: part
+# by part with products and solves by stations, and with factors of PETSc.
+PARTS, LIBRARY = 5.5, 5.6
 # A short function of NumPy, called for each step.
 CALLED = 1.5
 
 
 class Detour(NamedTuple):
-    """A slower way through a step: the reason, and its time in terms of two passes, about."""
+    """A slower way through a step: its reason, its time in terms of the compiled loop."""
 
     reason: str
     factor: float
 
     def __str__(self) -> str:
         return f"steps take about {self.factor:g} times as long as they could: {self.reason}"
+
+
+_told: set[str] = set()
+
+
+def tell(detour: Detour) -> None:
+    """Warn of a detour, once in a process: not for each line of a sweep, or each length of steps.
+
+    Not collective; on rank 0.
+    """
+    if detour.reason not in _told:
+        _told.add(detour.reason)
+        logger.warning("%s", detour)
 
 
 def detour_of(problem: Problem, numbering: Unknowns) -> Detour | None:

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-import logging
 from typing import Any
 
-from catenary.solver.integrators.detour import CALLED, PARTS, Detour, load_detour, method_detour
+from catenary.solver.integrators.detour import (
+    CALLED,
+    PARTS,
+    Detour,
+    load_detour,
+    method_detour,
+    tell,
+)
 from catenary.solver.integrators.generalized_alpha import GeneralizedAlphaLine
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.newmark import NewmarkLine
@@ -13,8 +19,6 @@ from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.problem.integrator_parameters import NEWMARK, integration_of
 from catenary.solver.problem.problem import Numerics
-
-logger = logging.getLogger(__name__)
 
 
 def make_line(
@@ -44,5 +48,5 @@ def make_line(
     if reason and line.detour is None:
         line.detour = Detour(reason, CALLED)
     if line.detour is not None and comm.rank == 0:
-        logger.warning("%s", line.detour)
+        tell(line.detour)
     return line

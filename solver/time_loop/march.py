@@ -25,6 +25,7 @@ from catenary.solver.base.flush_to_zero import flushed
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.contact.contact_wire import ContactWire
 from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
+from catenary.solver.integrators.detour import Detour, tell
 from catenary.solver.linear.petsc_solvers import (
     PREFIX,
     refused_options,
@@ -50,6 +51,7 @@ from catenary.solver.statics.equilibrium import Equilibrium
 from catenary.solver.time_loop.audience import Audience
 from catenary.solver.time_loop.compiled_steps import compiled_steps
 from catenary.solver.time_loop.observers import Observer
+from catenary.solver.time_loop.single_steps import single_steps_of
 from catenary.solver.time_loop.step_views import Showing
 from catenary.solver.time_loop.ts_stepper import Stepper
 
@@ -115,6 +117,8 @@ class March:
         self._set_off(model)
         self._first_step = 0
         self._ahead = self._happening()
+        if self.detour is not None and comm.rank == 0:
+            tell(self.detour)
 
     def _set_up(self, changed: ChangedLine) -> None:
         """Make all that steps a line and shows it, from a line that is at rest. Collective."""
@@ -184,6 +188,13 @@ class March:
         finally:
             scheme.destroy()
             line.destroy()
+
+    @property
+    def detour(self) -> Detour | None:
+        """Why steps take longer than they could, None if they do not; of ranks, see the line's."""
+        if self._line.detour is not None or self._comm.size > 1:
+            return self._line.detour
+        return single_steps_of(self._problem, self._showing.layout)
 
     @property
     def n_steps(self) -> int:
@@ -286,7 +297,7 @@ class March:
             n_steps,
             self._scheme.counters.as_dict(),
             self._traffic(max(1, self._stepper.step_number - since)),
-            "" if self._line.detour is None else str(self._line.detour),
+            "" if self.detour is None else str(self.detour),
         )
 
     def destroy(self) -> None:
