@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from catenary.meshgen.chains import names_of
-from catenary.meshgen.gmsh_lines import write_mesh
+from catenary.meshgen.chains import assemble, names_of
+from catenary.meshgen.division import check_counts, divide, divisions_of
+from catenary.meshgen.geometry import find_cuts
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
-from catenary.meshgen.reader import read_mesh
 from catenary.solver.base.errors import InputError
 
 # A user's mesh may differ from the scene by this much along the track [m].
@@ -22,13 +21,15 @@ _FIT = 0.01
 def make_mesh(
     line: Line, elements_per_gap: int, path: Path | None = None, *, support_refinement: int = 1
 ) -> LineMesh:
-    """Mesh ``line`` with Gmsh. Not collective: call it on one rank.
+    """Mesh ``line``, in a file with Gmsh. Not collective: call it on one rank.
+
+    Without a file the wires are divided in the same way, to Gmsh's accuracy of some nanometres.
 
     Parameters
     ----------
     line : Line
     elements_per_gap : elements between neighbouring cuts (masts, droppers) of a wire
-    path : where the mesh file is to stay; None for a temporary file
+    path : where the mesh file is to stay; None for none
     support_refinement : factor on the number of elements in the gaps next to a mast
 
     Raises
@@ -37,12 +38,16 @@ def make_mesh(
         As ``catenary.meshgen.gmsh_lines.write_mesh``.
     """
     if path is not None:
+        # Gmsh and meshio take long to import.
+        from catenary.meshgen.gmsh_lines import write_mesh
+        from catenary.meshgen.reader import read_mesh
+
         write_mesh(line, elements_per_gap, path, support_refinement=support_refinement)
         return read_mesh(path, names_of(line))
-    with tempfile.TemporaryDirectory(prefix="catenary-") as folder:
-        temporary = Path(folder, "line.msh")
-        write_mesh(line, elements_per_gap, temporary, support_refinement=support_refinement)
-        return read_mesh(temporary, names_of(line))
+    check_counts(elements_per_gap, support_refinement)
+    cuts = find_cuts(line)
+    divisions = divisions_of(cuts, elements_per_gap, support_refinement)
+    return assemble(divide(line, cuts, divisions), names_of(line), "the line")
 
 
 def use_mesh(line: Line, path: Path) -> LineMesh:
@@ -56,6 +61,8 @@ def use_mesh(line: Line, path: Path) -> LineMesh:
     InputError
         If the file is refused by ``catenary.meshgen.reader.read_mesh`` or belongs to another line.
     """
+    from catenary.meshgen.reader import read_mesh
+
     mesh = read_mesh(path, names_of(line))
     for what, found, wanted in _places(line, mesh):
         if found.size != wanted.size:

@@ -9,6 +9,7 @@ from pathlib import Path
 import gmsh
 import numpy as np
 
+from catenary.meshgen.division import check_counts, divisions_of
 from catenary.meshgen.geometry import Cuts, find_cuts
 from catenary.meshgen.line import Droppers, Line
 from catenary.meshgen.mesh import ANCHORS
@@ -38,12 +39,7 @@ def write_mesh(
         If a count is below 1, the file cannot be written, or the line is impossible
         (see ``catenary.meshgen.geometry.find_cuts``).
     """
-    for key, count in (
-        ("elements_per_gap", elements_per_gap),
-        ("support_refinement", support_refinement),
-    ):
-        if count < 1:
-            raise InputError(f"{key} is {count}, but must be a whole number of at least 1")
+    check_counts(elements_per_gap, support_refinement)
     if path.suffix != ".msh":
         raise InputError(f"the mesh file {path} must have a name that ends in .msh")
     cuts = find_cuts(line)
@@ -82,8 +78,7 @@ def _session(name: str) -> Iterator[None]:
 
 def _describe(line: Line, cuts: Cuts, elements_per_gap: int, support_refinement: int) -> None:
     """Geometry, divisions and physical groups in the current model."""
-    near_mast = cuts.is_mast[:-1] | cuts.is_mast[1:]
-    divisions = elements_per_gap * np.where(near_mast, support_refinement, 1)
+    divisions = divisions_of(cuts, elements_per_gap, support_refinement)
     points = {wire.name: np.zeros(cuts.x.size, dtype=np.int64) for wire in line.wires}
     curves: dict[str, list[int]] = {wire.name: [] for wire in line.wires}
     ends: list[int] = []

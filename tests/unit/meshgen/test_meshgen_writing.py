@@ -159,6 +159,22 @@ def test_any_spans_and_droppers_are_meshed_as_described(
     assert mesh.steady_arms.size == mesh.supports.size == n - 1
 
 
+@pytest.mark.parametrize("refinement", [1, 2])
+def test_a_mesh_without_a_file_is_that_of_the_file(
+    make_line: Callable[..., LineData], tmp_path: Path, refinement: int
+) -> None:
+    line = line_from(make_line())
+    written, made = (
+        make_mesh(line, 3, path, support_refinement=refinement)
+        for path in (tmp_path / "line.msh", None)
+    )
+    np.testing.assert_allclose(made.points, written.points, rtol=0, atol=PLACE)
+    for name, nodes in written.wires.items():
+        np.testing.assert_array_equal(made.wires[name], nodes)
+    for name in ("droppers", "steady_arms", "supports", "anchors", "dropper_group"):
+        np.testing.assert_array_equal(getattr(made, name), getattr(written, name))
+
+
 def test_gmsh_opens_the_file_with_its_physical_groups(
     make_line: Callable[..., LineData], tmp_path: Path
 ) -> None:
