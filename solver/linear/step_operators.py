@@ -88,6 +88,7 @@ class LineOperators:
     _is_direct = True
     _layout: Layout | None = None
     _rate_halo: Halo | None = None
+    _stiffness: sparse.bsr_matrix | None = None  # kept until its product is made
 
     def __init__(
         self,
@@ -134,6 +135,7 @@ class LineOperators:
             self._solver.hurry()
         for name in ("stiffness", "mass"):
             self._station_product(name)  # that no step, and no energy, has to wait for them
+        self._stiffness = None
 
     def by_stations(self, damped: bool) -> ByStations | None:
         """What a step in two passes works on, None unless all goes by stations. Not collective.
@@ -390,12 +392,15 @@ class LineOperators:
         domain = self.domain
         first = (domain.low - domain.read_low) // self._block
         operator = neighbours(part) if self._in_stations else None
-        stiffness = neighbours(self._rows_of("stiffness"), first)
+        self._stiffness = self._rows_of("stiffness")
+        stiffness = neighbours(self._stiffness, first)
         if operator is None or stiffness is None:
             return None
         return layout_of(operator, stiffness)
 
     def _rows_of(self, name: str) -> sparse.bsr_matrix:
+        if name == "stiffness" and self._stiffness is not None:
+            return self._stiffness
         domain = self.domain
         return part_of(
             self._model,

@@ -28,11 +28,14 @@ class ModelBuilder:
         dofs, length = wire_elements(self.model, wire, unknowns)
         data = self.problem.line.wire(wire)
         tension = data.tension_at(self.mesh.x(self.mesh.elements(wire)).mean(axis=1))
+        # Length and tension as one number, of which NumPy finds those that are alike.
+        alike, kind = np.unique(length + 1j * tension, return_inverse=True)
         self._add_block(
             wire,
             dofs,
-            elements.mass(length, data.mass_per_length),
-            elements.stiffness(length, data.bending_stiffness, tension),
+            elements.mass(alike.real, data.mass_per_length),
+            elements.stiffness(alike.real, data.bending_stiffness, alike.imag),
+            kind,
         )
         if unknowns[0] == "w":
             load = data.mass_per_length * elements.uniform_load(length)
@@ -126,6 +129,8 @@ class ModelBuilder:
         dofs: np.ndarray,
         mass: np.ndarray | None,
         stiffness: np.ndarray | None,
+        kind: np.ndarray | None = None,
     ) -> None:
-        self.model.blocks.append(Block(component, dofs, mass, stiffness))
+        kind = np.arange(dofs.shape[0]) if kind is None else kind
+        self.model.blocks.append(Block(component, dofs, kind, mass, stiffness))
         self._n_terms += dofs.shape[0]

@@ -11,6 +11,9 @@ from scipy import sparse
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.model.model import Model
 
+# Rows whose entries are put together at once, some 50 MB of them.
+_STRETCH = 2**16
+
 
 def iterate_entries(
     model: Model, first: int, last: int, mass: float, stiffness: float, damping: float
@@ -26,12 +29,12 @@ def iterate_entries(
         near = ((block.dofs >= first) & (block.dofs < last)).any(axis=1)
         if not near.any():
             continue
-        dofs = block.dofs[near]
+        dofs, kind = block.dofs[near], block.kind[near]
         matrix = np.zeros((dofs.shape[0], dofs.shape[1], dofs.shape[1]))
         if block.mass is not None:
-            matrix += (mass + damping * beta) * block.mass[near]
+            matrix += (mass + damping * beta) * block.mass[kind]
         if block.stiffness is not None:
-            matrix += (stiffness + damping * alpha) * block.stiffness[near]
+            matrix += (stiffness + damping * alpha) * block.stiffness[kind]
         rows = np.broadcast_to(dofs[:, :, None], matrix.shape)
         columns = np.broadcast_to(dofs[:, None, :], matrix.shape)
         keep = (rows >= first) & (rows < last) & free[rows] & free[columns]
@@ -78,6 +81,32 @@ def part_of(
     Both ranges begin and end between blocks. Entries beyond ``columns`` are left out; those of
     held unknowns are zero but for ``held_diagonal``. Indices are sorted.
     """
+    # By stretches, as entries take several times the memory of blocks.
+    step = _STRETCH - _STRETCH % size
+    ends = [rows[0], *range(rows[0] + step, rows[1], step), rows[1]]
+    parts = [
+        _stretch_of(model, stretch, columns, coefficients, held_diagonal, size)
+        for stretch in zip(ends[:-1], ends[1:], strict=True)
+    ]
+    if len(parts) == 1:
+        return parts[0]
+    counts = np.concatenate([np.diff(part.indptr) for part in parts])
+    indptr = np.concatenate([np.zeros(1, parts[0].indptr.dtype), np.cumsum(counts)])
+    indices = np.concatenate([part.indices for part in parts])
+    shape = rows[1] - rows[0], columns[1] - columns[0]
+    data = np.concatenate([part.data for part in parts])
+    return sparse.bsr_matrix((data, indices, indptr), shape=shape)
+
+
+def _stretch_of(
+    model: Model,
+    rows: tuple[int, int],
+    columns: tuple[int, int],
+    coefficients: tuple[float, float, float],
+    held_diagonal: float,
+    size: int,
+) -> sparse.bsr_matrix:
+    """``part_of`` for so few rows that their entries take little memory."""
     parts = list(iterate_entries(model, *rows, *coefficients))
     held = model.constrained
     held = held[(held >= rows[0]) & (held < rows[1])]

@@ -24,13 +24,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Block:
-    """Equal-sized element matrices of one component.
+    """Equal-sized element matrices of one component, those that are alike stored once.
 
-    dofs : (n, m) int; mass, stiffness : (n, m, m) or None
+    Attributes
+    ----------
+    dofs : (n, m) int, unknowns of each element
+    kind : (n,) int, of each element, which of the matrices it has
+    mass, stiffness : (k, m, m) or None
     """
 
     component: str
     dofs: np.ndarray
+    kind: np.ndarray
     mass: np.ndarray | None
     stiffness: np.ndarray | None
 

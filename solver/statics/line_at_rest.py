@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.meshgen.mesh import LineMesh
+from catenary.solver.base.freed_memory import give_back
 from catenary.solver.base.parallel import on_root
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
@@ -47,6 +48,7 @@ def line_at_rest(problem: Problem, mesh: LineMesh) -> LineAtRest:
         If there is no equilibrium with all droppers taut.
     """
     model, form = find_form(problem, mesh)
+    give_back()
     return LineAtRest(problem, model, form, elasticity(model, *middle_span(problem.line)))
 
 

@@ -22,6 +22,7 @@ from mpi4py import MPI
 
 from catenary.solver.base.errors import CatenaryError, InputError, RunBroken
 from catenary.solver.base.flush_to_zero import flushed
+from catenary.solver.base.freed_memory import give_back
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.contact.contact_wire import ContactWire
 from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
@@ -115,6 +116,7 @@ class March:
         self._set_ups = SchemeFactory(comm, form, self.ownership, self._nominal_height)
         self._set_up(unchanged(model))
         self._set_off(model)
+        give_back()
         self._first_step = 0
         self._ahead = self._happening()
         if self.detour is not None and comm.rank == 0:

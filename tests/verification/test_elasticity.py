@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from measuring import check, free_dofs, free_matrices
 from small_lines import (
     BARE,
@@ -18,6 +19,7 @@ from small_lines import (
 
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.effects.build_model import build
+from catenary.solver.statics import elasticity as lifts
 from catenary.solver.statics.elasticity import elasticity
 from catenary.solver.statics.equilibrium import find_form
 
@@ -63,3 +65,23 @@ def test_lift_of_a_span_agrees_with_a_dense_solve() -> None:
     print(f"condition number {condition:.1e}, lift {1e3 * found.lift.max():.3f} mm/N at most")
     # A span is stiffest near its masts and softest in its middle.
     assert 70.0 < found.x[np.argmax(found.lift)] < 95.0
+
+
+def test_a_long_line_is_looked_at_as_far_as_it_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A first look at 30 m to both sides ends where the line still moves, and is widened."""
+    line = ac_simple_line(30)
+    model, _ = find_form(problem_of(line, HANGING), mesh_of(line, 2))
+    stretch = 14 * 55.0, 15 * 55.0
+    whole = elasticity(model, *stretch).lift
+    monkeypatch.setattr(lifts, "_FIRST_REACH", 30.0)
+    looked: list[int] = []
+    condensed = lifts._condensed
+
+    def counted(matrix, first, last):
+        looked.append(matrix.shape[0])
+        return condensed(matrix, first, last)
+
+    monkeypatch.setattr(lifts, "_condensed", counted)
+    found = elasticity(model, *stretch).lift
+    assert len(looked) > 1 and looked[0] < looked[-1] <= model.n_dofs
+    check("lift [m/N]", found, whole, within=1e-12 * whole.max())

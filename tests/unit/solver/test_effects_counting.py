@@ -212,7 +212,7 @@ def test_an_effect_alone_adds_what_it_declares_and_nothing_else(name: str, mesh:
     assert model.dropper_damping.any() == (name == "structural_damping")
     # What was there before is the same to the bit.
     for old, new in zip(bare.blocks, model.blocks, strict=False):
-        assert np.array_equal(old.dofs, new.dofs)
+        assert np.array_equal(old.dofs, new.dofs) and np.array_equal(old.kind, new.kind)
         for ours, theirs in ((old.mass, new.mass), (old.stiffness, new.stiffness)):
             assert (ours is None and theirs is None) or np.array_equal(ours, theirs)
 
@@ -331,7 +331,8 @@ def test_point_masses_are_those_of_the_parts(mesh: LineMesh) -> None:
         diagonal = np.zeros(model.n_dofs)
         for block in model.blocks:
             if block.mass is not None:
-                np.add.at(diagonal, block.dofs, np.diagonal(block.mass, axis1=1, axis2=2))
+                of_kinds = np.diagonal(block.mass, axis1=1, axis2=2)
+                np.add.at(diagonal, block.dofs, of_kinds[block.kind])
         return diagonal[dofs]
 
     expected = np.zeros(mesh.n_nodes)
