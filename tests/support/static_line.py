@@ -28,7 +28,9 @@ def absolute_rest(
     load = model.weight.copy()
     for wire in mesh.wires:
         dofs, length = model.wire_elements(wire)
-        stiffness = elements.stiffness(length, line.wire(wire).bending_stiffness, tensions[wire])
+        data = line.wire(wire)
+        taken = data.tension - data.tension_at(mesh.x(mesh.elements(wire)).mean(axis=1))
+        stiffness = elements.stiffness(length, data.bending_stiffness, tensions[wire] - taken)
         for own, values in zip(dofs, stiffness, strict=True):
             matrix[np.ix_(own, own)] += values
     (supports,), (arms,) = line.supports, line.steady_arms
@@ -40,6 +42,9 @@ def absolute_rest(
         at = model.dofs(nodes)
         matrix[at, at] = matrix[at, at].toarray() + value
         load[at] += value * relaxed
+    for pair, number in zip(model.dofs(mesh.clamps), line.clamp_group, strict=True):
+        own = np.ix_(pair, pair)
+        matrix[own] += line.clamps[number].stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])
     held = model.constrained
     free = np.setdiff1d(np.arange(model.n_dofs), held)
     result = np.zeros(model.n_dofs)

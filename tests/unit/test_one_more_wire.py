@@ -1,7 +1,7 @@
 """Wires beyond the simple catenary, each by one topology: an auxiliary wire, and a stitch wire.
 
-What a newcomer writes is a function from `LineData` to a `Line`, as the two below; mesh, form
-finding, elasticity and march take any wires by name.
+What a newcomer writes is a function from `LineData` to a `Line`, as the two in `more_wires`; mesh,
+form finding, elasticity, march and incidents take any wires by name.
 """
 
 from __future__ import annotations
@@ -13,134 +13,48 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dense_line import DenseLine
-from measuring import check, march
+from measuring import check, march, matrix_of, solve_free
+from more_wires import (
+    AUXILIARY,
+    HANGERS,
+    STITCH,
+    STITCH_HALF,
+    TOPOLOGIES,
+    data_of,
+    further_topologies,
+)
 from numpy.polynomial.legendre import leggauss
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
-from small_lines import HANGING, WHOLE, en50318_line, mesh_of, numerics, problem_of, train
+from small_lines import HANGING, WHOLE, mesh_of, numerics, problem_of, train
+from static_line import absolute_rest, first_rest
 
 from catenary.meshgen.build import make_mesh, use_mesh
 from catenary.meshgen.line import (
-    Clamps,
-    Conductor,
     DropperKind,
     Droppers,
-    End,
     Line,
-    Piece,
-    Profile,
     Role,
-    Wire,
 )
-from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE, LineMesh
+from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh, elements_of
 from catenary.meshgen.topologies.all_topologies import make_line
-from catenary.meshgen.topologies.line_data import LineData
-from catenary.meshgen.topologies.registry import register, unregister
-from catenary.meshgen.topologies.simple import simple_catenary
+from catenary.postproc.channels.header import line_datasets
+from catenary.postproc.record.fields import component_numbers, line_cells
 from catenary.solver.base.errors import InputError
 from catenary.solver.model.elements import uniform_load
+from catenary.solver.problem.incidents import DropperBreak, TensionLoss
 from catenary.solver.problem.problem import Damping, Problem
+from catenary.solver.statics.after_incidents import changed_line
 from catenary.solver.statics.elasticity import elasticity
 from catenary.solver.statics.equilibrium import Equilibrium, find_form
 
-AUXILIARY, STITCH, HANGERS = "auxiliary_wire", "stitch_wire", "hangers"
-AUXILIARY_CONDUCTOR = Conductor(14.7e3, 1.375, 120.0)
-STITCH_CONDUCTOR = Conductor(3.5e3, 0.31, 0.0)
-STITCH_HALF, GRAVITY = 9.0, 9.81
-
-
-def compound(data: LineData) -> Line:
-    """The scene's droppers hang the contact wire from an auxiliary wire, which hangs by half as
-    many from the messenger wire."""
-    simple = simple_catenary(data)
-    contact, messenger = simple.wires
-    (low,) = simple.droppers
-    x = tuple((0.5 * (data.dropper_x[0::2] + data.dropper_x[1::2])).tolist())
-    ends = simple.support_positions[[0, -1]].tolist()
-    level = data.contact_height + 0.4 * data.encumbrance
-    profile = Profile(level, (0.0,), (0.0,), 0.0, data.profile.ends, data.profile.running)
-    course = Piece(tuple(ends), (0.0, 0.0), (level, level))
-    middle = Wire.of(AUXILIARY_CONDUCTOR, AUXILIARY, Role.AUXILIARY, (course,), profile)
-    return replace(
-        simple,
-        topology="compound",
-        wires=(contact, middle, messenger),
-        droppers=(
-            replace(low, name=HANGERS, upper=AUXILIARY),
-            Droppers(
-                DROPPERS, replace(data.dropper, stiffness=2e5), MESSENGER_WIRE, AUXILIARY, x, x
-            ),
-        ),
-    )
-
-
-def stitched(data: LineData) -> Line:
-    """At each inner mast the droppers nearest to it hang from a stitch wire clamped to the
-    messenger wire on both sides."""
-    simple = simple_catenary(data)
-    contact, messenger = simple.wires
-    (low,) = simple.droppers
-    masts = simple.support_positions[1:-1]
-    ends = np.stack([masts - STITCH_HALF, masts + STITCH_HALF], axis=1)
-    top = data.contact_height + data.encumbrance
-    pieces = tuple(
-        Piece((a, b), (0.0, 0.0), (top - 0.4, top - 0.4), (End.CLAMPED, End.CLAMPED))
-        for a, b in ends.tolist()
-    )
-    near = (np.abs(data.dropper_x[:, None] - masts) < STITCH_HALF).any(axis=1)
-    groups = [
-        replace(low, name=name, upper=upper, upper_x=tuple(x.tolist()), lower_x=tuple(x.tolist()))
-        for name, upper, x in (
-            (DROPPERS, MESSENGER_WIRE, data.dropper_x[~near]),
-            (HANGERS, STITCH, data.dropper_x[near]),
-        )
-    ]
-    taken = tuple((a, b, STITCH_CONDUCTOR.tension) for a, b in ends.tolist())
-    return replace(
-        simple,
-        topology="stitched",
-        wires=(
-            contact,
-            Wire.of(STITCH_CONDUCTOR, STITCH, Role.STITCH, pieces),
-            replace(messenger, taken=taken),
-        ),
-        droppers=tuple(groups),
-        clamps=(Clamps("clamps", 1e7, 0.38, MESSENGER_WIRE, STITCH, tuple(ends.ravel().tolist())),),
-    )
-
-
-TOPOLOGIES = {"compound": compound, "stitched": stitched}
+GRAVITY = 9.81
 
 
 @pytest.fixture(scope="module", autouse=True)
 def topologies() -> Iterator[None]:
-    for name, make in TOPOLOGIES.items():
-        register(name)(make)
-    yield
-    for name in TOPOLOGIES:
-        unregister(name)
-
-
-def data_of(topology: str, n_spans: int = 6, bending: float = 1.0) -> LineData:
-    """A compound line with the wires of the Shinkansen, a stitched one like a Re330."""
-    line = en50318_line(n_spans)
-    if topology == "compound":
-        span, places = 50.0, tuple(2.5 + 5.0 * k for k in range(10))
-        wires = Conductor(14.7e3, 1.511, 130.0), Conductor(24.5e3, 1.45, 100.0)
-    else:
-        span, places = 65.0, (2.5, 7.5, 17.5, 27.5, 37.5, 47.5, 57.5, 62.5)
-        wires = Conductor(27e3, 1.082, 137.0), Conductor(21e3, 1.06, 40.0)
-    return replace(
-        line,
-        topology=topology,
-        span_lengths=(span,) * n_spans,
-        dropper_positions=(places,) * n_spans,
-        pre_sag=((0.0,) * len(places),) * n_spans,
-        encumbrance=1.8,
-        contact_wire=replace(wires[0], bending_stiffness=bending * wires[0].bending_stiffness),
-        messenger_wire=replace(wires[1], bending_stiffness=bending * wires[1].bending_stiffness),
-        support_stiffness=5e5,
-    )
+    with further_topologies():
+        yield
 
 
 def with_strings(line: Line) -> Line:
@@ -407,6 +321,43 @@ def test_a_march_is_that_of_dense_matrices(topology: str) -> None:
         ("dropper forces [N]", seen["dropper_force"][1:], droppers),
     ):
         check(name, own, expected, within=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(
+    ("topology", "wire"),
+    [("compound", AUXILIARY), ("compound", CONTACT_WIRE), ("stitched", STITCH)],
+)
+def test_a_wire_that_loses_tension_and_a_dropper_that_breaks_lead_to_a_new_rest(
+    topology: str, wire: str
+) -> None:
+    """K' d = g with the balance lost g, against heights of the line found anew."""
+    line = small(topology)
+    mesh = mesh_of(line, 2)
+    model, form = find_form(problem_on(line), mesh)
+    places = mesh.x(mesh.droppers[:, 1])
+    number = int(np.flatnonzero(mesh.dropper_group == 1)[0])
+    happened = (TensionLoss(0.1, wire, 0.9), DropperBreak(0.2, float(places[number])))
+    after = changed_line(model, form, happened)
+    moved = solve_free(matrix_of(after.model, stiffness=1.0), after.model, after.load)
+    tensions = {own.name: own.tension for own in line.wires}
+    tensions[wire] *= 0.9
+    rest = absolute_rest(model, form, tensions=tensions, broken={number})
+    expected = rest - first_rest(model, form)
+    assert np.abs(expected).max() > 1e-4
+    check("moved [m]", moved, expected, within=1e-9)
+
+
+def test_components_of_pieces_are_told_apart() -> None:
+    """Elements of a wire of several pieces, as fields and result files have them."""
+    line = make_line(data_of("stitched"))
+    mesh = mesh_of(line, 1)
+    cells, component = line_cells(mesh.wires, mesh.droppers, mesh.breaks)
+    numbers = component_numbers(mesh.wires)
+    assert (component == numbers[STITCH]).sum() == len(mesh.elements(STITCH))
+    assert np.diff(mesh.points[cells, 0], axis=1).max() < 10.1
+    datasets = line_datasets(line, mesh, (65.0, 130.0))
+    nodes, breaks = datasets[f"line/wires/{STITCH}"], datasets[f"line/breaks/{STITCH}"]
+    np.testing.assert_array_equal(elements_of(nodes, breaks), mesh.elements(STITCH))
 
 
 def test_dropper_kinds_of_groups_may_differ() -> None:
