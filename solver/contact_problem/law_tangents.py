@@ -6,7 +6,7 @@ Each gives, for n contacts, own f = offset + by_depth d + by_rate d' with depth 
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -22,6 +22,22 @@ _TOLERANCE = 1e-10
 # How well depths [m] and rates [m/s] are known: differences of heights of 5 m and of speeds of some
 # m/s, a few roundings of 4e-16 to 9e-16 each. No force is known better than that times the slope.
 _KNOWN = 5e-15
+
+
+class ReportedForces(NamedTuple):
+    """Which forces of n contacts are reported at the end of a step.
+
+    Attributes
+    ----------
+    gamma : weight of the new force in what is reported; 0 reports the force itself
+    from_time : from which on a reported force that pulls ends the run [s]
+    latest, reported : (n,) forces of the latest step, and what is reported of it [N]
+    """
+
+    gamma: float
+    from_time: float
+    latest: np.ndarray
+    reported: np.ndarray
 
 
 class LawInSteps(Protocol):
@@ -66,13 +82,8 @@ class LawInSteps(Protocol):
     def reported(self, force: np.ndarray) -> np.ndarray:
         """What of the forces (n,) of the latest step is to be recorded [N]."""
 
-    def in_loop(self) -> tuple[float, float, np.ndarray, np.ndarray] | None:
-        """What ``accept`` and ``reported`` are in a compiled loop, None if they are not.
-
-        The weight of the new force in what is reported, 0 where that is the force itself; the time
-        [s] from which on the law does not pull; the latest forces, and what is reported, (n,) each
-        [N].
-        """
+    def in_loop(self) -> ReportedForces | None:
+        """``accept`` and ``reported`` for a compiled loop, None if there is none for the law."""
 
     def state(self) -> np.ndarray:
         """All that is remembered, as one array."""
@@ -111,9 +122,9 @@ class _Tangents:
         """The forces themselves."""
         return force
 
-    def in_loop(self) -> tuple[float, float, np.ndarray, np.ndarray] | None:
+    def in_loop(self) -> ReportedForces | None:
         """Forces count as they are."""
-        return 0.0, 0.0, np.zeros(0), np.zeros(self.n)
+        return ReportedForces(0.0, 0.0, np.zeros(0), np.zeros(self.n))
 
     def state(self) -> np.ndarray:
         """Nothing."""
@@ -220,9 +231,9 @@ class KinematicInSteps(_Tangents):
         """The mean over the step."""
         return self._mean
 
-    def in_loop(self) -> tuple[float, float, np.ndarray, np.ndarray]:
-        """What of the forces is reported, and from when on none may pull."""
-        return self._gamma, self._from_time, self._force, self._mean
+    def in_loop(self) -> ReportedForces:
+        """Means over the steps; none may pull once the pantographs are raised."""
+        return ReportedForces(self._gamma, self._from_time, self._force, self._mean)
 
     def state(self) -> np.ndarray:
         """The latest force itself."""

@@ -5,6 +5,8 @@ Each works on this rank's arrays and knows nothing of MPI or PETSc. Not collecti
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from catenary.solver.base.compiled import compiled, in_line
@@ -143,11 +145,30 @@ def forces(motion, links, result):
         result[link] *= share
 
 
+class Shown(NamedTuple):
+    """What is shown of a rank's part of the line at the end of a step.
+
+    Attributes
+    ----------
+    motion : ``LineState.read``
+    arms : (k,) int, unknowns of vertical displacement at steady arms
+    droppers, others : ``LinkArrays`` of droppers and of all other links
+    other_force : (m,) room for the forces of the latter [N]
+    """
+
+    motion: tuple[Any, ...]
+    arms: np.ndarray
+    droppers: Any
+    others: Any
+    other_force: np.ndarray
+
+
 @compiled
-def show(motion, arms, droppers, others, other_force, uplift, dropper_force):
-    """Displacement at the unknowns ``arms``, force of ``droppers`` and of ``others`` [N]."""
+def show(shown, uplift, dropper_force):
+    """Displacement at arms, forces of droppers and of other links [N]; ``shown`` is ``Shown``."""
+    motion, arms = shown.motion, shown.arms
     for i in range(arms.size):
         uplift[i] = displacement_at(arms[i], motion)
-    forces(motion, droppers, dropper_force)
-    if other_force.size:
-        forces(motion, others, other_force)
+    forces(motion, shown.droppers, dropper_force)
+    if shown.other_force.size:
+        forces(motion, shown.others, shown.other_force)

@@ -183,7 +183,7 @@ class CompiledSteps:
             ends=pantographs.ends,
             of_step=pantographs.of_step,
             outputs=pantographs.outputs,
-            showing=self._showing.showing,
+            shown=self._showing.shown,
             taps=self._showing.layout.taps,
         )
         kept = self._kept, self._motions

@@ -16,6 +16,7 @@ from catenary.solver.base.pointers import borrowed, call_held, numbers_at
 from catenary.solver.contact import contact_kernels
 from catenary.solver.contact_problem import complementarity_kernels
 from catenary.solver.contact_problem.complementarity_kernels import SmallProblem
+from catenary.solver.contact_problem.law_tangents import ReportedForces
 from catenary.solver.integrators import state_kernels
 
 # Numbers of ``counts``, named as in `schemes.Counters`.
@@ -32,13 +33,13 @@ class Steps(NamedTuple):
     placing, responding : arguments of ``place`` and ``respond``
     problem : SmallProblem of a step's forces
     superposing, compensating : of ``superpose`` and ``compensate`` after the forces
-    showing : of ``kernels.show`` before what it fills
+    shown : of the line, see ``state_kernels.show``
     free : address of the line's free step, see ``pointers.call_held``
     loading : address of what finds loads that change with time, zeros if there are none
     clock : (1,) the time that it reads [s]
     records : of all heads, ``head_records.HEAD``
     heads : (2 n + 2 n^2,) all strips as functions of the forces, see ``HeadState``
-    law : numbers of the contact law, see ``report``
+    law : which forces the contact law reports
     ends : of the contacts of each pantograph, see ``contact_kernels.write_outputs``
     switched : (m,) int, room for the numbers of links with a row
     outputs : outputs of the pantographs, of which ``of_step`` is filled by a step
@@ -55,14 +56,14 @@ class Steps(NamedTuple):
     heads: np.ndarray
     responding: tuple[Any, ...]
     problem: SmallProblem
-    law: tuple[Any, ...]
+    law: ReportedForces
     superposing: tuple[Any, ...]
     compensating: tuple[Any, ...]
     switched: np.ndarray
     ends: np.ndarray
     of_step: np.ndarray
     outputs: np.ndarray
-    showing: tuple[Any, ...]
+    shown: state_kernels.Shown
     taps: np.ndarray
 
 
@@ -70,16 +71,16 @@ class Steps(NamedTuple):
 def report(time, force, law):
     """Whether the contact law holds for ``force`` (n,) at ``time`` [s]; if so it is remembered.
 
-    A law that remembers forces has ``gamma`` > 0 and counts their mean over the step, as
-    `KinematicInSteps` says.
+    A law with ``gamma`` > 0 remembers forces and reports their mean over the step, as
+    `KinematicInSteps` does.
     """
-    gamma, from_time, before, reported = law
+    gamma, before, reported = law.gamma, law.latest, law.reported
     if gamma == 0.0:
         for i in range(force.size):
             reported[i] = force[i]
         return True
     for i in range(force.size):
-        if time > from_time and gamma * force[i] + (1.0 - gamma) * before[i] < 0.0:
+        if time > law.from_time and gamma * force[i] + (1.0 - gamma) * before[i] < 0.0:
             return False
     for i in range(force.size):
         reported[i] = gamma * force[i] + (1.0 - gamma) * before[i]
@@ -118,42 +119,43 @@ def take(steps, times, drives, rows, kept_motions, counts, shows, first, n_steps
     """
     steps, times, drives, rows, kept_motions = borrowed((steps, times, drives, rows, kept_motions))
     motion_of, motions = kept_motions
-    speed, moving, placing, free, loading, clock, records, heads = steps[:8]
-    responding, problem, law, superposing, compensating = steps[8:13]
-    switched, ends, of_step, outputs, showing, taps = steps[13:]
-    start, places = moving
-    solution, depth, reported = problem.unknowns.solution, problem.found[0], law[3]
-    motion, arms, droppers, others, other_force = showing
-    n, n_outputs = ends[-1], outputs.size
-    n_arms = n_outputs + arms.size
-    n_shown = n_arms + droppers.law.size
+    (start, places), speed, loading = steps.moving, steps.speed, steps.loading
+    records, heads, taps, shown = steps.records, steps.heads, steps.taps, steps.shown
+    problem, law, switched, outputs = steps.problem, steps.law, steps.switched, steps.outputs
+    solution, depth, motion = problem.unknowns.solution, problem.found[0], shown.motion
+    n, n_outputs = steps.ends[-1], outputs.size
+    n_arms = n_outputs + shown.arms.size
+    n_shown = n_arms + shown.droppers.law.size
     force = solution[:n]
     for i in range(first, n_steps):
         time = times[i]
         state_kernels.shift(start, places, speed * time)
-        contact_kernels.place(*placing)
+        contact_kernels.place(*steps.placing)
         if loading[0] != 0:
-            clock[0] = time
+            steps.clock[0] = time
             call_held(loading)
-        call_held(free)
+        call_held(steps.free)
         within = True
         for h in range(records.size):
             within &= head_records.predict(records[h], drives[i, h], heads, n)
-        contact_kernels.respond(*responding)
+        contact_kernels.respond(*steps.responding)
         m = find_forces(time, problem, law, switched, n, counts) if within else -1
         if m < 0:
             return i - first, True
-        contact_kernels.superpose(force, *superposing)
+        contact_kernels.superpose(force, *steps.superposing)
         if m:
-            contact_kernels.compensate(switched[:m], solution[n : n + m], *compensating)
+            slack = solution[n : n + m]
+            contact_kernels.compensate(switched[:m], slack, *steps.compensating)
         for h in range(records.size):
             head_records.move(records[h], force)
-        contact_kernels.write_outputs(force, reported, problem.heads, depth, ends, of_step)
+        contact_kernels.write_outputs(
+            force, law.reported, problem.heads, depth, steps.ends, steps.of_step
+        )
         if shows:
             row = rows[i]
             row[:n_outputs] = outputs
             uplift, tension = row[n_outputs:n_arms], row[n_arms:n_shown]
-            state_kernels.show(motion, arms, droppers, others, other_force, uplift, tension)
+            state_kernels.show(shown, uplift, tension)
             for j in range(taps.size):
                 row[n_shown + j] = numbers_at(taps[j], 1)[0]
             number = motion_of[i]

@@ -38,7 +38,7 @@ class Showing:
 
     Attributes
     ----------
-    showing : arguments of ``kernels.show`` before what it fills
+    shown : first argument of ``state_kernels.show``
     layout : of a row of a view
     """
 
@@ -87,14 +87,10 @@ class Showing:
             checkpoint=self._checkpoint,
         )
 
-        self.showing = (
-            self._line.motion.read,
-            self._arm_rows,
-            droppers,
-            others,
-            other_force,
+        self.shown = state_kernels.Shown(
+            self._line.motion.read, self._arm_rows, droppers, others, other_force
         )
-        self._show = bound(state_kernels.show, *self.showing, uplift, tension)
+        self._show = bound(state_kernels.show, self.shown, uplift, tension)
 
     def stage(self, dt: float, start_time: float, n_steps: int) -> Stage:
         """What stays the same for the whole run."""

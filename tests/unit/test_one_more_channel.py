@@ -155,7 +155,7 @@ def layout_of(array: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> row_layout.
     )
     monkeypatch.setattr(row_layout, "CHANNELS", {channel.name: channel for channel in channels})
     none = SimpleNamespace(outputs=np.zeros(0))
-    sources = Sources(none, none, none, shown[:2], shown[2:])  # type: ignore[arg-type]
+    sources = Sources(none, none, none, shown[:2], shown[2:], {})  # type: ignore[arg-type]
     return row_layout.RowLayout(sources, shown)
 
 
