@@ -43,6 +43,8 @@ def become(words: list[str], folder: str, environment: dict[str, str], files: li
 
 for name in PACKAGES:
     importlib.import_module(name)
+started = {"mpi4py.MPI", "petsc4py.PETSc", "h5py"} & set(sys.modules)
+assert not started, f"what processes are forked from must not have imported {started}"
 sys.modules["numba"].njit(lambda number: number + 1)(1)  # loads what all compiled loops need
 gc.freeze()
 for line in sys.stdin:
