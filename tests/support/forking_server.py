@@ -1,8 +1,8 @@
 """Runs command lines of the program, each in a process that is forked from this one.
 
 What is imported here, none of which starts MPI, is not imported again by every process: that is
-most of what a short run costs. It is packages and the program's tables of scenes, with what they
-need; its other modules, PETSc, MPI and HDF5 are imported by each. Pictures of reports are laid out,
+most of what a short run costs. It is packages and half of the program's modules; the others, PETSc,
+MPI and HDF5 are imported by each. Pictures of reports are laid out,
 but not painted unless ``pictures`` is true.
 
 A request is a line of JSON on standard input: ``words``, ``folder``, ``environment``, ``pictures``
@@ -19,7 +19,11 @@ import sys
 PACKAGES = (
     "gmsh", "jinja2", "matplotlib.backends.backend_agg", "matplotlib.figure", "meshio", "numba",
     "pydantic", "scipy.integrate", "scipy.interpolate", "scipy.optimize", "scipy.signal",
-    "scipy.sparse.linalg", "tqdm", "typer", "catenary.cases.scene.load",
+    "scipy.sparse.linalg", "tqdm", "typer",
+    # Of the program, with what they import:
+    "catenary.cases.run.file_sizes", "catenary.cases.run.scene_mesh", "catenary.cases.scene.load",
+    "catenary.postproc.evaluate.filters", "catenary.solver.contact_problem.coupling",
+    "catenary.solver.statics.equilibrium", "catenary.solver.time_loop.step_kernels",
 )  # fmt: skip
 
 
