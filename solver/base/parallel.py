@@ -8,12 +8,12 @@ import sys
 import time
 import traceback
 from collections.abc import Callable
-from typing import Any, TypeVar
-
-import numpy as np
-from mpi4py import MPI
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from catenary.solver.base.errors import CatenaryError, RunBroken
+
+if TYPE_CHECKING:
+    import numpy as np
 
 T = TypeVar("T")
 
@@ -77,6 +77,8 @@ def total(comm: Any, parts: np.ndarray) -> np.ndarray:
     ``parts`` (n,) of this rank; the array itself on one rank.
     """
     if comm.size > 1:
+        from mpi4py import MPI  # not for answers without MPI, such as --help
+
         comm.Allreduce(MPI.IN_PLACE, parts, op=MPI.SUM)
     return parts
 

@@ -2,8 +2,8 @@
 
 What is imported here, none of which starts MPI, is not imported again by every process: that is
 most of what a short run costs. It is packages and half of the program's modules; the others, PETSc,
-MPI and HDF5 are imported by each. Pictures of reports are laid out,
-but not painted unless ``pictures`` is true.
+MPI and HDF5 are imported by each. Pictures of reports are laid out, but not painted unless
+``pictures`` is true.
 
 A request is a line of JSON on standard input: ``words``, ``folder``, ``environment``, ``pictures``
 and the files ``stdout`` and ``stderr``. It is answered with the number of the process, and with its
