@@ -57,11 +57,16 @@ run: setup ## simulate the paper's case and write its report
 	.venv/bin/catenary run ambrosio2012 -o $(RESULT) --force
 	@echo "report: $(CURDIR)/$(RESULT)/report.html"
 
-check: setup lint ## lint, and the unit tests that start no process; under a minute
-	$(PYTEST_SHARED) -q -m "not process" tests/unit
+# Lint takes one core, and as long as ten tests: it runs beside them and speaks when they are done.
+BESIDE_LINT = @mkdir -p build; $(MAKE) --no-print-directory lint >build/lint.log 2>&1 & lint=$$!; \
+    trap 'kill $$lint' INT TERM; $(1); tested=$$?; wait $$lint; linted=$$?; cat build/lint.log; \
+    [ $$tested = 0 ] && [ $$linted = 0 ]
 
-test: setup lint ## lint and all tests, as CI runs them
-	$(PYTEST_SHARED) tests/regression tests/verification tests/unit
+check: setup ## lint, and the unit tests that start no process; under a minute
+	$(call BESIDE_LINT,$(PYTEST_SHARED) -q -m "not process" tests/unit)
+
+test: setup ## lint and all tests, as CI runs them
+	$(call BESIDE_LINT,$(PYTEST_SHARED) tests/regression tests/verification tests/unit)
 	@$(MAKE) --no-print-directory test-mpi
 
 test-unit: setup ## tests of single parts

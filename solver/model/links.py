@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from catenary.solver.model.shape_functions import shape_values
-
 if TYPE_CHECKING:
     from catenary.solver.model.model import Model
 
@@ -83,6 +81,9 @@ def at_places(
 
     By the Hermite functions of the element there, in a ``plane`` of deflection and slope.
     """
+    # Compiled loops are not loaded by a check of a scene, which places no link within an element.
+    from catenary.solver.model.shape_functions import shape_values
+
     nodes = model.mesh.wires[wire]
     at = model.mesh.x(nodes)
     element = np.clip(np.searchsorted(at, x) - 1, 0, at.size - 2)
