@@ -5,12 +5,10 @@ from __future__ import annotations
 import logging
 from typing import NamedTuple
 
-from catenary.solver.effects.all_effects import simulated
 from catenary.solver.model.loads import FunctionLoad
 from catenary.solver.model.model import Model
 from catenary.solver.model.unknowns import Unknowns
-from catenary.solver.problem.integrator_parameters import NEWMARK
-from catenary.solver.problem.problem import Damping, Numerics, Problem
+from catenary.solver.problem.problem import Numerics, Problem
 
 logger = logging.getLogger(__name__)
 
@@ -53,19 +51,14 @@ def detour_of(problem: Problem, numbering: Unknowns) -> Detour | None:
         return None
     if not numbering.in_stations:
         return Detour("the nodes of the wires are too many or too few to form stations", LIBRARY)
-    reason = method_detour(problem.numerics, _is_damped_by_component(simulated(problem).damping))
+    reason = method_detour(problem.numerics)
     return Detour(reason, PARTS) if reason else None
 
 
-def method_detour(numerics: Numerics, damped_by_component: bool) -> str:
+def method_detour(numerics: Numerics) -> str:
     """Why a method cannot take steps in two passes, empty if it can."""
     if numerics.coupling == "explicit":
         return 'numerics.coupling = "explicit" needs heights of the wire within a step'
-    if damped_by_component and numerics.integrator != NEWMARK:
-        return (
-            f'numerics.integrator = "{numerics.integrator}" with line.damping.per_component needs '
-            "velocities within a step"
-        )
     return ""
 
 
@@ -73,7 +66,3 @@ def load_detour(model: Model) -> str:
     """Why loads of a model take longer than they could, empty if they do not."""
     names = [load.name for load in model.loads if isinstance(load, FunctionLoad)]
     return f"the load {names[0]} is a Python function, called for each step" if names else ""
-
-
-def _is_damped_by_component(damping: Damping) -> bool:
-    return bool(set(damping.per_component.values()) - {(damping.alpha, damping.beta)})

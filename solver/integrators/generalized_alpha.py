@@ -69,7 +69,7 @@ class GeneralizedAlphaLine(LineIntegrator):
         velocity = [by.velocity_of_own * a + by.velocity_of_known * p for a, p in shares]
         work = by.damping_on_stiffness
         balance = position[0] + work * velocity[0], position[1] + work * velocity[1]
-        if not self._proportional or abs(balance[0]) < _LEAST_SHARE * by.dt**2:
+        if abs(balance[0]) < _LEAST_SHARE * by.dt**2:
             return None
         steps = AlphaSteps(
             known,
@@ -83,7 +83,9 @@ class GeneralizedAlphaLine(LineIntegrator):
         )
         operators, (shown, rate, _, _) = self.operators, self.motion.read
         total = aligned_arrays.zeros(shown.size, 1)
-        motion = AlphaAhead(operators.factor, rate, total, self._known, shown, steps)
+        # What products with C read, if there are any.
+        predicted = rate[:0] if self._proportional else operators.rate
+        motion = AlphaAhead(operators.factor, rate, total, self._known, shown, steps, predicted)
         return motion, steps
 
     def predict(self) -> None:

@@ -192,6 +192,7 @@ class LineIntegrator(ABC):
         ``free_acceleration`` and ``correct``. After ``load_at``. Collective."""
         if self._passes is not None:
             if self._comm.size > 1:
+                self._passes.predict_velocities()
                 self.operators.exchange()
             self._passes.step()
             return

@@ -178,6 +178,8 @@ class AlphaAhead(PredictedLineState):
     known : array (n_local,) of p in the latest step
     shown : array (n_local,) that is filled when displacements are asked for
     steps : of the steps to come, all alike; ``balance[0]`` is not zero
+    predicted : array (n_local,) for v* of the coming step, which a product with C reads; empty if
+        there is none. It is filled at the beginning of the step, from y, z and p
     """
 
     def __init__(
@@ -188,6 +190,7 @@ class AlphaAhead(PredictedLineState):
         known: np.ndarray,
         shown: np.ndarray,
         steps: AlphaSteps,
+        predicted: np.ndarray,
     ) -> None:
         way = steps.dt + steps.work_velocity
         by_position = steps.position_factor + way * steps.velocity_factor + steps.balance[0]
@@ -196,6 +199,7 @@ class AlphaAhead(PredictedLineState):
         self.gains[2] = steps.balance[0]
         self.read[3][:] = [-1.0, -way, -1.0, 1.0, 0.0]
         self._way, self._balance, self._shown, self.known = way, steps.balance, shown, known
+        self.predicted = predicted
 
     @property
     def acceleration(self) -> np.ndarray:

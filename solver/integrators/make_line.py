@@ -41,7 +41,7 @@ def make_line(
         line = GeneralizedAlphaLine(comm, model, ownership, numerics.dt, chosen)
     if only_free:
         line.keep_ahead()
-    reason = method_detour(numerics, not model.damping_is_proportional)
+    reason = method_detour(numerics)
     if reason and numerics.scheme == "one_solve":
         line.detour = Detour(reason, PARTS)
     reason = load_detour(model)

@@ -8,8 +8,6 @@ wait for. Two chains of stations go side by side, each of which waits for itself
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from catenary.solver.base.bound import bound
@@ -40,7 +38,8 @@ class StationPasses:
     factors : of the step operator
     read : what ``product`` reads; the rank's own part is x of the motion, and what others have of
         it is there before a step
-    velocity : the same of y of the motion, which a product with C reads
+    velocity : the same of y of the motion, or of what it predicts of the velocity, which a product
+        with C reads
     loads : of all that is solved for [N], or none, added in the pass forth; kept by reference
     answer : of all that is solved for; the rank's own part is the acceleration
     motion : of the rank's own stations
@@ -64,10 +63,10 @@ class StationPasses:
             layout = layout.remembering()
         factored = layout, factors.kinds, factors.blocks, low, high
         multiplied = product.layout, product.kinds, product.blocks, product.first, read, velocity
-        changes, known = changes_of(motion, steps)
+        changes, *more = changes_of(motion, steps)
         self._stretch = max(1, _STRETCH // layout.pitch)
         self._place = low, high, self._stretch, layout.pitch
-        self._parts = multiplied, factored, loads, answer, (*motion.read, known), changes
+        self._parts = multiplied, factored, loads, answer, (*motion.read, *more), changes
         self.track_links(NO_LINKS, np.zeros(0))
 
     def track_links(self, links: LinkArrays, reserve: np.ndarray) -> None:
@@ -76,6 +75,11 @@ class StationPasses:
         self.kernel, self.arguments = forth_and_back, (*self._parts, followed)
         self._step = bound(self.kernel, *self.arguments)
 
+    def predict_velocities(self) -> None:
+        """Fill in the rank's own part of what others read of it in a product with C. A step does
+        so, too, but only after these have read."""
+        predict_velocities(self._parts[4], self._parts[5])
+
     def step(self) -> None:
         """Find the accelerations and what the next step starts from."""
         self._step()
@@ -83,12 +87,13 @@ class StationPasses:
 
 def changes_of(
     motion: PredictedLineState, steps: Steps | AlphaSteps
-) -> tuple[tuple[float, ...], Any]:
-    """Numbers that take a state from one prediction to the next, and the known acceleration."""
+) -> tuple[tuple[float, ...], np.ndarray, np.ndarray]:
+    """Numbers that take a state from one prediction to the next, the known acceleration, and the
+    array for predicted velocities."""
     by_position, by_velocity, _ = map(float, motion.gains)
     if isinstance(steps, Steps):
         newmark = steps.dt, by_position, by_velocity, steps.damping_share
-        return (*newmark, *[0.0] * 6), np.zeros(0)
+        return (*newmark, *[0.0] * 6), np.zeros(0), np.zeros(0)
     assert isinstance(motion, AlphaAhead)
     of_balanced, of_known = steps.balance
 
@@ -100,17 +105,25 @@ def changes_of(
     by_position += of_balanced
     step = steps.dt, by_position, by_velocity, steps.damping_share
     more = *from_kept(steps.known), *from_kept(steps.velocity), *steps.balance
-    return tuple(map(float, (*step, *more))), motion.known
+    return tuple(map(float, (*step, *more))), motion.known, motion.predicted
 
 
 # Kernels take what belongs together as tuples, named as in ``StationPasses``.
+
+
+@compiled
+def predict_velocities(motion, changes):
+    """Fill in the velocities that the generalized-alpha method predicts, if products read them."""
+    _, y, z, _, known, predicted = motion
+    for i in range(predicted.size):
+        predicted[i] = y[i] + changes[6] * z[i] + changes[7] * known[i]
 
 
 @in_line
 def go_on(layout, station, solution, motion, changes):
     """Take the rank's own station from one prediction to the next: ``kernels.correct`` and
     ``predict`` at once. What was solved for is its acceleration but for damping on mass."""
-    x, y, z, _, known = motion
+    x, y, z = motion[:3]
     at = pitch(layout) * np.uint64(station)
     if remembers(layout):
         go_on_by_alpha(layout, at, solution, motion, changes)
@@ -127,7 +140,7 @@ def go_on(layout, station, solution, motion, changes):
 @in_line
 def go_on_by_alpha(layout, at, solution, motion, changes):
     """The same for the generalized-alpha method; see ``AlphaAhead``."""
-    x, y, z, _, known = motion
+    x, y, z, _, known, _ = motion
     before, then = load(layout, z, at), load(layout, known, at)
     known_now = add_scaled(add_scaled(zero(layout), changes[4], before), changes[5], then)
     v = add_scaled(add_scaled(load(layout, y, at), changes[6], before), changes[7], then)
@@ -255,5 +268,6 @@ def back(factored, motion, answer, changes, followed):
 @compiled
 def forth_and_back(multiplied, factored, loads, answer, motion, changes, followed):
     """Both passes."""
+    predict_velocities(motion, changes)
     forth(multiplied, factored, loads, answer)
     back(factored, motion, answer, changes, followed)

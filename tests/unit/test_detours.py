@@ -16,16 +16,18 @@ from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.integrators.detour import PARTS, detour_of
 from catenary.solver.problem.problem import Damping
 
-BY_COMPONENT = "line.damping.per_component={contact_wire={alpha_s=0.01,beta_per_s=0.02}}"
 HHT = 'numerics.integrator="hht"', "numerics.spectral_radius=0.8"
+BY_COMPONENT = "line.damping.per_component={contact_wire={alpha_s=0.01,beta_per_s=0.02}}"
 
 
 def test_the_plan_says_what_makes_steps_slower_and_by_how_much() -> None:
-    plain, slow = (
-        make_plan(load_scene("en50318_2002", [*HHT, *more])) for more in ([], [BY_COMPONENT])
+    plain, damped, slow = (
+        make_plan(load_scene("en50318_2002", more))
+        for more in ([], [*HHT, BY_COMPONENT], ['numerics.coupling="explicit"'])
     )
-    assert plain.detour == "" and "slower" not in plan_text(plain)
-    assert "hht" in slow.detour and "line.damping.per_component" in slow.detour
+    for plan in (plain, damped):
+        assert plan.detour == "" and "slower" not in plan_text(plan)
+    assert "numerics.coupling" in slow.detour
     assert slow.detour in plan_text(slow)
     assert slow.march == pytest.approx(PARTS * plain.march)
 
@@ -33,8 +35,8 @@ def test_the_plan_says_what_makes_steps_slower_and_by_how_much() -> None:
 def test_log_and_outcome_of_a_march_say_the_same(caplog: pytest.LogCaptureFixture) -> None:
     damping = Damping(1e-4, 0.0125, {"contact_wire": (2e-3, 0.3)})
     line = en50318_line(3)
-    for method, slower in (("newmark", False), ("hht", True)):
-        steps = numerics(1e-3, integrator=method, spectral_radius=0.8)
+    for coupling, slower in (("implicit", False), ("explicit", True)):
+        steps = numerics(1e-3, integrator="hht", spectral_radius=0.8, coupling=coupling)
         problem = problem_of(
             line, WHOLE, damping=damping, train=train(70.0, 70.0, 70.5), numerics=steps
         )
