@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import NamedTuple
 
-from catenary.mbs.head.wire_crossing import LateralPath
+from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph, Lowering
 from catenary.mbs.lumped import LumpedPantograph
@@ -42,7 +42,7 @@ class Operation(NamedTuple):
     dt: float
     beta: float
     gamma: float
-    lateral: LateralPath | None = None
+    lateral: LateralPath | SeveralPaths | None = None
     base: BaseMotion | None = None
     lowering: Lowering | None = None
 

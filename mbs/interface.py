@@ -1,8 +1,9 @@
 """Interface of pantographs to the coupling, for lumped masses and multibody systems.
 
 Heights are measured like the line's, z up [m]; contact forces are >= 0 in compression and push
-the head down. A head touches the wire with s strips, mostly one. A pantograph lives on rank 0 and
-is never called elsewhere.
+the head down. A head touches the wire with s strips, mostly one; where several contact wires run
+side by side each of them may touch each strip, and what is said of strips holds for contacts, those
+of one strip together. A pantograph lives on rank 0 and is never called elsewhere.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from catenary.mbs.head import head_kernels
 from catenary.mbs.head.head_kernels import FORCE, LinearStep
 from catenary.mbs.head.head_records import LUMPED
 from catenary.mbs.head.newmark_head import Raising, SteppedHead, parts_of
-from catenary.mbs.head.wire_crossing import LateralPath
+from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
 from catenary.mbs.interface import HeadState
 from catenary.mbs.lumped_data import LumpedData, chain_matrix
 from catenary.mbs.vehicle.base_motion import BaseMotion
@@ -50,7 +50,7 @@ class LumpedPantograph(SteppedHead):
         dt: float,
         beta: float = 0.25,
         gamma: float = 0.5,
-        lateral: LateralPath | None = None,
+        lateral: LateralPath | SeveralPaths | None = None,
         base: BaseMotion | None = None,
     ) -> None:
         head = data.head(rolls=lateral is not None)

@@ -12,7 +12,7 @@ import numpy as np
 from catenary.mbs.head import head_kernels
 from catenary.mbs.head.head_kernels import N_DRIVE, HeadArrays, NewmarkFactors
 from catenary.mbs.head.strips import HeadParts
-from catenary.mbs.head.wire_crossing import LateralPath
+from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
 from catenary.mbs.interface import HeadState
 from catenary.solver.base.bound import bound
 
@@ -35,7 +35,7 @@ class SteppedHead(ABC):
         dt: float,
         beta: float,
         gamma: float,
-        lateral: LateralPath | None,
+        lateral: LateralPath | SeveralPaths | None,
     ) -> None:
         s = len(head.offsets)
         self.strip_offsets = head.offsets

@@ -46,6 +46,7 @@ class Strips:
     length : of a strip across the track [m], None if it is not known
     suspension : of each strip, whose mass is part of the head's; None if it is fixed to the head
     pitch : how the head turns across the track, None if it does not
+    wires : contact wires side by side, each of which may touch each strip
     """
 
     number: int = 1
@@ -53,6 +54,7 @@ class Strips:
     length: float | None = None
     suspension: Suspension | None = None
     pitch: Turning | None = None
+    wires: int = 1
 
     @property
     def offsets(self) -> tuple[float, ...]:
@@ -60,6 +62,11 @@ class Strips:
         if self.number == 1:
             return (0.0,)
         return (0.5 * self.spacing, -0.5 * self.spacing)
+
+    @property
+    def contact_offsets(self) -> tuple[float, ...]:
+        """The same for each contact that may be: strip by strip, those of all wires together."""
+        return tuple(x for x in self.offsets for _ in range(self.wires))
 
     def compression(self, force: float) -> float:
         """How far a force shared by all strips presses them into the head [m]."""
@@ -79,10 +86,11 @@ class HeadParts:
     ----------
     masses : (n,) [kg] or [kg m2]
     stiffness, damping : (n + 1, n + 1)
-    touch : (s, n) by how much each coordinate raises each strip, the lateral place left out
+    touch : (s, n) by how much each coordinate raises each contact, the lateral place left out;
+        wires that touch one strip have a row each
     level : (n,) 1 for heights, 0 for angles
     roll : number of the roll's coordinate, -1 without it
-    offsets : (s,) places of the strips ahead of the head's centre [m]
+    offsets : (s,) places of the contacts ahead of the head's centre [m]
     """
 
     masses: np.ndarray
@@ -148,7 +156,8 @@ def head_parts(
     level = np.zeros(n)
     level[: head + 1] = 1.0
     number = head + 1 if roll is not None else -1
-    return HeadParts(masses, springs, dampers, touch, level, number, strips.offsets)
+    touch = np.repeat(touch, strips.wires, axis=0)
+    return HeadParts(masses, springs, dampers, touch, level, number, strips.contact_offsets)
 
 
 def _difference(n: int, upper: int, lower: int) -> np.ndarray:

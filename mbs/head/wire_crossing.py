@@ -54,3 +54,22 @@ class LateralPath:
             sway = self._base.lateral(time)
             self.place -= sway.place
             self.rate -= sway.velocity
+
+
+class SeveralPaths:
+    """Lateral places of several contact wires on the strips of a pantograph.
+
+    ``place`` and ``rate`` (s w,) are those of `LateralPath` for w wires, strip by strip.
+    """
+
+    def __init__(self, paths: Sequence[LateralPath]) -> None:
+        self._paths = tuple(paths)
+        n_strips = len(paths[0].place)
+        self._by_strip = np.zeros((2, n_strips, len(paths)))
+        self.place, self.rate = self._by_strip.reshape(2, -1)
+
+    def move_to(self, time: float) -> None:
+        """Put ``place`` and ``rate`` to ``time`` [s]."""
+        for number, path in enumerate(self._paths):
+            path.move_to(time)
+            self._by_strip[:, :, number] = path.place, path.rate

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.mbs.head.newmark_head import Raising
-from catenary.mbs.head.wire_crossing import LateralPath
+from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, head_weight_under_way, stand
 from catenary.mbs.rigid import kernels
@@ -108,7 +108,7 @@ class FullPantograph:
         dt: float,
         beta: float = 0.25,
         gamma: float = 0.5,
-        lateral: LateralPath | None = None,
+        lateral: LateralPath | SeveralPaths | None = None,
         base: BaseMotion | None = None,
         handling: StepSolver | str = "coordinate_partitioning",
         substeps: int = 1,
@@ -131,12 +131,12 @@ class FullPantograph:
         self._rest = standing.motion
         self._zero = nominal_height - self._head_under(static_force)
         self._still = without_spins(standing.system, standing.motion).with_forces(*data.wind)
-        s, space = len(data.strip_offsets), self._rest.numbers[SPACE]
+        s, space = len(data.strips.contact_offsets), self._rest.numbers[SPACE]
         self._touched = np.tile([space, space, self._rest.numbers[data.head]], (s, 1))
         self._between = np.ones(s, dtype=bool)
         self._upward, self._origins = np.tile([0.0, 0.0, 1.0], (s, 1)), np.zeros((s, 3))
         self._points = np.zeros((s, 3))
-        self._points[:, 0] = data.strip_offsets
+        self._points[:, 0] = data.strips.contact_offsets
         self._stepper = Stepper(system, dt, handling, self._pushed_down, substeps, beta, gamma)
         self._stepper.begin(standing.motion, 0.0)
         self._early = np.zeros((2, s))
@@ -145,7 +145,7 @@ class FullPantograph:
     @property
     def strip_offsets(self) -> tuple[float, ...]:
         """Places of the strips ahead of the pantograph's own place [m]."""
-        return self._data.strip_offsets
+        return self._data.strips.contact_offsets
 
     @property
     def system(self) -> System:

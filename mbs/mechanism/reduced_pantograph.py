@@ -25,7 +25,7 @@ from catenary.mbs.head.head_kernels import BASE, LIFTED, N_DRIVE, WEIGHT, ZERO, 
 from catenary.mbs.head.head_records import REDUCED
 from catenary.mbs.head.newmark_head import Raising, SteppedHead, parts_of
 from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning, head_parts
-from catenary.mbs.head.wire_crossing import LateralPath
+from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.vehicle.base_motion import BaseMotion
@@ -77,7 +77,7 @@ class RaisingPantograph(SteppedHead):
         dt: float,
         beta: float = 0.25,
         gamma: float = 0.5,
-        lateral: LateralPath | None = None,
+        lateral: LateralPath | SeveralPaths | None = None,
         base: BaseMotion | None = None,
     ) -> None:
         values = data.head_mass, data.head_stiffness, data.head_damping

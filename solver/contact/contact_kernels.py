@@ -20,13 +20,18 @@ from catenary.solver.integrators.state_kernels import (
 from catenary.solver.model.shape_functions import shape_slopes, shape_values
 from catenary.solver.model.switching_links import LinkArrays
 
-# A node of the contact wire: where it is along the track [m]; of its unknowns (w, theta_y) the
-# numbers on this rank, 0 where another rank owns them, whether this one does, and what they are at
-# rest [m], [-]; the columns of A^-1 for both, one after the other from ``at`` on and ``width`` long
-# each, for the local unknowns from ``begin`` on.
+# Far more than the round-off of a position, far less than an element [m].
+SLIP = 1e-6
+
+# A node of a contact wire: where it is along the track and across it [m]; whether an element joins
+# it to the next one; of its unknowns (w, theta_y) the numbers on this rank, 0 where another rank
+# owns them, whether this one does, what they are at rest [m], [-]; the columns of A^-1 for both,
+# one after the other from ``at`` on and ``width`` long each, for local unknowns from ``begin`` on.
 NODE = np.dtype(
     [
         ("x", np.float64),
+        ("y", np.float64),
+        ("joined", np.float64),
         ("local", np.int64, (2,)),
         ("owned", np.float64, (2,)),
         ("rest", np.float64, (2,)),
@@ -36,13 +41,19 @@ NODE = np.dtype(
     ]
 )
 
-# A place on the contact wire: where it is along the track [m], and the number of its element along
-# the wire; of the element's four unknowns the numbers on this rank, 0 where another rank owns them,
-# the Hermite functions N and dN/dx, 0 where not owned here and without regard to that, and what
-# they are at rest [m], [-]; the first and one after the last of the local unknowns that answer to a
-# force here.
+# A place of a strip on a contact wire, which is a candidate for a contact: the wire's first node
+# and the one after its last; the strip's half length [m]; 1 if the wire is there on the strip, else
+# 0, and so are then all functions; where it is along the track [m], and the number of the first
+# node of its element; of the element's four unknowns the numbers on this rank, 0 where another rank
+# owns them, the Hermite functions N and dN/dx, 0 where not owned here and without regard to that,
+# and what they are at rest [m], [-]; the first and one after the last of the local unknowns that
+# answer to a force here.
 TOUCH = np.dtype(
     [
+        ("first", np.int64),
+        ("end", np.int64),
+        ("half_length", np.float64),
+        ("present", np.float64),
         ("x", np.float64),
         ("element", np.int64),
         ("local", np.int64, (4,)),
@@ -67,6 +78,14 @@ class Answers(NamedTuple):
     slope: np.ndarray
 
 
+class Ends(NamedTuple):
+    """Which contacts a strip has, and which strips a pantograph: numbers of the first ones, and of
+    all; ``of_strip`` (n_strips + 1,), ``of_pantograph`` (n_pantographs + 1,)."""
+
+    of_strip: np.ndarray
+    of_pantograph: np.ndarray
+
+
 class Gains(NamedTuple):
     """What answers are worth within a step: of an acceleration ``position`` [s2] and ``velocity``
     [s]; the ``train_speed`` [m/s] of the convective part of rates; how far off links answer to a
@@ -89,23 +108,31 @@ class Followed(NamedTuple):
 
 @compiled
 def locate(x, nodes, touches):
-    """Make ``touches`` those at places ``x`` (n,) [m].
+    """Make ``touches`` those at places ``x`` (n,) [m], each on its own wire.
 
     A node belongs to the element that it ends.
     """
     for i in range(x.size):
         touch = touches[i]
-        place = x[i]
+        place, first, last = x[i], touch.first, touch.end - 1
         # Mostly the element of the step before, or the next one.
         e = touch.element
-        while e < nodes.size - 2 and nodes[e + 1].x < place:
+        while e < last - 1 and nodes[e + 1].x < place:
             e += 1
-        while e > 0 and nodes[e].x >= place:
+        while e > first and nodes[e].x >= place:
             e -= 1
         length = nodes[e + 1].x - nodes[e].x
+        inside = nodes[first].x - SLIP <= place <= nodes[last].x + SLIP
+        if nodes[e].joined == 0.0:
+            length, inside = 1.0, False
         xi = (place - nodes[e].x) / length
+        lateral = nodes[e].y + xi * (nodes[e + 1].y - nodes[e].y)
+        present = 1.0 if inside and abs(lateral) <= touch.half_length else 0.0
         values, slopes = shape_values(xi, length), shape_slopes(xi, length)
-        touch.x, touch.element = place, e
+        for k in range(4):
+            values[k] *= present
+            slopes[k] *= present
+        touch.x, touch.element, touch.present = place, e, present
         for k in range(4):
             node, unknown = nodes[e + k // 2], k % 2
             touch.local[k] = node.local[unknown]
@@ -290,6 +317,8 @@ def watch(followed, bounds, touches, answers, gains, rows):
 @compiled
 def respond(motion, touches, gains, answers, bounds, followed, share):
     """A rank's share of the small problem; links as for ``watch``."""
+    for i in range(touches.size):
+        share.present[i] = touches[i].present
     finite = meet(motion, touches, gains, answers, share.line)
     # A NaN elsewhere reaches the reserve of a link one step later and is caught there.
     count = -1
@@ -344,20 +373,27 @@ def compensate(numbers, compensation, start, offset, data, motion, gains):
 def write_outputs(force, reported, heads, depth, ends, outputs):
     """Contact force, head height and wire height of each pantograph, then the force of each strip.
 
-    These are the 3 n_pantographs + n numbers of ``outputs``; ``heads`` are those of ``gap``.
-    Pantograph p has the contacts from ``ends[p]`` to ``ends[p + 1]``: the sum of their forces, and
-    the means of their heights.
+    These are the 3 n_pantographs + n_strips numbers of ``outputs``; ``heads`` are those of the
+    contacts, ``ends`` are ``Ends``. A pantograph's force is the sum over its contacts, heights are
+    means over its strips; of several wires over a strip the lowest counts.
     """
-    n = ends.size - 1
+    n = ends.of_pantograph.size - 1
     for p in range(n):
         total, mean, mean_of_wire = 0.0, 0.0, 0.0
-        for i in range(ends[p], ends[p + 1]):
-            height = heads.place[i]
-            for j in range(ends[p], ends[p + 1]):
-                height -= heads.by_force[i, j] * force[j]
-            total += reported[i]
-            mean += height
-            mean_of_wire += height - depth[i]
-            outputs[3 * n + i] = reported[i]
-        strips = ends[p + 1] - ends[p]
+        first, last = ends.of_pantograph[p], ends.of_pantograph[p + 1]
+        begin, end = ends.of_strip[first], ends.of_strip[last]
+        for strip in range(first, last):
+            own, height_of_strip, lowest = 0.0, 0.0, np.inf
+            for i in range(ends.of_strip[strip], ends.of_strip[strip + 1]):
+                height = heads.place[i]
+                for j in range(begin, end):
+                    height -= heads.by_force[i, j] * force[j]
+                own += reported[i]
+                height_of_strip += height
+                lowest = min(lowest, height - depth[i])
+            total += own
+            mean += height_of_strip / (ends.of_strip[strip + 1] - ends.of_strip[strip])
+            mean_of_wire += lowest
+            outputs[3 * n + strip] = own
+        strips = last - first
         outputs[p], outputs[n + p], outputs[2 * n + p] = total, mean / strips, mean_of_wire / strips

@@ -1,59 +1,107 @@
-"""Where the pan heads touch the contact wire: location, interpolation, owned parts."""
+"""Where the pan heads may touch the contact wires: location, interpolation, owned parts."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from catenary.meshgen.line import Role
 from catenary.solver.contact import contact_kernels
-from catenary.solver.contact.contact_kernels import NODE, TOUCH
+from catenary.solver.contact.contact_kernels import NODE, SLIP, TOUCH
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.statics.equilibrium import Equilibrium
 
-# Far more than the round-off of a position, far less than an element [m].
-_SLIP = 1e-6
 
-
-class ContactWire:
-    """The contact wire as a train sees it. Not collective.
+class Candidates(NamedTuple):
+    """Pairs of strip and contact wire, strip by strip.
 
     Attributes
     ----------
-    x : (n_nodes,) positions of its nodes [m], ascending
+    place : (n,) of the strips along the track [m], kept by reference
+    wire : (n,) number of the contact wire
+    half_length : (n,) of the strip [m], infinite if it is not known
+    """
+
+    place: np.ndarray
+    wire: np.ndarray
+    half_length: np.ndarray
+
+
+class ContactWires:
+    """The contact wires as a train sees them. Not collective.
+
+    Attributes
+    ----------
+    x : (n_nodes,) positions of their nodes [m], ascending in each wire, wire by wire
+    ranges : (n_wires, 2) first node of each wire, and the one after its last
     dofs : (n_nodes, 2) unknowns (w, theta_y) of its nodes
-    nodes : (n_nodes,) records of ``NODE``, of no columns until an ``ForcesOnLine`` has some
+    nodes : (n_nodes,) records of ``NODE``, of no columns until a ``ForcesOnLine`` has some
     """
 
     def __init__(self, model: Model, form: Equilibrium, ownership: Ownership) -> None:
-        nodes = model.contact_nodes
+        names = [wire.name for wire in model.problem.line.wires_of(Role.CONTACT)]
+        chains = [model.mesh.wires[name] for name in names]
+        ends = np.cumsum([0, *(chain.size for chain in chains)])
+        self.ranges = np.stack([ends[:-1], ends[1:]], axis=1)
+        nodes = np.concatenate(chains)
         self.x = model.mesh.x(nodes)
         self.dofs = np.stack([model.dofs(nodes), model.dofs(nodes, "theta_y")], axis=1)
         mine = ownership.owned(self.dofs)
         self.nodes = np.zeros(self.x.size, dtype=NODE)
-        self.nodes["x"] = self.x
+        self.nodes["x"], self.nodes["y"] = self.x, model.mesh.points[nodes, 1]
+        self.nodes["joined"] = 1.0
+        for name, first, end in zip(names, ends[:-1], ends[1:], strict=True):
+            # No element leads from the end of a piece to the next one.
+            self.nodes["joined"][end - 1] = 0.0
+            self.nodes["joined"][first + model.mesh.breaks.get(name, np.zeros(0, int)) - 1] = 0.0
         self.nodes["local"] = np.where(mine, self.dofs - ownership.first, 0)
         self.nodes["owned"] = mine
         self.nodes["rest"] = np.stack([form.height[nodes], form.slope[nodes]], axis=1)
 
-    def touches(self, x: np.ndarray) -> np.ndarray:
-        """Places on the wire at positions ``x`` (n,) [m], records of ``TOUCH`` (n,)."""
-        touches = np.zeros(x.size, dtype=TOUCH)
+    @property
+    def n_wires(self) -> int:
+        """Number of contact wires."""
+        return len(self.ranges)
+
+    def on_wires(self, wire: np.ndarray, half_length: float | np.ndarray = np.inf) -> np.ndarray:
+        """Records of ``TOUCH`` (n,) on wires (n,), not located yet."""
+        touches = np.zeros(wire.size, dtype=TOUCH)
+        touches["first"], touches["end"] = self.ranges[wire].T
+        touches["element"], touches["half_length"] = touches["first"], half_length
+        return touches
+
+    def touches(self, x: np.ndarray, wire: int = 0) -> np.ndarray:
+        """Places on a wire at positions ``x`` (n,) [m], records of ``TOUCH`` (n,)."""
+        touches = self.on_wires(np.full(x.size, wire))
         contact_kernels.locate(x, self.nodes, touches)
         return touches
 
     def rest_height(self, x: np.ndarray) -> np.ndarray:
-        """Height of the line at rest at positions ``x`` (n,) [m], shape as ``x``."""
-        touches = self.touches(x)
-        return np.asarray((touches["whole_value"] * touches["rest"]).sum(axis=1))
+        """Height of the lowest wire at rest at positions ``x`` (n,) [m], (n,); infinite where there
+        is none."""
+        return self._lowest(x)[0]
 
     def rest_slope(self, x: np.ndarray) -> np.ndarray:
-        """Slope dw/dx of the line at rest at positions ``x`` (n,) [m], shape as ``x`` [-]."""
-        touches = self.touches(x)
-        return np.asarray((touches["whole_slope"] * touches["rest"]).sum(axis=1))
+        """Slope dw/dx of the lowest wire at rest at positions ``x`` (n,) [m], (n,) [-]."""
+        return self._lowest(x)[1]
 
-    def nodes_between(self, low: float, high: float) -> tuple[int, int]:
-        """Range of the wire's nodes whose elements cover [low, high] [m], ends included."""
+    def _lowest(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        height, slope = np.full(x.shape, np.inf), np.zeros(x.shape)
+        for wire in range(self.n_wires):
+            touches = self.touches(x, wire)
+            own = (touches["whole_value"] * touches["rest"]).sum(axis=1)
+            lower = (touches["present"] > 0.0) & (own < height)
+            height[lower] = own[lower]
+            slope[lower] = (touches["whole_slope"] * touches["rest"]).sum(axis=1)[lower]
+        return height, slope
+
+    def nodes_between(self, low: float, high: float, wire: int = 0) -> tuple[int, int]:
+        """Range of a wire's nodes whose elements cover [low, high] [m], ends included."""
+        first, end = self.ranges[wire]
+        own = self.x[first:end]
         # A position that is start + V t may miss an end by round-off and fall in the next element.
-        first = int(np.searchsorted(self.x, low - _SLIP, side="right")) - 1
-        last = int(np.searchsorted(self.x, high + _SLIP)) + 1
-        return max(first, 0), min(last, self.x.size)
+        begin = int(np.searchsorted(own, low - SLIP, side="right")) - 1
+        last = int(np.searchsorted(own, high + SLIP)) + 1
+        return int(first) + max(begin, 0), int(first) + min(last, own.size)

@@ -9,8 +9,8 @@ import numpy as np
 
 from catenary.solver.base.bound import bound
 from catenary.solver.contact import contact_kernels
-from catenary.solver.contact.contact_kernels import TOUCH, Answers, Gains
-from catenary.solver.contact.contact_wire import ContactWire
+from catenary.solver.contact.contact_kernels import Answers, Gains
+from catenary.solver.contact.contact_wire import Candidates, ContactWires
 from catenary.solver.contact.followed_links import FollowedLinks, LinkCoupling, link_columns
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.integrators.line_integrator import LineIntegrator
@@ -32,8 +32,8 @@ class ForcesOnLine:
 
     Parameters
     ----------
-    range_of_run : stretch of the contact wire that pan heads will touch [m]
-    contact_place : (n,) where strips may touch the wire [m], kept by reference
+    range_of_run : stretch of the contact wires that pan heads will touch [m]
+    candidates : pairs (n,) of strip and contact wire
     train_speed : V of the convective part of the gap rate [m/s]
     uses_rate : whether the contact law needs the gap rate
     table : the links of the line that are followed
@@ -46,13 +46,13 @@ class ForcesOnLine:
         form: Equilibrium,
         line: LineIntegrator,
         range_of_run: tuple[float, float],
-        contact_place: np.ndarray,
+        candidates: Candidates,
         train_speed: float,
         uses_rate: bool,
         table: LinkTable,
     ) -> None:
         self.line = line
-        self.wire = ContactWire(model, form, line.ownership)
+        self.wires = ContactWires(model, form, line.ownership)
         self.links = FollowedLinks(table, line)
         self._speed = train_speed
         # A force on an unknown that is held, at an anchor, moves nothing.
@@ -65,14 +65,14 @@ class ForcesOnLine:
         if table.switches:
             columns = link_columns(comm, table, line)
             self.link_coupling = LinkCoupling(comm, self.links, columns, line)
-        n, n_local = contact_place.size, line.ownership.n_local
-        self._contact_place = contact_place
-        self._touches = np.zeros(n, dtype=TOUCH)
+        n, n_local = candidates.place.size, line.ownership.n_local
+        self._contact_place = candidates.place
+        self._touches = self.wires.on_wires(candidates.wire, candidates.half_length)
         self._answers = Answers(np.zeros((n, n_local)), np.zeros((n, n_local if uses_rate else 0)))
         reach = line.windows.reach + table.half_length.max(initial=0.0)
         self._gains = Gains(train_speed, line.position_factor, line.velocity_factor, reach)
         touched = self._touches, self._answers
-        self.placing = contact_place, self.wire.nodes, node_columns, *touched
+        self.placing = candidates.place, self.wires.nodes, node_columns, *touched
         self._place = bound(contact_kernels.place, *self.placing)
         motion = line.motion.read, line.motion.gains
         self._force = np.zeros(n)
@@ -87,7 +87,11 @@ class ForcesOnLine:
 
     def locate(self) -> None:
         """Look where the contacts are now, for heights and loads only."""
-        contact_kernels.locate(self._contact_place, self.wire.nodes, self._touches)
+        contact_kernels.locate(self._contact_place, self.wires.nodes, self._touches)
+
+    def present(self) -> np.ndarray:
+        """Whether the wire of each contact is on its strip, (n,) bool, where they were located."""
+        return np.asarray(self._touches["present"] > 0.0)
 
     def heights(self, height: np.ndarray, rate: np.ndarray) -> None:
         """Fill in this rank's share of wire height [m] and its total rate [m/s] at each contact.
@@ -143,19 +147,20 @@ class ForcesOnLine:
     def _columns_of_nodes(
         self, comm: Any, range_of_run: tuple[float, float], free: np.ndarray
     ) -> np.ndarray:
-        """Columns of A^-1 for the nodes in a stretch of the wire, each with the place of its own.
+        """Columns of A^-1 for the nodes in a stretch of the wires, each with the place of its own.
 
         Collective; ``free`` (n_dofs,) is zero for the unknowns that are held.
         """
         line = self.line
-        first, last = self.wire.nodes_between(*range_of_run)
-        dofs = self.wire.dofs[first:last].reshape(-1, 1)
-        at = np.repeat(self.wire.x[first:last], 2)
+        ranges = (self.wires.nodes_between(*range_of_run, k) for k in range(self.wires.n_wires))
+        chosen = np.concatenate([np.arange(first, last) for first, last in ranges])
+        dofs = self.wires.dofs[chosen].reshape(-1, 1)
+        at = np.repeat(self.wires.x[chosen], 2)
         packed = unit_responses.compute(
             comm, line.operators.solve_for, line.ownership, line.windows, dofs, free[dofs], at
         ).packed()
         # Both unknowns of a node share a window; their columns stand one after the other.
-        nodes, offset = self.wire.nodes[first:last], packed.offset[0::2]
-        nodes["begin"], nodes["at"] = packed.start[0::2], offset[:-1]
-        nodes["width"] = np.diff(offset) // 2
+        nodes, offset = self.wires.nodes, packed.offset[0::2]
+        nodes["begin"][chosen], nodes["at"][chosen] = packed.start[0::2], offset[:-1]
+        nodes["width"][chosen] = np.diff(offset) // 2
         return packed.data

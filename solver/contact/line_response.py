@@ -88,9 +88,11 @@ class Coupled(NamedTuple):
 
 
 class Share(NamedTuple):
-    """What kernels fill in of a response: ``flags`` (1,) of ``FLAGS``, ``line`` and ``rows``."""
+    """What kernels fill in of a response: ``flags`` (1,) of ``FLAGS``, ``present`` (n,), 1 for a
+    contact whose wire is on its strip and else 0, ``line`` and ``rows``."""
 
     flags: np.ndarray
+    present: np.ndarray
     line: Affine
     rows: Rows
 
@@ -102,6 +104,7 @@ class LineResponse:
     ----------
     summed : everything that adds up over ranks, in one array
     line : Affine, free heights [m] and total rates [m/s] of the wire at the contacts; its views
+    present : (n,) 1 for contacts whose wire is on the strip, else 0; the same on all ranks
     early_height, early_rate : (n,) what the line's motion extrapolates to, or (0,) if not asked
     sent_rows : (capacity, 2 + 3 n) numbers of ``rows``
     rows : Rows, its views
@@ -132,7 +135,8 @@ class LineResponse:
         self.line = affine(answers, n)
         self.sent_rows = np.zeros((capacity, 2 + 3 * n))
         self.rows = rows_of(self.sent_rows, n)
-        self.share = Share(flags.view(FLAGS), self.line, self.rows)
+        self.present = np.ones(n)
+        self.share = Share(flags.view(FLAGS), self.present, self.line, self.rows)
         self.bounds = bounds or Bounds(np.full(n, np.inf), np.full(1, np.inf))
 
     @property

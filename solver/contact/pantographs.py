@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from scipy import integrate
 from catenary.mbs.build import Operation, has_joints, make_pantograph
 from catenary.mbs.head.head_records import HEAD, fill_head
 from catenary.mbs.head.newmark_head import SteppedHead
-from catenary.mbs.head.wire_crossing import LateralPath
+from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
@@ -22,7 +23,8 @@ from catenary.meshgen.line import Role
 from catenary.solver.base.bound import bound
 from catenary.solver.base.parallel import on_root
 from catenary.solver.contact import contact_kernels
-from catenary.solver.contact.contact_wire import ContactWire
+from catenary.solver.contact.contact_kernels import Ends
+from catenary.solver.contact.contact_wire import Candidates, ContactWires
 from catenary.solver.contact.head_states import Heads
 from catenary.solver.integrators import state_kernels
 from catenary.solver.model.model import Model
@@ -34,7 +36,9 @@ from catenary.solver.statics.equilibrium import Equilibrium
 
 
 class Pantographs:
-    """All pantographs of a train, n of them, with their n_contacts strips. Collective to make.
+    """All pantographs of a train, n of them, with their strips. Collective to make.
+
+    Each strip may touch each contact wire: these are the contacts, strip by strip.
 
     Each is placed at the wire at rest, or ``start_below`` it. With a kinematic contact it already
     moves up and down with the wire under way, V dw/dx: a head at rest would have to be brought to
@@ -43,12 +47,12 @@ class Pantographs:
     Attributes
     ----------
     models : the models on rank 0, empty elsewhere
-    n_contacts : number of strips that may touch the wire
-    contact_place : (n_contacts,) of these along the track [m], all ranks
+    n_contacts : number of strips times contact wires
+    candidates : Candidates for contacts (n_contacts,), all ranks
     position : (n,) of the pantographs along the track [m], all ranks
     contact_force, head_height, wire_height : (n,) after the latest step, rank 0 only: the sum over
         a pantograph's strips, and their means
-    strip_force : (n_contacts,) the same of each strip
+    strip_force : (n_strips,) the sum over the wires that each strip touches
     joints_in_loop : whether a pantograph has joints that may open, all ranks
     constraint_violation : (n,) largest open joint after the latest step [m], NaN for pantographs
         without joints in the loop, rank 0 only
@@ -56,7 +60,7 @@ class Pantographs:
         part that a step fills after its forces are known
     speed : of the train [m/s]
     moving : start and places of contacts and pantographs, see ``kernels.shift``
-    ends : (n + 1,) number of the first contact of each pantograph, and of all
+    ends : Ends, contacts of each strip and strips of each pantograph
 
     Raises
     ------
@@ -69,36 +73,43 @@ class Pantographs:
         comm: Any,
         problem: Problem,
         simulated: Simulated,
-        wire: ContactWire,
+        wires: ContactWires,
         nominal_height: Callable[[Placement], float],
     ) -> None:
         train = problem.train
-        self._wire = wire
+        self._wires = wires
         self._start = np.array([train.start - p.behind for p in train.placements])
         self.speed = train.speed
         offsets = [placement.data.strip_offsets for placement in train.placements]
-        counts = [len(own) for own in offsets]
-        ends = np.cumsum([0, *counts])
-        self._strips = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
-        self.ends = ends.astype(np.int64)
-        contact_start = np.repeat(self._start, counts) + np.concatenate(offsets)
+        counts, n_wires = [len(own) for own in offsets], wires.n_wires
+        of_strip, of_pantograph = np.arange(sum(counts) + 1), np.cumsum([0, *counts])
+        self.ends = Ends(n_wires * of_strip.astype(np.int64), of_pantograph.astype(np.int64))
+        self._contacts = [
+            slice(int(a), int(b)) for a, b in itertools.pairwise(n_wires * of_pantograph)
+        ]
+        strip_start = np.repeat(self._start, counts) + np.concatenate(offsets)
+        half_length = [_half_length(placement) for placement in train.placements]
         # Places of contacts and of pantographs move together, in one sum.
-        self.n_contacts = contact_start.size
-        self._all_start = np.concatenate([contact_start, self._start])
-        sizes = (self.n, 3 * self.n, self.n_contacts, self.n)
+        self.n_contacts = n_wires * strip_start.size
+        self._all_start = np.concatenate([np.repeat(strip_start, n_wires), self._start])
+        sizes = (self.n, 3 * self.n, strip_start.size, self.n)
         places_and_outputs = np.zeros(self.n_contacts + sum(sizes))
         self._all_places = places_and_outputs[: self._all_start.size]
         self.moving = self._all_start, self._all_places
         self._move = bound(state_kernels.shift, *self.moving, later=(0.0,))
-        self.contact_place = places_and_outputs[: self.n_contacts]
+        self.candidates = Candidates(
+            places_and_outputs[: self.n_contacts],
+            np.tile(np.arange(n_wires), strip_start.size),
+            np.repeat(np.repeat(half_length, counts), n_wires),
+        )
         self.outputs = places_and_outputs[self.n_contacts :]
         self.position, forces, self.strip_force, self.constraint_violation = np.split(
             self.outputs, np.cumsum(sizes)[:-1]
         )
         self._all_places[:] = self._all_start
         self.contact_force, self.head_height, self.wire_height = forces.reshape(3, self.n)
-        self.of_step = self.outputs[self.n : 4 * self.n + self.n_contacts]
-        self.wire_height[:] = wire.rest_height(self._start)
+        self.of_step = self.outputs[self.n : 4 * self.n + strip_start.size]
+        self.wire_height[:] = wires.rest_height(self._start)
         self.head_height[:] = self.wire_height - train.start_below
         self._heads = Heads(self.n_contacts)
         self.joints_in_loop = any(has_joints(placement.data) for placement in train.placements)
@@ -114,7 +125,12 @@ class Pantographs:
     @property
     def n_strips(self) -> tuple[int, ...]:
         """Number of strips of each pantograph."""
-        return tuple(strips.stop - strips.start for strips in self._strips)
+        return tuple(np.diff(self.ends.of_pantograph).tolist())
+
+    @property
+    def most_contacts(self) -> int:
+        """Number of contacts of the pantograph with the most."""
+        return self._wires.n_wires * max(self.n_strips)
 
     def move_to(self, time: float) -> None:
         """Move pantographs and contacts to where they are at ``time`` [s]."""
@@ -123,7 +139,7 @@ class Pantographs:
     def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Heights and velocities (n_contacts,) at ``time`` from the motion alone. Rank 0 only."""
         height, velocity = np.empty(self.n_contacts), np.empty(self.n_contacts)
-        for model, strips in self._models_with_strips:
+        for model, strips in self._models_with_contacts:
             height[strips], velocity[strips] = model.extrapolate(time)
         return height, velocity
 
@@ -132,7 +148,7 @@ class Pantographs:
         if len(self.models) == 1:
             self._heads.adopt(self.models[0].predict(time))
             return self._heads
-        for model, strips in self._models_with_strips:
+        for model, strips in self._models_with_contacts:
             self._heads.put(strips, model.predict(time))
         return self._heads
 
@@ -144,7 +160,7 @@ class Pantographs:
         if len(self.models) == 1:
             self.models[0].advance(contact_force)
         else:
-            for model, strips in self._models_with_strips:
+            for model, strips in self._models_with_contacts:
                 model.advance(contact_force[strips])
         if self.joints_in_loop:
             self.look_at_joints()
@@ -155,7 +171,7 @@ class Pantographs:
     def records(self) -> np.ndarray | None:
         """The heads as a compiled loop steps them, None if it cannot step one of them."""
         records = np.zeros(self.n, dtype=HEAD)
-        for record, model, strips in zip(records, self.models, self._strips, strict=True):
+        for record, model, strips in zip(records, self.models, self._contacts, strict=True):
             if not isinstance(model, SteppedHead):
                 return None
             fill_head(record, {**model.record(), "first": strips.start})
@@ -192,17 +208,28 @@ class Pantographs:
         """Make and place all models. Rank 0 only."""
         velocity = np.zeros(self.n)
         if isinstance(problem.contact, KinematicLaw):
-            velocity = self.speed * self._wire.rest_slope(self._start)
+            velocity = self.speed * self._wires.rest_slope(self._start)
         for number, placement in enumerate(problem.train.placements):
-            model = _make(problem, simulated, placement, nominal_height(placement))
+            height = nominal_height(placement)
+            model = _make(problem, simulated, placement, height, self._wires.n_wires)
             model.place(float(self.head_height[number]), float(velocity[number]))
             self.models.append(model)
-        self._models_with_strips = list(zip(self.models, self._strips, strict=True))
+        self._models_with_contacts = list(zip(self.models, self._contacts, strict=True))
         self.look_at_joints()
 
 
+def _half_length(placement: Placement) -> float:
+    """Half length of the strips of a pantograph [m], infinite if it is not known."""
+    length = placement.data.strips.length
+    return np.inf if length is None else 0.5 * length
+
+
 def _make(
-    problem: Problem, simulated: Simulated, placement: Placement, nominal_height: float
+    problem: Problem,
+    simulated: Simulated,
+    placement: Placement,
+    nominal_height: float,
+    n_wires: int,
 ) -> Pantograph:
     numerics, train = problem.numerics, problem.train
     start, base = train.start - placement.behind, None
@@ -219,24 +246,29 @@ def _make(
         base,
         placement.lowering if simulated.lowering else None,
     )
-    return make_pantograph(placement.data, operation)
+    data = placement.data
+    return make_pantograph(replace(data, strips=replace(data.strips, wires=n_wires)), operation)
 
 
 def _lateral_path(
     problem: Problem, placement: Placement, base: BaseMotion | None
-) -> LateralPath | None:
-    """Where the wire crosses the strips of a pantograph, None if its head cannot roll."""
+) -> LateralPath | SeveralPaths | None:
+    """Where the wires cross the strips of a pantograph, None if its head cannot roll."""
     if roll_of(placement.data) is None:
         return None
-    train, wire = problem.train, problem.line.wires_of(Role.CONTACT)[0]
-    return LateralPath(
-        np.concatenate([piece.x for piece in wire.pieces]),
-        tuple(y for piece in wire.pieces for y in piece.y),
-        train.start - placement.behind,
-        placement.data.strip_offsets,
-        train.speed,
-        base,
-    )
+    train = problem.train
+    paths = [
+        LateralPath(
+            np.concatenate([piece.x for piece in wire.pieces]),
+            tuple(y for piece in wire.pieces for y in piece.y),
+            train.start - placement.behind,
+            placement.data.strip_offsets,
+            train.speed,
+            base,
+        )
+        for wire in problem.line.wires_of(Role.CONTACT)
+    ]
+    return paths[0] if len(paths) == 1 else SeveralPaths(paths)
 
 
 def nominal_height_rule(

@@ -92,7 +92,7 @@ class Gap:
             If one of them is no number; it would compare as out of contact and go unnoticed.
         """
         self.line = line
-        if not complementarity_kernels.subtract(heads.affine, line.line, self.affine):
+        if not complementarity_kernels.subtract(heads.affine, line.line, line.present, self.affine):
             raise RunBroken(NOT_FINITE)
 
     def under(self, force: np.ndarray, slack: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -251,6 +251,8 @@ class InnerProblem:
             heads=heads,
             line=line.line,
             gap=self.gap.affine,
+            present=line.present,
+            pulls=self.law.pulls,
             flags=line.share.flags,
             rows=line.rows,
             bounds=line.bounds,

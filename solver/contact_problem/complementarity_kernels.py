@@ -41,6 +41,8 @@ class SmallProblem(NamedTuple):
     Attributes
     ----------
     heads, line, gap : Affine at the contacts of both sides, and of the depths between them
+    present : (n,) 1 for contacts whose wire is on the strip, else 0
+    pulls : whether forces of those that are may have any sign
     flags : (1,) of ``line_response.FLAGS``, of which the number of rows is read
     rows : Rows of links that may switch
     bounds : Bounds of these rows
@@ -54,6 +56,8 @@ class SmallProblem(NamedTuple):
     heads: Affine
     line: Affine
     gap: Affine
+    present: np.ndarray
+    pulls: bool
     flags: np.ndarray
     rows: Rows
     bounds: Bounds
@@ -64,20 +68,25 @@ class SmallProblem(NamedTuple):
     max_rounds: int
 
 
+# Depth where there is no wire on a strip [m]: out of contact, whatever the law.
+NOWHERE = -1.0
+
+
 @compiled
-def subtract(heads, line, gap):
+def subtract(heads, line, present, gap):
     """Depths and rates at the contacts without forces, and what forces take off them, into ``gap``.
 
     Returns whether all of it is finite.
     """
     total, n = 0.0, gap.place.size
     for i in range(n):
-        gap.place[i] = heads.place[i] - line.place[i]
-        gap.rate[i] = heads.rate[i] - line.rate[i]
+        gap.place[i] = heads.place[i] - line.place[i] if present[i] else NOWHERE
+        gap.rate[i] = heads.rate[i] - line.rate[i] if present[i] else 0.0
         total += gap.place[i] + gap.rate[i]
         for j in range(n):
-            gap.by_force[i, j] = heads.by_force[i, j] + line.by_force[i, j]
-            gap.rate_by_force[i, j] = heads.rate_by_force[i, j] + line.rate_by_force[i, j]
+            gap.by_force[i, j] = present[i] * (heads.by_force[i, j] + line.by_force[i, j])
+            by_rate = heads.rate_by_force[i, j] + line.rate_by_force[i, j]
+            gap.rate_by_force[i, j] = present[i] * by_rate
             total += gap.by_force[i, j] + gap.rate_by_force[i, j]
     return np.isfinite(total)
 
@@ -296,10 +305,13 @@ def solve(problem):
     rows. Rounds are not positive if the active set did not settle; the problem then stands in
     matrix and right-hand side.
     """
-    heads, line, gap, flags, rows, bounds, tangents, coupled, unknowns, found, rounds = problem
-    always, matrix, right, solution = unknowns
-    n, count, max_rounds = gap.place.size, int(flags[0].rows), rounds
-    finite = subtract(heads, line, gap)
+    gap, rows, bounds, tangents = problem.gap, problem.rows, problem.bounds, problem.tangents
+    coupled, present, max_rounds = problem.coupled, problem.present, problem.max_rounds
+    always, matrix, right, solution = problem.unknowns
+    n, count = gap.place.size, int(problem.flags[0].rows)
+    finite = subtract(problem.heads, problem.line, present, gap)
+    for i in range(n):
+        always[i] = problem.pulls and present[i] != 0.0
     press(gap, tangents, right, matrix)
     force = solution[:n]
     rounds = settle(matrix[:n, :n], right[:n], always[:n], force, max_rounds)
@@ -310,6 +322,6 @@ def solve(problem):
         rounds = settle(
             matrix[:size, :size], right[:size], always[:size], solution[:size], max_rounds
         )
-    finite &= under(gap, rows, force, solution[n:size], found)
+    finite &= under(gap, rows, force, solution[n:size], problem.found)
     complete = not leaves_out(force, solution[n:size], rows, bounds, coupled)
     return rounds, size, finite, complete

@@ -20,6 +20,7 @@ from catenary.solver.base.errors import NotConverged, RunBroken
 from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import Coupled, LineResponse
 from catenary.solver.contact_problem.complementarity import InnerProblem, InnerSolution
+from catenary.solver.contact_problem.complementarity_kernels import NOWHERE
 from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.problem.problem import Numerics
 
@@ -99,9 +100,11 @@ class Explicit(_RemembersLaw):
         """Forces of the law at the extrapolation."""
         law = self.law
         depth = heads.early_height - line.early_height
+        depth[line.present == 0.0] = NOWHERE
         force = law.force(depth, heads.early_velocity - line.early_rate).copy()
         if not law.pulls:
             np.maximum(force, 0.0, out=force)
+        force[line.present == 0.0] = 0.0
         _refuse_diverged(force)
         inner = self._inner
         inner.pivoted = False
@@ -150,6 +153,7 @@ class Iterated:
             new = law.force(*gap.under(force, slack)).copy()
             if not law.pulls:
                 np.maximum(new, 0.0, out=new)
+            new[line.present == 0.0] = 0.0
             _refuse_diverged(new)
             change = float(np.abs(new - force).max(initial=0.0))
             force = new

@@ -89,6 +89,7 @@ class Exchange:
         self._reduce.begin()
         # Two ranks at most own the ends of an element: the order of summing does not matter.
         mine, all_together = self._sums
+        self._merged.present[:] = share.present
         comm.Reduce(mine, all_together if is_root else None, op=MPI.SUM, root=0)
         self._count(share.summed.nbytes)
         if not is_root:
@@ -153,7 +154,7 @@ class Exchange:
             return
         if total > merged.capacity:
             larger = LineResponse(self._n, 2 * total, self._early, self._bounds)
-            larger.summed[:] = merged.summed
+            larger.summed[:], larger.present[:] = merged.summed, merged.present
             self._merged = merged = larger
             self._sums = self._sums[0], _message(larger.summed)
         end = share.count

@@ -13,6 +13,7 @@ from catenary.solver.base.parallel import on_root
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.pantographs import Pantographs
+from catenary.solver.contact_problem.complementarity_kernels import NOWHERE
 from catenary.solver.contact_problem.coupling import DIVERGED
 from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.problem.problem import Numerics
@@ -141,8 +142,11 @@ class FixedPoint:
             self.comm.Allreduce(MPI.IN_PLACE, both)
         height, rate = both
         depth = heads.height - heads.height_compliance @ force - height
+        nowhere = ~self.interaction.present()
+        depth[nowhere] = NOWHERE
         speed = heads.velocity - heads.velocity_compliance @ force - rate
         new = self.law.force(depth, speed).copy()
+        new[nowhere] = 0.0
         return (new if self.law.pulls else np.maximum(new, 0.0)), depth, speed
 
     def _compensation(self) -> np.ndarray:

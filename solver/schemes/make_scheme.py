@@ -79,7 +79,7 @@ class SchemeFactory:
             self.form,
             line,
             (train.start - trailing - reach[0], train.end + reach[1]),
-            pantographs.contact_place,
+            pantographs.candidates,
             train.speed,
             uses_rate,
             switching_links(model, self.form.dropper_force),

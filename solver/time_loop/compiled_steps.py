@@ -76,7 +76,7 @@ class CompiledSteps:
         self._records, self._law = records, law
         self._heads = np.zeros(2 * n * (1 + n))
         self._at_contacts = affine(self._heads, n)
-        self._drives = np.zeros((self.most, pantographs.n, drive_width(max(pantographs.n_strips))))
+        self._drives = np.zeros((self.most, pantographs.n, drive_width(pantographs.most_contacts)))
         self._counts = np.zeros(2, dtype=np.int64)
         self._bound_to: tuple[Any, Any] = None, None
         self._bound: Callable[[int, int], tuple[int, bool]]

@@ -20,11 +20,12 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from catenary.meshgen.line import Role
 from catenary.solver.base.errors import CatenaryError, InputError, RunBroken
 from catenary.solver.base.flush_to_zero import flushed
 from catenary.solver.base.freed_memory import give_back
 from catenary.solver.base.petsc import PETSc
-from catenary.solver.contact.contact_wire import ContactWire
+from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.integrators.detour import Detour, tell
 from catenary.solver.linear.petsc_solvers import (
@@ -105,11 +106,16 @@ class March:
                 f"numerics.scheme is ts_alpha2, which runs on one rank only, not on {comm.size}: "
                 'take "one_solve", or start it without mpirun'
             )
+        if problem.numerics.scheme == "ts_alpha2" and len(problem.line.wires_of(Role.CONTACT)) > 1:
+            raise InputError(
+                "numerics.scheme is ts_alpha2, for one contact wire only, and this line has "
+                'several: take "one_solve"'
+            )
         self._first = model
         self._form = form
         self.ownership = distribute(model, comm.size, comm.rank)
         self._nominal_height = nominal_height_rule(model, form, elasticity)
-        self._wire = ContactWire(model, form, self.ownership)
+        self._wire = ContactWires(model, form, self.ownership)
         self._pantographs = Pantographs(
             comm, problem, model.simulated, self._wire, self._nominal_height
         )

@@ -40,7 +40,7 @@ class Steps(NamedTuple):
     records : of all heads, ``head_records.HEAD``
     heads : (2 n + 2 n^2,) all strips as functions of the forces, see ``HeadState``
     law : which forces the contact law reports
-    ends : of the contacts of each pantograph, see ``contact_kernels.write_outputs``
+    ends : contacts of each strip and strips of each pantograph
     switched : (m,) int, room for the numbers of links with a row
     outputs : outputs of the pantographs, of which ``of_step`` is filled by a step
     taps : (k,) int, addresses of the numbers of further channels, see ``RowLayout``
@@ -60,7 +60,7 @@ class Steps(NamedTuple):
     superposing: tuple[Any, ...]
     compensating: tuple[Any, ...]
     switched: np.ndarray
-    ends: np.ndarray
+    ends: contact_kernels.Ends
     of_step: np.ndarray
     outputs: np.ndarray
     shown: state_kernels.Shown
@@ -123,7 +123,7 @@ def take(steps, times, drives, rows, kept_motions, counts, shows, first, n_steps
     records, heads, taps, shown = steps.records, steps.heads, steps.taps, steps.shown
     problem, law, switched, outputs = steps.problem, steps.law, steps.switched, steps.outputs
     solution, depth, motion = problem.unknowns.solution, problem.found[0], shown.motion
-    n, n_outputs = steps.ends[-1], outputs.size
+    n, n_outputs = problem.gap.place.size, outputs.size
     n_arms = n_outputs + shown.arms.size
     n_shown = n_arms + shown.droppers.law.size
     force = solution[:n]

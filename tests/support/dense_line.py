@@ -46,7 +46,7 @@ class DenseLink:
 
 @dataclass
 class DenseLine:
-    """Wires with what joins them, and one lumped pantograph of two masses under the contact wire.
+    """Wires with what joins them, and one lumped pantograph of two masses under the contact wires.
 
     Unknowns are w and dw/dx of each mesh node by its number, then the masses' heights, head first.
     ``dampers_act`` tells whether a slack dropper keeps its damper, ``share`` what it keeps besides.
@@ -62,6 +62,7 @@ class DenseLine:
     tried: int = 0
     acting: frozenset[int] = frozenset()
     state: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    contact_forces: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         line, mesh = self.problem.line, self.mesh
@@ -136,11 +137,14 @@ class DenseLine:
                 )
         return result
 
-    def meets(self, x: float) -> tuple[np.ndarray, float]:
-        """How the depth of the head at ``x`` [m] follows from the unknowns: direction and rest."""
-        (contact,) = self.problem.line.wires_of(Role.CONTACT)
-        nodes = self.mesh.wires[contact.name]
+    def meets(self, x: float, contact: int = 0) -> tuple[np.ndarray, float]:
+        """How the depth of the head at ``x`` [m] in a contact wire follows from the unknowns:
+        direction and rest; out of reach where the wire is not."""
+        wire = self.problem.line.wires_of(Role.CONTACT)[contact]
+        nodes = self.mesh.wires[wire.name]
         places = self.mesh.points[nodes, 0]
+        if not places[0] < x <= places[-1]:
+            return np.zeros(self.size), -1.0
         e = int(np.searchsorted(places, x)) - 1
         functions = hermite(places[e + 1] - places[e])
         values = np.array([f(x - places[e]) for f in functions])
@@ -163,7 +167,8 @@ class DenseLine:
         mass, damping, stiffness = self.matrices
         d, v, a = self.state
         d, v = d + dt * v + dt**2 / 4 * a, v + dt / 2 * a
-        direction, rest = self.meets(x)
+        n_contacts = len(self.problem.line.wires_of(Role.CONTACT))
+        contacts = [self.meets(x, number) for number in range(n_contacts)]
         law = self.problem.contact.stiffness  # type: ignore[union-attr]
         step = mass + dt / 2 * damping + dt**2 / 4 * stiffness
         right = self.load - damping @ v - stiffness @ d
@@ -175,34 +180,39 @@ class DenseLine:
         worth = self.spring * dt**2 / 4 + c * dt / 2
         change = np.where(self.open, 1.0, kept - 1.0)
         known = self.rest + self.spring * (self.pull @ d) + c * (self.pull @ v)
-        found: list[tuple[frozenset[int], np.ndarray, np.ndarray, float]] = []
+        found: list[tuple[frozenset[int], np.ndarray, np.ndarray, np.ndarray]] = []
         for acts in self._sets():
             matrix, force = step.copy(), right.copy()
-            for number in acts - {-1}:
+            for number in (number for number in acts if number >= 0):
                 pull = self.pull[number]
                 matrix += change[number] * worth[number] * np.outer(pull, pull)
                 force -= change[number] * known[number] * pull
-            if -1 in acts:
-                matrix += law * dt**2 / 4 * np.outer(direction, direction)
-                force -= law * (direction @ d + rest) * direction
+            for number, (direction, rest) in enumerate(contacts, start=1):
+                if -number in acts:
+                    matrix += law * dt**2 / 4 * np.outer(direction, direction)
+                    force -= law * (direction @ d + rest) * direction
             new = np.zeros(self.size)
             new[self.free] = np.linalg.solve(matrix[np.ix_(self.free, self.free)], force[self.free])
             tension = known + worth * (self.pull @ new)
-            depth = float(direction @ (d + dt**2 / 4 * new) + rest)
+            moved = d + dt**2 / 4 * new
+            depth = np.array([direction @ moved + rest for direction, rest in contacts])
             beyond = np.where(self.open, tension > 0.0, tension < 0.0)
             switched = set(np.flatnonzero(beyond).tolist())
-            if switched | ({-1} if depth > 0.0 else set()) == acts:
+            if switched | set((-1 - np.flatnonzero(depth > 0.0)).tolist()) == acts:
                 found.append((acts, new, tension, depth))
                 if not every_set:
                     break
         self.tried = len(found)
         self.acting, new, tension, depth = found[0]
         self.state = np.array([d + dt**2 / 4 * new, v + dt / 2 * new, new])
-        return law * max(depth, 0.0), np.where(tension < 0.0, kept * tension, tension)
+        self.contact_forces = law * np.maximum(depth, 0.0)
+        return float(self.contact_forces.sum()), np.where(tension < 0.0, kept * tension, tension)
 
     def _sets(self) -> Iterator[frozenset[int]]:
-        """All sets of slack droppers and of -1, the contact; those near the latest one first."""
-        whole = [-1, *range(len(self.pull))]
+        """All sets of switched links and of -1, -2 ..., the contacts; those near the latest one
+        first."""
+        n_contacts = len(self.problem.line.wires_of(Role.CONTACT))
+        whole = [*range(-n_contacts, 0), *range(len(self.pull))]
         for distance in range(len(whole) + 1):
             for other in combinations(whole, distance):
                 yield self.acting ^ frozenset(other)

@@ -18,7 +18,7 @@ from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.hard import checks as hard_checks
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.cases import HardCase, hard_cases
-from catenary.solver.contact.contact_wire import ContactWire
+from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
@@ -67,7 +67,7 @@ def test_energy_falls_by_what_damping_takes_and_nothing_else(
     scene = load_scene("en50318_2002", [*COMMON, *words, f"line.damping.alpha_s={damping}"])
     rest = hard_runs.at_rest(scene, MPI.COMM_SELF)
     model, dt = rest.model, rest.problem.numerics.dt
-    wire = ContactWire(model, rest.form, distribute(model, 1, 0))
+    wire = ContactWires(model, rest.form, distribute(model, 1, 0))
     watcher = States(wire, (), hard_runs.LineBalance(model, rest.problem))
     with March(MPI.COMM_SELF, rest.problem, model, rest.form, rest.lift) as march:
         assert march.run([watcher]).outcome == "done"

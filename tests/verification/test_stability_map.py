@@ -16,7 +16,7 @@ from catenary.cases.studies.stability.by_marching import COUPLINGS, Bench
 from catenary.cases.studies.stability.map import RESOLUTION, Grid, as_rows, find, make_map
 from catenary.cases.studies.stability.picture import draw
 from catenary.mbs.lumped_data import LumpedData
-from catenary.solver.contact.contact_wire import ContactWire
+from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.line_at_rest import line_at_rest
 
@@ -29,14 +29,14 @@ def bench() -> Bench:
     """Three spans with damping, droppers that stay taut, contact that lasts."""
     problem = problem_of(en50318_line(3), HANGING | {"structural_damping"})
     rest = line_at_rest(problem, mesh_of(en50318_line(3), 3))
-    wire = ContactWire(rest.model, rest.form, distribute(rest.model, 1, 0))
+    wire = ContactWires(rest.model, rest.form, distribute(rest.model, 1, 0))
     place = theory.lightest_place(rest.model, wire, 60.0, 120.0)
     return Bench(rest, EN_PANTOGRAPH, place, MPI.COMM_SELF)
 
 
 def line_at(bench: Bench, n_vectors: int = theory.N_VECTORS) -> theory.PointModel:
     model = bench.rest.model
-    wire = ContactWire(model, bench.rest.form, distribute(model, 1, 0))
+    wire = ContactWires(model, bench.rest.form, distribute(model, 1, 0))
     return theory.point_model(model, theory.load_at(wire, bench.x, model.n_dofs), n_vectors)
 
 
@@ -85,7 +85,7 @@ def test_a_line_as_a_point_sees_it_is_the_line(bench: Bench) -> None:
     """The reduced line has the answer of all unknowns within a step, and the same step matrix's
     radius beyond the limit, where one eigenvalue of the contact stands out."""
     model = bench.rest.model
-    wire = ContactWire(model, bench.rest.form, distribute(model, 1, 0))
+    wire = ContactWires(model, bench.rest.form, distribute(model, 1, 0))
     load = theory.load_at(wire, bench.x, model.n_dofs)
     mass, stiffness, damping = (part.toarray() for part in theory.matrices(model))
     line = line_at(bench)

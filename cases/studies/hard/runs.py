@@ -21,7 +21,7 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.solver.base.parallel import on_root
-from catenary.solver.contact.contact_wire import ContactWire
+from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.matrices import stiffness_matrix, whole_matrix
 from catenary.solver.model.model import Model
@@ -178,7 +178,7 @@ class Watcher:
 
     def __init__(
         self,
-        wire: ContactWire | None = None,
+        wire: ContactWires | None = None,
         keep: Collection[int] = (),
         balance: LineBalance | None = None,
     ) -> None:
@@ -288,7 +288,7 @@ def cut_of(rest: LineAtRest) -> float:
 
 def rest_height(rest: LineAtRest, x: np.ndarray) -> np.ndarray:
     """Height of the contact wire at rest at places ``x`` [m], shape as ``x``."""
-    wire = ContactWire(rest.model, rest.form, distribute(rest.model, 1, 0))
+    wire = ContactWires(rest.model, rest.form, distribute(rest.model, 1, 0))
     return wire.rest_height(x.ravel()).reshape(x.shape)
 
 
@@ -299,7 +299,7 @@ def node_places(rest: LineAtRest) -> np.ndarray:
 
 def run(rest: LineAtRest, comm: Any, with_work: bool = False) -> Watched:
     """March to the end, or to where it breaks. Collective; ``with_work`` on one rank only."""
-    wire = ContactWire(rest.model, rest.form, distribute(rest.model, 1, 0)) if with_work else None
+    wire = ContactWires(rest.model, rest.form, distribute(rest.model, 1, 0)) if with_work else None
     simulated = rest.model.simulated
     balance = LineBalance(rest.model, rest.problem) if with_work else None
     keep = [happened.step for happened in in_steps(simulated.incidents, rest.problem.numerics.dt)]

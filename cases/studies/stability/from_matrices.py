@@ -25,7 +25,7 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
 from catenary.mbs.lumped_data import LumpedData
-from catenary.solver.contact.contact_wire import ContactWire
+from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
 
@@ -86,7 +86,7 @@ def matrices(model: Model) -> tuple[csc_matrix, csc_matrix, csc_matrix]:
     )
 
 
-def load_at(wire: ContactWire, x: float, n_dofs: int) -> np.ndarray:
+def load_at(wire: ContactWires, x: float, n_dofs: int) -> np.ndarray:
     """Load of a unit force on the contact wire at ``x`` [m], shape (n_dofs,)."""
     touch = wire.touches(np.array([x]))[0]
     dofs = wire.dofs[touch["element"] + np.array([0, 1])].ravel()
@@ -95,7 +95,7 @@ def load_at(wire: ContactWire, x: float, n_dofs: int) -> np.ndarray:
     return load
 
 
-def lightest_place(model: Model, wire: ContactWire, low: float, high: float) -> float:
+def lightest_place(model: Model, wire: ContactWires, low: float, high: float) -> float:
     """Where in [low, high] [m] the contact wire meets a force with the least mass.
 
     An element's ends and eight places in between are tried. Not collective.

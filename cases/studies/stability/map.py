@@ -27,7 +27,7 @@ from catenary.cases.studies.stability.by_marching import (
 )
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.base.errors import InputError
-from catenary.solver.contact.contact_wire import ContactWire
+from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.elasticity import middle_span
 
@@ -170,7 +170,7 @@ def make_map(
     rest = at_rest(scene, comm)
     data = rest.problem.train.placements[0].data
     assert isinstance(data, LumpedData)  # the scene was refused otherwise
-    wire = ContactWire(rest.model, rest.form, distribute(rest.model, 1, 0))
+    wire = ContactWires(rest.model, rest.form, distribute(rest.model, 1, 0))
     place = theory.lightest_place(rest.model, wire, *middle_span(rest.problem.line))
     line = theory.point_model(rest.model, theory.load_at(wire, place, rest.model.n_dofs))
     bench = Bench(rest, data, place, comm)

@@ -11,7 +11,7 @@ from measuring import march
 from small_lines import HANGING, WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 
 from catenary.solver.contact import contact_kernels
-from catenary.solver.contact.contact_wire import ContactWire
+from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.equilibrium import find_form
 
@@ -20,12 +20,12 @@ EPS = np.finfo(float).eps
 
 
 @pytest.fixture(scope="module")
-def wire() -> ContactWire:
+def wire() -> ContactWires:
     model, form = find_form(problem_of(LINE, HANGING), mesh_of(LINE, 3))
-    return ContactWire(model, form, distribute(model, 1, 0))
+    return ContactWires(model, form, distribute(model, 1, 0))
 
 
-def test_positions_fall_into_the_elements_that_hold_them(wire: ContactWire) -> None:
+def test_positions_fall_into_the_elements_that_hold_them(wire: ContactWires) -> None:
     x = np.linspace(0.0, wire.x[-1], 997)
     touches = wire.touches(x)
     assert (wire.x[touches["element"]] <= x).all()
@@ -35,7 +35,7 @@ def test_positions_fall_into_the_elements_that_hold_them(wire: ContactWire) -> N
     assert np.array_equal(at_nodes["element"], np.maximum(np.arange(wire.x.size) - 1, 0))
 
 
-def test_places_are_found_from_wherever_a_contact_was_before(wire: ContactWire) -> None:
+def test_places_are_found_from_wherever_a_contact_was_before(wire: ContactWires) -> None:
     """A step mostly stays in its element; a start, a restart or a shorter step need not."""
     for x in (0.0, 110.0, 3.0, wire.x[7], wire.x[-1] + 1.0, wire.x[-1], wire.x[6], -1.0):
         place = np.array([x])
@@ -46,7 +46,7 @@ def test_places_are_found_from_wherever_a_contact_was_before(wire: ContactWire) 
         assert moved["element"][0] == expected
 
 
-def test_slopes_are_the_derivatives_of_the_values(wire: ContactWire) -> None:
+def test_slopes_are_the_derivatives_of_the_values(wire: ContactWires) -> None:
     """Central differences over 2 mm: error h^2 / 6 of a cubic's third derivative, 12 / l^3."""
     step = 1e-3
     middle = (wire.x[:-1] + wire.x[1:]) / 2 + 0.1
@@ -59,14 +59,14 @@ def test_slopes_are_the_derivatives_of_the_values(wire: ContactWire) -> None:
     assert np.array_equal(at["value"], at["whole_value"])  # one rank owns everything
 
 
-def test_height_at_rest_is_continuous_and_that_of_the_nodes(wire: ContactWire) -> None:
+def test_height_at_rest_is_continuous_and_that_of_the_nodes(wire: ContactWires) -> None:
     before, after = wire.touches(wire.x[1:-1] - 1e-9), wire.touches(wire.x[1:-1] + 1e-9)
     heights = [(t["whole_value"] * t["rest"]).sum(axis=1) for t in (before, after)]
     # 2 nm further along a slope below 1/10.
     assert np.abs(heights[1] - heights[0]).max() < 2e-10 + 16 * EPS * LINE.contact_height
 
 
-def test_a_run_that_ends_at_a_node_stays_within_its_stretch(wire: ContactWire) -> None:
+def test_a_run_that_ends_at_a_node_stays_within_its_stretch(wire: ContactWires) -> None:
     """Positions are start + V t: their last bit must not lead out of the tabulated columns."""
     passed, outside = 0, 0
     for speed, dt in itertools.product((50.0, 250 / 3.6, 83.3), (1e-3, 0.7e-3)):
