@@ -39,8 +39,8 @@ ROOMS = {
         "response", "lumped", "lowering", "roll", "build",
     ),
     "solver": (
-        "base", "problem", "model", "effects", "linear", "statics", "integrators", "contact",
-        "contact_problem", "schemes", "time_loop",
+        "base", "problem", "model", "effects", "linear", "statics", "waves", "integrators",
+        "contact", "contact_problem", "schemes", "time_loop",
     ),
     "postproc": ("standards", "channels", "files", "read", "record", "evaluate", "film", "paraview",
         "report",
@@ -50,7 +50,7 @@ ROOMS = {
         "scene.cost_model", "scene.checks", "scene.load", "terminal", "process",
         "result_folder", "run",
         "studies.sweep", "studies.pantograph", "studies.accuracy", "studies.hard",
-        "studies.stability", "studies.case_study", "ambrosio2012", "cli",
+        "studies.stability", "studies.waves", "studies.case_study", "ambrosio2012", "cli",
     ),
 }  # fmt: skip
 FILES = sorted(path for part in PARTS for path in (ROOT / part).rglob("*.py"))

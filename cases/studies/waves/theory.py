@@ -1,0 +1,79 @@
+"""What closed forms and the periodic line say about the waves of a scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catenary.meshgen.line import Role
+from catenary.solver.base.errors import InputError
+from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.elasticity import middle_span
+from catenary.solver.statics.line_at_rest import LineAtRest
+from catenary.solver.waves.bloch import BlochWaves, bloch_waves, period_of
+
+# Forces are judged below this frequency (EN 50317) [Hz].
+HIGHEST = 20.0
+
+
+@dataclass(frozen=True)
+class WaveTheory:
+    """Figures of a line under a train.
+
+    Attributes
+    ----------
+    speed : of the train [m/s]
+    wave_speed : of the contact wire as a string, sqrt(T / m) [m/s]
+    doppler : (c - v) / (c + v) [-]: an echo from ahead comes back with its frequency over this
+    reflection : share of a wave on the contact wire that a stiff dropper sends back,
+        Z_m / (Z_c + Z_m) with impedances sqrt(T m); NaN for lines of more than two wires [-]
+    amplification : reflection / doppler, by which an echo grows with each return [-]
+    bloch : waves of the line as a periodic one, None if its spans are not alike
+    why_not : why there are none, empty otherwise
+    """
+
+    speed: float
+    wave_speed: float
+    doppler: float
+    reflection: float
+    amplification: float
+    bloch: BlochWaves | None
+    why_not: str
+
+    def bands(self) -> np.ndarray:
+        """Pass bands, (n, 2) [Hz]."""
+        return np.zeros((0, 2)) if self.bloch is None else self.bloch.pass_bands(HIGHEST)
+
+    def outrunning(self) -> np.ndarray:
+        """Ranges of frequency with a wave that is faster than the train, (n, 2) [Hz]."""
+        waves = self.bloch
+        if waves is None:
+            return np.zeros((0, 2))
+        faster = np.abs(waves.group_velocity) > self.speed
+        inside = faster & (waves.frequency <= HIGHEST)
+        found = np.sort(waves.frequency[inside])
+        if not found.size:
+            return np.zeros((0, 2))
+        # Neighbours that are no further apart than waves of neighbouring phases are one range.
+        gap = max(0.1, float(np.abs(np.diff(waves.frequency, axis=0)).max()))
+        first = np.append(True, np.diff(found) > gap)
+        return np.column_stack([found[first], found[np.append(first[1:], True)]])
+
+
+def wave_theory(problem: Problem, rest: LineAtRest) -> WaveTheory:
+    """Figures of a problem and its line at rest. Not collective."""
+    contact = problem.line.wires_of(Role.CONTACT)[0]
+    carriers = [wire for wire in problem.line.wires if wire.role is not Role.CONTACT]
+    c, v = contact.wave_speed, problem.train.speed
+    reflection = np.nan
+    if len(carriers) == 1:
+        z_m, z_c = (np.sqrt(wire.tension * wire.mass_per_length) for wire in (carriers[0], contact))
+        reflection = float(z_m / (z_m + z_c))
+    doppler = (c - v) / (c + v)
+    waves, why_not = None, ""
+    try:
+        waves = bloch_waves(period_of(rest.model, *middle_span(problem.line)), HIGHEST)
+    except InputError as error:
+        why_not = str(error)
+    return WaveTheory(v, c, doppler, reflection, reflection / doppler, waves, why_not)

@@ -1,0 +1,1 @@
+"""Waves of a line that repeats itself: which of them travel, and how fast."""

@@ -1,0 +1,268 @@
+"""Bloch waves of a periodic line: its pass bands and group velocities.
+
+A line whose spans are alike carries waves that are multiplied by exp(-i q) from span to span. For
+each phase q the periods couple to K(q) = K_next exp(-i q) + K_own + K_previous exp(i q), and the
+frequencies are the eigenvalues of K(q) phi = omega^2 M(q) phi. Frequencies that no q has do not
+travel (L. Brillouin, Wave Propagation in Periodic Structures, 1946). Droppers are taut, and there
+is no damping.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy import linalg
+
+from catenary.meshgen.line import Role
+from catenary.solver.base.errors import InputError
+from catenary.solver.model.matrices import whole_matrix
+from catenary.solver.model.model import Model
+
+# Relative difference of the matrices of two spans that counts as none.
+_ALIKE = 1e-9
+# Phases q from 0 to pi at which waves are found, unless told otherwise.
+N_PHASES = 49
+# Waves up to so many times the highest frequency are found, so that branches are whole.
+_MARGIN = 1.5
+# Modes of a span that waves are made of, up to so many times the highest frequency: the error of
+# a frequency is below (1 / 5)^4 of the share that modes above it have.
+_MODES_UP_TO = 5.0
+# That error, seen on a string, which has no gaps: 1e-4 at the highest frequency.
+_GAP = 2e-4
+
+
+@dataclass(frozen=True)
+class Period:
+    """One span of a periodic line and how it is joined to the next, n unknowns a span.
+
+    Attributes
+    ----------
+    length : [m]
+    stiffness, mass : (n, n) of its own unknowns [N/m], [kg] and so on
+    stiffness_next, mass_next : (n, n) rows of its own unknowns, columns of the next span's
+    contact : (m,) which of the unknowns are deflections of the contact wire
+    contact_x : (m,) where these stand, from the start of the span [m]
+    """
+
+    length: float
+    stiffness: np.ndarray
+    mass: np.ndarray
+    stiffness_next: np.ndarray
+    mass_next: np.ndarray
+    contact: np.ndarray
+    contact_x: np.ndarray
+
+
+@dataclass(frozen=True)
+class BlochWaves:
+    """Waves of a periodic line up to a frequency, p phases and b branches.
+
+    Attributes
+    ----------
+    length : of a period [m]
+    phase : (p,) from 0 to pi, both included [rad a period]
+    frequency : (p, b) ascending in each row [Hz]
+    group_velocity : (p, b) of travel of their energy [m/s], zero at the ends of a branch
+    shape : (p, b, m) deflection of the contact wire at ``contact_x``, complex, largest value 1
+    contact_x : (m,) [m]
+    """
+
+    length: float
+    phase: np.ndarray
+    frequency: np.ndarray
+    group_velocity: np.ndarray
+    shape: np.ndarray
+    contact_x: np.ndarray
+
+    def pass_bands(self, highest: float) -> np.ndarray:
+        """Ranges of frequency in which a wave travels, those that overlap as one, (n, 2) [Hz].
+
+        A gap below the error of the frequencies is none.
+
+        Up to ``highest`` [Hz]. Ends of branches lie at phases 0 and pi but for those that cross:
+        a band's ends are known to the distance of two phases there.
+        """
+        low, high = self.frequency.min(axis=0), self.frequency.max(axis=0)
+        merged: list[list[float]] = []
+        for start, end in sorted(zip(low.tolist(), high.tolist(), strict=True)):
+            if start > highest:
+                break
+            if merged and start <= (1.0 + _GAP) * merged[-1][1]:
+                merged[-1][1] = max(merged[-1][1], end)
+            else:
+                merged.append([start, end])
+        return np.array(merged).reshape(-1, 2)
+
+    def fastest(self, highest: float) -> tuple[float, float]:
+        """The greatest group velocity of waves up to a frequency [m/s], and the frequency of its
+        wave [Hz]."""
+        speed = np.where(self.frequency <= highest, np.abs(self.group_velocity), 0.0)
+        at = np.unravel_index(speed.argmax(), speed.shape)
+        return float(speed[at]), float(self.frequency[at])
+
+    def harmonics(self, share: float = 0.1) -> np.ndarray:
+        """Wavenumbers along the contact wire and frequencies of all waves, (n, 3).
+
+        Rows are wavenumber [rad/m], frequency [Hz] and the amplitude [-] of exp(-i k x) in the
+        wave's deflection, as far as it is at least ``share`` of the largest in a wave.
+        """
+        rows = []
+        m = self.contact_x.size
+        orders = np.arange(-(m // 2), m // 2 + 1)
+        lengths = np.diff(np.append(self.contact_x, self.length))
+        # Middle of the gaps on both sides of a node: the trapezoidal rule over a period.
+        weight = 0.5 * (lengths + np.roll(lengths, 1)) / self.length
+        for p, phase in enumerate(self.phase.tolist()):
+            k = (phase + 2 * np.pi * orders) / self.length
+            wave = np.exp(1j * np.outer(k, self.contact_x))
+            amplitude = np.abs((self.shape[p] * weight) @ wave.T)
+            for b, frequency in enumerate(self.frequency[p].tolist()):
+                strong = amplitude[b] >= share * amplitude[b].max(initial=0.0)
+                rows += [
+                    (k_n, frequency, a)
+                    for k_n, a in zip(
+                        k[strong].tolist(), amplitude[b, strong].tolist(), strict=True
+                    )
+                ]
+        return np.array(rows).reshape(-1, 3)
+
+
+def period_of(model: Model, start: float, end: float) -> Period:
+    """The span of a line from ``start`` to ``end`` [m], as one of many. Not collective.
+
+    Raises
+    ------
+    InputError
+        If the spans on both sides of it are not like it.
+    """
+    unknowns = model.numbering
+    length = end - start
+    starts = [_first_number(model, x) for x in (start - length, start, end, end + length)]
+    if len(set(np.diff(starts).tolist())) > 1:
+        raise InputError(
+            f"the spans beside that from {start:g} to {end:g} m have other nodes: the waves of a "
+            "periodic line need spans that are alike"
+        )
+    own, after = slice(starts[1], starts[2]), slice(starts[2], starts[3])
+    parts = []
+    for kind in ({"stiffness": 1.0}, {"mass": 1.0}):
+        whole = whole_matrix(model, **kind).tocsr()
+        mine, joined = whole[own, own].toarray(), whole[own, after].toarray()
+        beside = whole[after, after].toarray()
+        if np.abs(mine - beside).max() > _ALIKE * np.abs(mine).max():
+            raise InputError(
+                f"the span from {start:g} to {end:g} m is not like the next one: the waves of a "
+                "periodic line need spans that are alike"
+            )
+        parts += [mine, joined]
+    contact = model.problem.line.wires_of(Role.CONTACT)[0]
+    nodes = np.unique(model.mesh.elements(contact.name))
+    numbers, x = unknowns.of(nodes, "w"), model.mesh.x(nodes)
+    inside = np.flatnonzero((numbers >= starts[1]) & (numbers < starts[2]))
+    inside = inside[np.argsort(x[inside])]
+    stiffness, stiffness_next, mass, mass_next = parts
+    return Period(
+        length, stiffness, mass, stiffness_next, mass_next,
+        (numbers[inside] - starts[1]).astype(np.int64), x[inside] - start,
+    )  # fmt: skip
+
+
+def _first_number(model: Model, x: float) -> int:
+    """Number of the first unknown of the station at a place along the track [m]."""
+    return int(model.numbering.within(x - 1e-6, np.inf)[0])
+
+
+def bloch_waves(period: Period, highest: float, n_phases: int = N_PHASES) -> BlochWaves:
+    """The waves of a periodic line up to a frequency [Hz]. Not collective.
+
+    Branches that begin below ``highest`` are whole.
+    """
+    # What nodes lack or effects hold has no mass, and is no part of a wave.
+    free = np.flatnonzero(np.diag(period.mass) > 0.0)
+    pick = np.ix_(free, free)
+    spans = _Spans(
+        period.stiffness[pick], period.stiffness_next[pick], period.mass[pick],
+        period.mass_next[pick],
+    )  # fmt: skip
+    at = np.searchsorted(free, period.contact)
+    basis = spans.basis((2 * np.pi * _MODES_UP_TO * highest) ** 2)
+    phase = np.linspace(0.0, np.pi, n_phases)
+    above = (2 * np.pi * _MARGIN * highest) ** 2
+    found = []
+    for q in phase.tolist():
+        squares, shapes, slope = spans.waves(q, basis, above)
+        omega = np.sqrt(np.maximum(squares, 0.0))
+        velocity = period.length * slope / np.maximum(2 * omega, 1e-9)
+        found.append((omega / (2 * np.pi), velocity, shapes[at]))
+    n_all = min(row[0].size for row in found)
+    frequency = np.array([row[0][:n_all] for row in found])
+    n = int((frequency.min(axis=0) <= highest).sum())
+    shape = np.array([row[2][:, :n].T for row in found])
+    largest = np.abs(shape).max(axis=2, keepdims=True)
+    return BlochWaves(
+        period.length,
+        phase,
+        frequency[:, :n],
+        np.array([row[1][:n] for row in found]),
+        shape / np.where(largest > 0.0, largest, 1.0),
+        period.contact_x,
+    )
+
+
+class _Basis(NamedTuple):
+    """Shapes in which the waves of a span are sought (R. Craig, M. Bampton, AIAA J. 6, 1968).
+
+    What a span does statically when the unknowns at its start and its end move, (n, b) each, and
+    its modes with both held, (n, m).
+    """
+
+    start: np.ndarray
+    end: np.ndarray
+    modes: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Spans:
+    """K and M of a span and its coupling with the next, (n, n) each."""
+
+    k: np.ndarray
+    k_next: np.ndarray
+    m: np.ndarray
+    m_next: np.ndarray
+
+    def basis(self, up_to: float) -> _Basis:
+        """With modes up to omega^2 ``up_to``."""
+        n = self.k.shape[0]
+        joined = self.k_next.any(axis=0) | self.m_next.any(axis=0)
+        shared, inner = np.flatnonzero(joined), np.flatnonzero(~joined)
+        stiffness, mass = (part[np.ix_(inner, inner)] for part in (self.k, self.m))
+        start, end = np.zeros((n, shared.size)), np.zeros((n, shared.size))
+        start[shared] = np.eye(shared.size)
+        beside = [self.k[np.ix_(inner, shared)], self.k_next[np.ix_(inner, shared)]]
+        start[inner], end[inner] = (-linalg.solve(stiffness, b, assume_a="pos") for b in beside)
+        _, shapes = linalg.eigh(stiffness, mass, subset_by_value=(-np.inf, up_to))
+        modes = np.zeros((n, shapes.shape[1]))
+        modes[inner] = shapes
+        return _Basis(start, end, modes)
+
+    def waves(
+        self, q: float, basis: _Basis, above: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """omega^2 (w,) up to ``above``, shapes (n, w) and d omega^2 / d q (w,) at a phase q."""
+        turn = np.exp(-1j * q)
+        shapes = np.hstack([basis.start + turn * basis.end, basis.modes])
+        joined = [turn * part for part in (self.k_next, self.m_next)]
+        k, m = (own + j + j.conj().T for own, j in zip((self.k, self.m), joined, strict=True))
+        squares, weights = linalg.eigh(
+            shapes.conj().T @ k @ shapes,
+            shapes.conj().T @ m @ shapes,
+            subset_by_value=(-np.inf, above),
+        )
+        waves = shapes @ weights
+        by_phase = [-1j * j + (-1j * j).conj().T for j in joined]
+        slope, of_mass = (
+            np.einsum("iw,iw->w", waves.conj(), part @ waves).real for part in by_phase
+        )
+        return squares, waves, slope - squares * of_mass

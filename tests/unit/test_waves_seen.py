@@ -1,0 +1,69 @@
+"""The motion of a wire over place and time, and its spectrum, of waves that are given."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from program import catenary
+
+from catenary.cases.studies.waves.seen import WavesSeen
+
+SPEED = 40.0
+
+
+def travelling(wavenumber: float, frequency: float) -> WavesSeen:
+    """cos(omega t - k x) on 400 m over 8 s, with a pantograph at 40 m/s."""
+    time, x = 0.01 * np.arange(800), 0.5 * np.arange(800)
+    phase = 2 * np.pi * frequency * time[:, None] - wavenumber * x
+    position = (20.0 + SPEED * time)[:, None]
+    return WavesSeen(time, x, np.sin(phase), np.cos(phase), position)
+
+
+@pytest.mark.parametrize("wavenumber", [0.5, -0.5])
+def test_a_wave_with_the_train_stands_at_positive_wavenumbers(wavenumber: float) -> None:
+    k, frequency, amplitude = travelling(wavenumber, 7.5).spectrum()
+    assert (np.diff(k) > 0).all() and (frequency >= 0).all()
+    row, column = np.unravel_index(amplitude.argmax(), amplitude.shape)
+    # Lines of the transform are 2 pi / 400 m and 1 / 8 s apart.
+    assert k[column] == pytest.approx(wavenumber, abs=0.016)
+    assert frequency[row] == pytest.approx(7.5, abs=0.125)
+    assert amplitude.max() == 1.0 and np.quantile(amplitude, 0.99) < 1e-2
+
+
+def test_the_frame_of_the_train_moves_with_it() -> None:
+    seen = travelling(0.3, 2.0)
+    relative, velocity = seen.in_the_train(10.0, 30.0)
+    row = 300
+    place = seen.position[row, 0] + relative
+    expected = np.cos(2 * np.pi * 2.0 * seen.time[row] - 0.3 * place)
+    # Linear interpolation: k^2 h^2 / 8.
+    np.testing.assert_allclose(velocity[row], expected, atol=0.3**2 * 0.5**2 / 8 + 1e-12)
+    last = seen.position[-1, 0] + relative
+    np.testing.assert_array_equal(np.isnan(velocity[-1]), last > seen.x[-1])
+    # What moves with the train stands still in its frame.
+    _, still = travelling(0.3, 0.3 * SPEED / (2 * np.pi)).in_the_train(10.0, 30.0)
+    assert np.ptp(still[:700], axis=0).max() < 0.01
+
+
+@pytest.mark.process
+def test_the_verb_runs_a_case_and_reads_a_run(tmp_path: Path) -> None:
+    out = tmp_path / "waves"
+    done = catenary("waves", "en50318_2002", "--short", "-o", str(out), cwd=tmp_path, pictures=True)
+    assert done.code == 0, done.stderr
+    assert "sqrt(T/m) of the contact wire: 121.7 m/s" in done.stdout
+    names = ("space_time.png", "train_frame.png", "wavenumbers.png", "waves.csv", "pass_bands.csv")
+    assert all((out / name).stat().st_size > 100 for name in names)
+    rows = (out / "pass_bands.csv").read_text().splitlines()
+    assert any(row.startswith("pass band,0.8") for row in rows)
+    (out / "waves.csv").unlink()
+    assert catenary("waves", str(out), cwd=tmp_path, pictures=True).code == 0
+    assert (out / "waves.csv").is_file()
+    for words, sentence in (
+        (["waves", "en50318_2002"], "-o is missing"),
+        (["waves", str(out), "--short"], "is a run; -o, --set and --short are for cases"),
+        (["waves", "en50318_2002", "--short", "-o", str(out)], "--force"),
+    ):
+        refused = catenary(*words, cwd=tmp_path)
+        assert refused.code == 2 and sentence in refused.stderr, refused.stderr
