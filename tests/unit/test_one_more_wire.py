@@ -98,6 +98,10 @@ def test_wires_are_meshed_in_stations_that_join_their_neighbours(
     model, _ = find_form(problem_of(line), mesh)
     assert model.numbering.in_stations
     assert model.numbering.planes == (2 * n_nodes_a_station,)
+    divided = make_mesh(line, 3)
+    np.testing.assert_allclose(divided.points, mesh.points, atol=1e-7)
+    np.testing.assert_array_equal(divided.droppers, mesh.droppers)
+    np.testing.assert_array_equal(divided.clamps, mesh.clamps)
     again = use_mesh(line, path)
     np.testing.assert_array_equal(again.points, mesh.points)
     np.testing.assert_array_equal(again.clamps, mesh.clamps)
