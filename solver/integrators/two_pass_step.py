@@ -14,8 +14,25 @@ from catenary.solver.base.bound import bound
 from catenary.solver.base.pointers import borrowed
 from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps, PredictedLineState, Steps
 from catenary.solver.integrators.state_kernels import compiled, in_line, reserves_within
-from catenary.solver.linear.lanes import add, add_scaled, load, pitch, remembers, store, zero
-from catenary.solver.linear.station_factors import StationFactors, eliminate, meet, substitute
+from catenary.solver.linear.lanes import (
+    add,
+    add_scaled,
+    load,
+    remembers,
+    same_part,
+    store,
+    widened,
+    zero,
+)
+from catenary.solver.linear.make_ups import by_make_up
+from catenary.solver.linear.station_factors import (
+    StationFactors,
+    eliminate,
+    first_of,
+    make_up_at,
+    meet,
+    solved,
+)
 from catenary.solver.linear.station_products import StationProduct, read_station, row_sums
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
 
@@ -61,11 +78,15 @@ class StationPasses:
         layout = factors.layout
         if isinstance(steps, AlphaSteps):
             layout = layout.remembering()
-        factored = layout, factors.kinds, factors.blocks, low, high
-        multiplied = product.layout, product.kinds, product.blocks, product.first, read, velocity
+        factored = layout, factors.places, factors.kinds, factors.blocks, low, high
+        multiplied = (
+            *(product.layout, product.places, product.kinds, product.blocks, product.first),
+            *(read, velocity),
+        )
         changes, *more = changes_of(motion, steps)
-        self._stretch = max(1, _STRETCH // layout.pitch)
-        self._place = low, high, self._stretch, layout.pitch
+        starts = factors.starts[low : high + 1] - factors.starts[low]
+        self._stretch = max(1, _STRETCH * (high - low) // max(1, int(starts[-1])))
+        self._place = low, high, self._stretch, starts
         self._parts = multiplied, factored, loads, answer, (*motion.read, *more), changes
         self.track_links(NO_LINKS, np.zeros(0))
 
@@ -120,11 +141,11 @@ def predict_velocities(motion, changes):
 
 
 @in_line
-def go_on(layout, station, solution, motion, changes):
-    """Take the rank's own station from one prediction to the next: ``kernels.correct`` and
-    ``predict`` at once. What was solved for is its acceleration but for damping on mass."""
+def go_on(layout, at, solution, motion, changes):
+    """Take the rank's own station, whose first unknown is ``at``, from one prediction to the next:
+    ``kernels.correct`` and ``predict`` at once. What was solved for is its acceleration but for
+    damping on mass."""
     x, y, z = motion[:3]
-    at = pitch(layout) * np.uint64(station)
     if remembers(layout):
         go_on_by_alpha(layout, at, solution, motion, changes)
         return
@@ -154,24 +175,34 @@ def go_on_by_alpha(layout, at, solution, motion, changes):
 
 
 @in_line
+def _eliminate_row(part, multiplied, factored, loads, station, before, states, outward, answer):
+    to_start, here, to_end = states
+    positions, velocities = (to_start[0], here[0], to_end[0]), (to_start[1], here[1], to_end[1])
+    of_product = same_part(multiplied[0], part)
+    sums = row_sums(of_product, multiplied, station, positions, velocities)
+    if loads.size > 0:
+        sums = add(sums[0], load(part, loads, first_of(factored, station))), sums[1]
+    return eliminate(part, factored, sums, station, before, outward, answer)
+
+
+eliminate_in = by_make_up(_eliminate_row)
+
+
+@in_line
 def eliminate_row(multiplied, factored, loads, station, before, states, outward, answer):
     """``eliminate`` with the right-hand side from a row of the product, and of ``loads`` if there
     are any; ``states`` are what ``read_station`` gives to the start, at and to the end of it."""
-    to_start, here, to_end = states
-    positions, velocities = (to_start[0], here[0], to_end[0]), (to_start[1], here[1], to_end[1])
-    sums = row_sums(multiplied, station, positions, velocities)
-    if loads.size > 0:
-        layout = factored[0]
-        load_here = load(layout, loads, pitch(layout) * np.uint64(station))
-        sums = add(sums[0], load_here), sums[1]
-    return eliminate(factored, sums, station, before, outward, answer)
+    layout, make_up = factored[0], make_up_at(factored, station)
+    return eliminate_in(
+        layout, make_up, multiplied, factored, loads, station, before, states, outward, answer
+    )
 
 
 @compiled
 def forth(multiplied, factored, loads, answer):
     """Leave in ``answer`` what elimination leaves of the right-hand side; see ``StationPasses``."""
     multiplied, factored, loads, answer = borrowed((multiplied, factored, loads, answer))
-    layout, kinds, _, low, high = factored
+    layout, _, kinds, _, low, high = factored
     n, middle = kinds.size, (low + high) // 2
     pairs = min(middle, n - 1 - middle)
     left = right = zero(layout)
@@ -205,23 +236,23 @@ def is_within(unknowns, begin, end):
 
 
 @compiled
-def left_behind(low, high, stretch, width, unknowns):
+def left_behind(low, high, stretch, starts, unknowns):
     """Links that the pass back has left behind with each stretch, (n_stretches + 1, 2).
 
     They are those from the first of both numbers to the second, and have all their ``unknowns``
-    (n, m) among what is known by then. ``width`` unknowns of a station stand together, so that few
-    wait for the next.
+    (n, m) among what is known by then. Unknowns of a station begin at its ``starts`` (n_own + 1,),
+    so that few wait for the next stretch.
     """
     n, own, pairs = unknowns.shape[0], high - low, (high - low - 1) // 2
     middle = own // 2
     ranges = np.empty((1 + (pairs + stretch - 1) // stretch + 1, 2), dtype=np.int64)
-    first = last = np.searchsorted(unknowns[:, 0], width * middle)
+    first = last = np.searchsorted(unknowns[:, 0], starts[middle])
     ranges[0] = first
     for number in range(1, ranges.shape[0]):
         reach = min(number * stretch, pairs)
-        begin, end = width * (middle - reach), width * (middle + reach + 1)
+        begin, end = starts[middle - reach], starts[middle + reach + 1]
         if number == ranges.shape[0] - 1:
-            begin, end = 0, width * own
+            begin, end = 0, starts[own]
         while first > 0 and is_within(unknowns[first - 1], begin, end):
             first -= 1
         while last < n and is_within(unknowns[last], begin, end):
@@ -239,29 +270,55 @@ def follow(number, motion, followed):
     reserves_within(motion[:4], links, before[1], now[1], reserve)
 
 
+@in_line
+def _go_back(part, factored, station, inward, answer, motion, changes):
+    own = solved(part, factored, station, inward, answer)
+    at = first_of(factored, station) - first_of(factored, factored[4])
+    go_on(part, at, own, motion, changes)
+    return widened(part, own)
+
+
+go_back_in = by_make_up(_go_back)
+
+
+@in_line
+def go_back(factored, station, inward, answer, motion, changes):
+    """Solve for an own station from those ``inward`` of it, and take its motion on."""
+    layout, make_up = factored[0], make_up_at(factored, station)
+    return go_back_in(layout, make_up, factored, station, inward, answer, motion, changes)
+
+
+@in_line
+def _begin_back(part, factored, middle, answer, motion, changes):
+    own = load(part, answer, first_of(factored, middle))
+    at = first_of(factored, middle) - first_of(factored, factored[4])
+    go_on(part, at, own, motion, changes)
+    return widened(part, own)
+
+
+begin_back = by_make_up(_begin_back)
+
+
 @compiled
 def back(factored, motion, answer, changes, followed):
     """Take the rank's own motion on from what ``forth`` has left in ``answer``, and find the
     reserve of its links, which come with their ranges of ``left_behind``."""
     factored, motion, answer, followed = borrowed((factored, motion, answer, followed))
-    layout, _, _, low, high = factored
+    layout, _, _, _, low, high = factored
     stretch = followed[3]
     middle, pairs = (low + high) // 2, (high - low - 1) // 2
-    x = y = load(layout, answer, pitch(layout) * np.uint64(middle))
-    go_on(layout, middle - low, x, motion, changes)
+    make_up = make_up_at(factored, middle)
+    x = y = begin_back(layout, make_up, factored, middle, answer, motion, changes)
     number = 1
     for start in range(1, pairs + 1, stretch):
         for k in range(start, min(start + stretch, pairs + 1)):
-            x = substitute(factored, middle - k, x, answer)
-            y = substitute(factored, middle + k, y, answer)
-            go_on(layout, middle - k - low, x, motion, changes)
-            go_on(layout, middle + k - low, y, motion, changes)
+            x = go_back(factored, middle - k, x, answer, motion, changes)
+            y = go_back(factored, middle + k, y, answer, motion, changes)
         follow(number, motion, followed)
         number += 1
     # One more towards the start of the line, if there is an even number of them.
     for i in range(middle - pairs - 1, low - 1, -1):
-        x = substitute(factored, i, x, answer)
-        go_on(layout, i - low, x, motion, changes)
+        x = go_back(factored, i, x, answer, motion, changes)
     follow(number, motion, followed)
 
 

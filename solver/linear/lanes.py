@@ -105,6 +105,60 @@ shares = _constant(
 is_damped = _constant(lambda layout: layout.damped, "Whether a product with K is one with C too.")
 
 
+varies = _constant(lambda layout: layout.varies, "Whether stations are of several make-ups.")
+
+
+@inlined
+def part_of(typing_context, layout, number):
+    """The layout of a make-up by its ``number``, which is a constant."""
+    if not isinstance(number, types.IntegerLiteral):
+        return None
+
+    def generate(context, builder, signature, arguments):
+        return context.get_dummy_value()
+
+    return LayoutType(layout.layout.parts[number.literal_value])(layout, number), generate
+
+
+@inlined
+def same_part(typing_context, layout, part):
+    """The part of ``layout`` for the make-up of ``part``, which is one of another layout."""
+
+    def generate(context, builder, signature, arguments):
+        return context.get_dummy_value()
+
+    return LayoutType(layout.layout.parts[part.layout.number])(layout, part), generate
+
+
+@inlined
+def narrowed(typing_context, part, x):
+    """Lanes of a whole layout as those of one of its parts."""
+    layout = part.layout
+
+    def generate(context, builder, signature, arguments):
+        if layout.whole is None:
+            return arguments[1]
+        return _chosen(builder, arguments[1], layout.lanes_of_whole)
+
+    return Lanes(layout.n_lanes)(part, x), generate
+
+
+@inlined
+def widened(typing_context, part, x):
+    """Lanes of a part as those of its whole layout, 0 where the part has none."""
+    layout = part.layout
+    whole = layout if layout.whole is None else layout.whole
+
+    def generate(context, builder, signature, arguments):
+        if layout.whole is None:
+            return arguments[1]
+        lanes, own = np.full(whole.n_lanes, -1), layout.lanes_of_whole
+        lanes[own[own >= 0]] = np.flatnonzero(own >= 0)
+        return _chosen(builder, arguments[1], lanes)
+
+    return Lanes(whole.n_lanes)(part, x), generate
+
+
 @inlined
 def zero(typing_context, layout):
     """0 in all lanes."""
@@ -293,6 +347,12 @@ def zeros(size: int) -> ir.Constant:
 def spread(builder: Any, x: Any, lanes: list[int]) -> Any:
     """Numbers of x by their lanes."""
     return _shuffled(builder, x, ir.Constant(x.type, ir.Undefined), lanes)
+
+
+def _chosen(builder: Any, x: Any, lanes: np.ndarray) -> Any:
+    """Numbers of x by their lanes, 0 for -1."""
+    chosen = np.where(lanes < 0, x.type.count, lanes)
+    return _shuffled(builder, x, zeros(x.type.count), chosen.tolist())
 
 
 def _widened(builder: Any, x: Any, size: int) -> Any:

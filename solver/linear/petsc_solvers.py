@@ -17,6 +17,7 @@ from scipy import sparse
 
 from catenary.solver.base.errors import InputError
 from catenary.solver.base.petsc import PETSc
+from catenary.solver.linear.sections import Sections
 from catenary.solver.linear.station_factors import StationFactors, station_factors
 from catenary.solver.linear.station_layout import Layout
 from catenary.solver.model.matrices import as_petsc
@@ -67,7 +68,7 @@ class PartSolver:
     own : the rank's own among them, in blocks
     in_stations : whether its blocks are stations
     is_whole : whether it is the whole line, which decides the prefix of its options
-    layout : of its stations, None if our own factors cannot be used
+    layout, stations : of its stations, None if our own factors cannot be used
 
     Attributes
     ----------
@@ -82,6 +83,7 @@ class PartSolver:
         in_stations: bool,
         is_whole: bool,
         layout: Layout | None = None,
+        stations: Sections | None = None,
     ) -> None:
         prefix = PREFIX if is_whole else PART_PREFIX
         self.matrix = as_petsc(part, PETSc.COMM_SELF)
@@ -94,7 +96,7 @@ class PartSolver:
         _choose_direct(self._ksp, in_stations)
         self.factors: StationFactors | None = None
         if layout is not None and not _is_given(f"{prefix}pc_"):
-            self.factors = station_factors(part, layout, own.start, own.stop)
+            self.factors = station_factors(part, layout, own.start, own.stop, stations)
         if self.factors is not None:
             self._ksp.getPC().setType(PETSc.PC.Type.PYTHON)
             self._ksp.getPC().setPythonContext(self.factors)

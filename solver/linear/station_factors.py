@@ -15,7 +15,6 @@ from catenary.solver.base.bound import bound
 from catenary.solver.base.compiled import compiled, in_line
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.base.pointers import borrowed
-from catenary.solver.linear import station_products
 from catenary.solver.linear.lane_products import (
     add_transposed,
     add_whole,
@@ -23,8 +22,19 @@ from catenary.solver.linear.lane_products import (
     sums_from,
     total_of,
 )
-from catenary.solver.linear.lanes import load, pitch, shares, store, whole_size, zero
+from catenary.solver.linear.lanes import (
+    load,
+    narrowed,
+    shares,
+    store,
+    whole_size,
+    widened,
+    zero,
+)
+from catenary.solver.linear.make_ups import block_at, by_make_up, make_up_of, start_of
+from catenary.solver.linear.sections import Sections, neighbours
 from catenary.solver.linear.station_layout import Layout
+from catenary.solver.linear.station_products import kinds_by_make_up
 
 # Bytes of factors from which on they share blocks: more would leave no room for the state in a
 # cache next to a processor, of 1 to 2 MB; a product with a transpose waits some longer.
@@ -37,7 +47,8 @@ class StationFactors:
     Attributes
     ----------
     layout : Layout
-    kinds : (n,) kind of each station
+    starts : (n + 1,) first unknown of each station, and how many unknowns there are
+    places, kinds : of the stations, see ``kinds_by_make_up``
     blocks : of each kind S^-1, -S^-1 B with its block B towards the middle, and, unless the
         layout shares these, the transpose of the second of the station before it in elimination,
         which that multiplies with; packed by the layout. S is a diagonal block after elimination.
@@ -47,19 +58,25 @@ class StationFactors:
     """
 
     def __init__(
-        self, layout: Layout, kinds: np.ndarray, blocks: np.ndarray, low: int, high: int
+        self,
+        layout: Layout,
+        stations: Sections,
+        kinds: np.ndarray,
+        blocks: np.ndarray,
+        low: int,
+        high: int,
+        n_kinds: int,
     ) -> None:
         self.layout, self.kinds, self.blocks = layout, kinds, blocks
+        self.starts, self.places = stations.starts, stations.places()
         self.low, self.high = low, high
-        self.n_stations, self.n_kinds = (
-            kinds.size,
-            blocks.size // (3 * layout.whole_terms.sources.size),
-        )
-        factored, vectors = (layout, kinds, blocks, low, high), (np.zeros(0), np.zeros(0))
+        self.n_stations, self.n_kinds = kinds.size, n_kinds
+        factored = layout, self.places, kinds, blocks, low, high
+        vectors = np.zeros(0), np.zeros(0)
         self._solve = bound(solve, factored, later=vectors)
 
     def solve(self, right: np.ndarray, answer: np.ndarray) -> None:
-        """Make ``answer`` that to ``right``, both (n pitch,), perhaps the same array."""
+        """Make ``answer`` that to ``right``, of all unknowns, perhaps the same array."""
         self._solve(right, answer)
 
     def apply(self, pc: PETSc.PC, right: PETSc.Vec, answer: PETSc.Vec) -> None:
@@ -75,33 +92,48 @@ class StationFactors:
 
 
 def station_factors(
-    matrix: sparse.bsr_matrix, layout: Layout, low: int = 0, high: int | None = None
+    matrix: sparse.bsr_matrix,
+    layout: Layout,
+    low: int = 0,
+    high: int | None = None,
+    stations: Sections | None = None,
 ) -> StationFactors | None:
     """Factors of a positive definite matrix in sorted blocks, eliminated towards the middle of the
-    stations from ``low`` to ``high``, all by default.
+    stations from ``low`` to ``high``, all by default. ``stations`` may be of several make-ups.
 
-    None if it is not block tridiagonal by stations. A matrix that is not positive definite gives
+    None if it is not block tridiagonal by stations, or if a station is joined to unknowns of one
+    beside it that it lacks itself. A matrix that is not positive definite gives
     wrong answers or NaN.
     """
-    blocks = station_products.neighbours(matrix)
+    blocks = neighbours(matrix, 0, stations)
     if blocks is None:
         return None
     n = blocks.shape[1]
     high = n if high is None else high
+    stations = Sections.alike(n, layout.pitch) if stations is None else stations
+    station, lacking = np.nonzero(stations.missing())
+    blocks[1, station, lacking, lacking] = 1.0
     factors = np.zeros((n, 3, layout.pitch, layout.pitch))
     factorise(blocks, (low + high) // 2, factors)
-    packed = layout.packed(factors, layout.whole_terms)
-    kinds, numbers = station_products.by_kinds(packed.reshape(n, -1))
-    if numbers.nbytes > LARGE and layout.turns:
-        layout = layout.sharing()
-        kinds, numbers = station_products.by_kinds(packed[:, :2].reshape(n, -1))
-    return StationFactors(layout, kinds, numbers, low, high)
+
+    def pack(part: Layout, rows: slice | np.ndarray) -> np.ndarray:
+        n_blocks = 2 if part.shares else 3
+        packed = part.packed(factors[rows, :n_blocks], part.whole_terms)
+        return packed.reshape(packed.shape[0], n_blocks * part.whole_terms.sources.size)
+
+    kinds, numbers, n_kinds, count = kinds_by_make_up(layout, stations.make_up, pack)
+    if layout.varies and count != np.count_nonzero(factors) - station.size:
+        return None  # elimination joins what a station lacks
+    if numbers.nbytes > LARGE and layout.turns and not layout.varies:
+        layout = layout.changed(shares=True)
+        kinds, numbers, n_kinds, _ = kinds_by_make_up(layout, stations.make_up, pack)
+    return StationFactors(layout, stations, kinds, numbers, low, high, n_kinds)
 
 
 @compiled
 def factorise(blocks, middle, factors):
     """Fill ``factors`` (n, 3, b, b), by rows, of ``blocks`` (3, n, b, b); see ``StationFactors``
-    and ``station_products.neighbours``."""
+    and ``neighbours``."""
     to_start, own, to_end = blocks[0], blocks[1], blocks[2]
     n = own.shape[0]
     for i in range(middle):
@@ -145,92 +177,130 @@ def invert(pivot, inverse):
 
 
 @in_line
-def factors_of(factored, station):
-    """Where the blocks of a station are."""
-    layout, kinds, blocks, _, _ = factored
-    # Indices are unsigned, which spares a check for negative ones.
-    kind = np.uint64(kinds[np.uint64(station)])
-    n_blocks = np.uint64(2) if shares(layout) else np.uint64(3)
-    return numbers_from(blocks, n_blocks * whole_size(layout) * kind)
+def factors_of(part, factored, station):
+    """Where the blocks of a station are; ``part`` is the layout of its make-up."""
+    _, _, kinds, blocks, _, _ = factored
+    n_blocks = np.uint64(2) if shares(part) else np.uint64(3)
+    return numbers_from(blocks, block_at(part, kinds, station, n_blocks * whole_size(part)))
 
 
 @in_line
-def eliminate(factored, sums, station, before, outward, answer):
+def first_of(factored, station):
+    """First unknown of a station."""
+    return start_of(factored[0], factored[1], station)
+
+
+@in_line
+def make_up_at(factored, station):
+    """Make-up of a station."""
+    return make_up_of(factored[0], factored[1], station)
+
+
+@in_line
+def eliminate(part, factored, sums, station, before, outward, answer):
     """Leave in ``answer`` what the right-hand side of a station, as ``sums``, is after those
-    ``outward`` of it are eliminated, of which ``before`` is the last."""
-    layout = factored[0]
-    if shares(layout):
-        numbers, total = factors_of(factored, before), total_of(layout, sums)
-        left = add_transposed(layout, total, numbers, whole_size(layout), outward)
+    ``outward`` of it are eliminated, of which ``before`` is the last; ``part`` is the layout of its
+    make-up."""
+    outward = narrowed(part, outward)
+    if shares(part):
+        numbers, total = factors_of(part, factored, before), total_of(part, sums)
+        left = add_transposed(part, total, numbers, whole_size(part), outward)
     else:
-        numbers, skipped = factors_of(factored, station), np.uint64(2) * whole_size(layout)
-        left = total_of(layout, add_whole(layout, sums, numbers, skipped, outward))
-    store(layout, answer, pitch(layout) * np.uint64(station), left)
-    return left
+        numbers, skipped = factors_of(part, factored, station), np.uint64(2) * whole_size(part)
+        left = total_of(part, add_whole(part, sums, numbers, skipped, outward))
+    store(part, answer, first_of(factored, station), left)
+    return widened(part, left)
+
+
+@in_line
+def _eliminate_right(part, factored, right, station, before, outward, answer):
+    sums = sums_from(part, load(part, right, first_of(factored, station)))
+    return eliminate(part, factored, sums, station, before, outward, answer)
+
+
+eliminate_in = by_make_up(_eliminate_right)
+
+
+@in_line
+def eliminate_right(factored, right, station, before, outward, answer):
+    """``eliminate`` with the right-hand side of an array."""
+    make_up = make_up_at(factored, station)
+    return eliminate_in(factored[0], make_up, factored, right, station, before, outward, answer)
+
+
+@in_line
+def _meet(part, factored, middle, towards_end, answer):
+    here, kinds = first_of(factored, middle), factored[2]
+    numbers, left = factors_of(part, factored, middle), load(part, answer, here)
+    towards_end = narrowed(part, towards_end)
+    if shares(part):
+        beyond = factors_of(part, factored, min(middle + 1, kinds.size - 1))
+        left = add_transposed(part, left, beyond, whole_size(part), towards_end)
+    else:
+        sums = sums_from(part, left)
+        left = total_of(part, add_whole(part, sums, numbers, whole_size(part), towards_end))
+    sums = sums_from(part, zero(part))
+    own = total_of(part, add_whole(part, sums, numbers, np.uint64(0), left))
+    store(part, answer, here, own)
+    return widened(part, own)
+
+
+meet_in = by_make_up(_meet)
 
 
 @in_line
 def meet(factored, middle, towards_end, answer):
     """Unknowns of the middle station from what ``answer`` holds of it and what is left of the one
     beside it, ``towards_end`` of the line."""
-    layout, kinds = factored[0], factored[1]
-    here = pitch(layout) * np.uint64(middle)
-    numbers, left = factors_of(factored, middle), load(layout, answer, here)
-    if shares(layout):
-        beyond = factors_of(factored, min(middle + 1, kinds.size - 1))
-        left = add_transposed(layout, left, beyond, whole_size(layout), towards_end)
-    else:
-        sums = sums_from(layout, left)
-        left = total_of(layout, add_whole(layout, sums, numbers, whole_size(layout), towards_end))
-    own = total_of(
-        layout, add_whole(layout, sums_from(layout, zero(layout)), numbers, np.uint64(0), left)
-    )
-    store(layout, answer, here, own)
-    return own
+    make_up = make_up_at(factored, middle)
+    return meet_in(factored[0], make_up, factored, middle, towards_end, answer)
 
 
 @in_line
-def substitute(factored, station, inward, answer):
-    """Unknowns of a station from what ``answer`` holds of it and the unknowns ``inward`` of it."""
-    layout = factored[0]
-    numbers = factors_of(factored, station)
-    left = load(layout, answer, pitch(layout) * np.uint64(station))
-    sums = add_whole(layout, sums_from(layout, zero(layout)), numbers, np.uint64(0), left)
-    return total_of(layout, add_whole(layout, sums, numbers, whole_size(layout), inward))
+def solved(part, factored, station, inward, answer):
+    """Unknowns of a station, in lanes of ``part``, from what ``answer`` holds of it and those
+    ``inward`` of it."""
+    numbers = factors_of(part, factored, station)
+    left = load(part, answer, first_of(factored, station))
+    sums = add_whole(part, sums_from(part, zero(part)), numbers, np.uint64(0), left)
+    inward = narrowed(part, inward)
+    return total_of(part, add_whole(part, sums, numbers, whole_size(part), inward))
 
 
 @in_line
-def right_side(factored, right, station):
-    """The right-hand side of a station as sums."""
-    layout = factored[0]
-    return sums_from(layout, load(layout, right, pitch(layout) * np.uint64(station)))
+def _substitute_into(part, factored, station, inward, answer):
+    own = solved(part, factored, station, inward, answer)
+    store(part, answer, first_of(factored, station), own)
+    return widened(part, own)
+
+
+substitute_in = by_make_up(_substitute_into)
 
 
 @in_line
 def substitute_into(factored, station, inward, answer):
-    """``substitute`` that leaves the unknowns in ``answer``, too."""
-    own = substitute(factored, station, inward, answer)
-    store(factored[0], answer, pitch(factored[0]) * np.uint64(station), own)
-    return own
+    """``solved`` in lanes of a whole cross-section, left in ``answer``, too."""
+    make_up = make_up_at(factored, station)
+    return substitute_in(factored[0], make_up, factored, station, inward, answer)
 
 
 @compiled
 def solve(factored, right, answer):
-    """Fill ``answer`` from ``right``; ``factored`` are layout, kinds, blocks, low and high of
-    ``StationFactors``."""
+    """Fill ``answer`` from ``right``; ``factored`` are layout, places, kinds, blocks, low and high
+    of ``StationFactors``."""
     factored, right, answer = borrowed((factored, right, answer))
-    layout, kinds, _, low, high = factored
+    layout, _, kinds, _, low, high = factored
     n, middle = kinds.size, (low + high) // 2
     pairs = min(middle, n - 1 - middle)
     x, y = zero(layout), zero(layout)
     for i in range(pairs):
         j = n - 1 - i
-        x = eliminate(factored, right_side(factored, right, i), i, max(i - 1, 0), x, answer)
-        y = eliminate(factored, right_side(factored, right, j), j, min(j + 1, n - 1), y, answer)
+        x = eliminate_right(factored, right, i, max(i - 1, 0), x, answer)
+        y = eliminate_right(factored, right, j, min(j + 1, n - 1), y, answer)
     for i in range(pairs, middle + 1):
-        x = eliminate(factored, right_side(factored, right, i), i, max(i - 1, 0), x, answer)
+        x = eliminate_right(factored, right, i, max(i - 1, 0), x, answer)
     for j in range(n - 1 - pairs, middle, -1):
-        y = eliminate(factored, right_side(factored, right, j), j, min(j + 1, n - 1), y, answer)
+        y = eliminate_right(factored, right, j, min(j + 1, n - 1), y, answer)
     x = y = meet(factored, middle, y, answer)
     for k in range(1, pairs + 1):
         x = substitute_into(factored, middle - k, x, answer)

@@ -6,7 +6,7 @@ The layout of a line is known before its kernels are compiled, and these are com
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -53,13 +53,20 @@ class Layout:
     damped : whether a product with K is one with C as well
     remembers : whether steps need an acceleration known before, as the generalized-alpha method's
     shares : whether factors keep one block for both ways between two stations; only if it turns
+    make_ups : places in a cross-section that stations of each make-up have; none if all have all
 
     Attributes
     ----------
-    pitch : unknowns of a station
+    pitch : unknowns of a cross-section
     n_lanes : lanes that they take, those without an unknown included
     turns : whether lanes 0 and 1, 2 and 3 and so on of a second sum are exchanged
+    whole, places, number : of one of its ``parts``: what it is a part of, which unknowns of that it
+        has, and of which make-up it is
     """
+
+    whole: Layout | None = None
+    places: tuple[int, ...] = ()
+    number: int = 0
 
     def __init__(
         self,
@@ -69,6 +76,7 @@ class Layout:
         damped: bool = False,
         remembers: bool = False,
         shares: bool = False,
+        make_ups: tuple[tuple[int, ...], ...] = (),
     ) -> None:
         self.widths = tuple(widths)
         self._plane = min(lanes for lanes in LANES if lanes >= max(self.widths))
@@ -76,6 +84,7 @@ class Layout:
         self.own = every if own is None else tuple(own)
         self.beside = every if beside is None else tuple(beside)
         self.damped, self.remembers = bool(damped), bool(remembers)
+        self.make_ups = make_ups
         self.pitch = sum(self.widths)
         self.n_lanes = self._plane * len(self.widths)
         # Columns where there are fewer of these than of differences.
@@ -91,15 +100,57 @@ class Layout:
     @property
     def key(self) -> tuple[object, ...]:
         """All that makes a layout."""
-        return self.widths, self.own, self.beside, self.damped, self.remembers, self.shares
+        own = self.widths, self.own, self.beside, self.damped, self.remembers
+        own += self.shares, self.make_ups
+        return own if self.whole is None else (*own, self.number, self.whole.key)
 
     def remembering(self) -> Layout:
         """The same for steps that need an acceleration known before."""
-        return Layout(self.widths, self.own, self.beside, self.damped, True, self.shares)
+        return self.changed(remembers=True)
 
-    def sharing(self) -> Layout:
-        """The same for factors that keep one block for both ways, if there can be such."""
-        return Layout(self.widths, self.own, self.beside, self.damped, self.remembers, True)
+    def changed(self, **settings: Any) -> Layout:
+        """The same with some other parameters, by their names."""
+        names = ("widths", "own", "beside", "damped", "remembers", "shares", "make_ups")
+        return Layout(**{**{name: getattr(self, name) for name in names}, **settings})
+
+    @property
+    def varies(self) -> bool:
+        """Whether stations are of several make-ups, of which this may be one."""
+        return bool(self.make_ups) or self.whole is not None
+
+    @cached_property
+    def parts(self) -> tuple[Layout, ...]:
+        """Layouts of each make-up; if there is one only, this itself."""
+        return tuple(self._part(n) for n in range(len(self.make_ups))) or (self,)
+
+    def _part(self, number: int) -> Layout:
+        places = np.array(self.make_ups[number])
+        planes = np.searchsorted(np.cumsum(self.widths), places, side="right")
+        widths = tuple(int(width) for width in np.bincount(planes) if width)
+        part = Layout(widths, (), (), self.damped, self.remembers)
+        lane = self._lane_of[places]
+        apart, together = lane[:, None] ^ lane, planes[:, None] == planes
+        own = part.differences(np.isin(apart, self.own) & together)
+        beside = part.differences(np.isin(apart, self.beside) & together)
+        part = Layout(widths, own, beside, self.damped, self.remembers)
+        part.whole, part.places, part.number = self, self.make_ups[number], number
+        return part
+
+    @cached_property
+    def _lane_of(self) -> np.ndarray:
+        """Lane of each unknown in its plane, (pitch,)."""
+        lane_of, there = np.zeros(self.pitch, dtype=int), self.unknowns >= 0
+        lane_of[self.unknowns[there]] = (np.arange(self.n_lanes) % self._plane)[there]
+        return lane_of
+
+    @cached_property
+    def lanes_of_whole(self) -> np.ndarray:
+        """Lane of the whole that each lane of a part stands for, -1 in one without an unknown."""
+        assert self.whole is not None
+        lane_of = np.zeros(self.whole.pitch, dtype=int)
+        there = self.whole.unknowns >= 0
+        lane_of[self.whole.unknowns[there]] = np.flatnonzero(there)
+        return np.where(self.unknowns >= 0, lane_of[np.array(self.places)[self.unknowns]], -1)
 
     @cached_property
     def unknowns(self) -> np.ndarray:
@@ -150,14 +201,16 @@ class Layout:
 
     def differences(self, joined: np.ndarray) -> tuple[int, ...]:
         """Numbers of the terms that hold what ``joined`` (b, b) joins, each within a plane."""
-        place = np.zeros(self.pitch, dtype=int)
-        there = self.unknowns >= 0
-        place[self.unknowns[there]] = (np.arange(self.n_lanes) % self._plane)[there]
         row, column = np.nonzero(joined)
-        return tuple(np.unique(place[row] ^ place[column]).tolist())
+        return tuple(np.unique(self._lane_of[row] ^ self._lane_of[column]).tolist())
 
     def packed(self, blocks: np.ndarray, terms: Terms) -> np.ndarray:
-        """Blocks (..., pitch, pitch) as products read them, shape (..., n_terms n_lanes)."""
+        """Blocks (..., pitch, pitch) as products read them, shape (..., n_terms n_lanes).
+
+        Those of a part are of the whole.
+        """
+        if self.whole is not None:
+            blocks = blocks[..., self.places, :][..., self.places]
         row, column = self.unknowns[terms.targets], self.unknowns[terms.sources]
         there = (row >= 0) & (column >= 0) & (terms.sources >= 0)
         numbers = np.where(there, blocks[..., row, column], 0.0)

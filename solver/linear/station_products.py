@@ -8,6 +8,9 @@ memory. Where no two spans are alike, blocks are read one after the other, as me
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from scipy import sparse
 
@@ -22,44 +25,45 @@ from catenary.solver.linear.lane_products import (
     sums_from,
     total_of,
 )
-from catenary.solver.linear.lanes import beside_size, is_damped, load, own_size, pitch, store, zero
+from catenary.solver.linear.lanes import (
+    beside_size,
+    is_damped,
+    narrowed,
+    own_size,
+    store,
+    zero,
+)
+from catenary.solver.linear.make_ups import (
+    Places,
+    block_at,
+    by_make_up,
+    load_at,
+    make_up_of,
+    start_of,
+)
+from catenary.solver.linear.sections import Sections, neighbours
 from catenary.solver.linear.station_layout import WIDEST, Layout
 from catenary.solver.linear.unique_rows import kinds_of
 
 
-def neighbours(matrix: sparse.bsr_matrix, first: int = 0) -> np.ndarray | None:
-    """Blocks of each row towards the start of the line, on the diagonal and towards the end.
-
-    Row i has its diagonal block in column ``first`` + i. Shape (3, n, b, b) with the matrix's size
-    of blocks; None if the matrix has blocks further away.
-    """
-    n, (size, _) = matrix.indptr.size - 1, matrix.blocksize
-    if n == 0:
-        return None
-    row = np.repeat(np.arange(n), np.diff(matrix.indptr))
-    step = matrix.indices - row - first
-    if np.abs(step).max(initial=0) > 1:
-        return None
-    blocks = np.zeros((3, n, size, size))
-    blocks[step + 1, row] = matrix.data
-    return blocks
-
-
-def layout_of(operator: np.ndarray, stiffness: np.ndarray) -> Layout | None:
-    """Layout of a line by its blocks of A and K, see ``neighbours``.
+def layout_of(
+    operator: np.ndarray, stiffness: np.ndarray, make_ups: tuple[tuple[int, ...], ...] = ()
+) -> Layout | None:
+    """Layout of a line by its blocks of A and K, see ``neighbours``, and by the make-ups of its
+    stations if there are several.
 
     None if a plane is wider than kernels are.
     """
     widths = _planes((operator != 0).any(axis=(0, 1)) | (stiffness != 0).any(axis=(0, 1)))
     if max(widths) > WIDEST:
         return None
-    return _joining(Layout(widths, (), ()), stiffness)
+    return _joining(Layout(widths, (), (), make_ups=make_ups), stiffness)
 
 
 def with_damping(layout: Layout, damping: np.ndarray | None) -> Layout:
     """The same for products with C, by its blocks, as well."""
     found = layout if damping is None else _joining(layout, damping)
-    return Layout(found.widths, found.own, found.beside, damped=True)
+    return found.changed(damped=True)
 
 
 def _joining(layout: Layout, blocks: np.ndarray) -> Layout:
@@ -67,10 +71,8 @@ def _joining(layout: Layout, blocks: np.ndarray) -> Layout:
     joined = (blocks != 0).any(axis=1)
     own = layout.differences(joined[1])
     beside = layout.differences(joined[0] | joined[2])
-    return Layout(
-        layout.widths,
-        tuple(sorted({*layout.own, *own})),
-        tuple(sorted({*layout.beside, *beside})),
+    return layout.changed(
+        own=tuple(sorted({*layout.own, *own})), beside=tuple(sorted({*layout.beside, *beside}))
     )
 
 
@@ -88,12 +90,40 @@ def by_kinds(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return kinds, aligned_arrays.copy(numbers[first])
 
 
+def kinds_by_make_up(
+    layout: Layout, make_up: np.ndarray, pack: Callable[[Layout, Any], np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, int, int]:
+    """Kinds (n,) of stations, the numbers of all kinds in a row, how many kinds there are, and how
+    many numbers of all stations are not zero.
+
+    ``pack`` returns the numbers of stations in the layout of their make-up, (n, m). Where
+    make-ups vary a kind is the place of its first number; see ``block_at``.
+    """
+    if not layout.varies:
+        packed = pack(layout, slice(None))
+        kinds, numbers = by_kinds(packed)
+        return kinds, numbers, int(kinds.max(initial=-1)) + 1, np.count_nonzero(packed)
+    begins, parts = np.zeros(make_up.size, dtype=np.int64), [np.zeros(0)]
+    end = n_kinds = count = 0
+    for number, part in enumerate(layout.parts):
+        stations = np.flatnonzero(make_up == number)
+        packed = pack(part, stations)
+        count += np.count_nonzero(packed)
+        first, kinds = kinds_of(packed)
+        begins[stations] = end + packed.shape[1] * kinds
+        parts.append(packed[first].ravel())
+        end += parts[-1].size
+        n_kinds += first.size
+    return begins, aligned_arrays.copy(np.concatenate(parts)), n_kinds, count
+
+
 class StationProduct:
     """Products with rows of K, and C if the layout is damped. Not collective.
 
     Attributes
     ----------
     layout : Layout
+    places : of the stations of the factor
     kinds : (n,) of its rows
     blocks : of each kind the diagonal block of K, then what joins it to the stations before and
         after it; the same of -C; all as products read them, see ``Layout``
@@ -102,12 +132,19 @@ class StationProduct:
     n_kinds : how many rows are different
     """
 
-    def __init__(self, layout: Layout, kinds: np.ndarray, blocks: np.ndarray, first: int) -> None:
-        self.layout, self.kinds, self.blocks, self.first = layout, kinds, blocks, first
-        size = layout.own_terms.sources.size + 2 * layout.beside_terms.sources.size
-        self.n_kinds = blocks.size // (size * (1 + layout.damped))
+    def __init__(
+        self,
+        layout: Layout,
+        places: Places,
+        kinds: np.ndarray,
+        blocks: np.ndarray,
+        first: int,
+        n_kinds: int,
+    ) -> None:
+        self.layout, self.places, self.kinds = layout, places, kinds
+        self.blocks, self.first, self.n_kinds = blocks, first, n_kinds
         vectors = np.zeros(0), np.zeros(0), np.zeros(0)
-        self._multiply = bound(multiply, layout, kinds, blocks, first, later=vectors)
+        self._multiply = bound(multiply, layout, places, kinds, blocks, first, later=vectors)
 
     def multiply(
         self, factor: np.ndarray, result: np.ndarray, velocity: np.ndarray | None = None
@@ -121,50 +158,61 @@ def station_product(
     first: int,
     layout: Layout,
     damping: sparse.bsr_matrix | None = None,
+    columns: Sections | None = None,
 ) -> StationProduct | None:
     """Products with a matrix in sorted blocks, whose first row is that of column ``first``.
 
-    The factor has a station more at both ends than the matrix has columns. None if the matrix joins
-    what the layout does not.
+    The factor has a whole cross-section more at both ends than the matrix has ``columns``, which
+    are alike if not given. None if the matrix joins what the layout does not.
     """
-    parts, beside = [], layout.beside_terms
+    numbers: list[tuple[np.ndarray, str]] = []
     for rows, sign in ((matrix, 1.0), (damping, -1.0)):
         if rows is None:
             continue
-        blocks = neighbours(rows, first)
+        blocks = neighbours(rows, first, columns)
         if blocks is None:
             return None
-        for place, terms in ((1, layout.own_terms), (0, beside), (2, beside)):
-            block = blocks[place]
-            packed = layout.packed(block, terms)
-            if np.count_nonzero(packed) != np.count_nonzero(block):
-                return None
-            parts.append(sign * packed)
-    return StationProduct(layout, *by_kinds(np.concatenate(parts, axis=1)), first + 1)
+        for place, terms in ((1, "own_terms"), (0, "beside_terms"), (2, "beside_terms")):
+            numbers.append((sign * blocks[place], terms))
+    n_rows = numbers[0][0].shape[0]
+    stations = Sections.alike(matrix.shape[1] // layout.pitch, layout.pitch)
+    stations = (stations if columns is None else columns).padded()
+
+    def pack(part: Layout, rows: slice | np.ndarray) -> np.ndarray:
+        packed = [part.packed(blocks[rows], getattr(part, terms)) for blocks, terms in numbers]
+        return np.concatenate(packed, axis=1)
+
+    make_up = stations.make_up[first + 1 : first + 1 + n_rows]
+    kinds, packed, n_kinds, count = kinds_by_make_up(layout, make_up, pack)
+    if count != sum(np.count_nonzero(blocks) for blocks, _ in numbers):
+        return None
+    return StationProduct(layout, stations.places(), kinds, packed, first + 1, n_kinds)
 
 
 @in_line
-def row_sums(multiplied, row, positions, velocities):
+def row_sums(part, multiplied, row, positions, velocities):
     """Sums of a row of a product, with what the factor and the velocity hold before, at and after
     its station.
 
-    ``multiplied`` holds layout, kinds, blocks and first of ``StationProduct`` and both vectors.
+    ``multiplied`` holds layout, places, kinds, blocks and first of ``StationProduct`` and both
+    vectors; ``part`` is the layout of the station's make-up.
     """
-    layout, kinds, blocks, _, _, _ = multiplied
-    size, beside = own_size(layout), beside_size(layout)
+    _, _, kinds, blocks, _, _, _ = multiplied
+    size, beside = own_size(part), beside_size(part)
     stored = size + np.uint64(2) * beside
-    if is_damped(layout):
-        numbers = numbers_from(blocks, np.uint64(2) * stored * np.uint64(kinds[np.uint64(row)]))
+    if is_damped(part):
+        numbers = numbers_from(blocks, block_at(part, kinds, row, np.uint64(2) * stored))
     else:
-        numbers = numbers_from(blocks, stored * np.uint64(kinds[np.uint64(row)]))
-    sums = sums_from(layout, zero(layout))
-    sums = add_own(layout, sums, numbers, np.uint64(0), positions[1])
-    sums = add_beside(layout, sums, numbers, size, positions[0])
-    sums = add_beside(layout, sums, numbers, size + beside, positions[2])
-    if is_damped(layout):
-        sums = add_own(layout, sums, numbers, stored, velocities[1])
-        sums = add_beside(layout, sums, numbers, stored + size, velocities[0])
-        sums = add_beside(layout, sums, numbers, stored + size + beside, velocities[2])
+        numbers = numbers_from(blocks, block_at(part, kinds, row, stored))
+    sums = sums_from(part, zero(part))
+    sums = add_own(part, sums, numbers, np.uint64(0), narrowed(part, positions[1]))
+    sums = add_beside(part, sums, numbers, size, narrowed(part, positions[0]))
+    sums = add_beside(part, sums, numbers, size + beside, narrowed(part, positions[2]))
+    if is_damped(part):
+        sums = add_own(part, sums, numbers, stored, narrowed(part, velocities[1]))
+        sums = add_beside(part, sums, numbers, stored + size, narrowed(part, velocities[0]))
+        after = narrowed(part, velocities[2])
+        sums = add_beside(part, sums, numbers, stored + size + beside, after)
     return sums
 
 
@@ -172,24 +220,34 @@ def row_sums(multiplied, row, positions, velocities):
 def read_station(multiplied, row):
     """What the factor and the velocity hold at the station of a row, which may be one before or
     after all rows."""
-    layout, _, _, first, factor, velocity = multiplied
-    # Indices are unsigned, which spares a check for negative ones.
-    at = pitch(layout) * np.uint64(first + row)
-    position = load(layout, factor, at)
+    layout, places, _, _, first, factor, velocity = multiplied
+    at, make_up = start_of(layout, places, first + row), make_up_of(layout, places, first + row)
+    position = load_at(layout, make_up, factor, at)
     if is_damped(layout):
-        return position, load(layout, velocity, at)
+        return position, load_at(layout, make_up, velocity, at)
     return position, position
 
 
+@in_line
+def _put_row(part, multiplied, row, positions, velocities, result):
+    layout, places, _, _, first, _, _ = multiplied
+    total = total_of(part, row_sums(part, multiplied, row, positions, velocities))
+    at = start_of(layout, places, first + row) - start_of(layout, places, first)
+    store(part, result, at, total)
+
+
+put_row = by_make_up(_put_row)
+
+
 @compiled
-def multiply(layout, kinds, blocks, first, factor, velocity, result):
+def multiply(layout, places, kinds, blocks, first, factor, velocity, result):
     """``result`` = K ``factor``, less C ``velocity``; see ``StationProduct``."""
-    multiplied = borrowed((layout, kinds, blocks, first, factor, velocity))
+    multiplied = borrowed((layout, places, kinds, blocks, first, factor, velocity))
     result = borrowed(result)
     before, here = read_station(multiplied, -1), read_station(multiplied, 0)
-    for i in range(np.uint64(kinds.size)):
-        after = read_station(multiplied, np.int64(i) + 1)
+    for i in range(kinds.size):
+        after = read_station(multiplied, i + 1)
         positions, velocities = (before[0], here[0], after[0]), (before[1], here[1], after[1])
-        row = total_of(layout, row_sums(multiplied, i, positions, velocities))
-        store(layout, result, pitch(layout) * i, row)
+        make_up = make_up_of(layout, multiplied[1], first + i)
+        put_row(layout, make_up, multiplied, i, positions, velocities, result)
         before, here = here, after

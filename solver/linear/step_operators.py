@@ -27,12 +27,12 @@ from catenary.solver.linear.petsc_solvers import (
     wants_distributed_solver,
     wants_view,
 )
+from catenary.solver.linear.sections import Sections, neighbours
 from catenary.solver.linear.station_factors import StationFactors
 from catenary.solver.linear.station_layout import WIDEST, Layout
 from catenary.solver.linear.station_products import (
     StationProduct,
     layout_of,
-    neighbours,
     station_product,
     with_damping,
 )
@@ -102,7 +102,7 @@ class LineOperators:
         self._model = model
         self._ownership = ownership
         self._coefficients = coefficients
-        self._block = model.numbering.block
+        self._block, self._pad = model.numbering.block, model.numbering.width
         self._product_event, self._solve_event = event("LineProduct"), event("LineSolve")
         if comm.size > 1 and wants_distributed_solver():
             self._solve_together(windows)
@@ -259,12 +259,12 @@ class LineOperators:
     def rate(self) -> np.ndarray:
         """(n_local,) what products with C multiply in two passes: this rank's part, to be filled
         in. Collective when first asked for."""
-        block, domain = self._block, self.domain
+        pad, domain = self._pad, self.domain
         if self._rate_halo is None:
             self._rate_padded = aligned_arrays.zeros(self._read_padded.size, 3)
-            read = self._rate_padded[block : self._rate_padded.size - block]
+            read = self._rate_padded[pad : self._rate_padded.size - pad]
             self._rate_halo = Halo(self._comm, self._ownership, domain.read_low, read)
-        read = self._rate_padded[block : self._rate_padded.size - block]
+        read = self._rate_padded[pad : self._rate_padded.size - pad]
         return read[domain.owned_of_read]
 
     @property
@@ -290,10 +290,11 @@ class LineOperators:
             rows = (low, high)
             part = part_of(self._model, rows, rows, self._coefficients, 1.0, self._block)
             owned = self.domain.owned
-            own = slice(owned.start // self._block, owned.stop // self._block)
+            stations = self._sections(low, high)
+            own = slice(*np.searchsorted(stations.starts, [owned.start, owned.stop]).tolist())
             self._layout = self._find_layout(part)
             whole = self._comm.size == 1
-            solver = PartSolver(part, own, self._in_stations, whole, self._layout)
+            solver = PartSolver(part, own, self._in_stations, whole, self._layout, stations)
             self._solver, is_direct = solver, solver.is_direct
         self._is_direct = bool(self._comm.allreduce(int(is_direct), op=MPI.MIN))
 
@@ -330,12 +331,12 @@ class LineOperators:
         Nothing in the loop makes or copies arrays. An array asked from a vector would keep it, and
         the communicator, alive beyond ``destroy``.
         """
-        own, block = self._ownership, self._block
+        own, pad = self._ownership, self._pad
         read_low, read_high = self._model.numbering.whole(*columns_of(self._model, (low, high)))
         self.domain = domain = Subdomain(own.first, own.last, low, high, read_low, read_high)
         # Products by stations read one more at both ends, which is zero where the line ends.
-        self._read_padded = aligned_arrays.zeros(read_high - read_low + 2 * block, 0)
-        self._read_array = read = self._read_padded[block : block + read_high - read_low]
+        self._read_padded = aligned_arrays.zeros(read_high - read_low + 2 * pad, 0)
+        self._read_array = read = self._read_padded[pad : pad + read_high - read_low]
         answer, force = aligned_arrays.zeros(domain.size, 1), aligned_arrays.zeros(domain.size, 2)
         loaded = aligned_arrays.zeros(domain.size, 3)
         # What products fill is this rank's, what is solved for perhaps the line's: two views.
@@ -378,25 +379,35 @@ class LineOperators:
         if key not in self._by_stations:
             domain, product = self.domain, None
             if self._layout is not None and domain.size:
-                first = (domain.low - domain.read_low) // self._block
+                columns, first = self._columns()
                 layout, damping = self._layout, None
                 if damped:
                     damping = self._rows_of("damping")
-                    layout = with_damping(layout, neighbours(damping, first))
-                product = station_product(self._rows_of(name), first, layout, damping)
+                    layout = with_damping(layout, neighbours(damping, first, columns))
+                product = station_product(self._rows_of(name), first, layout, damping, columns)
             self._by_stations[key] = product
         return self._by_stations[key]
 
     def _find_layout(self, part: sparse.bsr_matrix) -> Layout | None:
         """How unknowns of a station stand in lanes; None if they cannot, or nodes do not pair."""
-        domain = self.domain
-        first = (domain.low - domain.read_low) // self._block
-        operator = neighbours(part) if self._in_stations else None
+        if not self._in_stations:
+            return None
+        rows, (columns, first) = self._sections(self.domain.low, self.domain.high), self._columns()
+        operator = neighbours(part, 0, rows)
         self._stiffness = self._rows_of("stiffness")
-        stiffness = neighbours(self._stiffness, first)
+        stiffness = neighbours(self._stiffness, first, columns)
         if operator is None or stiffness is None:
             return None
-        return layout_of(operator, stiffness)
+        return layout_of(operator, stiffness, rows.make_ups if rows.varies else ())
+
+    def _sections(self, low: int, high: int) -> Sections:
+        return Sections.of(self._model.numbering, low, high)
+
+    def _columns(self) -> tuple[Sections, int]:
+        """Stations that products read, and which of them is the first that is solved for."""
+        domain = self.domain
+        columns = self._sections(domain.read_low, domain.read_high)
+        return columns, int(np.searchsorted(columns.starts, domain.low - domain.read_low))
 
     def _rows_of(self, name: str) -> sparse.bsr_matrix:
         if name == "stiffness" and self._stiffness is not None:

@@ -145,7 +145,7 @@ class Unknowns:
         return int(self.starts[first]), int(self.starts[max(first, last)])
 
 
-def number_unknowns(mesh: LineMesh, groups: Iterable[Group], padded: bool = True) -> Unknowns:
+def number_unknowns(mesh: LineMesh, groups: Iterable[Group], padded: bool = False) -> Unknowns:
     """The registry for a mesh whose wires have the unknowns of ``groups``. Not collective.
 
     ``padded`` fills all stations up to a whole cross-section.

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from catenary.solver.linear.sections import Sections, neighbours
 from catenary.solver.linear.station_layout import Layout
-from catenary.solver.linear.station_products import layout_of, neighbours
+from catenary.solver.linear.station_products import layout_of
 
 
 def line(
@@ -49,3 +50,25 @@ def layout(matrix: sparse.bsr_matrix) -> Layout:
     found = layout_of(blocks, blocks)
     assert found is not None
     return found
+
+
+def sections_of(present: np.ndarray) -> Sections:
+    """Stations that have the places ``present`` (n_stations, width) of a cross-section."""
+    rows, make_up = np.unique(present, axis=0, return_inverse=True)
+    make_ups = tuple(tuple(map(int, np.flatnonzero(row))) for row in rows)
+    starts = np.concatenate([[0], np.cumsum(present.sum(axis=1))])
+    return Sections(starts, make_up, make_ups, present.shape[1])
+
+
+def lacking(matrix: sparse.bsr_matrix, present: np.ndarray) -> sparse.bsr_matrix:
+    """A matrix without the rows and columns that stations lack, in blocks of one."""
+    kept = np.flatnonzero(present.ravel())
+    part = matrix.tocsr()[kept][:, kept].tobsr((1, 1))
+    part.sort_indices()
+    return part
+
+
+def holding(matrix: sparse.bsr_matrix, held: np.ndarray) -> sparse.bsr_matrix:
+    """A matrix whose unknowns ``held`` (n_stations, width) are joined to nothing."""
+    free = sparse.diags((~held.ravel()).astype(float))
+    return (free @ matrix @ free + sparse.diags(held.ravel().astype(float))).tobsr(matrix.blocksize)

@@ -9,9 +9,10 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from catenary.solver.linear import station_factors as module
+from catenary.solver.linear.sections import neighbours
 from catenary.solver.linear.station_factors import station_factors
 from catenary.solver.linear.station_layout import WIDEST, Layout
-from catenary.solver.linear.station_products import layout_of, neighbours, station_product
+from catenary.solver.linear.station_products import layout_of, station_product
 
 RNG = np.random.default_rng(7)
 # Sums of a dozen products of numbers of order one; solves lose a few digits to the condition, 1e2.
