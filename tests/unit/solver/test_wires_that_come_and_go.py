@@ -12,6 +12,7 @@ from small_lines import numerics
 from stitched_line import motion, stitched_model
 
 from catenary.solver.integrators.make_line import make_line
+from catenary.solver.model.loads import ShapeLoad
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
@@ -40,7 +41,7 @@ def test_stations_are_as_wide_as_the_wires_that_are_there() -> None:
     assert numbering.missing.size == 2 * 4
 
 
-def dense_steps(found: Model, method: Numerics, loads: np.ndarray | None) -> list[np.ndarray]:
+def dense_steps(found: Model, method: Numerics, load: np.ndarray) -> list[np.ndarray]:
     """Displacement, velocity and balancing acceleration after ``STEPS`` steps."""
     dt, beta, gamma, kept, shared = method.dt, method.beta, method.gamma, 0.0, 0.0
     if method.integrator != NEWMARK:
@@ -57,33 +58,32 @@ def dense_steps(found: Model, method: Numerics, loads: np.ndarray | None) -> lis
         p = (shared * b - kept * a) / (1.0 - kept)
         d = d + dt * v + dt**2 * ((0.5 - beta) * a + beta * p)
         v = v + dt * ((1.0 - gamma) * a + gamma * p)
-        b = inverse @ ((0.0 if loads is None else loads) - k @ d - c @ v)
+        b = inverse @ (load - k @ d - c @ v)
         a, d, v = p + ratio * b, d + sigma * b, v + tau * b
     return [d, v, b]
 
 
 @pytest.mark.parametrize("in_passes", [True, False])
 @pytest.mark.parametrize(
-    ("method", "by_component", "loaded"),
-    [(USUAL, False, False), (USUAL, True, True), (HHT, False, True)],
+    ("method", "by_component"),
+    [(USUAL, False), (USUAL, True), (HHT, False)],
     ids=["newmark", "damping by component", "hht"],
 )
 def test_steps_are_those_of_dense_matrices(
-    method: Numerics, by_component: bool, loaded: bool, in_passes: bool
+    method: Numerics, by_component: bool, in_passes: bool
 ) -> None:
-    found = model(by_component)
-    free = np.ones(found.n_dofs)
-    free[found.constrained] = 0.0
-    lost = 50.0 * np.random.default_rng(2).standard_normal(found.n_dofs) * free
-    made = make_line(
-        COMM, found, distribute(found, 1, 0), method, lost if loaded else None, in_passes
-    )
-    assert (made.passes is not None) is in_passes and made.operators.by_stations() is not None
+    load = 50.0 * motion(model(by_component), 2)[1]
+    forces = ShapeLoad(np.arange(load.size), load)
+    found = replace(model(by_component), loads=[forces])
+    made = make_line(COMM, found, distribute(found, 1, 0), method, in_passes)
+    assert (made.passes is not None) is in_passes
+    assert made.operators.by_stations(False) is not None
     made.start(*motion(found, 5))
     for _ in range(STEPS):
+        made.load_at(0.0)
         made.free_step()
     state = made.state()
-    expected = dense_steps(found, method, lost if loaded else None)
+    expected = dense_steps(found, method, load)
     for name, values in zip(("displacement", "velocity", "acceleration"), expected, strict=True):
         assert np.abs(state[name] - values).max() < ROUND_OFF * np.abs(values).max(), name
     made.destroy()
