@@ -69,7 +69,7 @@ def by_make_up(kernel: Any) -> Any:
     return function
 
 
-_OPTIONS = {"forceinline": True, "error_model": "numpy"}
+_OPTIONS: Any = {"forceinline": True, "error_model": "numpy"}
 
 
 def _chain(kernel: Any, names: list[str], layout: Layout, number: int) -> Callable[..., Any]:

@@ -100,8 +100,10 @@ class Layout:
     @property
     def key(self) -> tuple[object, ...]:
         """All that makes a layout."""
-        own = self.widths, self.own, self.beside, self.damped, self.remembers
-        own += self.shares, self.make_ups
+        own = (
+            *(self.widths, self.own, self.beside, self.damped, self.remembers, self.shares),
+            self.make_ups,
+        )
         return own if self.whole is None else (*own, self.number, self.whole.key)
 
     def remembering(self) -> Layout:
