@@ -6,8 +6,24 @@ import os
 import sys
 from pathlib import Path
 
+import pytest
+
+# Files to begin with, as cores become free: those that compile most. The first and the third share
+# loops; the second has others, and takes as long as both: no two cores compile the same at a time.
+FIRST = (
+    "unit/solver/test_repeated_blocks.py",
+    "regression/test_hard_cases.py",
+    "unit/solver/test_station_passes.py",
+)
+
 sys.path.insert(0, str(Path(__file__).with_name("support")))
 
 # The linear algebra of tests is small: threads would wait for each other.
 for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(threads, "1")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put ``FIRST`` first; the others keep their order."""
+    first = [Path(__file__).parent / name for name in FIRST]
+    items.sort(key=lambda item: first.index(item.path) if item.path in first else len(first))
