@@ -6,7 +6,7 @@ One list of reasons: `plan` reads it for a problem, a march for what it steps.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.mbs.build import has_joints
 from catenary.solver.effects.all_effects import simulated
@@ -14,7 +14,9 @@ from catenary.solver.integrators.detour import Detour
 from catenary.solver.problem.contact_laws import HertzLaw
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
-from catenary.solver.time_loop.row_layout import RowLayout
+
+if TYPE_CHECKING:
+    from catenary.solver.time_loop.row_layout import RowLayout
 
 
 class _Stepped(NamedTuple):

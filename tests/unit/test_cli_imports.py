@@ -77,8 +77,8 @@ def test_help_loads_no_arrays() -> None:
 def test_a_sound_case_loads_what_it_is_checked_with() -> None:
     """So that the names above are those of modules; a lumped pantograph needs no compiled loop."""
     (_, lumped), (_, mechanism) = run_all(["check en50318_2002", "check ambrosio2012"])
-    assert {"gmsh", "meshio", "scipy"} <= set(lumped)
-    unused = BACKENDS - {"gmsh", "meshio", "scipy"}
+    assert "scipy" in lumped
+    unused = BACKENDS - {"scipy"}
     assert not unused & set(lumped)
     assert not (unused - {"numba"}) & set(mechanism)
 
