@@ -1,0 +1,136 @@
+"""What lateral motion and its loads cost: the example of docs/architecture.md beside the vertical
+march, in turns in one process. Run by ``make bench``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from measuring import registered
+from mpi4py import MPI
+from step_cost import room
+
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
+from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.solver.effects.effect import Effect
+from catenary.solver.model.builder import ModelBuilder
+from catenary.solver.model.links import Direction, law
+from catenary.solver.model.loads import FieldLoad, FunctionLoad, ShapeLoad, along, harmonics
+from catenary.solver.statics.line_at_rest import line_at_rest
+from catenary.solver.time_loop.march import March
+from catenary.solver.time_loop.observers import Stage, StepView
+
+PLANE = ("v", "theta_z")
+WIND = 8.0  # [N/m]
+# Of shipped length, and of 54 km; steps of a round, some milliseconds, and rounds.
+LINES = {25: (400, 25), 1000: (60, 12)}
+# At most so many times the vertical march.
+MOST = {"lateral": 2.2, "with wind": 2.2, "coupled": 3.5}
+BUILDS = ("lateral", "with wind", "with a harmonic wind", "with gusts", "a function", "coupled")
+
+
+def build_of(name: str) -> Callable[[ModelBuilder], None]:
+    """The effect of docs/architecture.md with the load, or the springs, of that name."""
+
+    def build(builder: ModelBuilder) -> None:
+        for wire in (CONTACT_WIRE, MESSENGER_WIRE):
+            builder.add_wire(wire, PLANE)
+            unknowns, weights = along(builder.model, wire, PLANE)
+            even = weights @ np.full(weights.shape[1], WIND)
+            if name == "with wind":
+                builder.add_load(ShapeLoad(unknowns, even))
+            elif name == "with a harmonic wind":
+                builder.add_load(ShapeLoad(unknowns, even, harmonics([0.5], [1.0], [0.0])))
+            elif name == "with gusts":
+                points = np.arange(0.0, builder.mesh.points[:, 0].max() + 5.0, 5.0)
+                unknowns, weights = along(builder.model, wire, PLANE, points)
+                builder.add_load(FieldLoad(unknowns, weights, 0.05, gusts(points)))
+            elif name == "a function":
+                builder.add_load(FunctionLoad("wind", unknowns, by_function(even)))
+        builder.hold(builder.mesh.anchors, "v")
+        if name == "coupled":
+            couple(builder)
+
+    return build
+
+
+def by_function(even: np.ndarray) -> Callable[[float], np.ndarray]:
+    return lambda time: even * np.sin(time)
+
+
+def gusts(points: np.ndarray) -> Callable[[int, slice, np.ndarray], None]:
+    def fill(first: int, part: slice, slices: np.ndarray) -> None:
+        times = 0.05 * (first + np.arange(slices.shape[0]))
+        slices[:] = WIND * np.sin(0.1 * points[part] - times[:, None])
+
+    return fill
+
+
+def couple(builder: ModelBuilder) -> None:
+    """Inclined springs to the ground at arms and at the lower ends of droppers."""
+    mesh, model = builder.mesh, builder.model
+    nodes = np.unique(np.concatenate([mesh.steady_arms, mesh.droppers[:, 1]]))
+    laws = law(mesh.x(nodes), np.full(nodes.size, 100.0))
+    unknowns = np.stack([model.dofs(nodes), model.dofs(nodes, "v")], axis=1)
+    weights = np.broadcast_to(np.array([0.6, 0.8]), unknowns.shape)
+    builder.add_links("inclined", Direction(unknowns, weights), laws)
+
+
+class Timed:
+    """A march that starts again and again from its first state."""
+
+    def __init__(self, n_spans: int, name: str) -> None:
+        scene = load_scene("ambrosio2012", [f"line.n_spans={n_spans}", *room(n_spans)])
+        problem = problem_of(scene)
+        train = problem.train
+        way = (LINES[n_spans][0] + 0.5) * problem.numerics.dt * train.speed
+        effects = problem.effects if name == "vertical" else problem.effects | {"lateral"}
+        problem = replace(problem, effects=effects, train=replace(train, end=train.start + way))
+        effect = Effect(
+            "lateral", name, "unknowns and wires", "benchmark", False,
+            unknowns_of_wire=lambda wire: PLANE, build=build_of(name),
+        )  # fmt: skip
+        with registered(effect):
+            self._march = March(MPI.COMM_SELF, *line_at_rest(problem, mesh_of(scene)))
+        self._march.run([self])
+
+    def start(self, stage: Stage) -> None:
+        """An observer of the first run, for the state that it starts from."""
+
+    def observe(self, view: StepView) -> None:
+        if view.step == 0:
+            self._first = view.checkpoint()
+
+    def finish(self, outcome: str) -> None:
+        assert outcome == "done"
+
+    def step_cost(self) -> float:
+        """Time of a step of one more march [us]."""
+        assert self._first is not None
+        self._march.restore(self._first)
+        outcome = self._march.run([])
+        return 1e6 * outcome.wall / outcome.n_steps
+
+    def destroy(self) -> None:
+        self._march.destroy()
+
+
+@pytest.mark.parametrize("n_spans", LINES)
+def test_lateral_motion_costs_what_its_unknowns_cost(n_spans: int) -> None:
+    marches = {name: Timed(n_spans, name) for name in ("vertical", *BUILDS)}
+    least = dict.fromkeys(marches, np.inf)
+    for _ in range(LINES[n_spans][1]):
+        for name, march in marches.items():
+            least[name] = min(least[name], march.step_cost())
+    print(f"\n{n_spans} spans{'':22}{'us a step':>10}{'x vertical':>12}{'at most':>9}")
+    for name, value in least.items():
+        at_most = f"{MOST[name]:9.2f}" if name in MOST else ""
+        print(f"{name:30}{value:10.1f}{value / least['vertical']:12.2f}{at_most}")
+        marches[name].destroy()
+    for name, most in MOST.items():
+        assert least[name] < most * least["vertical"], name
