@@ -1,4 +1,4 @@
-"""Cost model: time and memory of meshing and of a run, from numbers of nodes, unknowns, steps."""
+"""Cost model: time and memory of the start and of a run, from numbers of nodes, unknowns, steps."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ SCHEME_FACTOR = {"one_solve": 1.0, "fixed_point": 9.0, "ts_alpha2": 70.0}
 # A substep of a pantograph with all its bodies: 0.21 to 0.38 ms were measured with the paper's
 # seven, by the way of keeping joints.
 ALL_BODIES_SUBSTEP = 3.0e-4  # [s]
-# Time of Gmsh and of reading its file, measured with 1e5 and 4e5 nodes on a two-core machine.
-MESHING_PER_NODE = 4.5e-5  # [s]
+# Processor time from the scene to the first step, measured with 9e5 nodes on a two-core machine.
+START_PER_NODE = 2.8e-5  # [s]
 # Resident memory of runs of ambrosio2012 on 25, 300, 1000 and 2000 spans, report included, within
 # 10 %: program and libraries, then per unknown.
 MEMORY_BASE = 3.85e8  # [B]
@@ -28,9 +28,9 @@ MEMORY_PER_UNKNOWN = 2200.0  # [B]
 MEMORY_PER_STEP = 40.0  # [B]
 
 
-def estimate_meshing(n_nodes: int) -> float:
-    """Time of making and reading a mesh of both wires [s]."""
-    return MESHING_PER_NODE * n_nodes
+def estimate_start(n_nodes: int) -> float:
+    """Processor time of mesh, line at rest and what steps it [s]."""
+    return START_PER_NODE * n_nodes
 
 
 def estimate_march(

@@ -124,8 +124,9 @@ def station_factors(
     kinds, numbers, n_kinds, count = kinds_by_make_up(layout, stations.make_up, pack)
     if layout.varies and count != np.count_nonzero(factors) - station.size:
         return None  # elimination joins what a station lacks
-    if numbers.nbytes > LARGE and layout.turns and not layout.varies:
-        layout = layout.changed(shares=True)
+    sharing = layout.changed(shares=True)
+    if numbers.nbytes > LARGE and sharing.shares and not layout.varies:
+        layout = sharing
         kinds, numbers, n_kinds, _ = kinds_by_make_up(layout, stations.make_up, pack)
     return StationFactors(layout, stations, kinds, numbers, low, high, n_kinds)
 

@@ -53,6 +53,7 @@ class Layout:
     damped : whether a product with K is one with C as well
     remembers : whether steps need an acceleration known before, as the generalized-alpha method's
     shares : whether factors keep one block for both ways between two stations; only if it turns
+        and one register holds all lanes
     make_ups : places in a cross-section that stations of each make-up have; none if all have all
 
     Attributes
@@ -89,7 +90,7 @@ class Layout:
         self.n_lanes = self._plane * len(self.widths)
         # Columns where there are fewer of these than of differences.
         self.turns = self._plane <= REGISTER and max(self.widths) > self._plane - 2
-        self.shares = bool(shares) and self.turns
+        self.shares = bool(shares) and self.turns and self.n_lanes <= REGISTER
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Layout) and self.key == other.key

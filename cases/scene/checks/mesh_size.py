@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.cases.scene.convert.line import span_lengths
-from catenary.cases.scene.cost_model import estimate_memory, estimate_meshing
+from catenary.cases.scene.cost_model import estimate_memory, estimate_start
 from catenary.cases.scene.input.faults import Fault
 from catenary.meshgen.line import Role
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
@@ -41,10 +41,10 @@ class Size(NamedTuple):
 
     def sentence(self) -> str:
         """What it is and what it takes, in one sentence."""
-        memory, meshing = estimate_memory(self.unknowns), estimate_meshing(self.nodes)
+        memory, start = estimate_memory(self.unknowns), estimate_start(self.nodes)
         return (
             f"{self.spans} spans and {self.droppers} droppers make {self.nodes} nodes and "
-            f"{self.unknowns} unknowns: meshing takes about {meshing:.0f} s and a "
+            f"{self.unknowns} unknowns: its start takes about {start:.0f} s and a "
             f"run about {memory / 1e9:.1f} GB of memory on one rank"
         )
 

@@ -58,6 +58,16 @@ def test_large_factors_keep_one_block_for_both_ways(
     compare_factors(n_stations, 0, n_stations, widths)
 
 
+@pytest.mark.parametrize("widths", [(4, 2, 2), (8, 4)])
+def test_large_factors_of_planes_in_two_registers_keep_all_blocks(
+    widths: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "LARGE", 0)
+    found = station_factors(line(40, widths=widths), layout(line(40, widths=widths)))
+    assert found is not None and not found.layout.shares
+    compare_factors(40, 0, 40, widths)
+
+
 def compare_factors(
     n_stations: int, low: int, high: int, widths: tuple[int, ...] = (4,), joined: bool = True
 ) -> None:
