@@ -14,6 +14,8 @@ from catenary.postproc.read.results import Results
 GIVEN = "mesh.elements_per_gap="
 # What another program may round coordinates to [m].
 ROUNDING = 1e-9
+# Places of nodes that Gmsh writes are off by up to this; wires divided without it are not [m].
+GMSH = 2e-9
 
 
 @pytest.fixture(scope="module")
@@ -92,12 +94,12 @@ def test_a_mesh_of_another_program_gives_nearly_the_same_forces(
     with Results(out) as results, Results(made) as expected:
         x, reference = results.line("node_points")[:, 0], expected.line("node_points")[:, 0]
         moved = np.abs(np.sort(x) - np.sort(reference)).max()
-    assert 0.5 * ROUNDING < moved <= 1.1 * ROUNDING
+    assert 0.5 * ROUNDING < moved <= 1.1 * ROUNDING + GMSH
     differences = largest_differences(out, made)
     # The shortest element, 0.625 m, is wrong by two roundings, its bending stiffness (1 / length^3)
-    # by 6 / 0.625: 1e-8. Forces and uplifts answer in proportion, by no more than about ten times
-    # as much.
-    allowed = 10 * 6 / 0.625 * ROUNDING
+    # by 6 / 0.625 times each: 3e-8. Forces and uplifts answer in proportion, by no more than about
+    # ten times as much.
+    allowed = 10 * 6 / 0.625 * (ROUNDING + GMSH)
     print(f"{differences}, allowed {allowed:.0e}")
     assert max(differences.values()) < allowed
 
