@@ -42,7 +42,7 @@ from catenary.solver.linear.make_ups import (
     start_of,
 )
 from catenary.solver.linear.sections import Sections, neighbours
-from catenary.solver.linear.station_layout import WIDEST, Layout
+from catenary.solver.linear.station_layout import LANES, WIDEST, Layout
 from catenary.solver.linear.unique_rows import kinds_of
 
 
@@ -54,7 +54,8 @@ def layout_of(
 
     None if a plane is wider than kernels are.
     """
-    widths = _planes((operator != 0).any(axis=(0, 1)) | (stiffness != 0).any(axis=(0, 1)))
+    joined = (operator != 0).any(axis=(0, 1)) | (stiffness != 0).any(axis=(0, 1))
+    widths = _without_gaps(_planes(joined))
     if max(widths) > WIDEST:
         return None
     return _joining(Layout(widths, (), (), make_ups=make_ups), stiffness)
@@ -82,6 +83,18 @@ def _planes(joined: np.ndarray) -> tuple[int, ...]:
     reach = np.where(joined | joined.T, np.arange(size), 0).max(axis=1, initial=0)
     ends = np.flatnonzero(np.maximum.accumulate(np.maximum(reach, np.arange(size))) == range(size))
     return tuple(int(width) for width in np.diff(ends, prepend=-1))
+
+
+def _without_gaps(widths: tuple[int, ...]) -> tuple[int, ...]:
+    """Planes beside each other put together where they fit into the lanes of one."""
+    lanes = min((n for n in LANES if n >= max(widths)), default=WIDEST)
+    merged = [widths[0]]
+    for width in widths[1:]:
+        if merged[-1] + width <= lanes:
+            merged[-1] += width
+        else:
+            merged.append(width)
+    return tuple(merged)
 
 
 def by_kinds(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

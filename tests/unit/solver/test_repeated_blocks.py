@@ -17,7 +17,7 @@ from catenary.solver.linear.station_products import layout_of, station_product
 RNG = np.random.default_rng(7)
 # Sums of a dozen products of numbers of order one; solves lose a few digits to the condition, 1e2.
 ROUND_OFF = 1e-14
-WIDTHS = [(2,), (3,), (4,), (6,), (8,), (10,), (12,), (16,), (4, 4), (6, 4), (4, 2, 2), (12, 2)]
+WIDTHS = [(2,), (3,), (4,), (6,), (8,), (10,), (12,), (16,), (4, 4), (6, 4), (6, 4, 4), (12, 2)]
 LENGTHS = [1, 2, 3, 4, 5, 40, 301]
 
 
@@ -124,6 +124,11 @@ def test_planes_are_what_no_matrix_joins() -> None:
         joined[place] = 0.1
         assert layout_of(joined, apart).widths == layout_of(apart, joined).widths == (6,)
     assert layout_of(*[np.ones((3, 2, WIDEST + 1, WIDEST + 1))] * 2) is None
+
+
+def test_planes_that_fit_into_the_lanes_of_one_are_put_together() -> None:
+    for widths, together in (((4, 2, 2), (4, 4)), ((6, 2), (8,)), ((4, 2), (4, 2))):
+        assert layout(line(10, widths=widths)).widths == together
 
 
 def test_what_is_not_positive_definite_gives_no_number_and_no_error() -> None:
