@@ -17,7 +17,7 @@ from catenary.solver.linear.station_products import layout_of, station_product
 RNG = np.random.default_rng(7)
 # Sums of a dozen products of numbers of order one; solves lose a few digits to the condition, 1e2.
 ROUND_OFF = 1e-14
-WIDTHS = [(2,), (3,), (4,), (6,), (8,), (10,), (12,), (16,), (4, 4), (6, 4), (6, 4, 4), (12, 2)]
+WIDTHS = [(2,), (3,), (4,), (6,), (8,), (10,), (12,), (16,), (4, 4), (6, 4), (4, 4, 4), (12, 2)]
 LENGTHS = [1, 2, 3, 4, 5, 40, 301]
 
 
