@@ -58,7 +58,7 @@ def test_large_factors_keep_one_block_for_both_ways(
     compare_factors(n_stations, 0, n_stations, widths)
 
 
-@pytest.mark.parametrize("widths", [(4, 2, 2), (8, 4)])
+@pytest.mark.parametrize("widths", [(4, 4, 4), (8, 4)])
 def test_large_factors_of_planes_in_two_registers_keep_all_blocks(
     widths: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
