@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from enum import StrEnum
+from enum import Enum
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from catenary.meshgen.spans import Spans
 _SAME_PLACE = 1e-6
 
 
-class Role(StrEnum):
+class Role(str, Enum):
     """What a wire is there for."""
 
     CONTACT = "contact"
@@ -27,7 +27,7 @@ class Role(StrEnum):
     STITCH = "stitch"
 
 
-class End(StrEnum):
+class End(str, Enum):
     """How a piece of wire ends: held in height by a tensioner, or carried by a clamp there."""
 
     HELD = "held"

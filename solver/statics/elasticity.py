@@ -55,7 +55,7 @@ def _seen_from(model: Model, x_from: float, x_to: float) -> sparse.csc_matrix:
     while True:
         low, high = numbering.within(x_from - reach, x_to + reach)
         near, stiffness = (low, high), (0.0, 1.0, 0.0)
-        matrix = part_of(model, near, near, stiffness, 1.0, width).tocsc()
+        matrix = part_of(model, near, near, stiffness, 1.0, numbering.block).tocsc()
         matrix.eliminate_zeros()
         condensed, motion = _condensed(matrix, first - low, last - low)
         # What moves at the ends of what was looked at, wherever the line goes on there.
