@@ -216,7 +216,8 @@ class SoundFile:
 
     def _usable(self) -> str:
         """What can still be used of a file of which no report can be made."""
-        dt = float(self.facts.get("time_step", np.nan))
+        step = self.facts.get("time_step", np.nan)
+        dt = float(step) if np.isrealobj(step) else np.nan
         if any(f.essential for f in self._faults) or not dt > 0.0:
             return "no part of it can be reported"
         about = {"n_steps": None, "outcome": "running", **self.attrs}

@@ -230,7 +230,7 @@ def meet(motion, touches, gains, answers, line):
             by_value = answer_at(touch.local, touch.value, by_force[j])
             line.by_force[i, j] = gains.position * by_value
             if by_slope.shape[1] > 0:
-                along = answer_at(touch.local, touch.slope, by_slope[j])
+                along = answer_at(touch.local, touch.slope, by_force[j])
                 line.rate_by_force[i, j] = (
                     gains.train_speed * gains.position * along + gains.velocity * by_value
                 )

@@ -27,6 +27,7 @@ from catenary.solver.base.freed_memory import give_back
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
+from catenary.solver.effects.all_effects import simulated
 from catenary.solver.integrators.detour import Detour, tell
 from catenary.solver.linear.petsc_solvers import (
     PREFIX,
@@ -111,6 +112,9 @@ class March:
                 "numerics.scheme is ts_alpha2, for one contact wire only, and this line has "
                 'several: take "one_solve"'
             )
+        if problem is not model.problem:
+            # The same line under other laws: a contact, a train, a damping of its own.
+            model = replace(model, problem=problem, simulated=simulated(problem))
         self._first = model
         self._form = form
         self.ownership = distribute(model, comm.size, comm.rank)

@@ -13,6 +13,7 @@ from catenary.cases.run.plan import make_plan, plan_text
 from catenary.cases.scene.cost_model import STATION_COST, cost_of_widths, estimate_march
 from catenary.cases.scene.load import load_scene
 from catenary.solver.effects.build_model import numbering_of
+from catenary.solver.integrators import detour
 from catenary.solver.integrators.detour import PARTS, detour_of
 from catenary.solver.problem.problem import Damping
 
@@ -32,7 +33,11 @@ def test_the_plan_says_what_makes_steps_slower_and_by_how_much() -> None:
     assert slow.march == pytest.approx(PARTS * plain.march)
 
 
-def test_log_and_outcome_of_a_march_say_the_same(caplog: pytest.LogCaptureFixture) -> None:
+def test_log_and_outcome_of_a_march_say_the_same(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Warnings are given once a process, of which other tests are a part.
+    monkeypatch.setattr(detour, "_told", set())
     damping = Damping(1e-4, 0.0125, {"contact_wire": (2e-3, 0.3)})
     line = en50318_line(3)
     for coupling, slower in (("implicit", False), ("explicit", True)):

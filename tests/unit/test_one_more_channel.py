@@ -36,7 +36,11 @@ from catenary.solver.time_loop.channels import (
 )
 
 PLACE = Channel(
-    "strip_place", "m", "place of the strip", PANTOGRAPH, lambda now: now.pantographs.contact_place
+    "strip_place",
+    "m",
+    "place of the strip",
+    PANTOGRAPH,
+    lambda now: now.pantographs.candidates.place,
 )
 
 

@@ -14,6 +14,7 @@ from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.base.errors import RunBroken
+from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact_problem.coupling import Coupling, make_coupling
@@ -74,7 +75,7 @@ class Wall:
         )
         law = LinearInSteps(LinearLaw(stiffness, 0.0), 1, pulls=True)
         accurate = numerics(dt, coupling=coupling, eps_force=1e-9)
-        self.coupling: Coupling = make_coupling(law, 0.0, np.zeros((0, 1)), accurate)
+        self.coupling: Coupling = make_coupling(law, no_links(), accurate)
         self.heads, self.dt, self.time = Heads(1), dt, 0.0
         self.mass.restore(np.array([1e-3, 0.0, -stiffness * 1e-3 / mass]))
         self.line = LineResponse(1, 0, early=True)
