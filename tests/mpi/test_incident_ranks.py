@@ -12,12 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
+from small_lines import bare_wires
 
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.mbs.lowering import Lowering
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
+from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.solver.base.parallel import on_root
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
@@ -178,13 +180,7 @@ def test_a_rank_without_any_station_is_legal(case: tuple[Problem, LineMesh, floa
         supports=np.zeros(0, dtype=int),
         anchors=np.array([0, 1, 2, 3]),
     )
-    line = replace(
-        problem.line,
-        span_lengths=(length,),
-        dropper_positions=((),),
-        pre_sag=((),),
-        stagger=(0.0, 0.0),
-    )
+    line = make_line(bare_wires(length))
     bare = replace(
         problem,
         line=line,

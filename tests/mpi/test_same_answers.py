@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
+from small_lines import bare_wires
 
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
+from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.solver.base.errors import InputError
 from catenary.solver.base.parallel import on_root
 from catenary.solver.model.partition import distribute
@@ -215,13 +217,7 @@ def test_a_rank_without_any_station_is_legal(case: tuple[Problem, LineMesh]) -> 
         supports=np.zeros(0, dtype=int),
         anchors=np.array([0, 1, 2, 3]),
     )
-    line = replace(
-        problem.line,
-        span_lengths=(length,),
-        dropper_positions=((),),
-        pre_sag=((),),
-        stagger=(0.0, 0.0),
-    )
+    line = make_line(bare_wires(length))
     train = replace(problem.train, start=5.0, end=50.0, placements=problem.train.placements[:1])
     bare = replace(problem, line=line, train=train)
     model, _ = find_form(bare, mesh)
