@@ -27,8 +27,6 @@ SIZE = (1280, 720)
 _SHARES = (0.62, 0.38)
 # Length of line in a picture beside one pantograph [m].
 _WIDTH = 110.0
-# Snapshots that are looked through for the largest uplift.
-_SAMPLED = 400
 
 
 @dataclass(frozen=True)
@@ -153,7 +151,7 @@ def _pictures(
     rows = data.row_at(float(times[0])), data.row_at(float(times[-1])) + 1
     spread = float(np.ptp(data.position[0]))
     width = wish.width or _WIDTH + 1.1 * spread
-    largest = _largest_uplift(snapshots, numbers)
+    largest = snapshots.largest_uplift(numbers)
     plotter = pyvista.Plotter(
         shape=(2, 1), row_weights=_SHARES, window_size=SIZE, off_screen=True, border=False
     )
@@ -191,12 +189,6 @@ def _scale(data: FilmData, width: float, largest: float, wish: Wish) -> Scale:
     room = data.points[:, 2].max() - contact.min() + 3.0
     aspect = SIZE[0] / (_SHARES[0] * SIZE[1])
     return scale_for(width, float(room), aspect, between, largest, wish.motion)
-
-
-def _largest_uplift(snapshots: Snapshots, numbers: np.ndarray) -> float:
-    """Largest uplift in the snapshots, or in so many of them that it is not far from that [m]."""
-    some = numbers[:: max(1, numbers.size // _SAMPLED)].tolist()
-    return max(1e-4, *(float(np.abs(snapshots.uplift(number)).max()) for number in some))
 
 
 def _slack(results: Results, times: np.ndarray, time: float) -> np.ndarray | None:

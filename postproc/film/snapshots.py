@@ -12,6 +12,8 @@ from catenary.postproc.record.growing_xdmf import snapshot_name
 from catenary.solver.base.errors import InputError
 
 FIELDS_FILE = "fields.h5"
+# Snapshots that are looked through for the largest uplift.
+_SAMPLED = 400
 
 
 class Snapshots:
@@ -59,6 +61,12 @@ class Snapshots:
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         self._file.close()
+
+    def largest_uplift(self, numbers: np.ndarray) -> float:
+        """Largest uplift in some snapshots, of many in so many of them that it is not far from
+        that, and not zero [m]."""
+        some = numbers[:: max(1, numbers.size // _SAMPLED)].tolist()
+        return max(1e-4, *(float(np.abs(self.uplift(number)).max()) for number in some))
 
     def uplift(self, number: int) -> np.ndarray:
         """Uplift of the nodes in a snapshot, (n_nodes,) [m].

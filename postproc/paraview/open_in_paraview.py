@@ -11,7 +11,7 @@ import numpy as np
 
 from catenary.postproc.film.film_data import FilmData, film_data
 from catenary.postproc.film.pantograph_shape import BELOW_HEAD
-from catenary.postproc.film.scale import round_down
+from catenary.postproc.film.scale import scale_for
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.paraview import scenery
 from catenary.postproc.read.records import Records
@@ -22,8 +22,8 @@ from catenary.solver.base.errors import InputError
 SCRIPT, FOLDER = "view.py", "paraview"
 _TEMPLATE = "view.py.template"
 # Line in the window beside one pantograph [m], width over height of the window, and the share of
-# the room between the wires that the largest uplift fills.
-_WIDTH, _ASPECT, _SHARE = 110.0, 1280.0 / 480.0, 0.4
+# the room between the wires that the arrow of a mean force fills.
+_WIDTH, _ASPECT, _ARROW = 110.0, 1280.0 / 480.0, 0.4
 
 
 def write_script(folder: Path, records: Records | None, motion: float | None = None) -> list[Path]:
@@ -71,12 +71,9 @@ def _settings(
     heights = data.points[:, 2]
     contact = heights[data.wires[data.contact]]
     low, high = float(np.median(contact)) - BELOW_HEAD - 0.4, float(heights.max()) + 0.6
-    height = round_down(width / _ASPECT / (high - low))
-    some = range(0, times.size, max(1, times.size // 200))
-    largest = max(1e-4, *(float(np.abs(snapshots.uplift(number)).max()) for number in some))
+    largest = snapshots.largest_uplift(np.arange(times.size))
     between = float(heights.max() - np.median(contact))
-    fitting = max(height, round_down(_SHARE * between * height / largest))
-    components = component_numbers(data.wires)
+    scale = scale_for(width, high - low, _ASPECT, between, largest, motion)
     first = data.row_at(float(times[0]))
     return {
         "folder": str((folder / FOLDER).absolute()),
@@ -84,15 +81,15 @@ def _settings(
         "pantographs": scenery.PANTOGRAPHS,
         "forces": scenery.FORCES,
         "surroundings": scenery.SURROUNDINGS,
-        "components": components,
+        "components": component_numbers(data.wires),
         "names": data.names,
-        "height": height,
-        "motion": motion or fitting,
+        "height": scale.height,
+        "motion": scale.motion,
         "largest_uplift_m": largest,
         "radius": 0.0018 * width,
-        "metres_a_newton": 0.1 * height * between / max(float(data.force.mean()), 1.0) * 4.0,
+        "metres_a_newton": _ARROW * scale.height * between / max(float(data.force.mean()), 1.0),
         "width_m": width,
-        "middle_m": 0.5 * height * (low + high),
+        "middle_m": 0.5 * scale.height * (low + high),
         "start_m": float(data.position[first].mean()) - data.speed * float(times[0]),
         "speed": data.speed,
         "times": [float(times[0]), float(times[-1])],

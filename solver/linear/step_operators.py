@@ -336,7 +336,7 @@ class LineOperators:
         self.domain = domain = Subdomain(own.first, own.last, low, high, read_low, read_high)
         # Products by stations read one more at both ends, which is zero where the line ends.
         self._read_padded = aligned_arrays.zeros(read_high - read_low + 2 * pad, 0)
-        self._read_array = read = self._read_padded[pad : pad + read_high - read_low]
+        read = self._read_padded[pad : pad + read_high - read_low]
         answer, force = aligned_arrays.zeros(domain.size, 1), aligned_arrays.zeros(domain.size, 2)
         loaded = aligned_arrays.zeros(domain.size, 3)
         # What products fill is this rank's, what is solved for perhaps the line's: two views.
