@@ -73,6 +73,7 @@ def check(
     for name, lines in kind_lines(scene, problem).items():
         console.say(f"pantograph {name}, " + "\n  ".join(lines))
     waves = arrival_facts(scene, problem)
+    console.say(f"ends: {'; '.join(waves['ends'])}")
     for fact in waves["pantographs"]:
         console.say(fact["says"])
     for text in waves["warnings"]:

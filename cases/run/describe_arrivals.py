@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from catenary.cases.run.describe_ends import end_sentences, end_warnings, lets_waves_out
 from catenary.cases.run.wave_arrivals import (
     SHORT_RUN_IN,
     Arrivals,
@@ -19,6 +20,7 @@ from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.line import Line
 from catenary.solver.effects.all_effects import simulated
+from catenary.solver.problem.ends import EndCondition
 from catenary.solver.problem.problem import Problem
 
 
@@ -56,7 +58,9 @@ def arrival_facts(scene: Scene, problem: Problem) -> dict[str, Any]:
             }
             for name, found, course in rows
         ],
+        "ends": list(end_sentences(problem)),
         "warnings": [
+            *end_warnings(problem),
             *_reflections(scene, told),
             *_short_run_in(scene, problem, told),
             *_short_stretch(problem, told),
@@ -107,10 +111,18 @@ def _told(problem: Problem) -> Told:
         )
         for start in starts
     )
-    found = tuple(arrivals(line, course) for course in courses)
+    found = tuple(_without_let_out(arrivals(line, course), problem.ends) for course in courses)
     n = len(starts)
     names = tuple("pantograph" if n == 1 else f"pantograph {i + 1}" for i in range(n))
     return Told(line, courses, found, names)
+
+
+def _without_let_out(found: Arrivals, ends: tuple[EndCondition, EndCondition]) -> Arrivals:
+    """The same without waves from ends that let them out."""
+    start, end = map(lets_waves_out, ends)
+    if start:
+        found = found._replace(near_end=None)
+    return found._replace(far_end=None, far_share=0.0) if end else found
 
 
 def _hardware(line: Line) -> float:
@@ -147,7 +159,11 @@ def _sentence(name: str, found: Arrivals) -> str:
 
 
 def _reflections(scene: Scene, told: Told) -> list[str]:
-    felt = [i for i, course in enumerate(told.courses) if reflection_felt(told.line, course)]
+    felt = [
+        i
+        for i, course in enumerate(told.courses)
+        if told.found[i].far_end is not None and reflection_felt(told.line, course)
+    ]
     if not felt:
         return []
     ends = [end_for(told.line, told.courses[i]) for i in felt]

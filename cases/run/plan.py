@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.cases.result_folder.output_folder import volume
 from catenary.cases.run.describe_arrivals import arrival_facts
+from catenary.cases.run.describe_ends import end_sentences
 from catenary.cases.run.describe_incidents import incident_facts
 from catenary.cases.run.describe_pantographs import kind_lines
 from catenary.cases.run.file_sizes import FileSizes
@@ -48,6 +49,7 @@ class Plan:
     kinds : name and description of each kind of pantograph on the train
     start, end, evaluation : stretch that the leading pantograph runs, and that is judged [m]
     incidents : time [s] and sentence of each, in order of time
+    ends : how the line begins and ends, in words
     arrivals : sentences about run-in and waves from the ends of the line
     warnings : sentences about them, empty if the line is long enough
     dt, simulated : time step and simulated time [s]
@@ -79,6 +81,7 @@ class Plan:
     end: float
     evaluation: tuple[float, float]
     incidents: tuple[tuple[float, str], ...]
+    ends: tuple[str, str]
     arrivals: tuple[str, ...]
     warnings: tuple[str, ...]
     dt: float
@@ -151,6 +154,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
         end=train.end,
         evaluation=problem.evaluation,
         incidents=tuple((fact["time_s"], fact["says"]) for fact in incident_facts(scene, problem)),
+        ends=end_sentences(problem),
         arrivals=tuple(fact["says"] for fact in waves["pantographs"]),
         warnings=tuple(waves["warnings"]),
         dt=dt,
@@ -206,6 +210,7 @@ def plan_text(plan: Plan) -> str:
         ("runs", f"from {plan.start:g} to {plan.end:g} m (leading pantograph)"),
         ("evaluated", f"from {plan.evaluation[0]:g} to {plan.evaluation[1]:g} m"),
         *(("incident", f"at {time:.4g} s: {says}") for time, says in plan.incidents),
+        ("ends", "; ".join(plan.ends)),
         *(("waves", says) for says in plan.arrivals),
         (
             "mesh",

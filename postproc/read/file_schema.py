@@ -141,11 +141,12 @@ def _arrivals(value: Any) -> bool:
     if not isinstance(value, dict):
         return False
     rows, warnings = value.get("pantographs", []), value.get("warnings", [])
+    ends = value.get("ends", [])
     return (
         isinstance(rows, list)
         and all(isinstance(row, dict) and isinstance(row.get("says"), str) for row in rows)
-        and isinstance(warnings, list)
-        and all(isinstance(text, str) for text in warnings)
+        and all(isinstance(texts, list) for texts in (warnings, ends))
+        and all(isinstance(text, str) for text in [*warnings, *ends])
     )
 
 

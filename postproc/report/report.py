@@ -292,6 +292,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
             (f"incident at {fact['time_s']:.4g} s", fact["says"])
             for fact in about.get("incidents", [])
         ),
+        *(("end of the line", says) for says in about.get("arrivals", {}).get("ends", [])),
         *(
             ("waves and run-in", fact["says"])
             for fact in about.get("arrivals", {}).get("pantographs", [])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from catenary.solver.effects import vertical_effects  # noqa: F401  (registers on import)
+from catenary.solver.effects import end_effects, vertical_effects  # noqa: F401  (registers)
 from catenary.solver.effects.effect import Effect, NamedWire, registered
 from catenary.solver.model.unknowns import Group
 from catenary.solver.problem.problem import Problem

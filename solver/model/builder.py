@@ -102,6 +102,11 @@ class ModelBuilder:
         self.model.loads.append(load)
         self._n_terms += len(load.unknowns)
 
+    def add_block(self, block: Block) -> None:
+        """Element matrices of any kind; those of masses carry no weight."""
+        self.model.blocks.append(block)
+        self._n_terms += block.dofs.shape[0]
+
     def hold(self, nodes: np.ndarray, unknown: str) -> None:
         """Hold an unknown of some nodes at its equilibrium value."""
         self._constrained.append(self.model.dofs(nodes, unknown))
@@ -132,5 +137,4 @@ class ModelBuilder:
         kind: np.ndarray | None = None,
     ) -> None:
         kind = np.arange(dofs.shape[0]) if kind is None else kind
-        self.model.blocks.append(Block(component, dofs, kind, mass, stiffness))
-        self._n_terms += dofs.shape[0]
+        self.add_block(Block(component, dofs, kind, mass, stiffness))

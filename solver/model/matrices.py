@@ -35,6 +35,8 @@ def iterate_entries(
             matrix += (mass + damping * beta) * block.mass[kind]
         if block.stiffness is not None:
             matrix += (stiffness + damping * alpha) * block.stiffness[kind]
+        if block.damping is not None:
+            matrix += damping * block.damping[kind]
         rows = np.broadcast_to(dofs[:, :, None], matrix.shape)
         columns = np.broadcast_to(dofs[:, None, :], matrix.shape)
         keep = (rows >= first) & (rows < last) & free[rows] & free[columns]

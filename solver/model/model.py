@@ -31,6 +31,7 @@ class Block:
     dofs : (n, m) int, unknowns of each element
     kind : (n,) int, of each element, which of the matrices it has
     mass, stiffness : (k, m, m) or None
+    damping : (k, m, m) or None, beside what the component's damping makes of the other two
     """
 
     component: str
@@ -38,6 +39,7 @@ class Block:
     kind: np.ndarray
     mass: np.ndarray | None
     stiffness: np.ndarray | None
+    damping: np.ndarray | None = None
 
 
 @dataclass
@@ -123,6 +125,8 @@ class Model:
     @property
     def damping_is_proportional(self) -> bool:
         """Whether C = alpha K + beta M holds for the whole line with one alpha and one beta."""
+        if any(block.damping is not None for block in self.blocks):
+            return False
         return len({self.damping_of(block.component) for block in self.blocks}) <= 1
 
     def wire_elements(self, wire: str) -> tuple[np.ndarray, np.ndarray]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from catenary.mbs.vehicle.motion_sources import VehicleMotion
 from catenary.meshgen.line import Line, Role
 from catenary.solver.problem.contact_laws import ContactLaw
+from catenary.solver.problem.ends import EndCondition, Fixed
 from catenary.solver.problem.incidents import LineIncident, TensionLoss
 
 if TYPE_CHECKING:
@@ -109,7 +110,7 @@ class Problem:
     ``evaluation`` (from, to) [m] is the stretch whose statistics are judged;
     ``residual_stiffness_ratio`` is the share of its stiffness that a compressed dropper keeps;
     ``slack_dampers_act`` whether the damper of a dropper goes on acting when its spring is slack;
-    ``incidents`` are what happens to the line on the way.
+    ``incidents`` are what happens to the line on the way; ``ends`` how it begins and ends.
     """
 
     line: Line
@@ -123,6 +124,7 @@ class Problem:
     gravity: float = 9.81
     incidents: tuple[LineIncident, ...] = ()
     slack_dampers_act: bool = False
+    ends: tuple[EndCondition, EndCondition] = (Fixed(), Fixed())
 
 
 def n_halvings(dt: float, smallest: float | None) -> int:

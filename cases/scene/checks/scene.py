@@ -24,6 +24,7 @@ from catenary.cases.scene.checks.effects import (
     check_requirements_of_chosen,
     check_requirements_of_defaults,
 )
+from catenary.cases.scene.checks.ends import check_ends
 from catenary.cases.scene.checks.incidents import check_incidents
 from catenary.cases.scene.checks.mesh_size import size_faults
 from catenary.cases.scene.checks.output import check_output
@@ -73,6 +74,7 @@ def faults_of(scene: Scene) -> list[Fault]:
         found.nothing_by(of_line, scene, line)
     if found.nothing_by(_running, scene, line) and found.nothing_by(_evaluation, scene):
         found.nothing_by(_raising, scene)
+        found.nothing_by(check_ends, scene, line)
     if found.faults:
         return found.faults
     # What may need multibody systems stands last: other faults are reported at once.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from catenary.cases.scene.convert.contact import contact_law_of
 from catenary.cases.scene.convert.course import end_of
+from catenary.cases.scene.convert.ends import ends_of
 from catenary.cases.scene.convert.incidents import line_incidents, lowering_of
 from catenary.cases.scene.convert.line import line_of
 from catenary.cases.scene.convert.pantograph import pantograph_of, static_force
@@ -51,6 +52,7 @@ def problem_of(scene: Scene) -> Problem:
         effects=frozenset(name for name, on in scene.switches().items() if on),
         incidents=line_incidents(scene.incidents, line, numerics.dt_s),
         slack_dampers_act=scene.line.dropper.slack_damping == "kept",
+        ends=ends_of(scene.line.ends),
     )
 
 

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from catenary.cases.scene.tables.ends import EndsTable
 from catenary.cases.scene.tables.table import TAKE_AWAY, OneOrMore, Table, ascending, exactly_one
 
 Span = Annotated[float, Field(ge=5, le=500)]
@@ -194,6 +195,7 @@ class LineTable(Table):
     transition: TransitionTable = Field(
         default_factory=TransitionTable, description="transition spans"
     )
+    ends: EndsTable = Field(default_factory=EndsTable, description="how the line ends")
 
     @model_validator(mode="after")
     def _consistent(self) -> LineTable:

@@ -1,0 +1,70 @@
+"""How the line ends, as a scene says it: keys, defaults, sentences, and what the plan tells."""
+
+from __future__ import annotations
+
+import pytest
+
+from catenary.cases.run.describe_arrivals import arrival_facts
+from catenary.cases.run.plan import make_plan, plan_text
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
+from catenary.solver.base.errors import InputError
+from catenary.solver.problem.ends import AbsorbingLayer, Fixed
+
+END = "line.ends.end"
+LAYER = f"{END}.kind=absorbing_layer"
+LONG = "line.n_spans=40"
+
+
+def test_lines_are_fixed_unless_the_scene_says_otherwise() -> None:
+    assert problem_of(load_scene("en50318_2002")).ends == (Fixed(), Fixed())
+
+
+def test_a_layer_has_usual_spans_and_damping_and_may_have_others() -> None:
+    assert problem_of(load_scene("en50318_2002", [LONG, LAYER])).ends[1] == AbsorbingLayer(20, 2.0)
+    own = [LONG, LAYER, f"{END}.spans=8", f"{END}.damping_per_s=3.5"]
+    assert problem_of(load_scene("en50318_2002", own)).ends == (Fixed(), AbsorbingLayer(8, 3.5))
+
+
+@pytest.mark.parametrize(
+    ("assignments", "sentence"),
+    [
+        ([f"{END}.kind=dashpot"], "it must not be dashpot: matched dashpots sqrt.* 0.26 to 0.84"),
+        ([f"{END}.kind=tensioner"], "fixed is the end of a wire at its tensioner"),
+        ([f"{END}.kind=free"], "it must be fixed or absorbing_layer"),
+        ([f"{END}.kind=3"], "line.ends.end.kind"),
+        ([f"{END}.spans=4"], "takes spans with kind absorbing_layer, not with fixed"),
+        ([f"{END}.damping_per_s=4"], "takes damping_per_s with kind absorbing_layer"),
+        ([LAYER, f"{END}.spans=0"], "it must be at least 1"),
+        ([LAYER, f"{END}.damping_per_s=-1"], "it must be greater than 0"),
+        ([LAYER, f"{END}.spans=22"], "the line has 22 spans"),
+        ([LAYER, f"{END}.spans=13"], r"into the evaluated stretch \(evaluation.to_m = 600\)"),
+        (
+            ["line.ends.start.kind=absorbing_layer", "line.ends.start.spans=7"],
+            r"reaches to 420 m, into the evaluated stretch \(evaluation.from_m = 360\)",
+        ),
+        (
+            ["line.ends.middle.kind=fixed"],
+            "line.ends.middle.kind .* is unknown; did you mean line.ends.end.kind",
+        ),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_sentence(assignments: list[str], sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence) as refused:
+        load_scene("en50318_2002", assignments)
+    assert "\n" not in str(refused.value)
+
+
+def test_plan_and_arrivals_tell_how_the_line_ends() -> None:
+    short = load_scene("en50318_2002", ["line.n_spans=16", "evaluation.to_m=900"])
+    fixed = arrival_facts(short, problem_of(short))
+    assert any("far end of the line reflects" in text for text in fixed["warnings"])
+    scene = load_scene(
+        "en50318_2002", ["line.n_spans=16", "evaluation.to_m=700", LAYER, f"{END}.spans=4"]
+    )
+    facts = arrival_facts(scene, problem_of(scene))
+    assert not any("reflects" in text for text in facts["warnings"])
+    (inside,) = (text for text in facts["warnings"] if "inside the absorbing layer" in text)
+    assert "begins at 720 m" in inside
+    assert facts["pantographs"][0]["far_end_met_at_m"] is None
+    assert "end 4 spans that absorb waves" in plan_text(make_plan(scene))
