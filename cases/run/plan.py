@@ -130,8 +130,8 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
     numbering = numbering_of(problem, mesh)
     train, dt = problem.train, problem.numerics.dt
     needs = needs_with_mesh(scene, mesh)
-    contact = problem.line.wires_of(Role.CONTACT)[0]
-    length = np.diff(mesh.x(mesh.elements(contact.name)), axis=1)
+    contact = problem.line.wires_of(Role.CONTACT)
+    length = np.concatenate([np.diff(mesh.x(mesh.elements(wire.name))) for wire in contact])
     waves = arrival_facts(scene, problem)
     return Plan(
         case=scene.case.name,
@@ -147,7 +147,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
         n_pantographs=len(train.placements),
         element_lengths=(float(length.min()), float(length.max())),
         speed=train.speed,
-        wave_speed=contact.wave_speed,
+        wave_speed=min(wire.wave_speed for wire in contact),
         static_forces=tuple(place.static_force for place in train.placements),
         kinds=tuple((name, told[0]) for name, told in kind_lines(scene, problem).items()),
         start=train.start,

@@ -43,7 +43,7 @@ from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.channels.facts import facts_of
-from catenary.postproc.channels.header import Header, line_datasets, static_datasets
+from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
 from catenary.postproc.files.own_files import remove_stale
 from catenary.postproc.record.fields import FieldRecorder
 from catenary.postproc.record.progress import Progress
@@ -173,10 +173,10 @@ def static_table(scene: Scene) -> dict[str, np.ndarray]:
     rest = line_at_rest(problem, mesh)
     data = {
         **line_datasets(problem.line, mesh, problem.evaluation),
-        **static_datasets(mesh, rest.model.contact_nodes, rest.form, rest.lift),
+        **static_datasets(problem.line, mesh, rest.form, rest.lift),
         "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
     }
-    return {name.rsplit("/", 1)[-1]: values for name, values in data.items()}
+    return {name.split("/", 1)[1]: values for name, values in data.items()}
 
 
 @dataclass(frozen=True)
@@ -376,15 +376,14 @@ def _header(order: _Order, problem: Problem, at_rest: LineAtRest) -> Header:
             "arrivals": arrival_facts(scene, problem),
             "versions": versions(),
             "config": resolved(scene),
+            "wires": wire_roles(line),
             "petsc_options": list(order.petsc_options),
             "effects_on": [tuple(row) for row in on],
             "effects_off": [tuple(row) for row in off],
         },
         datasets={
             **line_datasets(line, at_rest.mesh, problem.evaluation),
-            **static_datasets(
-                at_rest.mesh, at_rest.model.contact_nodes, at_rest.form, at_rest.lift
-            ),
+            **static_datasets(line, at_rest.mesh, at_rest.form, at_rest.lift),
         },
         facts=facts_of(problem, at_rest.mesh, at_rest.model.dropper_lengths),
     )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from catenary.cases.scene.input.case_files import CaseEntry
-from catenary.meshgen.spans import Spans
+from catenary.meshgen.line import Line, Role
 from catenary.postproc.evaluate.comparing import decimals_that_tell
 from catenary.postproc.evaluate.wording import counted, fixed
 
@@ -94,15 +94,15 @@ def _number(value: float | None, digits: int = 1) -> str:
     return "-" if value is None else fixed(value, digits)
 
 
-def static_text(table: Mapping[str, Any], line: Spans) -> str:
+def static_text(table: Mapping[str, Any], line: Line) -> str:
     """Dropper table, sag and elasticity of a line at rest.
 
     Parameters
     ----------
     table : arrays in SI units named as in ``/static`` and ``/line`` of a result file:
         ``dropper_span``, ``dropper_x``, ``dropper_length``, ``dropper_force``, ``contact_x``,
-        ``contact_height``, ``elasticity_x``, ``elasticity``
-    line : for the supports
+        ``contact_height``, ``elasticity_x``, ``elasticity``, ``wires/NAME``
+    line : for supports and contact wires
     """
     data = {name: np.asarray(value) for name, value in table.items()}
     masts = line.support_positions
@@ -123,15 +123,20 @@ def static_text(table: Mapping[str, Any], line: Spans) -> str:
             f"{span + 1:5d} {x[i]:12.3f} {length[i]:11.4f} {fixed(force[i], 1):>10}"
             for i in range(x.size)
         ]
-    height, lift = data["contact_height"], 1e3 * data["elasticity"]
+    lift, place = 1e3 * data["elasticity"], data["elasticity_x"]
     first, last = line.running_range
-    at = data["contact_x"]
-    running = height[(at >= first) & (at <= last)]
-    place = data["elasticity_x"]
+    lines += [""]
+    wires = [wire.name for wire in line.wires_of(Role.CONTACT)]
+    ends = np.cumsum([data[f"wires/{name}"].size for name in wires])[:-1]
+    chains = (np.split(data[f"contact_{own}"], ends) for own in ("x", "height"))
+    for name, at, height in zip(wires, *chains, strict=True):
+        running = height[(at >= first) & (at <= last)]
+        wire = "Contact wire" if len(wires) == 1 else name
+        lines.append(
+            f"{wire} at rest: {running.max():.4f} m at its highest and {running.min():.4f} m at "
+            f"its lowest in the running spans; sag {1e3 * (running.max() - running.min()):.1f} mm"
+        )
     lines += [
-        "",
-        f"Contact wire at rest: {running.max():.4f} m at its highest and {running.min():.4f} m at "
-        f"its lowest in the running spans; sag {1e3 * (running.max() - running.min()):.1f} mm",
         f"Elasticity from {place.min():g} to {place.max():g} m: {lift.min():.3f} to "
         f"{lift.max():.3f} mm/N, mean {lift.mean():.3f} mm/N, unevenness "
         f"{100 * (lift.max() - lift.min()) / (lift.max() + lift.min()):.1f} %",

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from catenary.meshgen.mesh import LineMesh
     from catenary.solver.problem.problem import Problem
 
+# Of each contact wire, in the order of the line.
+WIRE = "contact wire"
 # Bounds of what cannot be zero, and of everything.
 _POSITIVE, _MOST = 1e-12, 1e15
 NONE = float("nan")
@@ -42,8 +44,8 @@ class Fact(NamedTuple):
     ----------
     unit : SI unit, "-" if none
     meaning : what it is, in words
-    of : how it is derived: a number, or a sequence with one for each pantograph
-    per : ``RUN`` or ``PANTOGRAPH``
+    of : how it is derived: a number, or a sequence with one for each pantograph or contact wire
+    per : ``RUN``, ``PANTOGRAPH`` or ``WIRE``
     low, high : bounds, inclusive
     may_be_nan : whether NaN is a value, which then stands for "none"
     earlier : where files of earlier formats have it: the root attribute, or the key in each table
@@ -61,7 +63,7 @@ class Fact(NamedTuple):
 
 
 def facts_of(problem: Problem, mesh: LineMesh, dropper_length: np.ndarray) -> dict[str, np.ndarray]:
-    """All facts of a run by name, () or (n_pantographs,) each. Not collective.
+    """All facts of a run by name, (), (n_pantographs,) or (n_contact_wires,) each. Not collective.
 
     Parameters
     ----------
@@ -90,9 +92,14 @@ def _integration(source: Derivation) -> Integration:
     return integration_of(*own)
 
 
-def _contact(source: Derivation) -> Wire:
-    """The first contact wire."""
-    return source.problem.line.wires_of(Role.CONTACT)[0]
+def _contacts(source: Derivation) -> tuple[Wire, ...]:
+    """The contact wires."""
+    return source.problem.line.wires_of(Role.CONTACT)
+
+
+def _of_contacts(of: Callable[[Derivation, Wire], float]) -> Callable[[Derivation], list[float]]:
+    """What a fact of each contact wire is derived by."""
+    return lambda source: [of(source, wire) for wire in _contacts(source)]
 
 
 def _damping(source: Derivation, component: str) -> tuple[float, float]:
@@ -100,12 +107,12 @@ def _damping(source: Derivation, component: str) -> tuple[float, float]:
     return own.per_component.get(component, (own.alpha, own.beta))
 
 
-def _longest_element(source: Derivation) -> float:
-    """Of the contact wire, where it is evaluated."""
-    x = source.mesh.x(source.mesh.wires[_contact(source).name])
+def _longest_element(source: Derivation, wire: Wire) -> float:
+    """Of a wire, where it is evaluated; its shortest one if it is not there."""
+    first, second = (source.mesh.x(ends) for ends in source.mesh.elements(wire.name).T)
     start, end = source.problem.evaluation
-    lengths = np.diff(x)[(x[1:] > start) & (x[:-1] < end)]
-    return float(lengths.max(initial=np.diff(x).min()))
+    lengths = (second - first)[(second > start) & (first < end)]
+    return float(lengths.max(initial=(second - first).min()))
 
 
 def _stiffest_dropper(source: Derivation) -> float:
@@ -191,43 +198,51 @@ FACTS: dict[str, Fact] = {
     ),
     "wave_speed": Fact(
         "m/s",
-        "speed of transverse waves on the contact wire as a string, at the start",
-        lambda source: _contact(source).wave_speed,
+        "speed of transverse waves on the contact wire as a string, at the start; of several the "
+        "smallest",
+        lambda source: min(wire.wave_speed for wire in _contacts(source)),
         low=_POSITIVE,
         high=1e6,
         earlier="wave_speed_m_per_s",
     ),
     "contact_wire_tension": Fact(
         "N",
-        "tension of the contact wire at the start",
-        lambda source: _contact(source).tension,
+        "tension of a contact wire at the start",
+        _of_contacts(lambda source, wire: wire.tension),
+        per=WIRE,
         low=1e-6,
     ),
     "contact_wire_mass": Fact(
         "kg/m",
-        "mass per length of the contact wire",
-        lambda source: _contact(source).mass_per_length,
+        "mass per length of a contact wire",
+        _of_contacts(lambda source, wire: wire.mass_per_length),
+        per=WIRE,
         low=1e-9,
     ),
     "contact_wire_bending_stiffness": Fact(
         "N m2",
-        "bending stiffness of the contact wire",
-        lambda source: _contact(source).bending_stiffness,
+        "bending stiffness of a contact wire",
+        _of_contacts(lambda source, wire: wire.bending_stiffness),
+        per=WIRE,
     ),
     "contact_wire_stiffness_damping": Fact(
         "s",
-        "alpha of the contact wire's proportional damping C = alpha K + beta M",
-        lambda source: _damping(source, _contact(source).name)[0],
+        "alpha of a contact wire's proportional damping C = alpha K + beta M",
+        _of_contacts(lambda source, wire: _damping(source, wire.name)[0]),
+        per=WIRE,
     ),
     "contact_wire_mass_damping": Fact(
         "1/s",
-        "beta of the contact wire's proportional damping C = alpha K + beta M",
-        lambda source: _damping(source, _contact(source).name)[1],
+        "beta of a contact wire's proportional damping C = alpha K + beta M",
+        _of_contacts(lambda source, wire: _damping(source, wire.name)[1]),
+        per=WIRE,
     ),
     "longest_element": Fact(
         "m",
-        "length of the longest element of the contact wire in the evaluation stretch",
-        _longest_element,
+        "length of the longest element of a contact wire in the evaluation stretch, of the "
+        "shortest one if the wire is not there",
+        _of_contacts(_longest_element),
+        per=WIRE,
         low=_POSITIVE,
         high=1e9,
     ),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from catenary.meshgen.line import Line
+from catenary.meshgen.line import Line, Role
 from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.channels.facts import FACTS
 
@@ -24,6 +24,7 @@ REQUIRED_ATTRIBUTES = (
     "edition",
     "versions",
     "config",
+    "wires",
     "effects_on",
     "effects_off",
 )
@@ -53,6 +54,11 @@ class Header:
             raise ValueError(f"the head of a result file lacks {', '.join(missing)}")
 
 
+def wire_roles(line: Line) -> dict[str, str]:
+    """Root attribute ``wires``: the role of each wire by its name, in the order of the line."""
+    return {wire.name: wire.role.value for wire in line.wires}
+
+
 def line_datasets(
     line: Line, mesh: LineMesh, evaluation: tuple[float, float]
 ) -> dict[str, np.ndarray]:
@@ -79,14 +85,10 @@ def line_datasets(
 
 
 def static_datasets(
-    mesh: LineMesh, contact: np.ndarray, equilibrium: Equilibrium, elasticity: Elasticity
+    line: Line, mesh: LineMesh, equilibrium: Equilibrium, elasticity: Elasticity
 ) -> dict[str, np.ndarray]:
-    """Datasets of ``/static``: droppers, profile and elasticity at rest. Not collective.
-
-    Parameters
-    ----------
-    contact : (n,) nodes of the contact wire
-    """
+    """Datasets of ``/static``: droppers, profiles and elasticity at rest. Not collective."""
+    contact = np.concatenate([mesh.wires[wire.name] for wire in line.wires_of(Role.CONTACT)])
     return {
         "static/dropper_length": equilibrium.dropper_length,
         "static/dropper_force": equilibrium.dropper_force,
@@ -94,4 +96,5 @@ def static_datasets(
         "static/contact_height": equilibrium.height[contact],
         "static/elasticity_x": elasticity.x,
         "static/elasticity": elasticity.lift,
+        "static/elasticity_of_wires": elasticity.of_wires,
     }

@@ -7,12 +7,15 @@ errors.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import linalg, optimize, signal
 
+from catenary.meshgen.line import Role
+from catenary.postproc.channels.facts import FACTS, WIRE
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import covers
 from catenary.postproc.read.results import Results
@@ -85,9 +88,10 @@ def indicate(results: Results) -> Indicators:
     """The indicators of a run, as far as its record goes. Not collective."""
     n = results.n_pantographs
     error, deviation = np.full(n, np.nan), np.full(n, np.nan)
-    if any(np.isnan(results.fact(name)) for name in _NEEDED):
+    known = {name: results.facts_of_wires(name) for name in _NEEDED}
+    if any(np.isnan(value) for values in known.values() for value in values.values()):
         return Indicators(error, error, np.nan, np.nan, (_EARLIER,))
-    method = _method(results)
+    wires = _contact_wires(results)
     start, end = results.evaluation
     for p in range(n):
         position = results.column("contact_position", p)
@@ -100,12 +104,14 @@ def indicate(results: Results) -> Indicators:
         except InputError:  # the statistics say so
             continue
         deviation[p] = filtered.std()
-        error[p] = step_error(filtered, results.dt, method)
+        # Of several contact wires the one that remembers longest.
+        error[p] = max(step_error(filtered, results.dt, wire.method) for wire in wires)
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = error / deviation
-    resolved = _resolved(results)
-    speed = results.fact("speed") / results.fact("wave_speed")
-    required = required_frequency(filters.CUT_OFF, speed, method.alpha)
+    # Of several contact wires the one whose mesh is nearest to being too coarse.
+    resolved, required = min(
+        ((wire.resolved, wire.required) for wire in wires), key=lambda pair: pair[0] / pair[1]
+    )
     told = (*_step_warning(relative, results.dt), *_mesh_warning(resolved, required))
     return Indicators(error, relative, resolved, required, told)
 
@@ -240,23 +246,40 @@ def as_table(indicators: Indicators) -> dict[str, Any]:
     }
 
 
-def _method(results: Results) -> Method:
+class _ContactWire(NamedTuple):
+    """How a contact wire is stepped, what its longest element where it is evaluated resolves, and
+    what is required of it [Hz]."""
+
+    method: Method
+    resolved: float
+    required: float
+
+
+def _contact_wires(results: Results) -> list[_ContactWire]:
+    """The contact wires of a run."""
+    names = [name for name, fact in FACTS.items() if fact.per == WIRE]
+    facts = {name: results.facts_of_wires(name) for name in names}
+    return [
+        _contact_wire(results, {name: values[wire] for name, values in facts.items()})
+        for wire in results.wires_of(Role.CONTACT)
+    ]
+
+
+def _contact_wire(results: Results, of_wire: Mapping[str, float]) -> _ContactWire:
     fact = results.fact
+    alpha, tension = of_wire["contact_wire_stiffness_damping"], of_wire["contact_wire_tension"]
+    mass = of_wire["contact_wire_mass"]
     weights = fact("mass_weight"), fact("force_weight")
-    return Method(
-        fact("contact_wire_stiffness_damping"),
-        fact("contact_wire_mass_damping"),
-        Integration(fact("newmark_beta"), fact("newmark_gamma"), *weights),
-    )
-
-
-def _resolved(results: Results) -> float:
-    """``resolved_frequency`` of the longest element of the contact wire where it is evaluated."""
-    return resolved_frequency(
-        results.fact("longest_element"),
-        results.fact("contact_wire_tension"),
-        results.fact("contact_wire_bending_stiffness"),
-        results.fact("contact_wire_mass"),
+    return _ContactWire(
+        Method(
+            alpha,
+            of_wire["contact_wire_mass_damping"],
+            Integration(fact("newmark_beta"), fact("newmark_gamma"), *weights),
+        ),
+        resolved_frequency(
+            of_wire["longest_element"], tension, of_wire["contact_wire_bending_stiffness"], mass
+        ),
+        required_frequency(filters.CUT_OFF, fact("speed") / np.sqrt(tension / mass), alpha),
     )
 
 

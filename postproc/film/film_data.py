@@ -6,9 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from catenary.meshgen.line import Role
 from catenary.postproc.evaluate import filters
 from catenary.postproc.read.results import Results
 from catenary.solver.base.errors import InputError
+
+# A place that is that near to the end of a wire is on it [m].
+_NEAR = 1e-6
 
 
 @dataclass(frozen=True)
@@ -20,7 +24,8 @@ class FilmData:
     title : of the case
     speed : of the train [m/s]
     points : (n_nodes, 3) nodes of the line at rest [m]
-    wires : name -> nodes in order of x; ``contact`` names the one that pantographs touch
+    wires : name -> nodes in order of x
+    roles : name -> role of each wire, in the order of the line
     elements : name -> (n, 2) nodes of the wire's elements
     droppers : (n_droppers, 2) nodes
     supports : (n_supports,) masts along the track [m]
@@ -34,7 +39,7 @@ class FilmData:
     speed: float
     points: np.ndarray
     wires: dict[str, np.ndarray]
-    contact: str
+    roles: dict[str, Role]
     elements: dict[str, np.ndarray]
     droppers: np.ndarray
     supports: np.ndarray
@@ -50,10 +55,31 @@ class FilmData:
         """Number of pantographs."""
         return len(self.names)
 
+    @property
+    def contacts(self) -> list[str]:
+        """Names of the contact wires, in the order of the line."""
+        return [name for name, role in self.roles.items() if role is Role.CONTACT]
+
+    @property
+    def contact(self) -> str:
+        """Name of the first contact wire."""
+        return self.contacts[0]
+
     def rest_height(self, x: np.ndarray) -> np.ndarray:
-        """Height of the contact wire at rest at places along the track [m]."""
-        nodes = self.wires[self.contact]
-        return np.interp(x, self.points[nodes, 0], self.points[nodes, 2])
+        """Height of the lowest contact wire at rest at places along the track [m]."""
+        return self._at_rest(x).min(axis=0)
+
+    def touched(self, x: float) -> str:
+        """Name of the contact wire that is lowest at rest at a place along the track [m]."""
+        return self.contacts[int(self._at_rest(np.array([x]))[:, 0].argmin())]
+
+    def _at_rest(self, x: np.ndarray) -> np.ndarray:
+        """Heights of the contact wires (n_wires, n) [m]; of those that are not there infinite, but
+        at places where none is."""
+        chains = [self.points[self.wires[name]] for name in self.contacts]
+        there = np.array([(x >= at[0, 0] - _NEAR) & (x <= at[-1, 0] + _NEAR) for at in chains])
+        heights = np.array([np.interp(x, at[:, 0], at[:, 2]) for at in chains])
+        return np.where(there | ~there.any(axis=0), heights, np.inf)
 
     def row_at(self, time: float) -> int:
         """The record nearest to a time [s]."""
@@ -72,13 +98,12 @@ def film_data(results: Results) -> FilmData:
     if results.n_steps < 1:
         raise InputError(f"{results.path} holds no step, of which a film could be made")
     force = results.channel("contact_force")
-    wires = results.wires()
     return FilmData(
         str(results.attributes.get("title", "")),
         results.fact("speed"),
         results.line("node_points"),
-        wires,
-        lowest(wires, results.line("node_points")),
+        results.wires(),
+        results.roles,
         results.elements(),
         results.line("droppers"),
         results.line("support_x"),
@@ -89,11 +114,6 @@ def film_data(results: Results) -> FilmData:
         results.channel("head_height"),
         results.pantograph_names(),
     )
-
-
-def lowest(wires: dict[str, np.ndarray], points: np.ndarray) -> str:
-    """Name of the wire that hangs lowest on the whole, which is the one that is touched."""
-    return min(wires, key=lambda name: float(points[wires[name], 2].mean()))
 
 
 def _filtered(force: np.ndarray, dt: float) -> np.ndarray:

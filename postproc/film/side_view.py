@@ -92,11 +92,11 @@ class SideView:
         self._wires["uplift"] = 1e3 * uplift
         if slack is not None:
             self._droppers.cell_data["slack"] = slack.astype(float)
-        nodes = data.wires[data.contact]
         for p, (arms, head, vehicle, arrow) in enumerate(self._pantographs):
             x, force = float(data.position[row, p]), max(float(data.force[row, p]), 0.0)
             rest = float(data.rest_height(np.array([x]))[0])
             lifted = float(data.head_height[row, p]) - rest
+            nodes = data.wires[data.touched(x)]
             # Lines are drawn through nodes, and so is the head in contact with them.
             on_wire = float(np.interp(x, data.points[nodes, 0], uplift[nodes]))
             at_head = float(scale.drawn(np.array(rest), lifted if force == 0.0 else on_wire))

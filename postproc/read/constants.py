@@ -18,6 +18,8 @@ def constant_faults(file: h5py.File) -> tuple[list[str], dict[str, int]]:
         faults.append("line/wires has no wire")
     breaks = {f"line/breaks/{name}": BREAKS for name in _names(file, "line/breaks")}
     for path, declared in {**CONSTANTS, **wires, **breaks}.items():
+        if declared.later and not is_there(file, path):
+            continue
         try:
             values = np.asarray(file[path][...])
         except HDF5_ERRORS:
@@ -68,6 +70,7 @@ def _fault(values: np.ndarray, declared: Constant, sizes: dict[str, int]) -> str
             return f"has {size} entries in place of {wanted}"
     with np.errstate(invalid="ignore"):
         sound = (values >= declared.low) & (values <= declared.high)
+        sound |= declared.may_be_nan & np.isnan(values)
     if not sound.all():
         return f"holds {values[~sound].flat[0]:g}, which cannot be"
     if declared.ascending and (values.size < 2 or not (np.diff(values) > 0).all()):
@@ -90,6 +93,6 @@ def _between(file: h5py.File, sizes: dict[str, int]) -> list[str]:
         return faults
     x = file["static/contact_x"][...]
     start, end = file["line/evaluation_range"][...]
-    if start >= x[-1] or end <= x[0]:
-        return ["line/evaluation_range lies beyond the contact wire"]
+    if start >= x.max() or end <= x.min():
+        return ["line/evaluation_range lies beyond the contact wires"]
     return []

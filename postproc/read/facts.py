@@ -8,10 +8,10 @@ from typing import Any
 import h5py
 import numpy as np
 
-from catenary.postproc.channels.facts import FACTS, NONE, Fact
+from catenary.postproc.channels.facts import FACTS, NONE, WIRE, Fact
 from catenary.postproc.files.checked import sum_is_kept
 from catenary.postproc.read.attributes import HDF5_ERRORS
-from catenary.solver.time_loop.channels import RUN
+from catenary.solver.time_loop.channels import PANTOGRAPH, RUN
 
 # Without these there is no report.
 _ESSENTIAL = ("time_step", "speed", "wave_speed")
@@ -31,13 +31,20 @@ def read_facts(file: h5py.File) -> tuple[dict[str, np.ndarray], list[str]]:
     if same is False:
         return {}, ["its facts differ from their checksum"]
     faults = []
-    n_pantographs = np.size(found.get("static_force", 0.0))
     for name, fact in FACTS.items():
-        fault = ""
+        if fact.per == WIRE and name in found:
+            # Of one contact wire, before lines had several.
+            found[name] = np.atleast_1d(found[name])
+    sizes = {
+        PANTOGRAPH: (np.size(found.get("static_force", 0.0)),),
+        WIRE: (np.size(found.get("contact_wire_tension", 0.0)),),
+    }
+    for name, fact in FACTS.items():
+        fault, shape = "", sizes.get(fact.per, ())
         if name in found:
-            fault = _fault(found[name], fact, n_pantographs)
+            fault = _fault(found[name], fact, shape)
         elif same and name not in _ESSENTIAL:
-            found[name] = np.full(() if fact.per == RUN else n_pantographs, NONE)
+            found[name] = np.full(shape, NONE)
         else:
             fault = "is missing"
         faults += [f"facts/{name} {fault}"] if fault else []
@@ -55,10 +62,11 @@ def facts_of_earlier(about: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], l
     rows = about.get("pantographs") or [{}]
     found, faults = {}, []
     for name, fact in FACTS.items():
-        told = [about] if fact.per == RUN else rows
+        told = rows if fact.per == PANTOGRAPH else [about]
         values = np.array([_number(row.get(fact.earlier)) for row in told])
         found[name] = values[0] if fact.per == RUN else values
-        fault = _fault(found[name], fact._replace(may_be_nan=name not in _ESSENTIAL), len(rows))
+        optional = fact._replace(may_be_nan=name not in _ESSENTIAL)
+        fault = _fault(found[name], optional, found[name].shape)
         faults += [f'its attribute "{fact.earlier}" {fault}'] if fault else []
     return found, faults
 
@@ -68,11 +76,11 @@ def _number(value: Any) -> float:
     return float(value) if known else NONE
 
 
-def _fault(values: np.ndarray, fact: Fact, n_pantographs: int) -> str:
+def _fault(values: np.ndarray, fact: Fact, shape: tuple[int, ...]) -> str:
     """What is wrong with the values of a fact, empty if nothing is."""
     if values.dtype.kind != "f":
         return f"holds {values.dtype} where numbers belong"
-    if values.shape != (() if fact.per == RUN else (n_pantographs,)):
+    if values.shape != shape:
         return f"has the shape {values.shape}"
     with np.errstate(invalid="ignore"):
         sound = (values >= fact.low) & (values <= fact.high)

@@ -9,6 +9,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+from catenary.meshgen.line import Role
+from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.postproc.channels.line_record import LineRecord, from_table
 from catenary.postproc.standards.en50367 import EDITIONS, SYSTEMS
 from catenary.solver.time_loop import channels
@@ -22,6 +24,8 @@ _FIRST_FORMAT = "catenary-run-1"
 _FIRST_LINE_CHANNELS = ("arm_uplift", "dropper_force")
 # Files without facts, which are read, but not continued.
 EARLIER_FORMATS = (_FIRST_FORMAT, "catenary-run-2")
+# Roles of wires in files without: all such lines are simple catenaries.
+SIMPLE_CATENARY = {CONTACT_WIRE: Role.CONTACT.value, MESSENGER_WIRE: Role.MESSENGER.value}
 
 
 class Attribute(NamedTuple):
@@ -42,7 +46,8 @@ class Constant(NamedTuple):
     """A dataset that is written once: letters for its dimensions, and bounds of its values.
 
     A letter stands for the same size in all datasets; a digit is that size itself. ``low`` and
-    ``high`` are inclusive; ``ascending`` means strictly. ``whole`` numbers are stored as integers.
+    ``high`` are inclusive; ``ascending`` means strictly. ``whole`` numbers are stored as integers;
+    NaN ``may_be`` a value; what is ``later`` is not in all files of the format.
     """
 
     shape: str
@@ -50,6 +55,8 @@ class Constant(NamedTuple):
     high: float = LARGEST["m"]
     whole: bool = False
     ascending: bool = False
+    may_be_nan: bool = False
+    later: bool = False
 
 
 class Growing(NamedTuple):
@@ -150,6 +157,11 @@ def _arrivals(value: Any) -> bool:
     )
 
 
+def _wires(value: Any) -> bool:
+    roles = {role.value for role in Role}
+    return isinstance(value, dict) and bool(value) and set(map(str, value.values())) <= roles
+
+
 def _pantographs(value: Any) -> bool:
     return isinstance(value, list) and all(
         isinstance(row, dict)
@@ -179,6 +191,7 @@ ATTRIBUTES: dict[str, Attribute] = {
     "pantographs": Attribute("a list of tables of facts", _pantographs, True, []),
     "incidents": Attribute("a list of times with sentences", _incidents, True, []),
     "arrivals": Attribute("facts of waves from the ends, with sentences", _arrivals, True, {}),
+    "wires": Attribute("a table of roles", _wires, True, SIMPLE_CATENARY),
     "petsc_options": Attribute("a list", lambda v: isinstance(v, list), True, []),
     "n_strips": Attribute(
         "a list of whole numbers",
@@ -192,7 +205,8 @@ ATTRIBUTES: dict[str, Attribute] = {
     "inner_iterations": Attribute("a table of numbers", _table_of_numbers, True, {}),
 }
 
-# Letters: A arms, D droppers, N nodes, M masts, C nodes of the contact wire, E of the elasticity.
+# Letters: A arms, D droppers, N nodes, M masts, W contact wires, C their nodes, E places of the
+# elasticity.
 _NUMBERS = Constant("D", 0, 1e12, whole=True)
 # Nodes of a wire, and where in them its further pieces begin.
 WIRE, BREAKS = _NUMBERS._replace(shape="*"), Constant("*", 1, 1e12, whole=True)
@@ -207,10 +221,11 @@ CONSTANTS: dict[str, Constant] = {
     "line/droppers": _NUMBERS._replace(shape="D2"),
     "static/dropper_length": Constant("D"),
     "static/dropper_force": Constant("D", -LARGEST["N"], LARGEST["N"]),
-    "static/contact_x": Constant("C", ascending=True),
+    "static/contact_x": Constant("C"),
     "static/contact_height": Constant("C"),
     "static/elasticity_x": Constant("E"),
     "static/elasticity": Constant("E"),
+    "static/elasticity_of_wires": Constant("EW", may_be_nan=True, later=True),
 }
 
 # Letters of the columns of a channel: those that are recorded, and all that there are.

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from catenary.meshgen.line import Role
 from catenary.meshgen.mesh import elements_of
 from catenary.postproc.channels.line_record import LineRecord, from_table
 from catenary.postproc.files import block_reading
@@ -88,12 +89,21 @@ class Results:
         return self.fact("time_step")
 
     def fact(self, name: str) -> float:
-        """A fact of ``postproc.channels.facts``, NaN if the file was written without it."""
+        """A fact of ``postproc.channels.facts``, NaN if the file was written without it.
+
+        Of the run as a whole: see ``facts_of`` and ``facts_of_wires`` for others.
+        """
         return float(self._file.facts[name])
 
     def facts_of(self, name: str) -> np.ndarray:
         """A fact of each pantograph, shape (n_pantographs,), NaN likewise."""
         return np.broadcast_to(self._file.facts[name], self.n_pantographs)
+
+    def facts_of_wires(self, name: str) -> dict[str, float]:
+        """A fact of each contact wire by its name, NaN likewise."""
+        wires = self.wires_of(Role.CONTACT)
+        values = np.broadcast_to(self._file.facts[name], len(wires)).tolist()
+        return dict(zip(wires, values, strict=True))
 
     @property
     def n_steps(self) -> int:
@@ -332,6 +342,22 @@ class Results:
         """Node numbers of each wire in order of x."""
         return {name: np.asarray(nodes[...]) for name, nodes in self._file["line/wires"].items()}
 
+    @property
+    def roles(self) -> dict[str, Role]:
+        """The role of each wire by its name, in the order of the line."""
+        return {name: Role(role) for name, role in self.attributes["wires"].items()}
+
+    def wires_of(self, role: Role) -> list[str]:
+        """Names of the wires of a role, in the order of the line."""
+        return [name for name, own in self.roles.items() if own is role]
+
+    def contact_profiles(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Positions and heights at rest of the nodes of each contact wire by its name [m]."""
+        names, wires = self.wires_of(Role.CONTACT), self.wires()
+        ends = np.cumsum([wires[name].size for name in names])[:-1]
+        x, height = (np.split(self.static(f"contact_{own}"), ends) for own in ("x", "height"))
+        return {name: (x[i], height[i]) for i, name in enumerate(names)}
+
     def elements(self) -> dict[str, np.ndarray]:
         """Nodes of the elements of each wire, (n, 2) each, in order of x."""
         given = self._file["line/breaks"].items() if "line/breaks" in self._file else ()
@@ -342,7 +368,12 @@ class Results:
         }
 
     def static(self, name: str) -> np.ndarray:
-        """A dataset of ``/static``, for instance ``dropper_length``."""
+        """A dataset of ``/static``, for instance ``dropper_length``.
+
+        ``elasticity_of_wires`` of a file without is that of its one contact wire.
+        """
+        if name == "elasticity_of_wires" and f"static/{name}" not in self._file:
+            return self.static("elasticity")[:, None]
         return np.asarray(self._file[f"static/{name}"][...])
 
     @cached_property

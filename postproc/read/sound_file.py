@@ -10,6 +10,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from catenary.meshgen.line import Role
 from catenary.postproc.files.checked import text_of
 from catenary.postproc.files.kept_extremes import extremes_at
 from catenary.postproc.files.result_file import COMPLETE, FORMAT
@@ -73,7 +74,7 @@ class SoundFile:
             fatal += wrong
             self._faults = [] if fatal else table_faults(self._file, self.attrs, self._sizes)
             fatal += faults + [f"{f.path} {f.fault}" for f in self._faults if f.essential]
-            fatal += self._strip_faults() if not fatal else []
+            fatal += [*self._strip_faults(), *self._wire_faults()] if not fatal else []
             if fatal:
                 raise InputError(_refusal(path, fatal, self._usable()))
         except BaseException:
@@ -212,6 +213,28 @@ class SoundFile:
         path = "channels/strip_force"
         if strips > n and self._sizes.get("S") != strips:
             return [f"{path} does not have {strips} columns"]
+        return []
+
+    def _wire_faults(self) -> list[str]:
+        """What does not fit the wires and their roles."""
+        nodes, roles = self._file["line/wires"], self.attrs["wires"]
+        for name in roles:
+            if name not in nodes:
+                return [f"line/wires has no {name}, whose role is {roles[name]}"]
+        contact = [name for name, role in roles.items() if role == Role.CONTACT.value]
+        if not contact:
+            return ["no wire has the role of a contact wire"]
+        sizes = [nodes[name].size for name in contact]
+        if sum(sizes) != self._sizes["C"]:
+            return [f"static/contact_x has {self._sizes['C']} entries in place of {sum(sizes)}"]
+        x = np.split(self._file["static/contact_x"][...], np.cumsum(sizes)[:-1])
+        if not all(own.size > 1 and (np.diff(own) > 0.0).all() for own in x):
+            return ["static/contact_x does not ascend"]
+        if self._sizes.get("W", len(contact)) != len(contact):
+            return [f"static/elasticity_of_wires is of {self._sizes['W']} wires of {len(contact)}"]
+        tensions = np.size(self.facts["contact_wire_tension"])
+        if tensions != len(contact):
+            return [f"its facts are of {tensions} contact wires of {len(contact)}"]
         return []
 
     def _usable(self) -> str:

@@ -265,22 +265,26 @@ def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
 
 
 def static_line(results: Results) -> Figure:
-    """Contact-wire profile of the reference span and its neighbours; elasticity along a span."""
-    x, height = results.static("contact_x"), results.static("contact_height")
+    """Contact-wire profile of the reference span and its neighbours; elasticity along a span.
+
+    Of several contact wires each has a curve.
+    """
+    profiles = results.contact_profiles()
     at, lift = results.static("elasticity_x"), results.static("elasticity")
     masts, span = results.line("support_x"), results.reference_span
     figure, (profile, compliance) = stacked(5.2, 2)
 
     start, end = masts[max(span - 1, 0)], masts[min(span + 2, masts.size - 1)]
-    shown = (x >= start) & (x <= end)
-    level = float(np.interp(masts[span], x, height))
-    profile.plot(
-        x[shown],
-        1e3 * (height[shown] - level),
-        color=COLOURS[0],
-        linewidth=1.5,
-        label="contact wire at rest",
-    )
+    level = min(float(np.interp(masts[span], x, height)) for x, height in profiles.values())
+    for number, (name, (x, height)) in enumerate(profiles.items()):
+        shown = (x >= start) & (x <= end)
+        profile.plot(
+            x[shown],
+            1e3 * (height[shown] - level),
+            color=colour(number),
+            linewidth=1.5,
+            label="contact wire at rest" if len(profiles) == 1 else f"{name} at rest",
+        )
     _mark_static(profile, results, float(start), float(end))
     tidy(
         profile,
@@ -290,7 +294,14 @@ def static_line(results: Results) -> Figure:
     )
     legend_above(profile)
 
-    compliance.plot(at, 1e3 * lift, color=COLOURS[0], linewidth=1.5, label="elasticity")
+    if len(profiles) > 1:
+        own = results.static("elasticity_of_wires")
+        for number, name in enumerate(profiles):
+            known = np.isfinite(own[:, number])
+            label = f"{name} alone"
+            compliance.plot(at[known], 1e3 * own[known, number], color=colour(number), label=label)
+    look = (COLOURS[0], "elasticity") if len(profiles) == 1 else (GREY, "all contact wires")
+    compliance.plot(at, 1e3 * lift, color=look[0], linewidth=1.5, label=look[1])
     if at.size:
         _mark_static(compliance, results, float(at.min()), float(at.max()))
     compliance.set_ylim(bottom=0.0)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from catenary.meshgen.line import Role
 from catenary.postproc.evaluate import error_indicators
 from catenary.postproc.evaluate.statistics import PantographStatistics, RunStatistics
 from catenary.postproc.evaluate.verdict import Criterion, verdict
@@ -137,6 +138,24 @@ def _static(results: Results) -> dict[str, Any]:
             "max": np.max(elasticity, initial=-np.inf),
             "min": np.min(elasticity, initial=np.inf),
         },
+        **_elasticity_of_wires(results),
+    }
+
+
+def _elasticity_of_wires(results: Results) -> dict[str, Any]:
+    """Of each of several contact wires pressed alone, by its name."""
+    names = results.wires_of(Role.CONTACT)
+    if len(names) == 1:
+        return {}
+    columns = 1e3 * results.static("elasticity_of_wires").T
+    return {
+        "elasticity_of_wires_mm_per_N": {
+            name: {
+                "max": np.max(own, initial=-np.inf, where=np.isfinite(own)),
+                "min": np.min(own, initial=np.inf, where=np.isfinite(own)),
+            }
+            for name, own in zip(names, columns, strict=True)
+        }
     }
 
 

@@ -83,6 +83,12 @@ class ContactWires:
         is none."""
         return self._lowest(x)[0]
 
+    def rest_height_of(self, wire: int, x: np.ndarray) -> np.ndarray:
+        """Height of a wire at rest at positions ``x`` (n,) [m], (n,); NaN where it is not."""
+        touches = self.touches(x, wire)
+        own = (touches["whole_value"] * touches["rest"]).sum(axis=1)
+        return np.where(touches["present"] > 0.0, own, np.nan)
+
     def rest_slope(self, x: np.ndarray) -> np.ndarray:
         """Slope dw/dx of the lowest wire at rest at positions ``x`` (n,) [m], (n,) [-]."""
         return self._lowest(x)[1]

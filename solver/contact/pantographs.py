@@ -27,12 +27,10 @@ from catenary.solver.contact.contact_kernels import Ends
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
 from catenary.solver.contact.head_states import Heads
 from catenary.solver.integrators import state_kernels
-from catenary.solver.model.model import Model
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.problem import Placement, Problem
 from catenary.solver.problem.simulated import Simulated
 from catenary.solver.statics.elasticity import Elasticity
-from catenary.solver.statics.equilibrium import Equilibrium
 
 
 class Pantographs:
@@ -272,22 +270,21 @@ def _lateral_path(
 
 
 def nominal_height_rule(
-    model: Model, form: Equilibrium, elasticity: Elasticity
+    wires: ContactWires, elasticity: Elasticity
 ) -> Callable[[Placement], float]:
     """Head height at which the static force is defined.
 
-    That of the placement, or else the mean height of the contact wire in the stretch of
-    ``elasticity`` when the static force lifts it, so that the base spring neither adds to the
-    mean force nor takes from it.
+    That of the placement, or else the mean height of a head that lifts the contact wires with the
+    static force in the stretch of ``elasticity``, so that the base spring neither adds to the mean
+    force nor takes from it.
     """
-    nodes = model.contact_nodes
     x = elasticity.x
-    at_rest = np.interp(x, model.mesh.x(nodes), form.height[nodes])
+    at_rest = np.stack([wires.rest_height_of(wire, x) for wire in range(wires.n_wires)], axis=1)
 
     def height(placement: Placement) -> float:
         if placement.nominal_height is not None:
             return placement.nominal_height
-        lifted = at_rest + placement.static_force * elasticity.lift
+        lifted = elasticity.pressed(at_rest, placement.static_force)
         return float(integrate.trapezoid(lifted, x) / (x[-1] - x[0]))
 
     return height

@@ -1,51 +1,164 @@
-"""The static lift of the contact wire under a unit force."""
+"""How contact wires give way to static forces: their elasticity."""
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
+from catenary.meshgen.line import Role
 from catenary.meshgen.spans import Spans
+from catenary.solver.model.links import Direction, at_nodes, at_places
 from catenary.solver.model.matrices import part_of
 from catenary.solver.model.model import Model
 
 # How far to both sides of a stretch a line is looked at first [m], and what stands still.
 _FIRST_REACH, _STILL = 1500.0, 1e-13
+# Places closer than this along the track are one [m].
+_SAME_PLACE = 1e-6
 
 
 @dataclass(frozen=True)
 class Elasticity:
-    """Static lift of the contact wire under a unit force, ``lift`` [m/N] at ``x`` [m], (n,)."""
+    """How contact wires give way to static forces at places along the track.
+
+    Attributes
+    ----------
+    x : (n,) places, ascending [m]
+    compliance : (n, w, w) lift of a contact wire there under a unit force on another one, in the
+        order of the line's contact wires; NaN where one of the two is not [m/N]
+    """
 
     x: np.ndarray
-    lift: np.ndarray
+    compliance: np.ndarray
+
+    @property
+    def of_wires(self) -> np.ndarray:
+        """Lift of each contact wire under a unit force on it alone, (n, w), NaN where it is not
+        [m/N]."""
+        return np.einsum("iww->iw", self.compliance)
+
+    @property
+    def lift(self) -> np.ndarray:
+        """Lift of a head that presses with a unit force from where it touches all contact wires,
+        (n,) [m/N]; of a single wire its own."""
+        return self.pressed(np.zeros(self.compliance.shape[:2]), 1.0)
+
+    def pressed(self, height: np.ndarray, force: float) -> np.ndarray:
+        """Height of a head that presses with a static force, (n,) [m].
+
+        It divides the force among the contact wires that it touches, none of which pulls it.
+
+        Parameters
+        ----------
+        height : (n, w) of the wires at rest [m]
+        force : [N]
+        """
+        if height.shape[1] == 1:
+            return np.asarray(height[:, 0] + force * self.compliance[:, 0, 0])
+        return np.array(
+            [
+                _under(of_place, matrix, force)
+                for of_place, matrix in zip(height, self.compliance, strict=True)
+            ]
+        )
 
 
 def elasticity(model: Model, x_from: float, x_to: float) -> Elasticity:
-    """Static lift under a unit force at the contact wire's nodes in [x_from, x_to] [m].
+    """Static lift under unit forces where contact wires have nodes in [x_from, x_to] [m].
 
     Droppers taut, arms included. The line outside is condensed to the unknowns that it is joined
-    to; then there is a small solve for each node. Of a long line that is as much of it as moves by
+    to; then there is a small solve for each place. Of a long line that is as much of it as moves by
     more than round-off. Not collective.
     """
-    nodes = model.contact_nodes
-    x = model.mesh.x(nodes)
-    inside = np.flatnonzero((x >= x_from - 1e-9) & (x <= x_to + 1e-9))
+    chains = model.nodes_of(Role.CONTACT)
+    if len(chains) == 1:
+        x = model.mesh.x(chains[0])
+        inside = (x >= x_from - 1e-9) & (x <= x_to + 1e-9)
+        x, places = x[inside], [at_nodes(model, chains[0][inside])]
+        present = np.ones((x.size, 1), dtype=bool)
+    else:
+        x = _places_in(model, x_from, x_to)
+        wires = [wire.name for wire in model.problem.line.wires_of(Role.CONTACT)]
+        places = [at_places(model, wire, x) for wire in wires]
+        present = np.stack([_is_there(model, wire, x) for wire in wires], axis=1)
+        x_from, x_to = _element_ends(model, x_from, x_to)
     first, last = model.numbering.within(x_from, x_to)
     factor = sparse_linalg.splu(_seen_from(model, x_from, x_to))
-    dofs = model.dofs(nodes[inside])
-    # Where the wire is held it does not give way; the matrix has a one there, which is no spring.
-    gives_way = ~np.isin(dofs, model.constrained)
-    lift = np.zeros(inside.size)
-    unit = np.zeros(last - first)
-    for i, dof in zip(np.flatnonzero(gives_way), dofs[gives_way] - first, strict=True):
-        unit[dof] = 1.0
-        lift[i] = factor.solve(unit)[dof]
-        unit[dof] = 0.0
-    return Elasticity(x[inside], lift)
+    # Where a wire is held it does not give way; the matrix has a one there, which is no spring.
+    weights = [np.where(_moves(model, place), place.weights, 0.0) for place in places]
+    unknowns = [place.unknowns - first for place in places]
+    compliance = np.full((x.size, len(places), len(places)), np.nan)
+    load = np.zeros(last - first)
+    for i, j in np.argwhere(present):
+        acting = weights[j][i] != 0.0
+        at = unknowns[j][i][acting]
+        load[at] = weights[j][i][acting]
+        motion = factor.solve(load)
+        load[at] = 0.0
+        for k in np.flatnonzero(present[i]):
+            felt = weights[k][i] != 0.0
+            compliance[i, k, j] = motion[unknowns[k][i][felt]] @ weights[k][i][felt]
+    return Elasticity(x, compliance)
+
+
+def _under(height: np.ndarray, compliance: np.ndarray, force: float) -> float:
+    """Height of a head under wires of these heights (w,) [m], which are NaN where none is.
+
+    Of all sets of wires that it may touch the one in which no wire pulls it down and no other one
+    hangs lower.
+    """
+    there = np.flatnonzero(np.isfinite(height) & np.isfinite(np.diagonal(compliance)))
+    found, least = np.nan, np.inf
+    for size in range(1, there.size + 1):
+        for touched in map(list, itertools.combinations(there.tolist(), size)):
+            system = np.zeros((size + 1, size + 1))
+            system[:size, :size] = compliance[np.ix_(touched, touched)]
+            system[:size, size], system[size, :size] = -1.0, 1.0
+            try:
+                solved = np.linalg.solve(system, np.append(-height[touched], force))
+            except np.linalg.LinAlgError:  # two wires that do not give way
+                continue
+            own, head = solved[:-1], float(solved[-1])
+            others = np.setdiff1d(there, touched)
+            wires = height[others] + compliance[np.ix_(others, touched)] @ own
+            # In metres: how far a wire that pulls is from where it would hang.
+            pulls = -own * np.diagonal(compliance)[touched]
+            wrong = max(pulls.max(initial=0.0), (head - wires).max(initial=0.0))
+            if wrong < least:
+                found, least = head, wrong
+    return found
+
+
+def _places_in(model: Model, x_from: float, x_to: float) -> np.ndarray:
+    """Where contact wires have nodes in a stretch, each place once, (n,) [m]."""
+    x = np.sort(model.mesh.x(np.concatenate(model.nodes_of(Role.CONTACT))))
+    x = x[(x >= x_from - 1e-9) & (x <= x_to + 1e-9)]
+    return np.asarray(x[np.diff(x, prepend=-np.inf) > _SAME_PLACE])
+
+
+def _is_there(model: Model, wire: str, x: np.ndarray) -> np.ndarray:
+    """Whether one of the pieces of a wire runs over places, (n,) bool."""
+    ends = (model.mesh.x(piece)[[0, -1]] for piece in model.mesh.pieces(wire))
+    return np.any([(x >= a - _SAME_PLACE) & (x <= b + _SAME_PLACE) for a, b in ends], axis=0)
+
+
+def _element_ends(model: Model, x_from: float, x_to: float) -> tuple[float, float]:
+    """The stretch with the elements of contact wires that begin or end beyond it [m]."""
+    low, high = [x_from], [x_to]
+    for nodes in model.nodes_of(Role.CONTACT):
+        x = model.mesh.x(nodes)
+        low.append(x[max(int(np.searchsorted(x, x_from)) - 1, 0)])
+        high.append(x[min(int(np.searchsorted(x, x_to, side="right")), x.size - 1)])
+    return float(min(low)), float(max(high))
+
+
+def _moves(model: Model, places: Direction) -> np.ndarray:
+    """Which unknowns of places are not held, shape as they are."""
+    return ~np.isin(places.unknowns, model.constrained)
 
 
 def _seen_from(model: Model, x_from: float, x_to: float) -> sparse.csc_matrix:

@@ -89,7 +89,8 @@ class March:
     ----------
     comm : mpi4py communicator
     problem, model, form : what ``equilibrium.find_form`` was given and returned, on all ranks
-    elasticity : that of a running span, for the height at which static forces are defined
+    elasticity : of the contact wires in a running span, for the height at which static forces are
+        defined
     """
 
     def __init__(
@@ -118,8 +119,8 @@ class March:
         self._first = model
         self._form = form
         self.ownership = distribute(model, comm.size, comm.rank)
-        self._nominal_height = nominal_height_rule(model, form, elasticity)
         self._wire = ContactWires(model, form, self.ownership)
+        self._nominal_height = nominal_height_rule(self._wire, elasticity)
         self._pantographs = Pantographs(
             comm, problem, model.simulated, self._wire, self._nominal_height
         )

@@ -16,7 +16,7 @@ from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line as make_line_of
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.postproc.channels.facts import facts_of
-from catenary.postproc.channels.header import Header, line_datasets, static_datasets
+from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
 from catenary.postproc.record.recorder import Recorder
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Numerics, Placement, Problem, Train
@@ -118,7 +118,8 @@ def make_header(problem: Problem, mesh: LineMesh, **attributes: Any) -> Header:
     force = np.full(length.size, 65.0) + 8.0 * np.cos(mesh.x(mesh.droppers[:, 1]))
     equilibrium = Equilibrium(height, np.zeros(height.size), force, length)
     x = 8 * SPAN + np.linspace(0.0, SPAN, 41)
-    elasticity = Elasticity(x, 1e-3 * (0.33 + 0.12 * np.sin(np.pi * (x - x[0]) / SPAN) ** 2))
+    lift = 1e-3 * (0.33 + 0.12 * np.sin(np.pi * (x - x[0]) / SPAN) ** 2)
+    elasticity = Elasticity(x, lift[:, None, None])
     known: dict[str, Any] = {
         "case": "made_up",
         "title": "A made-up line <with> & awkward title",
@@ -127,6 +128,7 @@ def make_header(problem: Problem, mesh: LineMesh, **attributes: Any) -> Header:
         "edition": "2006",
         "versions": {"catenary": "0.1.0", "petsc": "3.18.5", "python": "3.11"},
         "config": {"line": {"n_spans": N_SPANS}, "numerics": {"scheme": "one_solve"}},
+        "wires": wire_roles(line),
         "effects_on": [
             ("vertical", "vertical motion of the tensioned wires", "always"),
             ("dropper_slackening", "droppers that slacken", "default"),
@@ -135,7 +137,7 @@ def make_header(problem: Problem, mesh: LineMesh, **attributes: Any) -> Header:
     }
     datasets = {
         **line_datasets(line, mesh, EVALUATION),
-        **static_datasets(mesh, mesh.wires[CONTACT_WIRE], equilibrium, elasticity),
+        **static_datasets(line, mesh, equilibrium, elasticity),
     }
     return Header({**known, **attributes}, datasets, facts_of(problem, mesh, length))
 

@@ -20,7 +20,8 @@ from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.tables.units import unit_of
 from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.lumped_data import LumpedData
-from catenary.postproc.channels.facts import FACTS, facts_of
+from catenary.meshgen.mesh import CONTACT_WIRE
+from catenary.postproc.channels.facts import FACTS, WIRE, facts_of
 from catenary.postproc.evaluate.error_indicators import as_table, indicate
 from catenary.postproc.evaluate.statistics import evaluate
 from catenary.postproc.files.checked import seal_arrays
@@ -29,7 +30,7 @@ from catenary.postproc.report.report import write_report
 from catenary.solver.base.errors import InputError
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw
 from catenary.solver.problem.problem import Damping, Placement, Problem
-from catenary.solver.time_loop.channels import RUN
+from catenary.solver.time_loop.channels import PANTOGRAPH, RUN
 
 ROOT = Path(__file__).parents[3]
 # Keys of tables that the head of a result file has itself: when an incident happens.
@@ -57,7 +58,7 @@ def test_every_fact_has_a_unit_a_meaning_and_a_value_within_its_bounds(
     for name, fact in FACTS.items():
         assert fact.unit and fact.meaning
         values = facts[name]
-        assert values.shape == (() if fact.per == RUN else (2,))
+        assert values.shape == {RUN: (), PANTOGRAPH: (2,), WIRE: (1,)}[fact.per]
         known = ~np.isnan(values)
         assert known.all() or fact.may_be_nan
         assert ((values >= fact.low) & (values <= fact.high))[known].all()
@@ -71,7 +72,11 @@ def test_facts_are_stored_with_unit_and_meaning_and_read_again(
         for name, fact in FACTS.items():
             assert file[f"facts/{name}"].attrs["unit"].decode() == fact.unit
             assert file[f"facts/{name}"].attrs["meaning"].decode() == fact.meaning
-            np.testing.assert_array_equal(results.facts_of(name), file[f"facts/{name}"][()])
+            stored = file[f"facts/{name}"][()]
+            if fact.per == WIRE:
+                assert results.facts_of_wires(name) == {CONTACT_WIRE: stored.item()}
+            else:
+                np.testing.assert_array_equal(results.facts_of(name), stored)
         assert results.dt == results.fact("time_step") == march.dt
         assert results.fact("speed") == problem.train.speed
 

@@ -95,6 +95,23 @@ REFUSED: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     "masts": (value("line/support_x", 3, -1e3), "line/support_x does not ascend"),
     "node beyond": (value("line/droppers", 0, 10**7), "line/droppers names number 10000000"),
     "NaN at rest": (value("static/elasticity", 2, np.nan), "static/elasticity holds nan"),
+    "two roles of one wire": (
+        put("wires", '{"contact_wire": "contact", "twin": "contact"}'),
+        "line/wires has no twin, whose role is contact",
+    ),
+    "no contact wire": (
+        put("wires", '{"contact_wire": "messenger", "messenger_wire": "messenger"}'),
+        "no wire has the role of a contact wire",
+    ),
+    "another contact wire": (
+        put("wires", '{"contact_wire": "contact", "messenger_wire": "contact"}'),
+        "static/contact_x has 481 entries in place of 962",
+    ),
+    "profile": (value("static/contact_x", 3, -1e3), "static/contact_x does not ascend"),
+    "two tensions": (
+        fact("contact_wire_tension", [1e4, 2e4]),
+        "has the shape (1,)",
+    ),
     "evaluation": (
         value("line/evaluation_range", 1, -5e6),
         "line/evaluation_range does not ascend",

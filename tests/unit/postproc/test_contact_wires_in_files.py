@@ -1,0 +1,143 @@
+"""Lines of several contact wires in result files: names, roles, facts and pictures of each."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from contact_wires import overlap, problem_on, twins
+from mpi4py import MPI
+from small_lines import mesh_of
+
+from catenary.meshgen.line import Line, Role
+from catenary.postproc.channels.facts import facts_of
+from catenary.postproc.channels.header import (
+    Header,
+    line_datasets,
+    static_datasets,
+    wire_roles,
+)
+from catenary.postproc.evaluate.error_indicators import indicate
+from catenary.postproc.files.checked import seal_attributes
+from catenary.postproc.film.film_data import film_data
+from catenary.postproc.read.results import Results
+from catenary.postproc.record.recorder import Recorder
+from catenary.postproc.report.report import write_report
+from catenary.solver.problem.problem import Damping
+from catenary.solver.statics.line_at_rest import line_at_rest
+from catenary.solver.time_loop.march import March
+
+FIRST, SECOND = "contact_wire", "contact_wire_2"
+
+
+@pytest.fixture
+def usual(march: Any) -> dict[str, Any]:
+    """Root attributes that have nothing to do with the line."""
+    return dict(march.header().attributes)
+
+
+def recorded(line: Line, folder: Path, usual: dict[str, Any]) -> Path:
+    """A run of 0.15 s on a line, whose first contact wire is damped otherwise than the others."""
+    problem = problem_on(line, evaluation=(8.0, 19.0))
+    problem = replace(
+        problem,
+        train=replace(problem.train, end=21.0),
+        damping=Damping(2e-4, 0.0, {FIRST: (5e-3, 0.0)}),
+    )
+    rest = line_at_rest(problem, mesh_of(line, 2))
+    datasets = {
+        **line_datasets(line, rest.mesh, problem.evaluation),
+        **static_datasets(line, rest.mesh, rest.form, rest.lift),
+    }
+    facts = facts_of(problem, rest.mesh, rest.model.dropper_lengths)
+    header = Header({**usual, "wires": wire_roles(line)}, datasets, facts)
+    recorder = Recorder(MPI.COMM_SELF, folder / "run.h5", header)
+    with March(MPI.COMM_SELF, *rest) as march:
+        outcome = march.run([recorder])
+    recorder.close({"march_wall_s": outcome.wall})
+    assert outcome.outcome == "done"
+    return folder / "run.h5"
+
+
+def test_each_contact_wire_has_its_name_role_facts_and_profile(
+    tmp_path: Path, usual: dict[str, Any]
+) -> None:
+    line = twins(0.3)
+    path = recorded(line, tmp_path, usual)
+    with Results(path) as results:
+        assert results.damage == []
+        assert list(results.roles) == [wire.name for wire in line.wires]
+        assert results.wires_of(Role.CONTACT) == [FIRST, SECOND]
+        for name, of in (
+            ("contact_wire_tension", "tension"),
+            ("contact_wire_mass", "mass_per_length"),
+            ("contact_wire_bending_stiffness", "bending_stiffness"),
+        ):
+            told = results.facts_of_wires(name)
+            assert told == {wire: getattr(line.wire(wire), of) for wire in (FIRST, SECOND)}
+        assert results.facts_of_wires("contact_wire_stiffness_damping") == {
+            FIRST: 5e-3, SECOND: 2e-4,
+        }  # fmt: skip
+        assert results.fact("wave_speed") == min(w.wave_speed for w in line.wires_of(Role.CONTACT))
+        points, wires = results.line("node_points"), results.wires()
+        for name, (x, height) in results.contact_profiles().items():
+            np.testing.assert_allclose(x, points[wires[name], 0], atol=1e-12)
+            np.testing.assert_allclose(height, points[wires[name], 2], atol=1e-12)
+        own = results.static("elasticity_of_wires")
+        assert own.shape == (results.static("elasticity").size, 2)
+        # A wire of 0.3 of the stiffness gives way more than one of 0.7, and both together least.
+        inner = slice(1, -1)
+        assert (own[inner, 0] > own[inner, 1]).all()
+        assert (results.static("elasticity")[inner] < own[inner].min(axis=1)).all()
+
+
+def test_the_report_shows_each_wire(tmp_path: Path, usual: dict[str, Any]) -> None:
+    path = recorded(twins(0.3), tmp_path, usual)
+    write_report(path, tmp_path)
+    told = json.loads((tmp_path / "summary.json").read_text())["static"]
+    own = told["elasticity_of_wires_mm_per_N"]
+    assert own[FIRST]["max"] > own[SECOND]["max"] > told["elasticity_mm_per_N"]["max"]
+
+
+def test_indicators_are_those_of_the_less_damped_wire(
+    tmp_path: Path, usual: dict[str, Any]
+) -> None:
+    """Damping lets fewer elements carry the waves ahead: the second wire asks for more."""
+    path = recorded(twins(0.5), tmp_path, usual)
+    with Results(path) as results:
+        found = indicate(results)
+    with Results(path) as results:
+        results._file.facts["contact_wire_stiffness_damping"] = np.array([5e-3, 5e-3])
+        assert indicate(results).required_frequency < found.required_frequency
+
+
+def test_films_show_the_wire_that_is_touched(tmp_path: Path, usual: dict[str, Any]) -> None:
+    """In an overlap the lower one, whatever its name and mean height are."""
+    path = recorded(overlap(), tmp_path, usual)
+    with Results(path) as results:
+        data = film_data(results)
+        profiles = results.contact_profiles()
+    assert data.contacts == [FIRST, SECOND]
+    assert data.touched(10.0) == FIRST and data.touched(40.0) == SECOND
+    x = np.array([2.0, 16.0, 24.0, 32.0, 46.0])
+    each = [np.interp(x, *profile, left=np.inf, right=np.inf) for profile in profiles.values()]
+    np.testing.assert_allclose(data.rest_height(x), np.min(each, axis=0), atol=1e-12)
+    assert data.touched(16.0) == FIRST and data.touched(32.0) == SECOND
+
+
+def test_files_without_roles_are_of_simple_catenaries(run_folder: Path, tmp_path: Path) -> None:
+    path = Path(shutil.copy(run_folder / "run.h5", tmp_path))
+    with h5py.File(path, "r+") as file:
+        del file.attrs["wires"], file["static/elasticity_of_wires"]
+        seal_attributes(file)
+    with Results(path) as results:
+        assert results.damage == []
+        assert results.roles == {FIRST: Role.CONTACT, "messenger_wire": Role.MESSENGER}
+        lift = results.static("elasticity")
+        np.testing.assert_array_equal(results.static("elasticity_of_wires"), lift[:, None])
