@@ -12,13 +12,17 @@ from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
 from catenary.solver.base.errors import InputError
 
+EXCITATIONS = ("pantograph", "force", "pulse", "hammer")
+
 
 @app.command(
     "waves",
-    help="Show the waves that a train sends along a line: its motion over place and time, in the "
-    "frame of the train, and over wavenumber and frequency, beside the waves, pass bands and "
-    "group velocities of the periodic line.",
-    epilog="Example: catenary waves en50318_2002 -o results/waves; catenary waves results/waves",
+    help="Show the waves that a train, a force that moves, a pulse or a hammer sends along a line: "
+    "its motion over place and time, in the frame of the train, and over wavenumber and "
+    "frequency, its energy ahead and behind, beside the waves, pass bands and group velocities "
+    "of the periodic line.",
+    epilog="Example: catenary waves en50318_2002 -o results/waves; catenary waves results/waves; "
+    "catenary waves en50318_2002 --excite hammer --at-m 630 -o results/hammer",
 )
 @console.guarded
 @console.serial
@@ -32,30 +36,73 @@ def waves(
         Path | None,
         typer.Option("-o", "--out", parser=console.folder, metavar="<path>", help="For a case."),
     ] = None,
+    excite: Annotated[
+        str,
+        typer.Option(
+            metavar="|".join(EXCITATIONS), help="What sets the line of a case into motion."
+        ),
+    ] = EXCITATIONS[0],
+    force_n: Annotated[
+        float | None,
+        typer.Option("--force-N", help="Of a force or a pulse; the static force if absent."),
+    ] = None,
+    frequency_hz: Annotated[
+        float | None,
+        typer.Option("--frequency-Hz", help="Of a force that moves; constant if absent."),
+    ] = None,
+    at_m: Annotated[
+        float | None,
+        typer.Option("--at-m", help="Place of a pulse or hammer; mid-line if absent."),
+    ] = None,
+    duration_s: Annotated[
+        float | None,
+        typer.Option("--duration-s", help="Of a pulse (0.1 if absent) or a hammer (0.02)."),
+    ] = None,
+    impulse_ns: Annotated[
+        float | None, typer.Option("--impulse-Ns", help="Of a hammer; 10 if absent.")
+    ] = None,
     assignments: Assignments = None,
     shortened: Shortened = False,
     force: Force = False,
 ) -> int:
     """Serial."""
     from catenary.cases.studies.waves import study
+    from catenary.cases.studies.waves.excited import Asked
 
     given = [*(assignments or []), *(extras or [])]
     folder = console.run_folder(case)
+    asked = Asked(force_n, frequency_hz, at_m, duration_s, impulse_ns)
+    if excite not in EXCITATIONS:
+        raise InputError(f"--excite is {excite}, but must be one of {', '.join(EXCITATIONS)}")
+    train = excite == EXCITATIONS[0]
+    if train and any(value is not None for value in asked):
+        raise InputError(
+            "--force-N, --frequency-Hz, --at-m, --duration-s and --impulse-Ns belong to another "
+            "--excite than pantograph; the scene says all about that"
+        )
     if (folder / "run.h5").is_file():
-        if out is not None or given or shortened:
-            raise InputError(f"{folder} is a run; -o, --set and --short are for cases")
+        if out is not None or given or shortened or not train:
+            raise InputError(f"{folder} is a run; -o, --set, --short and --excite are for cases")
+        studied = study.study_waves(folder)
     else:
         if out is None:
             raise InputError("-o is missing; it names the folder of the run that shows the waves")
         refuse_impossible(out)
-        dense = f"output.field_every_s={study.SNAPSHOT_EVERY}"
-        chosen = any(key.startswith("output.field_every") for key in given)
-        scene = load(case, given if chosen else [*given, dense], None, shortened)
-        if not _run(scene, out, force):
-            return console.BROKEN
-        folder = out
-    theory, files = study.study_waves(folder)
-    console.say(study.as_text(theory) + "\n" + "\n".join(map(str, files)))
+        if train:
+            dense = f"output.field_every_s={study.SNAPSHOT_EVERY}"
+            chosen = any(key.startswith("output.field_every") for key in given)
+            scene = load(case, given if chosen else [*given, dense], None, shortened)
+            if not _run(scene, out, force):
+                return console.BROKEN
+            studied = study.study_waves(out)
+        else:
+            scene = load(case, given, None, shortened)
+            from catenary.cases.process.petsc_options import start_petsc
+
+            start_petsc([])
+            studied = study.study_excited(scene, excite, asked, out, force)
+    text = study.as_text(studied.theory, studied.measured)
+    console.say(text + "\n" + "\n".join(map(str, studied.files)))
     return console.DONE
 
 

@@ -1,1 +1,1 @@
-"""Waves of a line that repeats itself: which of them travel, and how fast."""
+"""Waves of a line: what excites them, which travel and how fast, what obstacles send back."""

@@ -53,7 +53,8 @@ def test_the_verb_runs_a_case_and_reads_a_run(tmp_path: Path) -> None:
     done = catenary("waves", "en50318_2002", "--short", "-o", str(out), cwd=tmp_path, pictures=True)
     assert done.code == 0, done.stderr
     assert "sqrt(T/m) of the contact wire: 121.7 m/s" in done.stdout
-    names = ("space_time.png", "train_frame.png", "wavenumbers.png", "waves.csv", "pass_bands.csv")
+    names = ("space_time.png", "train_frame.png", "wavenumbers.png", "waves.csv", "pass_bands.csv",
+             "energy.png", "energy.csv")  # fmt: skip
     assert all((out / name).stat().st_size > 100 for name in names)
     rows = (out / "pass_bands.csv").read_text().splitlines()
     assert any(row.startswith("pass band,0.8") for row in rows)
@@ -62,8 +63,29 @@ def test_the_verb_runs_a_case_and_reads_a_run(tmp_path: Path) -> None:
     assert (out / "waves.csv").is_file()
     for words, sentence in (
         (["waves", "en50318_2002"], "-o is missing"),
-        (["waves", str(out), "--short"], "is a run; -o, --set and --short are for cases"),
+        (["waves", str(out), "--short"], "is a run; -o, --set, --short and --excite are for cases"),
         (["waves", "en50318_2002", "--short", "-o", str(out)], "--force"),
+        (["waves", "en50318_2002", "--excite", "bell", "-o", "x"], "--excite is bell, but must be"),
+        (["waves", "en50318_2002", "--at-m", "3", "-o", "x"], "belong to another --excite than"),
+        (
+            ["waves", "en50318_2002", "--excite", "pulse", "-o", str(out)],
+            "run.h5 holds the results",
+        ),
     ):
         refused = catenary(*words, cwd=tmp_path)
         assert refused.code == 2 and sentence in refused.stderr, refused.stderr
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("kind", ["force", "hammer"])
+def test_the_verb_excites_a_line_without_its_train(kind: str, tmp_path: Path) -> None:
+    words = ["waves", "en50318_2002", "--short", "--excite", kind, "-o", "struck",
+             "--set", "evaluation.to_m=480", "--set", "mesh.elements_per_gap=3"]  # fmt: skip
+    done = catenary(*words, cwd=tmp_path, pictures=True)
+    assert done.code == 0, done.stderr
+    struck = tmp_path / "struck"
+    assert (struck / "train_frame.png").is_file() == (kind == "force")
+    rows = np.genfromtxt(struck / "energy.csv", delimiter=",", names=True)
+    assert rows["total_J"].max() > 0.1 and (rows["total_J"] > -1e-9).all()
+    again = catenary(*words, cwd=tmp_path)
+    assert again.code == 2 and "waves.csv is there already" in again.stderr

@@ -6,38 +6,50 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from catenary.cases.studies.waves.seen import WavesSeen
+from catenary.cases.studies.waves.energy import EnergySeen
+from catenary.cases.studies.waves.seen import WavesSeen, places_of
 from catenary.cases.studies.waves.theory import HIGHEST, WaveTheory
 from catenary.postproc.report import figures
 
 # Share of velocities that the scale of colours covers, and what is drawn of a spectrum [-].
 _COVERED, _DECADES = 0.995, 4.0
+# Lines of the wave speeds: of the wires, and of the fastest energy of the periodic line.
+_DASHES = ("--", "-.", ":", (0, (6, 1, 1, 1, 1, 1)))
+# How far from what moves the mean energy is drawn [m].
+_AROUND = 400.0
 # Wavenumbers that are drawn [rad/m]; most places and times in a picture.
 _WIDEST, _MOST = 1.2, 1600
 
 
-def space_time(seen: WavesSeen, theory: WaveTheory, supports: np.ndarray) -> Figure:
-    """Velocity of the contact wire over place and time, with train, supports and wave speeds."""
+def space_time(
+    seen: WavesSeen, theory: WaveTheory, supports: np.ndarray, what: str = "pantographs"
+) -> Figure:
+    """Velocity of the contact wire over place and time, with supports and wave speeds, and with
+    the course of what moves, pantographs or a force."""
     figure = figures.new_figure(6.4)
     axes = figure.add_subplot()
     _velocity(figure, axes, seen.x, seen.time, seen.velocity)
     for p in range(seen.position.shape[1]):
-        label = "pantographs" if p == 0 else None
+        label = what if p == 0 else None
         axes.plot(seen.position[:, p], seen.time, color="black", linewidth=1.2, label=label)
-    row = int(0.3 * seen.time.size)
-    start, place = float(seen.time[row]), float(seen.position[row].max())
-    for end, label in ((seen.x[-1], "wave speed of the contact wire"), (seen.x[0], None)):
-        when = [start, start + abs(end - place) / theory.wave_speed]
-        axes.plot([place, end], when, "--", color="black", linewidth=1.0, label=label)
+    start, place = seen.source
+    for number, (speed, label) in enumerate(theory.speeds()):
+        for end in (seen.x[-1], seen.x[0]):
+            axes.plot(
+                [place, end], [start, start + abs(end - place) / speed], _DASHES[number],
+                color="black", linewidth=1.0, label=label if end == seen.x[-1] else None,
+            )  # fmt: skip
     _supports(axes, supports)
     axes.set_xlim(seen.x[0], seen.x[-1])
     axes.set_ylim(seen.time[0], seen.time[-1])
     figures.tidy(axes, "place along the track [m]", "time [s]")
-    figures.legend_above(axes)
+    figures.legend_above(axes, 3)
     return figure
 
 
-def train_frame(seen: WavesSeen, theory: WaveTheory, behind: float, ahead: float) -> Figure:
+def train_frame(
+    seen: WavesSeen, theory: WaveTheory, behind: float, ahead: float, what: str
+) -> Figure:
     """The same against the distance from the first pantograph."""
     figure = figures.new_figure(6.4)
     axes = figure.add_subplot()
@@ -56,7 +68,7 @@ def train_frame(seen: WavesSeen, theory: WaveTheory, behind: float, ahead: float
     )  # fmt: skip
     axes.set_xlim(-behind, ahead)
     axes.set_ylim(seen.time[0], seen.time[-1])
-    figures.tidy(axes, "distance from the first pantograph [m]", "time [s]")
+    figures.tidy(axes, f"distance from the {what} [m]", "time [s]")
     figures.legend_above(axes)
     return figure
 
@@ -95,6 +107,34 @@ def wavenumbers(seen: WavesSeen, theory: WaveTheory) -> Figure:
     axes.set_ylim(0.0, HIGHEST)
     figures.tidy(axes, "wavenumber [rad/m], positive with the train", "frequency [Hz]")
     figures.legend_above(axes, 3)
+    return figure
+
+
+def energy_parts(energy: EnergySeen, seen: WavesSeen) -> Figure:
+    """Energy ahead of and behind what moves, over time, and where it is on the mean."""
+    figure = figures.new_figure(6.4)
+    over_time, over_place = figure.subplots(2, 1)
+    places = places_of(seen, energy.time)
+    behind, between, ahead = energy.parts(places)
+    labels = (
+        ("behind", "between", "ahead") if seen.position.shape[1] else ("before it", "", "beyond it")
+    )
+    for part, label, number in zip((behind, between, ahead), labels, (0, 2, 1), strict=True):
+        if label and part.any():
+            over_time.plot(
+                energy.time, part, color=figures.COLOURS[number], linewidth=1.2, label=label
+            )
+    over_time.plot(energy.time, energy.total, color="black", linewidth=0.9, label="all")
+    over_time.set_ylim(bottom=0.0)
+    figures.tidy(over_time, "time [s]", "energy of the line [J]")
+    figures.legend_above(over_time)
+    relative, mean = energy.around(places.max(axis=1), _AROUND)
+    over_place.semilogy(relative, np.maximum(mean, 1e-12), color=figures.COLOURS[0], linewidth=1.2)
+    positive = mean[mean > 0.0]
+    if positive.size:
+        over_place.set_ylim(max(positive.min(), 1e-6 * positive.max()), 2.0 * positive.max())
+    where = "first pantograph, or the force" if seen.position.shape[1] else "blow"
+    figures.tidy(over_place, f"distance from the {where} [m]", "mean energy [J/m]")
     return figure
 
 

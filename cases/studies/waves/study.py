@@ -3,33 +3,52 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from catenary.cases.result_folder.output_folder import refuse_earlier
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.load import scene_from
+from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.output import as_csv
 from catenary.cases.studies.waves import pictures
-from catenary.cases.studies.waves.seen import waves_seen
+from catenary.cases.studies.waves.energy import EnergyMotion, EnergySeen
+from catenary.cases.studies.waves.excited import Asked, excitation_of, march, without_train
+from catenary.cases.studies.waves.measured import measured_rows
+from catenary.cases.studies.waves.seen import WavesSeen, WireMotion, places_of, waves_seen
 from catenary.cases.studies.waves.theory import WaveTheory, wave_theory
 from catenary.postproc.files.disk import write_all
-from catenary.postproc.film.film_data import film_data
+from catenary.postproc.film.film_data import FilmData, film_data
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.read.guard import examined
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import figures
-from catenary.solver.statics.line_at_rest import line_at_rest
+from catenary.solver.base.errors import InputError
+from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
+from catenary.solver.waves.excitation import MovingForce
 
+Row = dict[str, Any]
+TABLE = "waves.csv"
 # Snapshots that show waves up to 20 Hz, and five of them a period at 20 Hz [s].
 SNAPSHOT_EVERY = 0.01
+# Of a blow, whose waves are shorter [s].
+BLOW_EVERY = 0.004
 # What is shown behind and ahead of the train [m].
 _BEHIND, _AHEAD = 300.0, 200.0
 
 
-def study_waves(folder: Path) -> tuple[WaveTheory, list[Path]]:
+class Studied(NamedTuple):
+    """What theory says, what is measured, and the files that show it."""
+
+    theory: WaveTheory
+    measured: list[Row]
+    files: list[Path]
+
+
+def study_waves(folder: Path) -> Studied:
     """Analyse the waves in a run's folder and write pictures and tables there. Not collective.
 
     Raises
@@ -41,21 +60,98 @@ def study_waves(folder: Path) -> tuple[WaveTheory, list[Path]]:
         data = film_data(results)
         config = results.attributes["config"]
         with Snapshots(folder, len(data.points)) as snapshots:
-            seen = waves_seen(data, snapshots)
-    scene = scene_from(config, Origin(str(folder)))
+            scene = scene_from(config, Origin(str(folder)))
+            problem = problem_of(scene)
+            rest = line_at_rest(problem, mesh_of(scene))
+            energy = EnergyMotion(rest, _numbers_in(data, rest))
+            seen = waves_seen(data, snapshots, [energy])
+    return _write(folder, wave_theory(problem, rest), seen, energy.seen(), data.supports, "train")
+
+
+def study_excited(scene: Scene, kind: str, asked: Asked, folder: Path, force: bool) -> Studied:
+    """March a line without its train under an excitation, and write what is seen. Serial.
+
+    Parameters
+    ----------
+    kind : of the excitation, see `excited.KINDS`
+    folder : new, or empty, unless ``force`` is given
+
+    Raises
+    ------
+    InputError
+        If something asked for is impossible, or the folder holds something.
+    RunBroken
+        If the march breaks.
+    """
     problem = problem_of(scene)
-    theory = wave_theory(problem, line_at_rest(problem, mesh_of(scene)))
+    excitation = excitation_of(kind, asked, problem, problem.numerics.dt)
+    refuse_earlier(folder, force)
+    if not force and (folder / TABLE).exists():
+        raise InputError(
+            f"{folder / TABLE} is there already; name another folder with -o, or give --force"
+        )
+    rest = line_at_rest(without_train(problem, excitation), mesh_of(scene))
+    wire = WireMotion(rest.model.contact_nodes, rest.model.contact_x)
+    energy = EnergyMotion(rest)
+    moves = isinstance(excitation, MovingForce)
+    march(rest, excitation, SNAPSHOT_EVERY if moves else BLOW_EVERY, [wire, energy])
+    if isinstance(excitation, MovingForce):
+        start, speed = excitation.start, excitation.speed
+        seen = wire.seen(lambda times: (start + speed * times)[:, None])
+    else:
+        seen = wire.seen(lambda times: np.zeros((times.size, 0)), excitation.at)
+    theory = wave_theory(problem, rest)
+    supports = problem.line.support_positions[1:-1]
+    return _write(folder, theory, seen, energy.seen(), supports, "force" if moves else "blow")
+
+
+def _numbers_in(data: FilmData, rest: LineAtRest) -> np.ndarray:
+    """For each node of a line's mesh its number in the run's."""
+    numbers = np.empty(rest.mesh.n_nodes, dtype=np.int64)
+    for name, nodes in rest.mesh.wires.items():
+        numbers[nodes] = data.wires[name]
+    return numbers
+
+
+def _write(
+    folder: Path,
+    theory: WaveTheory,
+    seen: WavesSeen,
+    energy: EnergySeen,
+    supports: np.ndarray,
+    what: str,
+) -> Studied:
+    """Pictures and tables of what is seen and what theory says."""
+    moving = "pantographs" if what == "train" else what
+    measured = measured_rows(theory, seen)
     content: dict[str, bytes | str] = {
-        "space_time.png": figures.png(pictures.space_time(seen, theory, data.supports)),
-        "train_frame.png": figures.png(pictures.train_frame(seen, theory, _BEHIND, _AHEAD)),
+        "space_time.png": figures.png(pictures.space_time(seen, theory, supports, moving)),
         "wavenumbers.png": figures.png(pictures.wavenumbers(seen, theory)),
-        "waves.csv": as_csv(as_rows(theory)),
+        "energy.png": figures.png(pictures.energy_parts(energy, seen)),
+        "energy.csv": as_csv(energy_rows(energy, seen)),
+        TABLE: as_csv([*as_rows(theory), *measured]),
         "pass_bands.csv": as_csv(band_rows(theory)),
     }
-    return theory, write_all(folder, content)
+    if seen.position.shape[1]:
+        ahead_of = "first pantograph" if what == "train" else what
+        content["train_frame.png"] = figures.png(
+            pictures.train_frame(seen, theory, _BEHIND, _AHEAD, ahead_of)
+        )
+    return Studied(theory, measured, write_all(folder, content))
 
 
-def as_rows(theory: WaveTheory) -> list[dict[str, Any]]:
+def energy_rows(energy: EnergySeen, seen: WavesSeen) -> list[Row]:
+    """Energy over time: behind, between and ahead of what moves, or of the place of a blow [J]."""
+    behind, between, ahead = energy.parts(places_of(seen, energy.time))
+    return [
+        {"time_s": t, "behind_J": b, "between_J": m, "ahead_J": a, "total_J": b + m + a}
+        for t, b, m, a in zip(
+            *(part.tolist() for part in (energy.time, behind, between, ahead)), strict=True
+        )
+    ]
+
+
+def as_rows(theory: WaveTheory) -> list[Row]:
     """Figures with unit and meaning."""
     rows = [
         ("train_speed", theory.speed, "m/s", "speed of the train"),
@@ -76,7 +172,7 @@ def as_rows(theory: WaveTheory) -> list[dict[str, Any]]:
     ]
 
 
-def band_rows(theory: WaveTheory) -> list[dict[str, Any]]:
+def band_rows(theory: WaveTheory) -> list[Row]:
     """Pass bands of the periodic line, and ranges that outrun the train [Hz]."""
     rows: list[tuple[str, np.ndarray]] = [
         ("pass band", theory.bands()), ("outruns the train", theory.outrunning())
@@ -88,9 +184,10 @@ def band_rows(theory: WaveTheory) -> list[dict[str, Any]]:
     ]
 
 
-def as_text(theory: WaveTheory) -> str:
+def as_text(theory: WaveTheory, measured: list[Row]) -> str:
     """Figures for a terminal."""
-    lines = [f"{row['meaning']}: {row['value']:.4g} {row['unit']}" for row in as_rows(theory)]
+    rows = [*as_rows(theory), *measured]
+    lines = [f"{row['meaning']}: {row['value']:.4g} {row['unit']}" for row in rows]
     for what, bands in (("Pass bands", theory.bands()), ("Outrun the train", theory.outrunning())):
         text = ", ".join(f"{low:.2f}-{high:.2f}" for low, high in bands)
         if text:

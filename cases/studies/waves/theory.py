@@ -15,6 +15,8 @@ from catenary.solver.waves.bloch import BlochWaves, bloch_waves, period_of
 
 # Forces are judged below this frequency (EN 50317) [Hz].
 HIGHEST = 20.0
+# Speeds that a picture shows at most.
+MOST_SPEEDS = 4
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,7 @@ class WaveTheory:
     ----------
     speed : of the train [m/s]
     wave_speed : of the contact wire as a string, sqrt(T / m) [m/s]
+    wires : name and speed of waves of all wires as strings [m/s]
     doppler : (c - v) / (c + v) [-]: an echo from ahead comes back with its frequency over this
     reflection : share of a wave on the contact wire that a stiff dropper sends back,
         Z_m / (Z_c + Z_m) with impedances sqrt(T m); NaN for lines of more than two wires [-]
@@ -35,11 +38,20 @@ class WaveTheory:
 
     speed: float
     wave_speed: float
+    wires: tuple[tuple[str, float], ...]
     doppler: float
     reflection: float
     amplification: float
     bloch: BlochWaves | None
     why_not: str
+
+    def speeds(self) -> list[tuple[float, str]]:
+        """Speeds of waves [m/s] and what they are of: the wires, the periodic line up to 20 Hz."""
+        found = [(speed, f"{name.replace('_', ' ')} as a string") for name, speed in self.wires]
+        if self.bloch is not None:
+            speed, at = self.bloch.fastest(HIGHEST)
+            found.append((speed, f"fastest energy of the line ({at:.1f} Hz)"))
+        return found[:MOST_SPEEDS]
 
     def bands(self) -> np.ndarray:
         """Pass bands, (n, 2) [Hz]."""
@@ -76,4 +88,5 @@ def wave_theory(problem: Problem, rest: LineAtRest) -> WaveTheory:
         waves = bloch_waves(period_of(rest.model, *middle_span(problem.line)), HIGHEST)
     except InputError as error:
         why_not = str(error)
-    return WaveTheory(v, c, doppler, reflection, reflection / doppler, waves, why_not)
+    wires = tuple((wire.name, wire.wave_speed) for wire in problem.line.wires)
+    return WaveTheory(v, c, wires, doppler, reflection, reflection / doppler, waves, why_not)

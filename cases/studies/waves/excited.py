@@ -1,0 +1,191 @@
+"""A line that something other than its train sets into motion, marched and seen.
+
+The train stands aside: one mass that nothing lifts, under a contact without stiffness. All else is
+the line's own, droppers that slacken included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+
+from catenary.cases.studies.waves.seen import NodeMotion
+from catenary.mbs.lumped_data import LumpedData
+from catenary.solver.base.errors import InputError, RunBroken
+from catenary.solver.problem.contact_laws import LinearLaw
+from catenary.solver.problem.problem import Placement, Problem, Train
+from catenary.solver.statics.line_at_rest import LineAtRest
+from catenary.solver.time_loop.march import March
+from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.waves.excitation import Blow, Excitation, MovingForce, hammer, load_of
+
+FORCE, PULSE, HAMMER = "force", "pulse", "hammer"
+KINDS = (FORCE, PULSE, HAMMER)
+# A whole (1 - cosine) / 2 of 0.1 s has most of its waves below 20 Hz, half a sine of 0.02 s below
+# 75 Hz [s].
+DURATIONS = {PULSE: 0.1, HAMMER: 0.02}
+# Impulse of a hammer [N s].
+IMPULSE = 10.0
+_NEVER = 2**62
+_ASIDE = LumpedData((8.0,), (0.0,), (0.0,))
+
+
+class Asked(NamedTuple):
+    """What is asked for beside its kind; None for what the scene or the kind gives.
+
+    Attributes
+    ----------
+    force : of a moving force or a pulse [N]
+    frequency : of a moving force [Hz]
+    at : place of a blow [m]
+    duration : of a blow [s]
+    impulse : of a hammer [N s]
+    """
+
+    force: float | None = None
+    frequency: float | None = None
+    at: float | None = None
+    duration: float | None = None
+    impulse: float | None = None
+
+
+# Which of them belong to which kind, and the options that give them.
+_OPTIONS = {
+    "force": ("--force-N", (FORCE, PULSE)),
+    "frequency": ("--frequency-Hz", (FORCE,)),
+    "at": ("--at-m", (PULSE, HAMMER)),
+    "duration": ("--duration-s", (PULSE, HAMMER)),
+    "impulse": ("--impulse-Ns", (HAMMER,)),
+}
+
+
+def excitation_of(kind: str, asked: Asked, problem: Problem, dt: float) -> Excitation:
+    """The excitation of a kind on the line of a problem.
+
+    Parameters
+    ----------
+    kind : one of `KINDS`
+    dt : time step, which a blow lasts ten times at least [s]
+
+    Raises
+    ------
+    InputError
+        If something asked for is none of the kind's, or out of range.
+    """
+    for name, (option, kinds) in _OPTIONS.items():
+        value = getattr(asked, name)
+        if value is None:
+            continue
+        if kind not in kinds:
+            raise InputError(f"{option} belongs to --excite {' or '.join(kinds)}, not to {kind}")
+        if not np.isfinite(value):
+            raise InputError(f"{option} is {value:g}, but must be finite")
+    ends, train = problem.line.support_positions[[0, -1]], problem.train
+    if kind == FORCE:
+        frequency = asked.frequency or 0.0
+        highest = 0.1 / dt
+        if not 0.0 <= frequency <= highest:
+            raise InputError(
+                f"--frequency-Hz is {frequency:g}, but must be from 0 to {highest:g}, ten time "
+                "steps a period"
+            )
+        force = train.placements[0].static_force if asked.force is None else asked.force
+        return MovingForce(force, frequency, train.start, train.speed, train.raise_time)
+    duration = DURATIONS[kind] if asked.duration is None else asked.duration
+    if not 10 * dt <= duration <= 10.0:
+        raise InputError(
+            f"--duration-s is {duration:g}, but must be from {10 * dt:g}, ten time steps, to 10"
+        )
+    at = float(ends.mean()) if asked.at is None else asked.at
+    if not ends[0] < at < ends[1]:
+        raise InputError(
+            f"--at-m is {at:g}, but must lie on the line, from {ends[0]:g} to {ends[1]:g} m"
+        )
+    if kind == HAMMER:
+        return hammer(at, IMPULSE if asked.impulse is None else asked.impulse, duration)
+    force = train.placements[0].static_force if asked.force is None else asked.force
+    return Blow(at, duration, force, False)
+
+
+def without_train(problem: Problem, excitation: Excitation) -> Problem:
+    """The problem without its train, for as long as waves of the excitation take to the far end.
+
+    A force that moves has the train's course.
+    """
+    train, ends = problem.train, problem.line.support_positions[[0, -1]]
+    place = Placement(_ASIDE, 0.0, 0.0)
+    if isinstance(excitation, MovingForce):
+        course = Train(train.speed, train.start, train.end, 0.0, (place,))
+    else:
+        speed = max(wire.wave_speed for wire in problem.line.wires)
+        slowest = min(wire.wave_speed for wire in problem.line.wires)
+        duration = excitation.duration + np.abs(ends - excitation.at).max() / slowest
+        # One that creeps: its place is nobody's business, its course is the run's duration.
+        creep = 1e-3 * speed
+        start = float(ends[0]) + 1e-3 * float(np.ptp(ends))
+        course = Train(creep, start, start + creep * float(duration), 0.0, (place,))
+    left_out = {"lowering", "vehicle_motion", "several_pantographs", "head_roll"}
+    return replace(
+        problem,
+        train=course,
+        contact=LinearLaw(0.0, 0.0),
+        effects=problem.effects - left_out,
+        numerics=replace(problem.numerics, scheme="one_solve", coupling="implicit"),
+    )
+
+
+class _Watch:
+    """Observer that hands over the uplift of all nodes at every so many steps."""
+
+    def __init__(self, every: int, seen: Callable[[float, np.ndarray], None]) -> None:
+        self._every, self._seen = every, seen
+
+    def start(self, stage: Stage) -> None:
+        """Which rows are which nodes."""
+        self._nodes = stage.owned_nodes
+
+    def next_state(self, step: int) -> int:
+        """No state is needed."""
+        return _NEVER
+
+    def next_motion(self, step: int) -> int:
+        """The next multiple."""
+        return (step // self._every + 1) * self._every
+
+    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
+        """Channels are of no interest."""
+
+    def observe(self, view: StepView) -> None:
+        """Hand over."""
+        if view.step % self._every == 0:
+            uplift = np.empty(self._nodes.size)
+            uplift[self._nodes] = view.node_uplift()
+            self._seen(view.time, uplift)
+
+    def finish(self, outcome: str) -> None:
+        """Nothing is left to do."""
+
+
+def march(rest: LineAtRest, excitation: Excitation, every: float, seen: list[NodeMotion]) -> None:
+    """March to the end and show the motion each ``every`` seconds. Serial.
+
+    Raises
+    ------
+    RunBroken
+        If the march breaks.
+    """
+    dt = rest.problem.numerics.dt
+    rest.model.loads.append(load_of(excitation, rest.model, dt))
+
+    def show(time: float, uplift: np.ndarray) -> None:
+        for one in seen:
+            one.add(time, uplift)
+
+    with March(MPI.COMM_SELF, *rest) as run:
+        outcome = run.run([_Watch(max(1, round(every / dt)), show)])
+    if outcome.outcome != "done":
+        raise RunBroken(outcome.outcome)

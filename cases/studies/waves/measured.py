@@ -1,0 +1,120 @@
+"""Group velocities measured from the signals that a blow sends along a line."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from catenary.cases.studies.waves.seen import WavesSeen
+from catenary.cases.studies.waves.theory import HIGHEST, WaveTheory
+from catenary.solver.waves.bloch import BlochWaves
+
+# A band is so many widths to both sides, and lies within a branch [-]; its largest width [Hz].
+_WIDTHS, _WIDEST = 4.0, 0.2
+# The fastest waves up to these frequencies are measured [Hz].
+_UP_TO = (0.5 * HIGHEST, HIGHEST)
+# Spans from the blow to the first station, least spans from there to the second, and which share of
+# the line between blow and end lies before the second.
+_FIRST, _APART, _SHARE = 2, 3, 0.5
+
+
+class Arrived(NamedTuple):
+    """Signals of two stations in a band of frequencies.
+
+    Attributes
+    ----------
+    velocity : distance over the time between the centres of their energies [m/s]
+    frequency : (f,) of the band [Hz]
+    weight : (f,) share of each frequency in the energy of the first signal
+    """
+
+    velocity: float
+    frequency: np.ndarray
+    weight: np.ndarray
+
+    def expected(self, frequency: np.ndarray, velocity: np.ndarray) -> float:
+        """Distance over mean travel time of the band, given group velocities (n,) [m/s] at
+        ascending frequencies (n,) [Hz]."""
+        slowness = 1.0 / np.interp(self.frequency, frequency, velocity)
+        return float(1.0 / (self.weight @ slowness))
+
+
+def arrived(
+    time: np.ndarray, first: np.ndarray, second: np.ndarray, distance: float, frequency: float,
+    width: float,
+) -> Arrived:  # fmt: skip
+    """How fast the energy of a band of frequencies travels from one station to another.
+
+    The centre of energy of a signal in time is the mean of its group delays, each frequency by its
+    share of the energy: whatever the phases are.
+
+    Parameters
+    ----------
+    time : (t,) at equal distances [s]
+    first, second : (t,) signals of a wave that passes both once
+    distance : from the first to the second [m]
+    frequency, width : middle of the band and its width (one standard deviation) [Hz]
+    """
+    # The band's filter reaches as far back as forth: there is room before the record, and behind.
+    n = time.size
+    padded, at = 3 * n, (time[1] - time[0]) * np.arange(-n, 2 * n)
+    nu = np.fft.rfftfreq(padded, time[1] - time[0])
+    band = np.exp(-0.5 * ((nu - frequency) / width) ** 2)
+    spectra = [np.fft.rfft(np.pad(signal, n)) * band for signal in (first, second)]
+    centres = []
+    for spectrum in spectra:
+        whole = np.zeros(padded, dtype=complex)
+        whole[: nu.size] = spectrum
+        energy = np.abs(np.fft.ifft(whole)) ** 2
+        centres.append(float(at @ energy / energy.sum()))
+    weight = np.abs(spectra[0]) ** 2
+    inside = np.abs(nu - frequency) < _WIDTHS * width
+    weight = weight[inside]
+    velocity = distance / (centres[1] - centres[0])
+    return Arrived(velocity, nu[inside], weight / weight.sum())
+
+
+def measured_rows(theory: WaveTheory, seen: WavesSeen) -> list[dict[str, Any]]:
+    """Group velocities of the waves of a blow beside those of the periodic line, as rows of
+    ``waves.csv``; none without a blow, periodic line or room for two stations."""
+    waves = theory.bloch
+    if waves is None or seen.position.shape[1]:
+        return []
+    length, room = waves.length, _SHARE * (seen.x[-1] - seen.struck)
+    n = int(room // length) - _FIRST
+    if n < _APART:
+        return []
+    columns = [
+        int(np.argmin(np.abs(seen.x - (seen.struck + spans * length))))
+        for spans in (_FIRST, _FIRST + n)
+    ]
+    first, second = (seen.velocity[:, column].astype(float) for column in columns)
+    distance = float(seen.x[columns[1]] - seen.x[columns[0]])
+    rows = []
+    for number, highest in enumerate(_UP_TO, start=1):
+        frequency, velocity = branch_of_fastest(waves, highest)
+        at, wide = 0.5 * (frequency[0] + frequency[-1]), frequency[-1] - frequency[0]
+        width = min(_WIDEST, float(wide) / (2.2 * _WIDTHS))
+        found = arrived(seen.time, first, second, distance, float(at), width)
+        what = f"of energy around {at:.1f} Hz over {distance:.0f} m"
+        rows += [
+            _row(f"group_velocity_{number}", found.velocity, f"measured, {what}"),
+            _row(f"group_velocity_{number}_theory", found.expected(frequency, velocity),
+                 f"of the periodic line, {what}"),
+        ]  # fmt: skip
+    return rows
+
+
+def branch_of_fastest(waves: BlochWaves, highest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (n,), ascending [Hz], and group velocities [m/s] of the branch that has the
+    fastest wave up to a frequency [Hz]."""
+    speed = np.where(waves.frequency <= highest, np.abs(waves.group_velocity), 0.0)
+    branch = int(speed.max(axis=0).argmax())
+    order = np.argsort(waves.frequency[:, branch])
+    velocity = np.maximum(np.abs(waves.group_velocity[order, branch]), 1e-3)
+    return waves.frequency[order, branch], velocity
+
+
+def _row(name: str, value: float, meaning: str) -> dict[str, Any]:
+    return {"name": name, "value": value, "unit": "m/s", "meaning": meaning}
