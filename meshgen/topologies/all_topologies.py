@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from catenary.meshgen.line import Line
-from catenary.meshgen.topologies import simple  # noqa: F401  registers itself
+from catenary.meshgen.topologies import compound, simple, stitched  # noqa: F401  register
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.topologies.registry import registered
 from catenary.solver.base.errors import InputError
@@ -17,9 +17,15 @@ def make_line(data: LineData) -> Line:
     InputError
         If there is no such topology, or the data make no line.
     """
-    make = registered().get(data.topology)
-    if make is None:
+    topology = registered().get(data.topology)
+    if topology is None:
         known = ", ".join(sorted(registered()))
         raise InputError(f"the topology {data.topology} is unknown; it must be one of: {known}")
+    for part in topology.parts:
+        if getattr(data, part) is None:
+            raise InputError(f"the topology {data.topology} needs {part}")
     data.check()
-    return make(data)
+    return topology.make(data)
+
+
+__all__ = ["make_line", "registered"]

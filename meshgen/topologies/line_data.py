@@ -16,6 +16,34 @@ SHORTEST_GAP = 1e-3
 
 
 @dataclass(frozen=True)
+class StitchWire:
+    """A wire clamped to the messenger wire on both sides of each inner support.
+
+    ``length`` from clamp to clamp [m]; of each clamp ``clamp_mass`` [kg], half of it on either
+    wire, and ``clamp_stiffness`` [N/m].
+    """
+
+    conductor: Conductor
+    length: float
+    clamp_mass: float
+    clamp_stiffness: float
+
+
+@dataclass(frozen=True)
+class AuxiliaryWire:
+    """A wire between messenger and contact wire, hung from the one and carrying the other.
+
+    ``height`` above the contact wire at the supports [m]; ``dropper`` and ``dropper_positions``
+    are those by which it hangs, per span, distances from the left support, ascending [m].
+    """
+
+    conductor: Conductor
+    height: float
+    dropper: DropperKind
+    dropper_positions: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
 class LineData(Spans):
     """What a scene says of a line.
 
@@ -26,9 +54,11 @@ class LineData(Spans):
     stagger : (n_spans + 1,) lateral position of the contact wire at each support [m]
     contact_height : height of the contact wire at the supports of the running spans [m]
     encumbrance : height of the messenger wire above ``contact_height`` at the supports [m]
+    dropper : what the contact wire hangs by
     support_stiffness : vertical stiffness of a messenger-wire support [N/m]
     transition_rise : height gained by the contact wire over all transition spans of one end [m]
     topology : name of the topology that makes the line
+    auxiliary_wire, stitch_wire : parts of which some topologies make wires
     """
 
     dropper_positions: tuple[tuple[float, ...], ...]
@@ -37,20 +67,33 @@ class LineData(Spans):
     contact_height: float
     encumbrance: float
     contact_wire: Conductor
-    messenger_wire: Conductor
-    dropper: DropperKind
+    messenger_wire: Conductor | None
+    dropper: DropperKind | None
     support_stiffness: float
     steady_arm: SteadyArm
     transition_rise: float
     topology: str = "simple"
+    auxiliary_wire: AuxiliaryWire | None = None
+    stitch_wire: StitchWire | None = None
 
     @cached_property
     def dropper_x(self) -> np.ndarray:
-        """Places of all droppers along the line, ascending [m]."""
-        counts = [len(places) for places in self.dropper_positions]
-        starts = np.repeat(self.support_positions[:-1], counts)
-        within = [place for places in self.dropper_positions for place in places]
+        """Places of all droppers of the contact wire along the line, ascending [m]."""
+        return self.along(self.dropper_positions)
+
+    def along(self, positions: tuple[tuple[float, ...], ...]) -> np.ndarray:
+        """Places along the line of distances from the left support, per span [m]."""
+        starts = np.repeat(self.support_positions[:-1], [len(places) for places in positions])
+        within = [place for places in positions for place in places]
         return np.asarray(starts + np.array(within, dtype=float))
+
+    @property
+    def stitch_clamps(self) -> np.ndarray:
+        """Places of the clamps of stitch wires, ascending [m]; ValueError without these."""
+        if self.stitch_wire is None:
+            raise ValueError("the line has no stitch wires")
+        half = 0.5 * self.stitch_wire.length
+        return np.add.outer(self.support_positions[1:-1], (-half, half)).ravel()
 
     @cached_property
     def profile(self) -> Profile:
@@ -90,6 +133,12 @@ class LineData(Spans):
         ):
             if n != wanted:
                 raise InputError(f"{name} has {n} entries, but {self.n_spans} spans need {wanted}")
+        if self.auxiliary_wire is not None:
+            above = self.auxiliary_wire.dropper_positions
+            for span, (length, places) in enumerate(
+                zip(self.span_lengths, above, strict=True), start=1
+            ):
+                _check_span(span, length, places)
         spans = zip(self.span_lengths, self.dropper_positions, self.pre_sag, strict=True)
         for span, (length, places, lowered) in enumerate(spans, start=1):
             if len(places) != len(lowered):

@@ -3,22 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.line_data import LineData
 
-Topology = Callable[[LineData], Line]
+Make = Callable[[LineData], Line]
+
+
+class Topology(NamedTuple):
+    """What makes lines of a topology, and the parts of ``LineData`` that only some of them have.
+
+    ``parts`` must be given for this topology; parts that no entry names here must not.
+    """
+
+    make: Make
+    parts: tuple[str, ...]
+
+
+# Parts of most topologies: wires hang by droppers from a messenger wire.
+HUNG = ("messenger_wire", "dropper")
 
 _TOPOLOGIES: dict[str, Topology] = {}
 
 
-def register(name: str) -> Callable[[Topology], Topology]:
-    """Decorator: the function makes lines of the topology ``name``; a second one is an error."""
+def register(name: str, *parts: str) -> Callable[[Make], Make]:
+    """Decorator: the function makes lines of the topology ``name``; a second one is an error.
 
-    def keep(make: Topology) -> Topology:
+    ``parts`` are names of what it needs of ``LineData``; ``HUNG`` if none is named.
+    """
+
+    def keep(make: Make) -> Make:
         if name in _TOPOLOGIES:
             raise ValueError(f"topology {name} is registered already")
-        _TOPOLOGIES[name] = make
+        _TOPOLOGIES[name] = Topology(make, parts or HUNG)
         return make
 
     return keep

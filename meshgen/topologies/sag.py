@@ -8,7 +8,7 @@ from catenary.meshgen.line import Piece
 from catenary.meshgen.spans import Spans
 
 # Only for the first guess of a sag; equilibrium uses the scene's value [m/s2].
-_GRAVITY = 9.81
+GRAVITY = 9.81
 
 
 def sagging(spans: Spans, x: np.ndarray, top: float, mass: float, tension: float) -> Piece:
@@ -25,6 +25,6 @@ def sagging(spans: Spans, x: np.ndarray, top: float, mass: float, tension: float
     x = np.unique(np.concatenate([masts, x]))
     span = np.clip(np.searchsorted(masts, x, side="right") - 1, 0, spans.n_spans - 1)
     along, length = x - masts[span], np.asarray(spans.span_lengths)[span]
-    sag = np.where(np.isin(x, masts), 0.0, mass * _GRAVITY * along * (length - along))
+    sag = np.where(np.isin(x, masts), 0.0, mass * GRAVITY * along * (length - along))
     z = top - sag / (2.0 * tension)
     return Piece(tuple(x.tolist()), (0.0,) * x.size, tuple(z.tolist()))

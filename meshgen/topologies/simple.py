@@ -2,34 +2,43 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from catenary.meshgen.line import Droppers, Line, Piece, Role, SteadyArms, Supports, Wire
 from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE, STEADY_ARMS, SUPPORTS
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.meshgen.topologies.registry import register
+from catenary.meshgen.topologies.registry import HUNG, register
 from catenary.meshgen.topologies.sag import sagging
 
 SIMPLE = "simple"
 
 
-@register(SIMPLE)
+@register(SIMPLE, *HUNG)
 def simple_catenary(data: LineData) -> Line:
     """A contact wire that droppers hang from a messenger wire straight above the track."""
+    assert data.dropper is not None
     masts = data.support_positions
     at_masts, at_droppers = tuple(masts.tolist()), tuple(data.dropper_x.tolist())
     inner = at_masts[1:-1]
     contact = Piece(at_masts, data.stagger, tuple(data.profile.level(masts).tolist()))
-    load = data.contact_wire.mass_per_length + data.messenger_wire.mass_per_length
-    top = data.contact_height + data.encumbrance
-    messenger = sagging(data, data.dropper_x, top, load, data.messenger_wire.tension)
     return Line(
         data.span_lengths,
         data.n_transition,
         SIMPLE,
         (
             Wire.of(data.contact_wire, CONTACT_WIRE, Role.CONTACT, (contact,), data.profile),
-            Wire.of(data.messenger_wire, MESSENGER_WIRE, Role.MESSENGER, (messenger,)),
+            hung_messenger(data, data.dropper_x, data.contact_wire.mass_per_length),
         ),
         (Droppers(DROPPERS, data.dropper, MESSENGER_WIRE, CONTACT_WIRE, at_droppers, at_droppers),),
         (SteadyArms(STEADY_ARMS, data.steady_arm, CONTACT_WIRE, inner),),
         (Supports(SUPPORTS, data.support_stiffness, MESSENGER_WIRE, inner),),
     )
+
+
+def hung_messenger(data: LineData, x: np.ndarray, hung: float) -> Wire:
+    """A messenger wire above the track that carries ``hung`` [kg/m] at places ``x`` (n,) [m]."""
+    wire = data.messenger_wire
+    assert wire is not None
+    top = data.contact_height + data.encumbrance
+    course = sagging(data, x, top, hung + wire.mass_per_length, wire.tension)
+    return Wire.of(wire, MESSENGER_WIRE, Role.MESSENGER, (course,))

@@ -1,4 +1,4 @@
-"""Topologies with one wire more, as a newcomer would write them: functions from data to a line."""
+"""Lines of more than two wires: shipped topologies, and one as a newcomer would write it."""
 
 from __future__ import annotations
 
@@ -6,94 +6,39 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
-import numpy as np
 from small_lines import en50318_line
 
-from catenary.meshgen.line import Clamps, Conductor, Droppers, End, Line, Piece, Profile, Role, Wire
-from catenary.meshgen.mesh import DROPPERS, MESSENGER_WIRE
-from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.line import Conductor, DropperKind, Line, Piece, Role, Wire
+from catenary.meshgen.topologies.compound import AUXILIARY_WIRE
+from catenary.meshgen.topologies.line_data import AuxiliaryWire, LineData, StitchWire
 from catenary.meshgen.topologies.registry import register, unregister
 from catenary.meshgen.topologies.simple import simple_catenary
+from catenary.meshgen.topologies.stitched import STITCH_WIRE
 
-AUXILIARY, STITCH, HANGERS = "auxiliary_wire", "stitch_wire", "hangers"
-AUXILIARY_CONDUCTOR = Conductor(14.7e3, 1.375, 120.0)
-STITCH_CONDUCTOR = Conductor(3.5e3, 0.31, 0.0)
+AUXILIARY, STITCH = AUXILIARY_WIRE, STITCH_WIRE
 STITCH_HALF = 9.0  # [m]
+TOPOLOGIES = ("compound", "stitched")
+FEEDER = "feeder"
 
 
-def compound(data: LineData) -> Line:
-    """The scene's droppers hang the contact wire from an auxiliary wire, which hangs by half as
-    many from the messenger wire."""
+def with_feeder(data: LineData) -> Line:
+    """A simple catenary with a wire above it that nothing joins: what a newcomer writes."""
     simple = simple_catenary(data)
-    contact, messenger = simple.wires
-    (low,) = simple.droppers
-    x = tuple((0.5 * (data.dropper_x[0::2] + data.dropper_x[1::2])).tolist())
-    ends = simple.support_positions[[0, -1]].tolist()
-    level = data.contact_height + 0.4 * data.encumbrance
-    profile = Profile(level, (0.0,), (0.0,), 0.0, data.profile.ends, data.profile.running)
-    course = Piece(tuple(ends), (0.0, 0.0), (level, level))
-    middle = Wire.of(AUXILIARY_CONDUCTOR, AUXILIARY, Role.AUXILIARY, (course,), profile)
-    return replace(
-        simple,
-        topology="compound",
-        wires=(contact, middle, messenger),
-        droppers=(
-            replace(low, name=HANGERS, upper=AUXILIARY),
-            Droppers(
-                DROPPERS, replace(data.dropper, stiffness=2e5), MESSENGER_WIRE, AUXILIARY, x, x
-            ),
-        ),
-    )
-
-
-def stitched(data: LineData) -> Line:
-    """At each inner mast the droppers nearest to it hang from a stitch wire clamped to the
-    messenger wire on both sides."""
-    simple = simple_catenary(data)
-    contact, messenger = simple.wires
-    (low,) = simple.droppers
-    masts = simple.support_positions[1:-1]
-    ends = np.stack([masts - STITCH_HALF, masts + STITCH_HALF], axis=1)
-    top = data.contact_height + data.encumbrance
-    pieces = tuple(
-        Piece((a, b), (0.0, 0.0), (top - 0.4, top - 0.4), (End.CLAMPED, End.CLAMPED))
-        for a, b in ends.tolist()
-    )
-    near = (np.abs(data.dropper_x[:, None] - masts) < STITCH_HALF).any(axis=1)
-    groups = [
-        replace(low, name=name, upper=upper, upper_x=tuple(x.tolist()), lower_x=tuple(x.tolist()))
-        for name, upper, x in (
-            (DROPPERS, MESSENGER_WIRE, data.dropper_x[~near]),
-            (HANGERS, STITCH, data.dropper_x[near]),
-        )
-    ]
-    taken = tuple((a, b, STITCH_CONDUCTOR.tension) for a, b in ends.tolist())
-    return replace(
-        simple,
-        topology="stitched",
-        wires=(
-            contact,
-            Wire.of(STITCH_CONDUCTOR, STITCH, Role.STITCH, pieces),
-            replace(messenger, taken=taken),
-        ),
-        droppers=tuple(groups),
-        clamps=(Clamps("clamps", 1e7, 0.38, MESSENGER_WIRE, STITCH, tuple(ends.ravel().tolist())),),
-    )
-
-
-TOPOLOGIES = {"compound": compound, "stitched": stitched}
+    ends = tuple(simple.support_positions[[0, -1]].tolist())
+    top = data.contact_height + data.encumbrance + 1.0
+    course = Piece(ends, (0.0, 0.0), (top, top))
+    feeder = Wire.of(Conductor(5e3, 1.1, 50.0), FEEDER, Role.MESSENGER, (course,))
+    return replace(simple, topology="with_feeder", wires=(*simple.wires, feeder))
 
 
 @contextmanager
 def further_topologies() -> Iterator[None]:
-    """``compound`` and ``stitched`` are known to the registry while the block runs."""
-    for name, make in TOPOLOGIES.items():
-        register(name)(make)
+    """``with_feeder`` is known to the registry while the block runs."""
+    register("with_feeder")(with_feeder)
     try:
         yield
     finally:
-        for name in TOPOLOGIES:
-            unregister(name)
+        unregister("with_feeder")
 
 
 def data_of(topology: str, n_spans: int = 6, bending: float = 1.0) -> LineData:
@@ -105,6 +50,7 @@ def data_of(topology: str, n_spans: int = 6, bending: float = 1.0) -> LineData:
     else:
         span, places = 65.0, (2.5, 7.5, 17.5, 27.5, 37.5, 47.5, 57.5, 62.5)
         wires = Conductor(27e3, 1.082, 137.0), Conductor(21e3, 1.06, 40.0)
+    above = tuple(5.0 + 10.0 * k for k in range(5))
     return replace(
         line,
         topology=topology,
@@ -114,5 +60,12 @@ def data_of(topology: str, n_spans: int = 6, bending: float = 1.0) -> LineData:
         encumbrance=1.8,
         contact_wire=replace(wires[0], bending_stiffness=bending * wires[0].bending_stiffness),
         messenger_wire=replace(wires[1], bending_stiffness=bending * wires[1].bending_stiffness),
+        auxiliary_wire=AuxiliaryWire(
+            Conductor(14.7e3, 1.375, 120.0),
+            0.4 * 1.8,
+            DropperKind(2e5, None, 0.0, 0.0, 0.0),
+            (above,) * n_spans,
+        ),
+        stitch_wire=StitchWire(Conductor(3.5e3, 0.31, 0.0), 2.0 * STITCH_HALF, 0.38, 1e7),
         support_stiffness=5e5,
     )

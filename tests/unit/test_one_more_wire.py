@@ -1,6 +1,6 @@
-"""Wires beyond the simple catenary, each by one topology: an auxiliary wire, and a stitch wire.
+"""Wires beyond the simple catenary: an auxiliary wire, stitch wires, and one of a newcomer.
 
-What a newcomer writes is a function from `LineData` to a `Line`, as the two in `more_wires`; mesh,
+What a newcomer writes is a function from `LineData` to a `Line`, as the one in `more_wires`; mesh,
 form finding, elasticity, march and incidents take any wires by name.
 """
 
@@ -16,7 +16,7 @@ from dense_line import DenseLine
 from measuring import check, march, matrix_of, solve_free
 from more_wires import (
     AUXILIARY,
-    HANGERS,
+    FEEDER,
     STITCH,
     STITCH_HALF,
     TOPOLOGIES,
@@ -36,7 +36,7 @@ from catenary.meshgen.line import (
     Line,
     Role,
 )
-from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh, elements_of
+from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE, LineMesh, elements_of
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.postproc.channels.header import line_datasets
 from catenary.postproc.record.fields import component_numbers, line_cells
@@ -115,10 +115,13 @@ def test_a_mesh_whose_wire_has_too_few_pieces_is_refused(tmp_path: Path) -> None
 
 
 def test_a_topology_that_is_unknown_or_wrong_is_refused() -> None:
-    with pytest.raises(InputError, match="bridled is unknown; it must be one of: compound, simple"):
-        make_line(replace(data_of("compound"), topology="bridled"))
+    known = "compound, .*simple, .*stitched, .*with_feeder"
+    with pytest.raises(InputError, match=f"hanging is unknown; it must be one of: {known}"):
+        make_line(replace(data_of("compound"), topology="hanging"))
+    with pytest.raises(InputError, match="the topology stitched needs stitch_wire"):
+        make_line(replace(data_of("stitched"), stitch_wire=None))
     line = make_line(data_of("compound"))
-    with pytest.raises(ValueError, match="hangers hang auxiliary_wire, which has no profile"):
+    with pytest.raises(ValueError, match="droppers hang auxiliary_wire, which has no profile"):
         bare = replace(line.wires[1], profile=None)
         hung = replace(line.droppers[0], upper=MESSENGER_WIRE, lower=AUXILIARY)
         replace(line, wires=(line.wires[0], bare, line.wires[2]), droppers=(hung,))
@@ -126,6 +129,17 @@ def test_a_topology_that_is_unknown_or_wrong_is_refused() -> None:
         replace(line, droppers=(replace(line.droppers[0], upper="third_rail"),))
     with pytest.raises(ValueError, match="two parts have the name contact_wire"):
         replace(line, wires=(*line.wires, line.wires[0]))
+
+
+def test_a_wire_of_a_newcomer_hangs_between_its_ends() -> None:
+    """Half of its sag m g L^2 / (8 T) is where a parabola has it, at 0.146 L."""
+    line = make_line(replace(data_of("stitched", 2), topology="with_feeder"))
+    mesh, form = at_rest(with_strings(line))
+    wire = line.wire(FEEDER)
+    sag = GRAVITY * wire.mass_per_length * 130.0**2 / (8 * wire.tension)
+    middle = wire.top - height_at(mesh, form, FEEDER, 65.0)
+    check("sag [m]", middle, sag, within=1e-9)
+    assert len(mesh.elements(FEEDER)) == len(mesh.elements(CONTACT_WIRE))
 
 
 # ---- rest --------------------------------------------------------------------------------------
@@ -268,7 +282,10 @@ def small(topology: str) -> Line:
     data = data_of(topology, 2)
     places = (3.0, 9.0, 15.0, 21.0) if topology == "compound" else (4.0, 12.0, 20.0)
     spans = {"span_lengths": (24.0,) * 2, "dropper_positions": (places,) * 2}
-    line = make_line(replace(data, **spans, pre_sag=((0.0,) * len(places),) * 2))  # type: ignore[arg-type]
+    assert data.auxiliary_wire is not None
+    auxiliary = replace(data.auxiliary_wire, dropper_positions=((6.0, 18.0),) * 2)
+    short = replace(data, **spans, auxiliary_wire=auxiliary)  # type: ignore[arg-type]
+    line = make_line(replace(short, pre_sag=((0.0,) * len(places),) * 2))
     return replace(line, clamps=tuple(replace(group, mass=0.0) for group in line.clamps))
 
 
@@ -370,7 +387,7 @@ def test_dropper_kinds_of_groups_may_differ() -> None:
     kinds = DropperKind(1e5, None, 0.1, 0.2, 0.1), DropperKind(None, 3e5, 0.2, 0.1, 0.3)
     changed = replace(line, droppers=tuple(map(_with_kind, (low, high), kinds)))
     mesh = mesh_of(changed, 2)
-    problem = problem_of(changed, damping=Damping(1e-4, 0.0, {HANGERS: (2e-3, 0.0)}))
+    problem = problem_of(changed, damping=Damping(1e-4, 0.0, {DROPPERS: (2e-3, 0.0)}))
     model, _ = find_form(problem, mesh)
     of = mesh.dropper_group
     assert (model.dropper_stiffness[of == 0] == 1e5).all()

@@ -68,8 +68,9 @@ def _requirements(scene: Scene, name: str, how: str, key: str) -> Iterator[Fault
 
 def check_effect_data(scene: Scene) -> Iterator[Fault]:
     """Effects without the value that they need, and values without their effect."""
+    hung = scene.line.dropper
     values = {
-        "residual_dropper_stiffness": scene.line.dropper.residual_stiffness_ratio,
+        "residual_dropper_stiffness": 0.0 if hung is None else hung.residual_stiffness_ratio,
     }
     switches = scene.switches()
     for name, value in values.items():

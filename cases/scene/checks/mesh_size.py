@@ -69,8 +69,10 @@ def size_of(scene: Scene) -> Size | None:
     return Size(scene.line.n_spans, droppers, nodes, unknowns)
 
 
-def _droppers_in(table: DropperTable, span: float) -> int:
+def _droppers_in(table: DropperTable | None, span: float) -> int:
     """Droppers of a span of that length [m]; none if the table has no such pattern."""
+    if table is None:
+        return 0
     if table.positions_m is not None:
         return len(table.positions_m)
     for pattern in table.patterns or []:

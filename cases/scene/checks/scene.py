@@ -30,6 +30,7 @@ from catenary.cases.scene.checks.mesh_size import size_faults
 from catenary.cases.scene.checks.output import check_output
 from catenary.cases.scene.checks.pantograph import check_mechanisms, check_pantographs
 from catenary.cases.scene.checks.scheme import check_scheme
+from catenary.cases.scene.checks.topology import check_parts, check_topology
 from catenary.cases.scene.checks.usual import usual_faults
 from catenary.cases.scene.checks.vehicle import check_vehicle
 from catenary.cases.scene.convert.course import end_of, strips_ahead
@@ -60,6 +61,7 @@ def check(scene: Scene) -> None:
 def faults_of(scene: Scene) -> list[Fault]:
     """All in which a scene contradicts itself."""
     found = _Findings()
+    whole = found.nothing_by(check_topology, scene)
     for of_tables in _OF_TABLES:
         found.nothing_by(of_tables, scene)
     if found.nothing_by(_pantograph_names, scene):
@@ -67,8 +69,10 @@ def faults_of(scene: Scene) -> list[Fault]:
         found.nothing_by(check_scheme, scene)
     # What is too large is not made, and what follows from a wrong unit is not reported.
     sound = found.nothing_by(size_faults, scene) and found.nothing_by(usual_faults, scene)
-    line = _line(scene, found) if sound else None
+    line = _line(scene, found) if sound and whole else None
     if line is None:
+        return found.faults
+    if not found.nothing_by(check_parts, scene, line):
         return found.faults
     for of_line in (check_dropper_lengths, _speed):
         found.nothing_by(of_line, scene, line)

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeVar
+
 import numpy as np
 
 from catenary.cases.scene.scene import Scene
-from catenary.cases.scene.tables.line import LineTable, WireTable
+from catenary.cases.scene.tables.line import (
+    DropperTable,
+    HangingTable,
+    LineTable,
+    StitchWireTable,
+    WireTable,
+)
 from catenary.cases.scene.tables.units import length_from_mm
 from catenary.meshgen.line import Conductor, DropperKind, Line, SteadyArm
 from catenary.meshgen.topologies.all_topologies import make_line
-from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.topologies.line_data import AuxiliaryWire, LineData, StitchWire
 from catenary.solver.base.errors import InputError
 
 # Span lengths are written in decimal; two that differ by less are the same one.
@@ -37,29 +46,25 @@ def line_data_of(scene: Scene) -> LineData:
     """
     table = scene.line
     spans = span_lengths(table)
-    positions = [_positions(scene, span) for span in spans]
+    hung = table.dropper
+    positions = [_positions(scene, "line.dropper", hung, span) for span in spans]
     first, last = table.transition.n_spans_start, table.n_spans - table.transition.n_spans_end
     pre_sag = [
-        _pre_sag(table, spans[i], positions[i]) if first <= i < last else (0.0,) * len(positions[i])
+        _pre_sag(hung, spans[i], positions[i])
+        if hung is not None and first <= i < last
+        else (0.0,) * len(positions[i])
         for i in range(table.n_spans)
     ]
-    kind = table.dropper
     return LineData(
         span_lengths=spans,
         dropper_positions=tuple(positions),
         pre_sag=tuple(pre_sag),
         stagger=_stagger(table),
         contact_height=table.contact_height_m,
-        encumbrance=table.encumbrance_m,
+        encumbrance=table.encumbrance_m or 0.0,
         contact_wire=_conductor(table.contact_wire),
-        messenger_wire=_conductor(table.messenger_wire),
-        dropper=DropperKind(
-            stiffness=kind.stiffness_N_per_m,
-            axial_stiffness=kind.axial_stiffness_N,
-            mass_per_length=kind.mass_kg_per_m,
-            upper_clamp_mass=kind.messenger_clamp_kg,
-            lower_clamp_mass=kind.contact_clamp_kg,
-        ),
+        messenger_wire=_optional(_conductor, table.messenger_wire),
+        dropper=None if hung is None else _dropper_kind(hung, hung.contact_clamp_kg),
         support_stiffness=table.support.stiffness_N_per_m,
         steady_arm=SteadyArm(
             length=table.steady_arm.length_m,
@@ -70,6 +75,46 @@ def line_data_of(scene: Scene) -> LineData:
         ),
         n_transition=(table.transition.n_spans_start, table.transition.n_spans_end),
         transition_rise=table.transition.rise_m,
+        topology=table.topology,
+        auxiliary_wire=_auxiliary(scene, spans),
+        stitch_wire=_optional(_stitch, table.stitch_wire),
+    )
+
+
+_Table = TypeVar("_Table")
+_Part = TypeVar("_Part")
+
+
+def _optional(make: Callable[[_Table], _Part], table: _Table | None) -> _Part | None:
+    return None if table is None else make(table)
+
+
+def _auxiliary(scene: Scene, spans: tuple[float, ...]) -> AuxiliaryWire | None:
+    table = scene.line.auxiliary_wire
+    if table is None:
+        return None
+    key = "line.auxiliary_wire.dropper"
+    return AuxiliaryWire(
+        _conductor(table),
+        table.height_m,
+        _dropper_kind(table.dropper, table.dropper.auxiliary_clamp_kg),
+        tuple(_positions(scene, key, table.dropper, span) for span in spans),
+    )
+
+
+def _stitch(table: StitchWireTable) -> StitchWire:
+    return StitchWire(
+        _conductor(table), table.length_m, table.clamp_kg, table.clamp_stiffness_N_per_m
+    )
+
+
+def _dropper_kind(table: HangingTable, lower_clamp: float) -> DropperKind:
+    return DropperKind(
+        stiffness=table.stiffness_N_per_m,
+        axial_stiffness=table.axial_stiffness_N,
+        mass_per_length=table.mass_kg_per_m,
+        upper_clamp_mass=table.messenger_clamp_kg,
+        lower_clamp_mass=lower_clamp,
     )
 
 
@@ -84,8 +129,9 @@ def span_lengths(table: LineTable) -> tuple[float, ...]:
     return ends * transition.n_spans_start + running + ends * transition.n_spans_end
 
 
-def _positions(scene: Scene, span: float) -> tuple[float, ...]:
-    kind = scene.line.dropper
+def _positions(scene: Scene, key: str, kind: HangingTable | None, span: float) -> tuple[float, ...]:
+    if kind is None:
+        return ()
     if kind.positions_m is not None:
         return tuple(kind.positions_m)
     if kind.patterns is not None:
@@ -93,7 +139,7 @@ def _positions(scene: Scene, span: float) -> tuple[float, ...]:
             if abs(pattern.span_m - span) < _SAME_SPAN:
                 return tuple(pattern.positions_m)
         listed = ", ".join(f"{pattern.span_m:g}" for pattern in kind.patterns)
-        key = "line.dropper.patterns"
+        key = f"{key}.patterns"
         raise InputError(
             f"{key} {scene.origin.of(key)} has no entry for spans of {span:g} m; it has {listed} m"
         )
@@ -102,8 +148,7 @@ def _positions(scene: Scene, span: float) -> tuple[float, ...]:
     return tuple(margin + i * kind.spacing_m for i in range(kind.count))
 
 
-def _pre_sag(table: LineTable, span: float, positions: tuple[float, ...]) -> tuple[float, ...]:
-    kind = table.dropper
+def _pre_sag(kind: DropperTable, span: float, positions: tuple[float, ...]) -> tuple[float, ...]:
     if kind.pre_sag_mm is not None:
         return tuple(length_from_mm(value) for value in kind.pre_sag_mm)
     for pattern in kind.patterns or []:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 def problem_of(scene: Scene) -> Problem:
     """The problem of a scene."""
     numerics, train, line = scene.numerics, _train(scene), line_of(scene)
-    ratio = scene.line.dropper.residual_stiffness_ratio
+    hung = scene.line.dropper
     return Problem(
         line=line,
         damping=_damping(scene.line),
@@ -48,10 +48,10 @@ def problem_of(scene: Scene) -> Problem:
             smallest_dt=numerics.smallest_dt_s,
         ),
         evaluation=(scene.evaluation.from_m, scene.evaluation.to_m),
-        residual_stiffness_ratio=ratio,
+        residual_stiffness_ratio=0.0 if hung is None else hung.residual_stiffness_ratio,
         effects=frozenset(name for name, on in scene.switches().items() if on),
         incidents=line_incidents(scene.incidents, line, numerics.dt_s),
-        slack_dampers_act=scene.line.dropper.slack_damping == "kept",
+        slack_dampers_act=hung is not None and hung.slack_damping == "kept",
         ends=ends_of(scene.line.ends),
     )
 

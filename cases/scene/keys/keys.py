@@ -183,5 +183,9 @@ def _without_unit(name: str) -> str:
 
 def _most_alike(key: str, known: list[str], last: str) -> str:
     candidates = [c for c in known if c.rsplit(".", 1)[-1] == last]
+    # A key of a table below the one that is named: the first, which most scenes have.
+    below = [c for c in candidates if c.startswith(key.removesuffix(last))]
+    if below and key != last:
+        return below[0].replace(ANY, "<name>")
     best = difflib.get_close_matches(key, candidates, n=1, cutoff=0.0)[0]
     return best.replace(ANY, "<name>")

@@ -21,6 +21,14 @@ TYPICAL: dict[str, str] = {
     "line.messenger_wire.bending_stiffness_N_m2": (
         "45 (65 mm2) to 130 (120 mm2); a strand has less than a solid wire"
     ),
+    "line.auxiliary_wire.tension_N": "9800 to 14700 (Shinkansen)",
+    "line.auxiliary_wire.mass_kg_per_m": "copper of 150 mm2 1.375",
+    "line.auxiliary_wire.bending_stiffness_N_m2": "a solid wire of 150 mm2 215, a strand less",
+    "line.auxiliary_wire.height_m": "0.2 to 0.6",
+    "line.stitch_wire.tension_N": "2000 to 5000, mostly 2800 to 3500",
+    "line.stitch_wire.mass_kg_per_m": "bronze strand of 35 mm2 0.31",
+    "line.stitch_wire.bending_stiffness_N_m2": "2 to 11 (35 mm2); a strand has less than a wire",
+    "line.stitch_wire.length_m": "12 to 22, mostly 18",
     "line.dropper.stiffness_N_per_m": "100000 (EN 50318)",
     "line.dropper.axial_stiffness_N": "1.2e6 (bronze rope of 12 mm2 at 100 GPa)",
     "line.dropper.count": "5 to 9",

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from catenary.cases.scene.tables.ends import EndsTable
 from catenary.cases.scene.tables.table import TAKE_AWAY, OneOrMore, Table, ascending, exactly_one
+from catenary.meshgen.topologies.all_topologies import registered
 
 Span = Annotated[float, Field(ge=5, le=500)]
 Stagger = Annotated[float, Field(ge=-2, le=2)]
@@ -41,8 +42,8 @@ class DropperPattern(Table):
         return self
 
 
-class DropperTable(Table):
-    """All droppers: what they are, where they hang and the pre-sag that they give the wire."""
+class HangingTable(Table):
+    """Droppers: what they are, and where they hang."""
 
     stiffness_N_per_m: float | None = Field(
         None, gt=0, le=1e9, description="stiffness in tension, the same for every length"
@@ -51,8 +52,9 @@ class DropperTable(Table):
         None, gt=0, le=1e9, description="EA; the stiffness is EA over the dropper's length"
     )
     mass_kg_per_m: float = Field(0.0, ge=0, le=100, description="mass per length")
-    messenger_clamp_kg: float = Field(0.0, ge=0, le=100, description="clamp on the messenger wire")
-    contact_clamp_kg: float = Field(0.0, ge=0, le=100, description="clamp on the contact wire")
+    messenger_clamp_kg: float = Field(
+        0.0, ge=0, le=100, description="clamp at the upper end, on the messenger wire or another"
+    )
     positions_m: list[DropperPosition] | None = Field(
         None,
         min_length=1,
@@ -66,6 +68,24 @@ class DropperTable(Table):
     patterns: list[DropperPattern] | None = Field(
         None, min_length=1, max_length=200, description="one entry per span length"
     )
+
+    @model_validator(mode="after")
+    def _placed(self) -> HangingTable:
+        exactly_one(self, "stiffness_N_per_m", "axial_stiffness_N")
+        exactly_one(self, "positions_m", "count", "patterns")
+        if (self.count is None) != (self.spacing_m is None):
+            raise ValueError("needs count and spacing_m together, but only one is given")
+        if self.patterns is not None:
+            ascending([p.span_m for p in self.patterns], "patterns by span_m")
+        if self.positions_m is not None:
+            ascending(self.positions_m, "positions_m")
+        return self
+
+
+class DropperTable(HangingTable):
+    """Droppers of the contact wire, and the pre-sag that they give it."""
+
+    contact_clamp_kg: float = Field(0.0, ge=0, le=100, description="clamp on the contact wire")
     pre_sag_mm: list[PreSag] | None = Field(
         None, description="how far the contact wire hangs lower, one value per dropper"
     )
@@ -82,22 +102,16 @@ class DropperTable(Table):
     )
 
     @model_validator(mode="after")
-    def _consistent(self) -> DropperTable:
-        exactly_one(self, "stiffness_N_per_m", "axial_stiffness_N")
-        exactly_one(self, "positions_m", "count", "patterns")
-        if (self.count is None) != (self.spacing_m is None):
-            raise ValueError("needs count and spacing_m together, but only one is given")
+    def _pre_sag(self) -> DropperTable:
         if self.pre_sag_mm is not None and self.pre_sag_mid_mm is not None:
             raise ValueError(f"takes pre_sag_mm or pre_sag_mid_mm, but both are given{TAKE_AWAY}")
         if self.patterns is not None:
-            ascending([p.span_m for p in self.patterns], "patterns by span_m")
             if self.pre_sag_mm is not None:
                 raise ValueError("with patterns takes pre_sag_mm in each pattern, not here")
             mixed = any(p.pre_sag_mm is not None for p in self.patterns)
             if mixed and self.pre_sag_mid_mm is not None:
                 raise ValueError("takes pre_sag_mm in the patterns or pre_sag_mid_mm, not both")
         if self.positions_m is not None:
-            ascending(self.positions_m, "positions_m")
             _one_pre_sag_each(self.pre_sag_mm, len(self.positions_m))
         if self.count is not None:
             _one_pre_sag_each(self.pre_sag_mm, self.count)
@@ -110,6 +124,39 @@ def _one_pre_sag_each(pre_sag: list[float] | None, n_droppers: int) -> None:
             f"must give one pre_sag_mm per dropper, but there are {len(pre_sag)} values "
             f"for {n_droppers} droppers"
         )
+
+
+class AuxiliaryDropperTable(HangingTable):
+    """Droppers from the messenger wire down to the auxiliary wire, which hangs level by them."""
+
+    auxiliary_clamp_kg: float = Field(0.0, ge=0, le=100, description="clamp on the auxiliary wire")
+
+    @model_validator(mode="after")
+    def _level(self) -> AuxiliaryDropperTable:
+        if any(pattern.pre_sag_mm is not None for pattern in self.patterns or []):
+            raise ValueError("takes no pre_sag_mm in patterns: the auxiliary wire hangs level")
+        return self
+
+
+class AuxiliaryWireTable(WireTable):
+    """A wire between messenger and contact wire."""
+
+    height_m: float = Field(
+        gt=0, le=10, description="height above the contact wire at the supports"
+    )
+    dropper: AuxiliaryDropperTable = Field(
+        description="droppers from the messenger wire to the auxiliary wire"
+    )
+
+
+class StitchWireTable(WireTable):
+    """A wire clamped to the messenger wire on both sides of each inner support."""
+
+    length_m: float = Field(gt=0, le=100, description="length from clamp to clamp")
+    clamp_kg: float = Field(0.0, ge=0, le=100, description="mass of each of its two clamps")
+    clamp_stiffness_N_per_m: float = Field(
+        1e7, gt=0, le=1e10, description="stiffness of each clamp, in tension and compression"
+    )
 
 
 class SupportTable(Table):
@@ -173,6 +220,12 @@ class TransitionTable(Table):
 class LineTable(Table):
     """The line from anchor to anchor."""
 
+    topology: str = Field(
+        "simple",
+        min_length=1,
+        max_length=100,
+        description="which wires the line has: " + ", ".join(registered()),
+    )
     n_spans: int = Field(ge=1, le=20_000, description="number of spans from anchor to anchor")
     span_m: Annotated[list[Span], OneOrMore, Field(min_length=1, max_length=2000)] = Field(
         description="span length, or a list of span lengths that is repeated"
@@ -180,15 +233,22 @@ class LineTable(Table):
     contact_height_m: float = Field(
         5.08, gt=0, le=20, description="height of the contact wire at the supports above the rail"
     )
-    encumbrance_m: float = Field(
-        gt=0, le=10, description="height of the messenger wire above the contact wire at supports"
+    encumbrance_m: float | None = Field(
+        None,
+        gt=0,
+        le=10,
+        description="height of the messenger wire above the contact wire at supports",
     )
     stagger_m: Annotated[list[Stagger], OneOrMore, Field(min_length=1, max_length=2001)] = Field(
         [0.0], description="alternating sideways offset at the supports, or one value per support"
     )
     contact_wire: WireTable = Field(description="contact wire")
-    messenger_wire: WireTable = Field(description="messenger wire")
-    dropper: DropperTable = Field(description="droppers")
+    messenger_wire: WireTable | None = Field(None, description="messenger wire")
+    auxiliary_wire: AuxiliaryWireTable | None = Field(
+        None, description="wire between messenger and contact wire"
+    )
+    stitch_wire: StitchWireTable | None = Field(None, description="stitch wires at the supports")
+    dropper: DropperTable | None = Field(None, description="droppers of the contact wire")
     support: SupportTable = Field(default_factory=SupportTable, description="supports")
     steady_arm: SteadyArmTable = Field(default_factory=SteadyArmTable, description="steady arms")
     damping: DampingTable = Field(description="proportional damping")

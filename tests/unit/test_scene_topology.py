@@ -1,0 +1,133 @@
+"""`line.topology`: which tables it takes, which it refuses, and the lines that come of it."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from measuring import check
+
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.convert.line import line_of
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.input.faults import SceneError
+from catenary.cases.scene.load import load_scene
+from catenary.meshgen.line import Role
+from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
+
+RE330, COMPOUND = "re330_stitched", "shinkansen_compound"
+WITHOUT_STITCH = ["line.topology=simple", "line.stitch_wire="]
+OLD_TENSIONS = ["line.contact_wire.tension_N=14700", "line.auxiliary_wire.tension_N=14700"]
+
+REFUSED = {
+    "unknown": (RE330, ["line.topology=stiched"], "line.topology is .stiched.*did you mean stitch"),
+    "unlike any": (RE330, ["line.topology=x"], "it must be one of .*simple"),
+    "no stitch wire": (RE330, ["line.stitch_wire="],
+                       r"line.stitch_wire \(stitch wires at the supports\) is missing"),
+    "no messenger": (RE330, ["line.messenger_wire="], r"line.messenger_wire \(.*\) is missing"),
+    "no encumbrance": (RE330, ["line.encumbrance_m="], r"line.encumbrance_m \(.*\) is missing"),
+    "no droppers": (RE330, ["line.dropper="], r"line.dropper \(.*\) is missing"),
+    "stitch wire of a simple line": (
+        RE330, ["line.topology=simple"],
+        "line.stitch_wire in .* is no part of the topology simple; leave it out, or take "
+        "line.topology = stitched"),
+    "auxiliary wire of a simple line": (
+        COMPOUND, ["line.topology=simple"], "line.auxiliary_wire in .* is no part of .* compound"),
+    "no auxiliary wire": (COMPOUND, ["line.auxiliary_wire="], "line.auxiliary_wire .* is missing"),
+    "long stitch wires": (RE330, ["line.stitch_wire.length_m=65"],
+                          "length_m is 65 m .* it must be less than the shortest span .65 m."),
+    "short stitch wires": (RE330, ["line.stitch_wire.length_m=9"],
+                           "no dropper would hang from it: the nearest one is 5 m"),
+    "clamp on a dropper": (RE330, ["line.stitch_wire.length_m=10"],
+                           "its clamp at 60 m of the line would stand on a dropper"),
+    "one span": (RE330, ["line.n_spans=1"], "a stitched line needs a support, that is two spans"),
+    "strong stitch wires": (RE330, ["line.stitch_wire.tension_N=21000"],
+                            "it must be less than line.messenger_wire.tension_N .21000 N"),
+    "stitch wires in kN": (RE330, ["line.stitch_wire.tension_N=3.5"], "is it 3.5 kN. write 3500"),
+    "high auxiliary wire": (COMPOUND, ["line.auxiliary_wire.height_m=1.5"],
+                            "it must be less than line.encumbrance_m .1.5 m"),
+    "auxiliary wire above its droppers": (
+        COMPOUND, ["line.auxiliary_wire.height_m=1.4"],
+        "the messenger wire would hang 0.* m below the auxiliary wire in span"),
+    "dropper outside": (COMPOUND, ["line.auxiliary_wire.dropper.positions_m=[5,55]"],
+                        "line.auxiliary_wire.dropper.positions_m .* puts a dropper at 55 m"),
+    "pre-sag of the auxiliary wire": (
+        COMPOUND, ["line.auxiliary_wire.dropper.positions_m=",
+                   "line.auxiliary_wire.dropper.patterns="
+                   "[{span_m=50,positions_m=[25],pre_sag_mm=[3]}]"],
+        "takes no pre_sag_mm in patterns"),
+    "pattern for another span": (
+        COMPOUND, ["line.auxiliary_wire.dropper.positions_m=",
+                   "line.auxiliary_wire.dropper.patterns=[{span_m=40,positions_m=[25]}]"],
+        "line.auxiliary_wire.dropper.patterns .* has no entry for spans of 50 m; it has 40 m"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_table_that_does_not_fit_is_refused_in_one_sentence(name: str) -> None:
+    case, changes, expected = REFUSED[name]
+    with pytest.raises(SceneError) as refused:
+        load_scene(case, changes)
+    (fault,) = refused.value.faults
+    assert re.search(expected, fault.sentence), fault.sentence
+
+
+def rest_of(case: str, changes: list[str]) -> LineAtRest:
+    """A shortened case at rest."""
+    scene = load_scene(case, changes, shortened=True)
+    return line_at_rest(problem_of(scene), mesh_of(scene))
+
+
+@pytest.mark.parametrize(
+    ("case", "changes", "most", "least"),
+    [
+        (RE330, [], 0.443, 0.322),
+        (RE330, WITHOUT_STITCH, 0.396, 0.147),
+        (RE330, ["line.stitch_wire.tension_N=2000"], 0.438, 0.316),
+        (RE330, ["line.stitch_wire.tension_N=5000"], 0.450, 0.330),
+        (COMPOUND, [], 0.322, 0.183),
+        (COMPOUND, OLD_TENSIONS, 0.336, 0.172),
+    ],
+)
+def test_elasticity_is_that_of_an_independent_model(
+    case: str, changes: list[str], most: float, least: float
+) -> None:
+    """Figures of another finite-element model, of three digits.
+
+    Its strands' bending stiffness is not known; without it the extremes move by some 0.001 mm/N
+    (the test below), which bounds what it may explain.
+    """
+    lift = 1e3 * rest_of(case, changes).lift.lift
+    check("elasticity max, min [mm/N]", [lift.max(), lift.min()], [most, least], within=1.5e-3)
+
+
+def test_a_stitched_line_is_softer_at_the_support_and_more_even() -> None:
+    stitched, simple = rest_of(RE330, []), rest_of(RE330, WITHOUT_STITCH)
+    at_mast = [float(rest.lift.lift[0]) for rest in (stitched, simple)]
+    print(f"at the support {1e3 * at_mast[0]:.3f} and {1e3 * at_mast[1]:.3f} mm/N")
+    assert at_mast[0] > 1.8 * at_mast[1]
+    uneven = [float(np.ptp(r.lift.lift) / (r.lift.lift.max() + r.lift.lift.min()))
+              for r in (stitched, simple, rest_of(COMPOUND, []))]  # fmt: skip
+    assert uneven[0] < 0.17 and uneven[1] > 0.45 and uneven[0] < uneven[2] < uneven[1]
+
+
+def test_bending_of_strands_moves_the_elasticity_by_little() -> None:
+    strings = ["line.messenger_wire.bending_stiffness_N_m2=0",
+               "line.stitch_wire.bending_stiffness_N_m2=0"]  # fmt: skip
+    with_strands, without = rest_of(RE330, []), rest_of(RE330, strings)
+    moved = 1e3 * np.abs(with_strands.lift.lift - without.lift.lift).max()
+    assert 1e-5 < moved < 1.5e-3, moved
+
+
+@pytest.mark.parametrize("case", [RE330, COMPOUND])
+def test_a_line_of_a_scene_has_its_topology_and_hangs_taut(case: str) -> None:
+    rest = rest_of(case, [])
+    line = rest.problem.line
+    role = Role.STITCH if case == RE330 else Role.AUXILIARY
+    assert len(line.wires_of(role)) == 1 and line.topology in load_scene(case).line.topology
+    assert rest.form.dropper_force.min() > 20.0
+    low = rest.mesh.droppers[:, 1]
+    contact = np.isin(low, rest.mesh.wires["contact_wire"])
+    height = rest.form.height[low[contact]]
+    check("height at the droppers [m]", height, line_of(load_scene(case)).wires[0].top, within=1e-9)
