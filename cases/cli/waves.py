@@ -61,6 +61,14 @@ def waves(
     impulse_ns: Annotated[
         float | None, typer.Option("--impulse-Ns", help="Of a hammer; 10 if absent.")
     ] = None,
+    obstacles: Annotated[
+        bool,
+        typer.Option(
+            "--obstacles",
+            help="Measure what each kind of obstacle of the line sends back and lets through, "
+            "beside theory, and nothing else.",
+        ),
+    ] = False,
     assignments: Assignments = None,
     shortened: Shortened = False,
     force: Force = False,
@@ -80,7 +88,11 @@ def waves(
             "--force-N, --frequency-Hz, --at-m, --duration-s and --impulse-Ns belong to another "
             "--excite than pantograph; the scene says all about that"
         )
+    if obstacles and not train:
+        raise InputError("--obstacles runs pulses of its own; leave --excite away")
     if (folder / "run.h5").is_file():
+        if obstacles:
+            raise InputError(f"{folder} is a run; --obstacles is for cases")
         if out is not None or given or shortened or not train:
             raise InputError(f"{folder} is a run; -o, --set, --short and --excite are for cases")
         studied = study.study_waves(folder)
@@ -88,6 +100,13 @@ def waves(
         if out is None:
             raise InputError("-o is missing; it names the folder of the run that shows the waves")
         refuse_impossible(out)
+        if obstacles:
+            from catenary.cases.process.petsc_options import start_petsc
+
+            start_petsc([])
+            text, files = study.study_obstacles(load(case, given, None, shortened), out, force)
+            console.say(text + "\n" + "\n".join(map(str, files)))
+            return console.DONE
         if train:
             dense = f"output.field_every_s={study.SNAPSHOT_EVERY}"
             chosen = any(key.startswith("output.field_every") for key in given)

@@ -89,3 +89,13 @@ def test_the_verb_excites_a_line_without_its_train(kind: str, tmp_path: Path) ->
     assert rows["total_J"].max() > 0.1 and (rows["total_J"] > -1e-9).all()
     again = catenary(*words, cwd=tmp_path)
     assert again.code == 2 and "waves.csv is there already" in again.stderr
+
+
+@pytest.mark.process
+def test_the_verb_refuses_obstacles_of_a_run(tmp_path: Path) -> None:
+    for words, sentence in (
+        (["--excite", "pulse", "-o", "x"], "--obstacles runs pulses of its own"),
+        ([], "-o is missing"),
+    ):
+        refused = catenary("waves", "en50318_2002", "--obstacles", *words, cwd=tmp_path)
+        assert refused.code == 2 and sentence in refused.stderr, refused.stderr

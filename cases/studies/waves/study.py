@@ -14,7 +14,7 @@ from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.output import as_csv
-from catenary.cases.studies.waves import pictures
+from catenary.cases.studies.waves import obstacles, pictures
 from catenary.cases.studies.waves.energy import EnergyMotion, EnergySeen
 from catenary.cases.studies.waves.excited import Asked, excitation_of, march, without_train
 from catenary.cases.studies.waves.measured import measured_rows
@@ -31,7 +31,7 @@ from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.waves.excitation import MovingForce
 
 Row = dict[str, Any]
-TABLE = "waves.csv"
+TABLE, OBSTACLES = "waves.csv", "obstacles.csv"
 # Snapshots that show waves up to 20 Hz, and five of them a period at 20 Hz [s].
 SNAPSHOT_EVERY = 0.01
 # Of a blow, whose waves are shorter [s].
@@ -86,10 +86,7 @@ def study_excited(scene: Scene, kind: str, asked: Asked, folder: Path, force: bo
     problem = problem_of(scene)
     excitation = excitation_of(kind, asked, problem, problem.numerics.dt)
     refuse_earlier(folder, force)
-    if not force and (folder / TABLE).exists():
-        raise InputError(
-            f"{folder / TABLE} is there already; name another folder with -o, or give --force"
-        )
+    _refuse_table(folder / TABLE, force)
     rest = line_at_rest(without_train(problem, excitation), mesh_of(scene))
     wire = WireMotion(rest.model.contact_nodes, rest.model.contact_x)
     energy = EnergyMotion(rest)
@@ -103,6 +100,34 @@ def study_excited(scene: Scene, kind: str, asked: Asked, folder: Path, force: bo
     theory = wave_theory(problem, rest)
     supports = problem.line.support_positions[1:-1]
     return _write(folder, theory, seen, energy.seen(), supports, "force" if moves else "blow")
+
+
+def study_obstacles(scene: Scene, folder: Path, force: bool) -> tuple[str, list[Path]]:
+    """Measure the obstacles of a scene's line; a text for terminals, and the files. Serial.
+
+    Raises
+    ------
+    InputError
+        If the folder holds such a table and ``force`` is not given.
+    """
+    _refuse_table(folder / OBSTACLES, force)
+    problem = problem_of(scene)
+    rest = line_at_rest(problem, mesh_of(scene))
+    results = [obstacles.result_of(one, problem) for one in obstacles.obstacles_of(rest)]
+    content: dict[str, bytes | str] = {
+        OBSTACLES: as_csv(obstacles.as_rows(results)),
+        "obstacles.png": figures.png(obstacles.picture(results)),
+    }
+    lines = [
+        f"{one.name.replace('_', ' ')}: measured within {100.0 * one.error.max():.2g} % of theory"
+        for one in results
+    ]
+    return "\n".join(lines), write_all(folder, content)
+
+
+def _refuse_table(path: Path, force: bool) -> None:
+    if not force and path.exists():
+        raise InputError(f"{path} is there already; name another folder with -o, or give --force")
 
 
 def _numbers_in(data: FilmData, rest: LineAtRest) -> np.ndarray:
