@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from catenary.cases.run.recording import PER_NODE, THINNED_WINDOW, Recording
+from catenary.cases.run.recording import (
+    THINNED_WINDOW,
+    Extent,
+    Recording,
+    shown_share,
+    snapshot_bytes,
+)
 from catenary.cases.scene.convert.course import resolved
 from catenary.mbs.build import has_joints
 from catenary.postproc.channels.line_record import GZIP
@@ -41,8 +47,10 @@ _COMPRESSED = {"dropper_force": (0.7, 0.1), "arm_uplift": (0.95, 0.85)}
 _INCOMPRESSIBLE = (1.0, 1.0)
 # Report and pictures of any run, and what a dropper and an arm add to its tables [B].
 _REPORT, _REPORT_PER_DROPPER, _REPORT_PER_ARM = 1.2e6, 300.0, 90.0
-# Tables of a snapshot in the file of its numbers, and its lines in the XDMF file [B].
-_SNAPSHOT = 700 + 1150
+# Tables of the snapshots' blocks, and room that is claimed beside them [B].
+_FIELD_TABLES = 200e3
+# Lines of a block in the XDMF file at each snapshot, and of each of its fields [B].
+_XDMF_BLOCK, _XDMF_FIELD = 600, 250
 
 
 @dataclass(frozen=True)
@@ -90,13 +98,25 @@ def estimate_files(
     film = 0.0
     if recording.field_every:
         n_snapshots = recording.n_steps // recording.field_every + 1
-        film = 24.0 * recording.n_nodes + 12.0 * recording.n_cells
-        film += n_snapshots * (PER_NODE * recording.n_nodes + _SNAPSHOT)
+        film = _film_bytes(problem, recording, n_snapshots)
     return FileSizes(
         result=rows + _BYTES * (kept + at_rest) + head,
         film=film,
         report=_REPORT + _REPORT_PER_DROPPER * n_droppers + _REPORT_PER_ARM * n_arms,
     )
+
+
+def _film_bytes(problem: Problem, recording: Recording, n_snapshots: int) -> float:
+    """Size of ``fields.h5`` and ``fields.xdmf``, were all parts of the line in them [B]."""
+    fields, line = recording.fields, problem.line
+    share = shown_share(fields, problem, recording.n_steps)
+    extent = Extent(recording.arm_x, recording.dropper_x, recording.n_nodes, recording.n_cells)
+    n_blocks = len(line.wires) + 3 + bool(line.clamps)
+    n_points = recording.n_nodes + 2 * (extent.dropper_x.size + extent.arm_x.size)
+    n_points += 2 * line.support_positions.size
+    text = n_blocks * (_XDMF_BLOCK + _XDMF_FIELD * len(fields.kinds))
+    values = share * snapshot_bytes(fields, extent)
+    return _FIELD_TABLES + 40.0 * n_points + n_snapshots * (values + text + 40 * n_blocks)
 
 
 def _tables(problem: Problem, recording: Recording) -> dict[str, tuple[Channel, int]]:

@@ -10,6 +10,8 @@ import numpy as np
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.channels.line_record import GZIP, NONE, LineRecord, says
+from catenary.postproc.record.field_kinds import USUAL_FIELDS
+from catenary.postproc.record.field_layout import Course, FieldRecord
 from catenary.solver.problem.problem import Problem
 from catenary.solver.time_loop import channels
 
@@ -23,8 +25,8 @@ WHOLE_UP_TO = 500e6
 # the train [m].
 THINNED_EVERY, THINNED_WINDOW = 5e-3, (300.0, 200.0)
 FIELD_EVERY = 0.05  # [s]
-# Bytes of a node in a snapshot.
-PER_NODE = 16
+# Times at which the part of the line in a window is counted.
+_SAMPLES = 200
 
 
 class Extent(NamedTuple):
@@ -61,6 +63,7 @@ class Recording:
     Attributes
     ----------
     line : of the line's channels
+    fields : of the snapshots
     field_every, energy_every : steps between two records, None for none
     field_by_size : whether snapshots are rarer because of their size
     arm_x, dropper_x : positions [m]
@@ -69,6 +72,7 @@ class Recording:
     """
 
     line: LineRecord
+    fields: FieldRecord
     field_every: int | None
     energy_every: int | None
     field_by_size: bool
@@ -84,6 +88,11 @@ class Recording:
         if self.field_every:
             chosen = " (chosen by size)" if self.field_by_size else ""
             told["film"] = f"a snapshot of the line every {self.field_every * dt:.3g} s{chosen}"
+            if self.fields.fields != USUAL_FIELDS:
+                told["film"] += f" with {', '.join(self.fields.fields)}"
+            if self.fields.window is not None:
+                behind, ahead = self.fields.window
+                told["film"] += f" from {behind:g} m behind to {ahead:g} m ahead of the train"
         return told
 
     def told(self, dt: float) -> list[str]:
@@ -100,11 +109,13 @@ def recording_of(output: OutputTable, problem: Problem, extent: Extent, n_steps:
     output : the scene's table
     n_steps : steps after step 0
     """
-    field_every, by_size = _field_every(output, problem, extent.n_nodes, n_steps)
+    fields = _field_record(output, problem)
+    field_every, by_size = _field_every(output, problem, fields, extent, n_steps)
     places = {channels.ARM: extent.arm_x.size, channels.DROPPER: extent.dropper_x.size}
     n_columns = sum(places[channels.CHANNELS[name].per] for name in channels.line_channels())
     return Recording(
         _line_record(output, problem, n_columns, n_steps),
+        fields,
         field_every,
         cadence(output.energy_every_s, problem.numerics.dt),
         by_size,
@@ -143,7 +154,11 @@ def _line_record(output: OutputTable, problem: Problem, n_columns: int, n_steps:
 
 
 def _field_every(
-    output: OutputTable, problem: Problem, n_nodes: int, n_steps: int
+    output: OutputTable,
+    problem: Problem,
+    fields: FieldRecord,
+    extent: Extent,
+    n_steps: int,
 ) -> tuple[int | None, bool]:
     """Steps between two snapshots, None for none, and whether their size has made them rarer."""
     dt = problem.numerics.dt
@@ -152,6 +167,44 @@ def _field_every(
     if output.field_every_s is not None:
         return cadence(output.field_every_s, dt), False
     usual = cadence(FIELD_EVERY, dt) or 1
-    most = max(1.0, WHOLE_UP_TO / (PER_NODE * n_nodes))
+    share = shown_share(fields, problem, n_steps)
+    most = max(1.0, WHOLE_UP_TO / (share * snapshot_bytes(fields, extent)))
     needed = int(np.ceil(n_steps / most))
     return max(usual, needed), needed > usual
+
+
+def _field_record(output: OutputTable, problem: Problem) -> FieldRecord:
+    """Which part of the fields is recorded."""
+    masts, train = problem.line.support_positions, problem.train
+    spans, window = output.field_spans, output.field_window_m
+    behind = [placement.behind for placement in train.placements]
+    return FieldRecord(
+        fields=USUAL_FIELDS if output.fields is None else tuple(output.fields),
+        parts=None if output.field_parts is None else tuple(output.field_parts),
+        stretch=None if spans is None else (float(masts[spans[0] - 1]), float(masts[spans[1]])),
+        window=None if window is None else (window[0], window[1]),
+        course=Course(train.start - max(behind), train.start - min(behind), train.speed),
+    )
+
+
+def snapshot_bytes(fields: FieldRecord, extent: Extent) -> float:
+    """Bytes of the values of a snapshot of the whole line, whatever its parts."""
+    n_droppers, n_arms = extent.dropper_x.size, extent.arm_x.size
+    total = 0.0
+    for kind in fields.kinds:
+        n_values = extent.n_nodes
+        if kind.of_droppers:
+            n_values = n_droppers
+        elif not kind.of_wires:
+            n_values += 2 * n_droppers + n_arms * 2
+        total += kind.item_bytes * n_values
+    return total
+
+
+def shown_share(fields: FieldRecord, problem: Problem, n_steps: int) -> float:
+    """Share of the line that snapshots show, their mean over a run."""
+    begin, end = problem.line.support_positions[[0, -1]]
+    low, high = fields.edges(np.linspace(0.0, n_steps * problem.numerics.dt, _SAMPLES))
+    first, last = (begin, end) if fields.stretch is None else fields.stretch
+    shown = np.clip(np.minimum(high, last) - np.maximum(low, first), 0.0, None)
+    return max(float(shown.mean() / (end - begin)), 1e-6)

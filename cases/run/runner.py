@@ -45,6 +45,7 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
 from catenary.postproc.files.own_files import remove_stale
+from catenary.postproc.record.blocks import RecordedLine
 from catenary.postproc.record.fields import FieldRecorder
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
@@ -296,10 +297,9 @@ def _observers(
         fields = FieldRecorder(
             comm,
             order.out_dir / "fields.xdmf",
-            at_rest.mesh.wires,
-            at_rest.mesh.droppers,
+            RecordedLine.of(problem.line, at_rest.mesh, at_rest.form.slope),
             every=recording.field_every,
-            breaks=at_rest.mesh.breaks,
+            record=recording.fields,
             flush_every=flush_every,
             resume=order.resume,
             wait=True,

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
 import numpy as np
 
+from catenary.postproc.files.checked import text_of
 from catenary.postproc.read.guard import survives
-from catenary.postproc.record.growing_xdmf import snapshot_name
+from catenary.postproc.record.blocks import OTHER_PARTS
+from catenary.postproc.record.fields_file import FORMAT
 from catenary.solver.base.errors import InputError
 
 FIELDS_FILE = "fields.h5"
@@ -16,12 +20,25 @@ FIELDS_FILE = "fields.h5"
 _SAMPLED = 400
 
 
+@dataclass(frozen=True)
+class _Wire:
+    """What snapshots show of a wire: nodes of its points, and points and rows of each snapshot."""
+
+    nodes: np.ndarray
+    first: np.ndarray
+    count: np.ndarray
+    start: np.ndarray
+    values: h5py.Dataset
+
+
 class Snapshots:
-    """Uplift of all nodes at the times of the snapshots. A context manager; not collective.
+    """Uplift of the nodes at the times of the snapshots. A context manager; not collective.
 
     Attributes
     ----------
     times : (n,) times of the snapshots that are there, ascending [s]
+    parts : names of the wires and other parts of the line that are shown
+    whole : whether each snapshot shows all nodes
 
     Parameters
     ----------
@@ -31,7 +48,7 @@ class Snapshots:
     Raises
     ------
     InputError
-        If the folder has no snapshots, or damaged ones, or those of another line.
+        If the folder has no snapshots, or damaged ones, those of another line or without uplift.
     """
 
     def __init__(self, folder: Path, n_nodes: int) -> None:
@@ -46,15 +63,39 @@ class Snapshots:
         self._path, self._n_nodes = path, n_nodes
         self._file = h5py.File(path, "r")
         try:
-            times = np.asarray(self._file["times"][...], dtype=float)
-        except (KeyError, OSError, TypeError, ValueError) as error:
+            self._open()
+        except BaseException:
             self._file.close()
+            raise
+
+    def _open(self) -> None:
+        path, file = self._path, self._file
+        if text_of(file.attrs.get("format")) != FORMAT and "uplift" in file:
+            raise InputError(
+                f"{path} was written by an earlier version of Catenary; run the scene again"
+            )
+        try:
+            times = np.asarray(file["times"][...], dtype=float)
+        except (KeyError, OSError, TypeError, ValueError) as error:
             raise InputError(f"{path} is damaged: it has no times of snapshots") from error
         n = int(np.append(np.isfinite(times), False).argmin()) if times.ndim == 1 else 0
         self.times = times[:n]
         if n < 2 or not (np.diff(self.times) > 0).all():
-            self._file.close()
             raise InputError(f"{path} has fewer than two snapshots in order of time")
+        try:
+            self.parts = tuple(json.loads(text_of(file.attrs["parts"])))
+            self._of_this_line = int(file.attrs["n_nodes"]) == self._n_nodes
+            wires = [file[name] for name in self.parts if name not in OTHER_PARTS]
+            if not all({"uplift", "displacement"} & set(wire) for wire in wires):
+                raise InputError(
+                    f"{path} has neither uplift nor displacement; run the scene again with one of "
+                    "them in output.fields"
+                )
+            self._wires = [_wire(group) for group in wires]
+        except (KeyError, OSError, TypeError, ValueError) as error:
+            raise InputError(f"{path} is damaged: {error}") from error
+        shown = sum(wire.count for wire in self._wires)
+        self.whole = bool(np.all(shown == self._n_nodes))
 
     def __enter__(self) -> Snapshots:
         return self
@@ -62,29 +103,55 @@ class Snapshots:
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         self._file.close()
 
+    def need_whole(self, for_what: str) -> None:
+        """Raise InputError unless each snapshot shows all nodes, as ``for_what`` needs."""
+        if not self.whole:
+            raise InputError(
+                f"{self._path} shows a part of the line only, and {for_what} needs all of it; run "
+                "the scene again without output.field_window_m, field_spans and field_parts"
+            )
+
     def largest_uplift(self, numbers: np.ndarray) -> float:
         """Largest uplift in some snapshots, of many in so many of them that it is not far from
         that, and not zero [m]."""
         some = numbers[:: max(1, numbers.size // _SAMPLED)].tolist()
-        return max(1e-4, *(float(np.abs(self.uplift(number)).max()) for number in some))
+        return max(1e-4, *(float(np.nanmax(np.abs(self.uplift(number)))) for number in some))
 
     def uplift(self, number: int) -> np.ndarray:
-        """Uplift of the nodes in a snapshot, (n_nodes,) [m].
+        """Uplift of the nodes in a snapshot, NaN where it shows none, (n_nodes,) [m].
 
         Raises
         ------
         InputError
             If it is not of this line, or not finite.
         """
+        uplift = np.full(self._n_nodes, np.nan)
+        sound = self._of_this_line
         try:
-            values = np.asarray(self._file[f"uplift/{snapshot_name(number)}"][...], dtype=float)
-        except (KeyError, OSError, TypeError, ValueError) as error:
+            for wire in self._wires if sound else ():
+                first, count = int(wire.first[number]), int(wire.count[number])
+                rows = slice(int(wire.start[number]), int(wire.start[number]) + count)
+                values = np.asarray(wire.values[rows], dtype=float)
+                if values.ndim > 1:
+                    values = values[:, 2]
+                uplift[wire.nodes[first : first + count]] = values
+                sound = sound and bool(np.isfinite(values).all())
+        except (IndexError, KeyError, OSError, TypeError, ValueError) as error:
             raise InputError(
                 f"{self._path} is damaged at t = {self.times[number]:g} s: {error}"
             ) from error
-        if values.shape != (self._n_nodes,) or not np.isfinite(values).all():
+        if not sound:
             raise InputError(
                 f"{self._path} does not belong to the run.h5 beside it, or is damaged at "
                 f"t = {self.times[number]:g} s"
             )
-        return values
+        return uplift
+
+
+def _wire(group: h5py.Group) -> _Wire:
+    first, count = group["first"][...], group["count"][...]
+    start = np.cumsum(count) - count
+    values = group["uplift" if "uplift" in group else "displacement"]
+    if values.shape[0] != int(count.sum()):
+        raise ValueError(f"{values.name} is too short")
+    return _Wire(group["nodes"][...], first, count, start, values)

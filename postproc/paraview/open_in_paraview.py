@@ -16,7 +16,6 @@ from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.paraview import scenery
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.fields import component_numbers
 from catenary.solver.base.errors import InputError
 
 SCRIPT, FOLDER = "view.py", "paraview"
@@ -81,7 +80,7 @@ def _settings(
         "pantographs": scenery.PANTOGRAPHS,
         "forces": scenery.FORCES,
         "surroundings": scenery.SURROUNDINGS,
-        "components": component_numbers(data.wires),
+        "blocks": [[name, "wire" if name in data.wires else name] for name in snapshots.parts],
         "names": data.names,
         "height": scale.height,
         "motion": scale.motion,

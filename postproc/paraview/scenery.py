@@ -1,4 +1,4 @@
-"""Writes what moves or stands beside the line: pantographs, contact forces, masts, arms, track.
+"""Writes what moves or stands beside the line: pantographs, contact forces, track.
 
 XDMF files of one grid a time, with a common HDF5 file. Points are places at rest; a field
 ``uplift`` moves them, as in ``fields.xdmf``, so that one factor draws all motions larger.
@@ -14,7 +14,6 @@ import numpy as np
 
 from catenary.postproc.film.film_data import FilmData
 from catenary.postproc.film.pantograph_shape import BELOW_HEAD, shape
-from catenary.postproc.record.growing_xdmf import snapshot_name
 
 NUMBERS, PANTOGRAPHS, FORCES, SURROUNDINGS = (
     "scenery.h5", "pantographs.xdmf", "forces.xdmf", "surroundings.xdmf",
@@ -22,10 +21,8 @@ NUMBERS, PANTOGRAPHS, FORCES, SURROUNDINGS = (
 # Foot, knee and hinge of the arms, and the ends of the head: how far each moves with the head.
 _SHARES = np.array([0.0, 0.5, 1.0, 1.0, 1.0])
 _CELLS = np.array([[0, 1], [1, 2], [3, 4]], dtype=np.int32)
-# Masts stand beside the track; they are a little higher than the highest wire [m].
-_BESIDE, _ABOVE = 3.0, 0.4
-# Numbers of what ``surroundings`` holds.
-MAST, ARM, TRACK = 0, 1, 2
+# Half the distance of the rails [m].
+_HALF_GAUGE = 0.75
 
 
 @dataclass(frozen=True)
@@ -56,10 +53,9 @@ def write(data: FilmData, times: np.ndarray, folder: Path) -> Scenery:
         If they cannot be written.
     """
     p = data.n_pantographs
-    points, cells, kind = surroundings(data)
+    points, cells = track(data)
     with h5py.File(folder / NUMBERS, "w") as file:
         file["surroundings/points"], file["surroundings/cells"] = points, cells
-        file["surroundings/kind"] = kind
         file["pantographs/cells"] = np.concatenate([_CELLS + 5 * i for i in range(p)])
         file["pantographs/number"] = np.repeat(np.arange(p, dtype=np.int32), len(_CELLS))
         for number, time in enumerate(times.tolist()):
@@ -93,10 +89,9 @@ def write(data: FilmData, times: np.ndarray, folder: Path) -> Scenery:
             for name, time in _named(times)
         ],
     )  # fmt: skip
-    kinds = _field("kind", "Scalar", "Cell", f"{len(cells)}", "surroundings/kind", True)
     standing = _lines("surroundings/cells", len(cells))
     place = _points("surroundings/points", len(points))
-    _write_text(files.surroundings, [(None, standing, place, kinds)])
+    _write_text(files.surroundings, [(None, standing, place, "")])
     return files
 
 
@@ -118,42 +113,19 @@ def _foot(data: FilmData) -> float:
     return float(np.median(data.points[nodes, 2])) - BELOW_HEAD
 
 
-def surroundings(data: FilmData) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points (n, 3) [m], lines (m, 2) and their kinds (m,): masts, steady arms, rails.
-
-    A steady arm reaches from its mast to the contact wire, where that is at rest.
-    """
-    x, nodes = data.supports, data.wires[data.contact]
-    top = float(data.points[:, 2].max()) + _ABOVE
-    n, zero = x.size, np.zeros_like(x)
-    beside = np.full(n, _BESIDE)
-    wire = data.points[nodes]
-    lateral = np.interp(x, wire[:, 0], wire[:, 1])
-    height = data.rest_height(x)
+def track(data: FilmData) -> tuple[np.ndarray, np.ndarray]:
+    """Points (4, 3) [m] and lines (2, 2) of the rails, from end to end of the line."""
     ends = (float(data.points[:, 0].min()), float(data.points[:, 0].max()))
-    rails = [[at, side, 0.0] for side in (-0.75, 0.75) for at in ends]
-    points = np.concatenate(
-        [
-            np.column_stack([x, beside, zero]),
-            np.column_stack([x, beside, np.full(n, top)]),
-            np.column_stack([x, beside, height + 0.3]),
-            np.column_stack([x, lateral, height]),
-            np.array(rails),
-        ]
-    )
-    first = np.arange(n)
-    cells = np.concatenate(
-        [
-            np.column_stack([first, first + n]),
-            np.column_stack([first + 2 * n, first + 3 * n]),
-            [[4 * n, 4 * n + 1], [4 * n + 2, 4 * n + 3]],
-        ]
-    )
-    kind = np.repeat([MAST, ARM, TRACK], [n, n, 2])
-    return points, cells.astype(np.int32), kind.astype(np.int32)
+    rails = [[at, side, 0.0] for side in (-_HALF_GAUGE, _HALF_GAUGE) for at in ends]
+    return np.array(rails), np.array([[0, 1], [2, 3]], dtype=np.int32)
 
 
 # ---- XDMF --------------------------------------------------------------------------------------
+
+
+def snapshot_name(number: int) -> str:
+    """Name of the dataset of a snapshot in its group."""
+    return f"{number:06d}"
 
 
 def _named(times: np.ndarray) -> list[tuple[str, float]]:

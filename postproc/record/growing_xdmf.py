@@ -1,35 +1,48 @@
 """The XDMF text of snapshots that appear one after another, and is well-formed after each of them.
 
-The text names all snapshots that are planned from the start on. Those that are not there yet stand
-in a section of plain text (CDATA), which readers pass over. Its begin moves over each snapshot that
-appears: two writes of a few bytes, whatever the length of the text. Between the two the mark of the
-later place is plain text itself, so that a kill leaves a text that can be read.
+The text names all snapshots that are planned from the start on, block by block. Those that are not
+there yet stand in a section of plain text (CDATA), which readers pass over. Its begin moves over
+each snapshot that appears: two writes of a few bytes a block, whatever the length of the text.
+Between the two the mark of the later place is plain text itself, so that a kill leaves a text that
+can be read.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from catenary.postproc.files.disk import write_at, write_whole
+from catenary.postproc.record.field_layout import Slots
 
 _HIDE, _END = b"<![CDATA[", b"]]>"
 _SHOW = b" " * len(_HIDE)
+_BEGIN = b"""\
+<?xml version="1.0" encoding="UTF-8"?>
+<Xdmf Version="3.0">
+  <Domain>
+    <Grid Name="line" GridType="Collection" CollectionType="Spatial">
+"""
+_CLOSE = b"    </Grid>\n  </Domain>\n</Xdmf>\n"
+_BLOCK_CLOSE = b"      </Grid>\n"
+# Readers take the numbers from their places in the file, as they stand there.
+_KINDS = {
+    "<f4": ("Float", 4), "<f8": ("Float", 8), "<i4": ("Int", 4), "|i1": ("Char", 1),
+}  # fmt: skip
 
 
 class GrowingXdmf:
-    """An XDMF 3 file with a grid for each snapshot. Not collective.
+    """An XDMF 3 file with a series of grids for each block. Not collective.
 
     Parameters
     ----------
     path : the file, which is written at once and takes the place of another
-    h5_name : file of the numbers, relative to it
-    n_nodes, n_cells : of the mesh
-    times : of all snapshots that are planned [s]
-    n_shown : how many of them are there
+    blocks : name of each block -> the text of its grids, one for each planned snapshot
+    n_shown : how many snapshots are there
 
     Raises
     ------
@@ -37,90 +50,94 @@ class GrowingXdmf:
         If it cannot be written.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        h5_name: str,
-        n_nodes: int,
-        n_cells: int,
-        times: list[float],
-        n_shown: int,
-    ) -> None:
+    def __init__(self, path: Path, blocks: Mapping[str, list[str]], n_shown: int) -> None:
         self._path, self._n_shown = path, n_shown
-        mesh = _mesh(h5_name, n_nodes, n_cells)
-        self._grids = [
-            _grid(h5_name, mesh, n_nodes, number, time).encode()
-            for number, time in enumerate(times)
-        ]
+        self._blocks = {name: [grid.encode() for grid in grids] for name, grids in blocks.items()}
         pieces, at = [_BEGIN], len(_BEGIN)
-        self._marks = []
-        for number in range(len(times) + 1):
-            self._marks.append(at)
-            grid = self._grids[number] if number < len(times) else b""
-            pieces += [_HIDE if number == n_shown else _SHOW, b"\n", grid]
-            at += len(_HIDE) + 1 + len(grid)
-        write_whole(path, b"".join([*pieces, _END, _CLOSE]))
+        self._marks: list[list[int]] = []
+        for name, grids in self._blocks.items():
+            marks = []
+            pieces.append(_block_begin(name))
+            at += len(pieces[-1])
+            for number in range(len(grids) + 1):
+                marks.append(at)
+                grid = grids[number] if number < len(grids) else b""
+                pieces += [_HIDE if number == n_shown else _SHOW, b"\n", grid]
+                at += len(_HIDE) + 1 + len(grid)
+            pieces += [_END, _BLOCK_CLOSE]
+            at += len(_END) + len(_BLOCK_CLOSE)
+            self._marks.append(marks)
+        write_whole(path, b"".join([*pieces, _CLOSE]))
         self._handle = os.open(path, os.O_WRONLY)
 
     def show(self, n_shown: int) -> None:
         """Let the first ``n_shown`` snapshots be there, not fewer than before; OSError if not."""
         if n_shown == self._n_shown:
             return
-        for number, mark in ((n_shown, _HIDE), (self._n_shown, _SHOW)):
-            write_at(self._handle, self._marks[number], np.frombuffer(mark, dtype=np.uint8))
+        for marks in self._marks:
+            for number, mark in ((n_shown, _HIDE), (self._n_shown, _SHOW)):
+                write_at(self._handle, marks[number], np.frombuffer(mark, dtype=np.uint8))
         self._n_shown = n_shown
 
     def close(self) -> None:
         """Close the file, written anew without what never appeared if there is room for it."""
         os.close(self._handle)
+        pieces = [_BEGIN]
+        for name, grids in self._blocks.items():
+            pieces += [_block_begin(name), *grids[: self._n_shown], _BLOCK_CLOSE]
         with contextlib.suppress(OSError):
-            write_whole(self._path, b"".join([_BEGIN, *self._grids[: self._n_shown], _CLOSE]))
+            write_whole(self._path, b"".join([*pieces, _CLOSE]))
 
 
-_BEGIN = b"""\
-<?xml version="1.0" encoding="UTF-8"?>
-<Xdmf Version="3.0">
-  <Domain>
-    <Grid Name="line" GridType="Collection" CollectionType="Temporal">
-"""
-_CLOSE = b"    </Grid>\n  </Domain>\n</Xdmf>\n"
+def _block_begin(name: str) -> bytes:
+    return f'      <Grid Name="{name}" GridType="Collection" CollectionType="Temporal">\n'.encode()
 
 
-def snapshot_name(number: int) -> str:
-    """Name of the dataset of a snapshot in its group."""
-    return f"{number:06d}"
+def grids_of(
+    slots: Slots, times: list[float], h5_name: str, offsets: Mapping[str, int]
+) -> list[str]:
+    """The grids of a block at ``times`` [s].
+
+    Parameters
+    ----------
+    h5_name : file of the numbers, relative to that of the text
+    offsets : name of a table of the block -> where it begins in that file [B]
+    """
+    texts = []
+    moves = bool(np.ptp(slots.first) or np.ptp(slots.count))
+    for number, time in enumerate(times):
+        first, count = int(slots.first[number]), int(slots.count[number])
+        n_cells = int(slots.cell_count[number])
+        # The XDMF reader takes a mesh for the one before if its items begin alike.
+        name = f"<!-- {number} -->{h5_name}" if moves else h5_name
+        cells = _item(name, (n_cells, 2), "<i4", offsets["cells"], int(slots.cell_first[number]))
+        places = _item(name, (count, 3), "<f8", offsets["points"], first)
+        fields = ""
+        for kind in slots.kinds:
+            n_values = kind.values_of(count)
+            shape = (n_values,) if kind.components == 1 else (n_values, kind.components)
+            at = offsets[kind.name], slots.row_at(kind, number)
+            fields += (
+                f'<Attribute Name="{kind.name}" '
+                f'AttributeType="{"Scalar" if kind.components == 1 else "Vector"}" '
+                f'Center="{"Cell" if kind.of_droppers else "Node"}">'
+                f"{_item(h5_name, shape, kind.number, *at)}</Attribute>\n"
+            )
+        texts.append(
+            f'<Grid Name="{slots.name}" GridType="Uniform"><Time Value="{time!r}"/>\n'
+            f'<Topology TopologyType="Polyline" NodesPerElement="2" NumberOfElements="{n_cells}">'
+            f"{cells}</Topology>\n"
+            f'<Geometry GeometryType="XYZ">{places}</Geometry>\n{fields}</Grid>\n'
+        )
+    return texts
 
 
-def _mesh(h5_name: str, n_nodes: int, n_cells: int) -> str:
-    return f"""\
-        <Topology TopologyType="Polyline" NodesPerElement="2" NumberOfElements="{n_cells}">
-          <DataItem Dimensions="{n_cells} 2" NumberType="Int" Precision="4" Format="HDF">\
-{h5_name}:/mesh/cells</DataItem>
-        </Topology>
-        <Geometry GeometryType="XYZ">
-          <DataItem Dimensions="{n_nodes} 3" NumberType="Float" Precision="8" Format="HDF">\
-{h5_name}:/mesh/points</DataItem>
-        </Geometry>
-        <Attribute Name="component" AttributeType="Scalar" Center="Cell">
-          <DataItem Dimensions="{n_cells}" NumberType="Int" Precision="4" Format="HDF">\
-{h5_name}:/mesh/component</DataItem>
-        </Attribute>
-"""
-
-
-def _grid(h5_name: str, mesh: str, n_nodes: int, number: int, time: float) -> str:
-    fields = (("uplift", "Scalar", f"{n_nodes}"), ("displacement", "Vector", f"{n_nodes} 3"))
-    own = "".join(_node_attribute(*field, h5_name, number) for field in fields)
+def _item(h5_name: str, shape: tuple[int, ...], number: str, offset: int, row: int) -> str:
+    """Rows of a table from number ``row`` on, which begins at ``offset`` in the file."""
+    name, size = _KINDS[number]
+    width = int(np.prod(shape[1:], dtype=int))
+    seek = offset + row * width * size
     return (
-        f'      <Grid Name="line" GridType="Uniform">\n        <Time Value="{time!r}"/>\n'
-        f"{mesh}{own}      </Grid>\n"
+        f'<DataItem Dimensions="{" ".join(map(str, shape))}" NumberType="{name}" '
+        f'Precision="{size}" Format="Binary" Endian="Little" Seek="{seek}">{h5_name}</DataItem>'
     )
-
-
-def _node_attribute(name: str, kind: str, dimensions: str, h5_name: str, number: int) -> str:
-    return f"""\
-        <Attribute Name="{name}" AttributeType="{kind}" Center="Node">
-          <DataItem Dimensions="{dimensions}" NumberType="Float" Precision="4" Format="HDF">\
-{h5_name}:/{name}/{snapshot_name(number)}</DataItem>
-        </Attribute>
-"""

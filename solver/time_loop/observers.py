@@ -27,7 +27,8 @@ class Stage:
     owned_arms, owned_droppers : indices of those whose values this rank provides; every index has
         exactly one owner
     node_points : (n_nodes, 3) static equilibrium shape of the line [m], z up
-    owned_nodes : node numbers of the rows of ``Snapshot.uplift``, one owner each
+    owned_nodes : node numbers of what ``StepView.node_motion`` returns, one owner each
+    unknowns : names of the unknowns that nodes have
     """
 
     n_pantographs: int
@@ -41,6 +42,7 @@ class Stage:
     node_points: np.ndarray
     owned_nodes: np.ndarray
     n_strips: tuple[int, ...] = ()
+    unknowns: tuple[str, ...] = ("w", "theta_y")
     joints_in_loop: bool = False
 
     @property
@@ -62,6 +64,10 @@ class StepView:
     row : (n,) the values of all channels one after another
     columns : where in the row each channel is, by name
     node_uplift : () -> (n owned nodes,) vertical displacement [m]; not collective
+    node_motion : (name of an unknown, whether its rate is meant) -> (n owned nodes,) [m], [m/s] or
+        [-], [1/s], zero for nodes without it; not collective
+    wire_tension : () -> (n_nodes,) tension of the wires ahead of all nodes [N], the same array as
+        long as it does not change; not collective
     line_state : () -> displacement, velocity and acceleration of the rank's unknowns, by these
         names; not collective
     energies : () -> the values of ``channels.ENERGIES`` but the time, kinetic and elastic energy of
@@ -74,6 +80,8 @@ class StepView:
     row: np.ndarray
     columns: dict[str, slice]
     node_uplift: Callable[[], np.ndarray]
+    node_motion: Callable[[str, bool], np.ndarray]
+    wire_tension: Callable[[], np.ndarray]
     line_state: Callable[[], Mapping[str, np.ndarray]]
     energies: Callable[[], tuple[float, ...]]
     checkpoint: Callable[[], dict[str, Any] | None]
@@ -112,7 +120,7 @@ class Observer(Protocol):
 
 @runtime_checkable
 class MotionObserver(Observer, Protocol):
-    """A `BlockObserver` that at some steps needs ``node_uplift`` or ``energies`` and no more.
+    """A `BlockObserver` that at some steps needs the motion of nodes or ``energies`` and no more.
 
     A block goes on behind them. It is shown these steps by ``observe``; what else a view has, the
     row excepted, is refused.

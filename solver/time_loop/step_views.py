@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -82,6 +83,8 @@ class Showing:
             row=np.zeros(self.layout.width),
             columns=self.layout.columns,
             node_uplift=lambda: self._displacement()[self._node_rows],
+            node_motion=self._node_motion,
+            wire_tension=lambda: self._tension,
             line_state=self._line_state,
             energies=self._energies,
             checkpoint=self._checkpoint,
@@ -109,6 +112,7 @@ class Showing:
             node_points=points,
             owned_nodes=self._owned_nodes,
             n_strips=self._pantographs.n_strips,
+            unknowns=self._model.unknowns,
             joints_in_loop=self._pantographs.joints_in_loop,
         )
 
@@ -190,6 +194,25 @@ class Showing:
         """That of the rank's unknowns after the step that is shown."""
         kept = self._kept_motion
         return self._line.displacement if kept is None else kept[0]
+
+    def _node_motion(self, name: str, rate: bool) -> np.ndarray:
+        """One unknown of the rank's nodes, or its rate, zero for nodes without it."""
+        kept, line = self._kept_motion, self._line
+        if kept is None:
+            kept = line.displacement, line.velocity
+        numbering = self._model.numbering
+        numbers = numbering.numbers[self._owned_nodes, numbering.names.index(name)]
+        own = numbers - line.ownership.first
+        return np.where(numbers >= 0, kept[rate][own], 0.0)
+
+    @cached_property
+    def _tension(self) -> np.ndarray:
+        """Tension of the wires ahead of all nodes, as the line is now [N]."""
+        mesh, line = self._model.mesh, self._model.problem.line
+        tension = np.zeros(mesh.n_nodes)
+        for name, nodes in mesh.wires.items():
+            tension[nodes] = line.wire(name).tension_at(mesh.x(nodes))
+        return tension
 
     def _line_state(self) -> Mapping[str, np.ndarray]:
         self._refuse_kept_motion()

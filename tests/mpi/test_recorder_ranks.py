@@ -22,6 +22,8 @@ from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files import result_file
 from catenary.postproc.files.disk import NoRoom
 from catenary.postproc.read.results import Results
+from catenary.postproc.record.blocks import RecordedLine
+from catenary.postproc.record.field_layout import FieldRecord
 from catenary.postproc.record.fields import FieldRecorder
 from catenary.postproc.record.recorder import Recorder
 from catenary.solver.base.errors import RunBroken
@@ -104,6 +106,8 @@ def make_view(step: int, share: Share) -> StepView:
         row=row,
         columns=columns,
         node_uplift=lambda: 1e-3 * step + share(N_NODES),
+        node_motion=lambda name, rate: 1e-3 * step + (2.0 if rate else 1.0) * share(N_NODES),
+        wire_tension=lambda: 10.0 * step + np.arange(N_NODES),
         line_state=dict,
         energies=lambda: (COMM.allreduce(1.0), float(step)),
         checkpoint=lambda: checkpoint(step),
@@ -189,9 +193,9 @@ def test_fields_reach_the_file(folder: Path, share: Share) -> None:
     recorder = FieldRecorder(
         COMM,
         folder / "fields.xdmf",
-        wires,
-        np.array([[35, 5], [45, 15]]),
+        RecordedLine(wires, np.array([[35, 5], [45, 15]])),
         every=20,
+        record=FieldRecord(("uplift", "velocity", "tension")),
         snapshots_per_flush=3,
     )
     recorder.start(make_stage(share))
@@ -202,9 +206,14 @@ def test_fields_reach_the_file(folder: Path, share: Share) -> None:
         return
     with h5py.File(folder / "fields.h5") as file:
         np.testing.assert_allclose(file["times"][...], 0.02 * np.arange(7))
-        for number, name in enumerate(sorted(file["uplift"])):
-            expected = 0.02 * number + np.arange(N_NODES)
-            np.testing.assert_allclose(file["uplift"][name][...], expected, rtol=1e-6)
+        for name, nodes in wires.items():
+            uplift, tension = (file[f"{name}/{kind}"][:].reshape(7, -1) for kind in
+                               ("uplift", "tension"))  # fmt: skip
+            velocity = file[f"{name}/velocity"][:].reshape(7, -1, 3)
+            number = np.arange(7)[:, None]
+            np.testing.assert_allclose(uplift, 0.02 * number + nodes, rtol=1e-6)
+            np.testing.assert_allclose(velocity[..., 2], 0.02 * number + 2 * nodes, rtol=1e-6)
+            np.testing.assert_allclose(tension, 200.0 * number + nodes, rtol=1e-6)
 
 
 def test_a_full_disk_on_rank_0_breaks_the_run_on_all_ranks_at_the_same_step(

@@ -30,22 +30,41 @@ pytestmark = [
 PROBE = """
 import json, sys
 from paraview import simple as pv, servermanager
+from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
+
+def ranges_in(arrays):
+    return {arrays.GetArrayName(i): arrays.GetArray(i).GetRange(-1)
+            for i in range(arrays.GetNumberOfArrays())}
+
+def leaves(data):
+    several = data.IsA("vtkMultiPieceDataSet")
+    for i in range(data.GetNumberOfPieces() if several else data.GetNumberOfBlocks()):
+        leaf = data.GetPiece(i) if several else data.GetBlock(i)
+        named = data.HasMetaData(i) and data.GetMetaData(i).Has(vtkCompositeDataSet.NAME())
+        name = data.GetMetaData(i).Get(vtkCompositeDataSet.NAME()) if named else None
+        if leaf.IsA("vtkCompositeDataSet"):
+            yield from leaves(leaf)
+        else:
+            yield name, [leaf.GetNumberOfPoints(), leaf.GetNumberOfCells(),
+                         {**ranges_in(leaf.GetPointData()), **ranges_in(leaf.GetCellData())}]
+
 found = {}
 for name in sys.argv[2:]:
     reader = getattr(pv, sys.argv[1])
     source = reader(**{"FileName" if "Xdmf3" in sys.argv[1] else "FileNames": [name]})
     source.UpdatePipelineInformation()
     times = list(source.TimestepValues) if hasattr(source, "TimestepValues") else []
-    ranges = []
+    ranges, blocks = [], []
     for time in times or [0.0]:
         source.UpdatePipeline(time)
         about = source.GetDataInformation()
-        array = source.PointData.GetArray("uplift")
-        uplift = list(array.GetRange()) if array else None
-        ranges.append([about.GetNumberOfPoints(), list(about.GetBounds()), uplift])
-    found[name] = {"times": times, "ranges": ranges}
+        ranges.append([about.GetNumberOfPoints(), list(about.GetBounds())])
+        data = servermanager.Fetch(source)
+        blocks.append(list(leaves(data)) if data.IsA("vtkCompositeDataSet") else [])
+    found[name] = {"times": times, "ranges": ranges, "blocks": blocks}
 print("FOUND " + json.dumps(found))
 """
+FIELDS = '["uplift","displacement","velocity","tension","bending_moment","dropper_force"]'
 
 
 def on_screen(*words: object) -> str:
@@ -62,7 +81,10 @@ def folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     out = tmp_path_factory.mktemp("paraview") / "run"
     two = 'train.pantographs=[{name="reference"},{name="reference",behind_m=50}]'
     more = ["train.start_m=180", two] if request.param == 2 else []
-    words = ["run", "en50318_2002", "-o", out, "--short", "--set", "output.field_every_m=2", *more]
+    more += [f"output.fields={FIELDS}", "output.field_every_m=2"]
+    if request.param == 2:
+        more += ["output.field_window_m=[150, 120]"]
+    words = ["run", "en50318_2002", "-o", out, "--short", "--set", *more]
     for line in (words, ["paraview", out]):
         done = catenary(*map(str, line), cwd=out.parent)
         assert done.code == 0, done.stderr
@@ -88,9 +110,27 @@ def test_both_readers_play_all_times(folder: Path, reader: str, tmp_path: Path) 
         low, high = row[1][:2]
         assert low == pytest.approx(place.min() - 0.45, abs=2.5)
         assert high >= place.max() and high < place.max() + 4.5
-    uplift = np.array([row[2] for row in line["ranges"]])
-    assert 0.01 < uplift.max() < 0.2 and np.ptp(uplift[:, 1]) > 0.005
-    assert around["ranges"][0][1][5] > heads.max()
+    assert around["ranges"][0][1][5] < heads.max()
+    names = ["contact_wire", "messenger_wire", "droppers", "steady_arms", "masts"]
+    if reader == "XDMFReader":
+        assert all([name for name, _ in blocks] == names for blocks in line["blocks"])
+    contact = [blocks[0][1] for blocks in line["blocks"]]
+    largest = np.array([about[2]["uplift"][1] for about in contact])
+    assert 0.01 < largest.max() < 0.2 and np.ptp(largest) > 0.005
+    assert 0.1 < max(about[2]["velocity"][1] for about in contact) < 5.0
+    assert {tuple(about[2]["tension"]) for about in contact} == {(20000.0, 20000.0)}
+    assert 1.0 < max(about[2]["bending_moment"][1] for about in contact) < 50.0
+    droppers = [blocks[2][1] for blocks in line["blocks"]]
+    assert 80.0 < max(about[2]["dropper_force"][1] for about in droppers) < 400.0
+    assert {about[2]["dropper_state"][1] for about in droppers} == {1.0}
+    assert all(blocks[4][1][2] == {} for blocks in line["blocks"])
+    # A window goes with the train, and shows as much of the line all the way.
+    sizes = np.array([about[0] for about in contact])
+    begins = [row[1][0] for row in line["ranges"]]
+    if n == 2:
+        assert sizes.max() < 700 and np.ptp(sizes) < 20 and begins[-1] > begins[0] + 100.0
+    else:
+        assert np.ptp(sizes) == np.ptp(begins) == 0
 
 
 def test_pictures_show_line_and_pantographs(folder: Path, tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ from catenary.meshgen.line import (
 from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE, LineMesh, elements_of
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.postproc.channels.header import line_datasets
-from catenary.postproc.record.fields import component_numbers, line_cells
+from catenary.postproc.record.blocks import RecordedLine, blocks_of
 from catenary.solver.base.errors import InputError
 from catenary.solver.model.elements import uniform_load
 from catenary.solver.problem.incidents import DropperBreak, TensionLoss
@@ -372,10 +372,12 @@ def test_components_of_pieces_are_told_apart() -> None:
     """Elements of a wire of several pieces, as fields and result files have them."""
     line = make_line(data_of("stitched"))
     mesh = mesh_of(line, 1)
-    cells, component = line_cells(mesh.wires, mesh.droppers, mesh.breaks)
-    numbers = component_numbers(mesh.wires)
-    assert (component == numbers[STITCH]).sum() == len(mesh.elements(STITCH))
-    assert np.diff(mesh.points[cells, 0], axis=1).max() < 10.1
+    blocks = blocks_of(RecordedLine.of(line, mesh, np.zeros(mesh.n_nodes)), mesh.points)
+    assert [block.name for block in blocks][:3] == list(mesh.wires)
+    (block,) = (block for block in blocks if block.name == STITCH)
+    cells = block.cells(0, len(block.nodes))
+    np.testing.assert_array_equal(block.nodes[cells], mesh.elements(STITCH))
+    assert np.diff(block.points[cells, 0], axis=1).max() < 10.1
     datasets = line_datasets(line, mesh, (65.0, 130.0))
     nodes, breaks = datasets[f"line/wires/{STITCH}"], datasets[f"line/breaks/{STITCH}"]
     np.testing.assert_array_equal(elements_of(nodes, breaks), mesh.elements(STITCH))

@@ -27,7 +27,7 @@ from catenary.cases.scene.checks.effects import (
 from catenary.cases.scene.checks.ends import check_ends
 from catenary.cases.scene.checks.incidents import check_incidents
 from catenary.cases.scene.checks.mesh_size import size_faults
-from catenary.cases.scene.checks.output import check_output
+from catenary.cases.scene.checks.output import check_output, check_recorded_parts
 from catenary.cases.scene.checks.pantograph import check_mechanisms, check_pantographs
 from catenary.cases.scene.checks.scheme import check_scheme
 from catenary.cases.scene.checks.topology import check_parts, check_topology
@@ -74,7 +74,7 @@ def faults_of(scene: Scene) -> list[Fault]:
         return found.faults
     if not found.nothing_by(check_parts, scene, line):
         return found.faults
-    for of_line in (check_dropper_lengths, _speed):
+    for of_line in (check_dropper_lengths, check_recorded_parts, _speed):
         found.nothing_by(of_line, scene, line)
     if found.nothing_by(_running, scene, line) and found.nothing_by(_evaluation, scene):
         found.nothing_by(_raising, scene)

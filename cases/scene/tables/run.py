@@ -14,6 +14,8 @@ from pydantic import (
 )
 
 from catenary.cases.scene.tables.table import TAKE_AWAY, Table
+from catenary.postproc.record.blocks import OTHER_PARTS
+from catenary.postproc.record.field_kinds import FIELDS, USUAL_FIELDS
 from catenary.solver.problem.integrator_parameters import (
     AVERAGE_ACCELERATION,
     HHT,
@@ -24,6 +26,7 @@ from catenary.solver.time_loop.channels import line_channels
 
 # Channels of the line, which may be recorded in part.
 _RECORDED = line_channels()
+_FIELDS = FIELDS
 
 # Statistics are taken below 20 Hz (EN 50317); its Nyquist limit is the longest step that can do so.
 MAX_DT = 1.0 / 40.0
@@ -276,6 +279,33 @@ class OutputTable(Table):
     field_every_m: float | None = Field(
         None, gt=0, le=1e4, description="the same as a distance that the train travels"
     )
+    fields: list[Literal[_FIELDS]] | None = Field(  # type: ignore[valid-type]
+        None,
+        min_length=1,
+        max_length=len(_FIELDS),
+        description=f"fields of the snapshots, of {' and '.join(_FIELDS)}; "
+        f"{' and '.join(USUAL_FIELDS)} if absent",
+    )
+    field_parts: list[Annotated[str, Field(min_length=1, max_length=100)]] | None = Field(
+        None,
+        min_length=1,
+        max_length=100,
+        description="parts of the line that snapshots show: names of wires, and "
+        f"{', '.join(OTHER_PARTS)}; all if absent",
+    )
+    field_spans: list[Annotated[int, Field(ge=1, le=10**6)]] | None = Field(
+        None,
+        min_length=2,
+        max_length=2,
+        description="first and last span that snapshots show, counted from 1; all if absent",
+    )
+    field_window_m: list[Annotated[float, Field(ge=0, le=1e6)]] | None = Field(
+        None,
+        min_length=2,
+        max_length=2,
+        description="how far behind the last and ahead of the first pantograph snapshots show the "
+        "line; the whole line if absent",
+    )
     energy_every_s: float = Field(
         0.05, ge=0, le=1e4, description="cadence of the line's energy; 0 writes none"
     )
@@ -344,10 +374,10 @@ class OutputTable(Table):
             )
         if self.field_every_s is not None and self.field_every_m is not None:
             raise ValueError("takes field_every_s or field_every_m, but both are given" + TAKE_AWAY)
-        spans = self.line_channels_spans
-        if spans is not None and spans[0] > spans[1]:
-            raise ValueError(
-                f"must have line_channels_spans from a span to a later one, not {spans[0]} to "
-                f"{spans[1]}"
-            )
+        for key in ("line_channels_spans", "field_spans"):
+            spans = getattr(self, key)
+            if spans is not None and spans[0] > spans[1]:
+                raise ValueError(
+                    f"must have {key} from a span to a later one, not {spans[0]} to {spans[1]}"
+                )
         return self

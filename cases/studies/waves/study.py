@@ -60,6 +60,7 @@ def study_waves(folder: Path) -> Studied:
         data = film_data(results)
         config = results.attributes["config"]
         with Snapshots(folder, len(data.points)) as snapshots:
+            snapshots.need_whole("a space-time picture")
             scene = scene_from(config, Origin(str(folder)))
             problem = problem_of(scene)
             rest = line_at_rest(problem, mesh_of(scene))

@@ -17,6 +17,7 @@ from catenary.meshgen.topologies.all_topologies import make_line as make_line_of
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
+from catenary.postproc.record.blocks import RecordedLine
 from catenary.postproc.record.recorder import Recorder
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Numerics, Placement, Problem, Train
@@ -158,6 +159,8 @@ class March:
         self.mesh = make_mesh(self.line)
         self.arm_x = self.mesh.x(self.mesh.steady_arms)
         self.dropper_x = self.mesh.x(self.mesh.droppers[:, 1])
+        self.recorded = RecordedLine.of(self.line, self.mesh, np.zeros(self.mesh.n_nodes))
+        self.tension = 1000.0 * np.arange(self.mesh.n_nodes)
 
     def header(self, **attributes: Any) -> Header:
         problem = make_problem(self.line, len(self.separations), dt=self.dt, speed=self.speed)
@@ -205,6 +208,15 @@ class March:
             total += hump + np.where(ahead < 0, wake, 0.0)
         return total
 
+    def motion(self, t: float, x: np.ndarray, name: str, rate: bool) -> np.ndarray:
+        """The wave, its slope, or the rate of them."""
+        if rate:
+            late, early = (self.motion(t + d, x, name, False) for d in (1e-6, -1e-6))
+            return (late - early) / 2e-6
+        if name == "w":
+            return self.wave(t, x)
+        return (self.wave(t, x + 1e-6) - self.wave(t, x - 1e-6)) / 2e-6
+
     def view(self, step: int) -> StepView:
         t = step * self.dt
         position = self.position(t)
@@ -228,6 +240,8 @@ class March:
             row=row,
             columns=columns,
             node_uplift=lambda: self.wave(t, nodes),
+            node_motion=lambda name, rate: self.motion(t, nodes, name, rate),
+            wire_tension=lambda: self.tension,
             line_state=dict,
             energies=lambda: (2.0 + np.sin(t), 3.0 + np.cos(t)),
             checkpoint=lambda: {"step": step, "state": np.full(50, float(step)), "kind": "made up"},

@@ -93,10 +93,7 @@ def test_a_file_written_by_blocks_is_the_same(
             march.comm, path, march.header(), flush_every=flush_every, record=record,
             energy_every=energy_every, resume=bool(first),
         )  # fmt: skip
-        wires, droppers = march.mesh.wires, march.mesh.droppers
-        fields = FieldRecorder(
-            march.comm, files, wires, droppers, every=20, flush_every=flush_every
-        )
+        fields = FieldRecorder(march.comm, files, march.recorded, every=20, flush_every=flush_every)
         observers = fields, Progress(march.comm), recorder
         if way == "steps":
             march.drive(*observers, first_step=first)

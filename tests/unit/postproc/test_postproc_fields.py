@@ -1,4 +1,4 @@
-"""Field snapshots, read back by VTK's XDMF reader."""
+"""Field snapshots, read back by VTK's XDMF reader: block by block, in whole and in part."""
 
 from __future__ import annotations
 
@@ -11,14 +11,30 @@ import numpy as np
 import pytest
 import pyvista
 
-from catenary.postproc.record import fields, growing_xdmf
+from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE
+from catenary.postproc.record import fields_file, growing_xdmf
+from catenary.postproc.record.blocks import ARMS, MASTS, RecordedLine, blocks_of
+from catenary.postproc.record.field_kinds import FIELDS
+from catenary.postproc.record.field_layout import Course, FieldRecord
+from catenary.postproc.record.field_values import curvature
 from catenary.postproc.record.fields import FieldRecorder
 from catenary.solver.base.errors import RunBroken
+
+BLOCKS = (CONTACT_WIRE, MESSENGER_WIRE, DROPPERS, ARMS, MASTS)
 
 
 def watch(march: Any, path: Path, **options: Any) -> FieldRecorder:
     known = {"every": 50, "snapshots_per_flush": 4, **options}
-    return FieldRecorder(march.comm, path, march.mesh.wires, march.mesh.droppers, **known)
+    return FieldRecorder(march.comm, path, march.recorded, **known)
+
+
+def blocks_at(path: Path, time: float) -> dict[str, pyvista.DataSet]:
+    """The blocks of a file at a time by name."""
+    reader = pyvista.get_reader(path)
+    (number,) = np.flatnonzero(np.isclose(reader.time_values, time, rtol=1e-9))
+    reader.set_active_time_point(int(number))
+    found = reader.read()
+    return {name: found[name] for name in found.keys()}
 
 
 def test_vtk_reads_points_times_and_values(tmp_path: Path, make_march: Any) -> None:
@@ -27,37 +43,186 @@ def test_vtk_reads_points_times_and_values(tmp_path: Path, make_march: Any) -> N
     reader = pyvista.get_reader(path)
     np.testing.assert_allclose(reader.time_values, 0.05 * np.arange(21), rtol=1e-12)
     for time in reader.time_values[::5]:
-        reader.set_active_time_value(time)
-        grid = reader.read()
-        expected = march.wave(time, march.mesh.points[:, 0])
-        np.testing.assert_array_equal(grid.points, march.mesh.points)
-        np.testing.assert_allclose(grid.point_data["uplift"], expected, atol=1e-8)
-        np.testing.assert_array_equal(grid.point_data["displacement"][:, :2], 0.0)
-        np.testing.assert_array_equal(
-            grid.point_data["displacement"][:, 2], grid.point_data["uplift"]
-        )
-        warped = grid.warp_by_vector("displacement", factor=2.0)
-        np.testing.assert_allclose(
-            warped.points[:, 2], march.mesh.points[:, 2] + 2 * expected, atol=1e-6
-        )
+        blocks = blocks_at(path, time)
+        assert tuple(blocks) == BLOCKS
+        for name in (CONTACT_WIRE, MESSENGER_WIRE, DROPPERS):
+            grid, nodes = blocks[name], march.mesh.wires.get(name, march.mesh.droppers.ravel())
+            at_rest = march.mesh.points[nodes]
+            expected = march.wave(time, at_rest[:, 0])
+            np.testing.assert_array_equal(grid.points, at_rest)
+            np.testing.assert_allclose(grid.point_data["uplift"], expected, atol=1e-8)
+            moved = grid.point_data["displacement"]
+            np.testing.assert_array_equal(moved[:, :2], 0.0)
+            np.testing.assert_array_equal(moved[:, 2], grid.point_data["uplift"])
+            warped = grid.warp_by_vector("displacement", factor=2.0)
+            np.testing.assert_allclose(warped.points[:, 2], at_rest[:, 2] + 2 * expected, atol=1e-6)
+        cells = blocks[CONTACT_WIRE].cell_connectivity.reshape(-1, 2)
+        np.testing.assert_array_equal(cells[:, 1] - cells[:, 0], 1)
+        assert blocks[DROPPERS].n_cells == len(march.mesh.droppers)
 
 
-def test_wires_and_droppers_are_told_apart(tmp_path: Path, make_march: Any) -> None:
+def test_arms_end_on_the_wire_and_masts_stand_beside_it(tmp_path: Path, make_march: Any) -> None:
     march, path = make_march(n_steps=100), tmp_path / "fields.xdmf"
     march.drive(watch(march, path))
-    grid = pyvista.get_reader(path).read()
-    component = grid.cell_data["component"]
-    n = [len(march.mesh.wires[name]) - 1 for name in ("contact_wire", "messenger_wire")]
-    assert np.bincount(component).tolist() == [*n, len(march.mesh.droppers)]
-    cells = grid.cell_connectivity.reshape(-1, 2)
-    np.testing.assert_array_equal(cells[component == 2], march.mesh.droppers)
-    assert (march.mesh.points[cells[component == 1], 2] > 6.0).all()
+    blocks = blocks_at(path, 0.1)
+    arms, masts = blocks[ARMS], blocks[MASTS]
+    np.testing.assert_array_equal(arms.points[1::2], march.mesh.points[march.mesh.steady_arms])
+    np.testing.assert_array_equal(arms.point_data["uplift"][0::2], 0.0)
+    np.testing.assert_allclose(
+        arms.point_data["uplift"][1::2], march.wave(0.1, march.arm_x), atol=1e-8
+    )
+    np.testing.assert_allclose(masts.points[0::2, 0], march.line.support_positions)
+    assert (masts.points[0::2, 2] > march.mesh.points[:, 2].max()).all()
+    assert not masts.point_data.keys(), "what never moves has no field"
 
 
-def test_other_wires_get_numbers_of_their_own() -> None:
-    wires = {"stitch_wire": np.arange(3), "contact_wire": np.arange(3), "feeder": np.arange(2)}
-    _, component = fields.line_cells(wires, np.zeros((0, 2), dtype=int), {})
-    assert component.tolist() == [2, 2, 0, 0, 1]
+def test_arms_reach_the_wire_where_its_stagger_is(make_march: Any) -> None:
+    march = make_march(n_steps=10)
+    staggered = march.mesh.points.copy()
+    staggered[:, 1] = 0.2 * np.cos(np.pi * staggered[:, 0] / 50.0)
+    blocks = {block.name: block for block in blocks_of(march.recorded, staggered)}
+    ends = blocks[ARMS].points[1::2]
+    np.testing.assert_array_equal(ends, staggered[march.mesh.steady_arms])
+    np.testing.assert_allclose(np.abs(ends[:, 1]), 0.2)
+    assert (blocks[MASTS].points[:, 1] > 1.0).all()
+
+
+def test_all_fields_have_their_values(tmp_path: Path, make_march: Any) -> None:
+    march, path = make_march(n_steps=400), tmp_path / "fields.xdmf"
+    march.drive(watch(march, path, record=FieldRecord(FIELDS)))
+    view, blocks = march.view(350), blocks_at(path, 0.35)
+    for name, nodes in march.mesh.wires.items():
+        data, x = blocks[name].point_data, march.mesh.points[nodes, 0]
+        rate = march.motion(0.35, x, "w", True)
+        np.testing.assert_allclose(data["velocity"][:, 2], rate, atol=1e-6)
+        np.testing.assert_array_equal(data["velocity"][:, :2], 0.0)
+        np.testing.assert_array_equal(data["tension"], march.tension[nodes])
+        stiffness = march.line.wire(name).bending_stiffness
+        height = march.mesh.points[nodes, 2] + march.wave(0.35, x)
+        bent = curvature(x, height[None], march.motion(0.35, x, "theta_y", False)[None], NO_BREAKS)
+        np.testing.assert_allclose(
+            data["bending_moment"], stiffness * bent[0], rtol=1e-6, atol=1e-4 * stiffness
+        )
+    droppers = blocks[DROPPERS].cell_data
+    np.testing.assert_allclose(droppers["dropper_force"], view.dropper_force, rtol=1e-6)
+    np.testing.assert_array_equal(droppers["dropper_state"], np.sign(view.dropper_force))
+    assert (droppers["dropper_state"] < 0).any() and (droppers["dropper_state"] > 0).any()
+
+
+NO_BREAKS = np.zeros(0, dtype=int)
+
+
+def test_curvature_of_a_cubic_is_that_of_the_cubic() -> None:
+    x = np.array([0.0, 0.4, 1.5, 2.0, 4.0])
+    w, slope = x**3 - 2 * x**2, 3 * x**2 - 4 * x
+    found = curvature(x, w[None], slope[None], NO_BREAKS)[0]
+    np.testing.assert_allclose(found, 6 * x - 4, rtol=1e-12)
+    # Two pieces of other slopes, which nothing joins.
+    lifted = np.where(x > 1.0, 5.0 + x, w), np.where(x > 1.0, 1.0, slope)
+    found = curvature(x, lifted[0][None], lifted[1][None], np.array([2]))[0]
+    np.testing.assert_allclose(found, [-4.0, -1.6, 0.0, 0.0, 0.0], atol=1e-12)
+
+
+def test_fields_that_are_not_chosen_cost_nothing(tmp_path: Path, make_march: Any) -> None:
+    asked = []
+
+    def listened(march: Any, step: int) -> Any:
+        view = type(march).view(march, step)
+        motion, tension = view.node_motion, view.wire_tension
+        view.node_motion = lambda *what: (asked.append(what), motion(*what))[1]
+        view.wire_tension = lambda: (asked.append("tension"), tension())[1]
+        return view
+
+    sizes = {}
+    for chosen in (("uplift",), ("uplift", "displacement"), ("velocity",), FIELDS):
+        march, path = make_march(n_steps=200), tmp_path / "fields.xdmf"
+        march.view = lambda step, march=march: listened(march, step)
+        asked.clear()
+        march.drive(watch(march, path, record=FieldRecord(chosen)))
+        sizes[chosen] = (tmp_path / "fields.h5").stat().st_size, set(asked)
+        with h5py.File(tmp_path / "fields.h5") as file:
+            assert set(file["masts"]) == set(fields_file.AT_REST)
+            assert set(file["steady_arms"]) - set(fields_file.AT_REST) == {
+                name for name in chosen if name in ("uplift", "displacement", "velocity")
+            }
+    assert sizes["uplift",][1] == sizes["uplift", "displacement"][1] == {("w", False)}
+    assert sizes["velocity",][1] == {("w", True)}
+    assert sizes[FIELDS][1] == {("w", False), ("w", True), ("theta_y", False), "tension"}
+    n_moving = march.mesh.n_nodes + 2 * march.dropper_x.size + 2 * march.arm_x.size
+    more = sizes["uplift", "displacement"][0] - sizes["uplift",][0]
+    assert 0 <= more - 12 * 5 * n_moving <= 4 * 1024, "values, and tables of four blocks"
+
+
+def test_a_window_goes_with_the_train(tmp_path: Path, make_march: Any) -> None:
+    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
+    course = Course(float(march.position(0.0).min()), float(march.position(0.0).max()), march.speed)
+    record = FieldRecord(FIELDS, window=(30.0, 20.0), course=course)
+    march.drive(watch(march, path, record=record))
+    whole = tmp_path / "whole.xdmf"
+    march.drive(watch(march, whole, record=FieldRecord(FIELDS)))
+    for time in (0.0, 0.5, 1.0):
+        low, high = march.position(time).min() - 30.0, march.position(time).max() + 20.0
+        every, part = blocks_at(whole, time), blocks_at(path, time)
+        for name in BLOCKS:
+            x = every[name].points[:, 0]
+            by_unit = x if name in march.mesh.wires else np.repeat(x[1::2], 2)
+            inside = (by_unit >= low) & (by_unit <= high)
+            grid = part[name]
+            np.testing.assert_array_equal(grid.points, every[name].points[inside])
+            for field, values in every[name].point_data.items():
+                if field != "bending_moment":
+                    np.testing.assert_array_equal(grid.point_data[field], values[inside])
+            for field, values in every[name].cell_data.items():
+                np.testing.assert_array_equal(grid.cell_data[field], values[inside[1::2]])
+            joined = inside.sum() - 1 if name in march.mesh.wires else inside.sum() // 2
+            assert grid.n_cells == joined
+    sizes = [one.with_suffix(".h5").stat().st_size for one in (path, whole)]
+    assert sizes[0] < 0.75 * sizes[1]
+
+
+def test_a_window_beyond_the_line_shows_its_end(tmp_path: Path, make_march: Any) -> None:
+    march, path = make_march(n_steps=100), tmp_path / "fields.xdmf"
+    record = FieldRecord(window=(1.0, 1.0), course=Course(5e3, 5e3, 50.0))
+    march.drive(watch(march, path, record=record))
+    blocks = blocks_at(path, 0.1)
+    assert [blocks[name].n_cells for name in BLOCKS] == [1] * 5
+    assert blocks[CONTACT_WIRE].points[-1, 0] == march.mesh.points[:, 0].max()
+
+
+def test_parts_and_stretches_are_chosen(tmp_path: Path, make_march: Any) -> None:
+    march, path = make_march(n_steps=100), tmp_path / "fields.xdmf"
+    record = FieldRecord(
+        ("uplift", "dropper_force"), parts=(CONTACT_WIRE, DROPPERS), stretch=(100.0, 200.0)
+    )
+    march.drive(watch(march, path, record=record))
+    blocks = blocks_at(path, 0.05)
+    assert tuple(blocks) == (CONTACT_WIRE, DROPPERS)
+    x = march.mesh.points[march.mesh.wires[CONTACT_WIRE], 0]
+    np.testing.assert_array_equal(blocks[CONTACT_WIRE].points[:, 0], x[(x >= 100.0) & (x <= 200.0)])
+    there = (march.dropper_x >= 100.0) & (march.dropper_x <= 200.0)
+    force = march.view(50).dropper_force[there]
+    np.testing.assert_allclose(blocks[DROPPERS].cell_data["dropper_force"], force, rtol=1e-6)
+
+
+def test_pieces_of_a_wire_stay_apart_in_a_window(tmp_path: Path, make_march: Any) -> None:
+    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
+    nodes = march.mesh.wires[CONTACT_WIRE]
+    breaks = np.array([40, 41, 55])
+    line = RecordedLine({"cut": nodes}, breaks={"cut": breaks})
+    (block,) = blocks_of(line, march.mesh.points)
+    low, high = block.points[[35, 60], 0]
+    record = FieldRecord(window=(0.0, high - low), course=Course(low, low, 30.0))
+    recorder = FieldRecorder(march.comm, path, line, every=50, record=record)
+    march.drive(recorder)
+    for time in (0.0, 0.4, 0.95):
+        grid = blocks_at(path, time)["cut"]
+        first = int(np.searchsorted(block.points[:, 0], low + 30.0 * time))
+        assert grid.points[0, 0] == block.points[first, 0]
+        cells = grid.cell_connectivity.reshape(-1, 2)
+        inside = [at - first for at in breaks.tolist() if first < at < first + grid.n_points]
+        expected = [k for k in range(grid.n_points - 1) if k + 1 not in inside]
+        np.testing.assert_array_equal(cells[:, 0], expected)
+        np.testing.assert_array_equal(cells[:, 1] - cells[:, 0], 1)
 
 
 def test_files_are_valid_after_every_flush(tmp_path: Path, make_march: Any) -> None:
@@ -65,7 +230,7 @@ def test_files_are_valid_after_every_flush(tmp_path: Path, make_march: Any) -> N
     watcher = watch(march, path)
     watcher.start(march.stage())
     watcher.observe(march.view(0))
-    assert pyvista.get_reader(path).read().n_points == march.mesh.n_nodes
+    assert blocks_at(path, 0.0)[CONTACT_WIRE].n_points == len(march.mesh.wires[CONTACT_WIRE])
     for step in range(1, 230):  # the steps 50, 100, 150 and 200 fill the buffer
         watcher.observe(march.view(step))
     assert pyvista.get_reader(path).time_values == pytest.approx([0.0, 0.05, 0.1, 0.15, 0.2])
@@ -74,11 +239,15 @@ def test_files_are_valid_after_every_flush(tmp_path: Path, make_march: Any) -> N
 def test_xdmf_names_the_numbers_beside_it(tmp_path: Path, make_march: Any) -> None:
     march, path = make_march(n_steps=100), tmp_path / "run_7.xdmf"
     march.drive(watch(march, path))
-    items = [item.text for item in ElementTree.parse(path).iter("DataItem")]
-    assert items and all(text and text.startswith("run_7.h5:/") for text in items)
+    items = list(ElementTree.parse(path).iter("DataItem"))
+    assert items and {item.text for item in items} == {"run_7.h5"}
+    places = set()
     with h5py.File(tmp_path / "run_7.h5") as file:
-        assert all(text.split(":")[1] in file for text in items if text)
-        assert len(file["uplift"]) == len(file["times"]) == 3
+        for name in BLOCKS:
+            for table in file[name].values():
+                begin = table.id.get_offset() or 0
+                places |= {*range(begin, begin + table.nbytes + 1)}
+    assert {int(item.attrib["Seek"]) for item in items} <= places
 
 
 def test_the_text_is_well_formed_after_each_write_of_a_flush(
@@ -97,11 +266,16 @@ def test_the_text_is_well_formed_after_each_write_of_a_flush(
     watcher.start(march.stage())
     for step in range(420):
         watcher.observe(march.view(step))
-    # The first snapshot, then three and three of a full buffer; two writes each.
-    assert found == [0, 1, 1, 4, 4, 7]
+    # The first snapshot, then three and three of a full buffer; two writes each, block by block.
+    n = len(BLOCKS)
+    assert found == [
+        before + done * added
+        for before, added in ((0, 1), (n, 3), (4 * n, 3))
+        for done in (step // 2 for step in range(1, 2 * n + 1))
+    ]
     assert pyvista.get_reader(path).time_values == pytest.approx(0.05 * np.arange(7))
     watcher.finish("interrupted")
-    assert times_in(path) == pytest.approx(0.05 * np.arange(9))
+    assert times_in(path) == pytest.approx(np.tile(0.05 * np.arange(9), n))
     assert "CDATA" not in path.read_text()
 
 
@@ -116,7 +290,7 @@ def test_a_flush_writes_as_much_of_the_text_however_long_it_is(
         march = make_march(n_steps=n_steps)
         march.drive(watch(march, tmp_path / f"{n_steps}.xdmf", every=10, snapshots_per_flush=5))
     # Two writes for each of 1 + 20 / 5 flushes, and of 1 + 9 + 1 + 10 + 1 with one at step 499.
-    assert set(sizes) == {9} and len(sizes) == 2 * (5 + 22)
+    assert set(sizes) == {9} and len(sizes) == 2 * len(BLOCKS) * (5 + 22)
 
 
 def times_in(path: Path) -> list[float]:
@@ -141,13 +315,15 @@ def test_a_snapshot_that_a_kill_left_half_written_is_replaced(
     march.drive(watch(march, path), outcome="interrupted", last=620)
     with h5py.File(tmp_path / "fields.h5", "r+") as file:
         # In its place, but not yet among the times.
-        file["uplift/000013"][:7] = 99.0
+        n = file["contact_wire/count"][0]
+        file["contact_wire/uplift"][13 * n : 13 * n + 7] = 99.0
     march.drive(watch(march, path, resume=True), first_step=600)
     reader = pyvista.get_reader(path)
     np.testing.assert_allclose(reader.time_values, 0.05 * np.arange(21), rtol=1e-12)
     reader.set_active_time_value(reader.time_values[13])
-    expected = march.wave(0.65, march.mesh.points[:, 0])
-    np.testing.assert_allclose(reader.read().point_data["uplift"], expected, atol=1e-8)
+    wire = reader.read()[CONTACT_WIRE]
+    expected = march.wave(0.65, wire.points[:, 0])
+    np.testing.assert_allclose(wire.point_data["uplift"], expected, atol=1e-8)
 
 
 def other_times(path: Path) -> None:
@@ -157,12 +333,12 @@ def other_times(path: Path) -> None:
 
 def other_mesh(path: Path) -> None:
     with h5py.File(path, "r+") as file:
-        file["mesh/points"][2, 2] = np.nan
+        file["contact_wire/points"][2, 2] = np.nan
 
 
 def no_snapshots(path: Path) -> None:
     with h5py.File(path, "r+") as file:
-        del file["uplift/000002"]
+        del file["contact_wire/uplift"]
 
 
 def broken_tables(path: Path) -> None:
@@ -199,9 +375,10 @@ def test_no_table_of_the_file_changes_once_the_run_goes_on(tmp_path: Path, make_
     after = bytearray(numbers.read_bytes())
     assert len(after) == len(before) and after != before
     with h5py.File(numbers) as file:
-        kinds = [list(file[name].values()) for name in ("uplift", "displacement")]
-        places = [file["times"], *sum(kinds, [])]
-        assert len(places) == 1 + 2 * 21
+        moving = [name for name in BLOCKS if name != MASTS]
+        kinds = [file[name][kind] for name in moving for kind in ("uplift", "displacement")]
+        places = [file["times"], *kinds]
+        assert len(places) == 1 + 2 * 4
         for offset, size in [(place.id.get_offset(), place.nbytes) for place in places]:
             before[offset : offset + size] = after[offset : offset + size] = bytes(size)
     assert after == before
@@ -226,7 +403,9 @@ def test_a_file_that_a_kill_has_spoilt_is_begun_anew(
     numbers = tmp_path / "fields.h5"
     numbers.write_bytes(numbers.read_bytes()[: int(share * numbers.stat().st_size)])
     said: list[str] = []
-    monkeypatch.setattr(fields.logger, "warning", lambda text, *words: said.append(text % words))
+    monkeypatch.setattr(
+        fields_file.logger, "warning", lambda text, *words: said.append(text % words)
+    )
     march.drive(watch(march, path, resume=True), first_step=500)
     (sentence,) = said
     assert str(numbers) in sentence and "its snapshots now begin at t = 0.500 s" in sentence
@@ -246,7 +425,7 @@ def test_a_full_disk_breaks_the_run_and_keeps_the_snapshots(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(fields, "write_at", full)
+    monkeypatch.setattr(fields_file, "write_at", full)
     with pytest.raises(RunBroken, match=r"fields.h5 failed at t = 0.400 s \(No space left"):
         for step in range(201, 500):
             watcher.observe(march.view(step))

@@ -1,0 +1,161 @@
+"""The blocks of snapshots, as the line stands at rest: each wire, droppers, clamps, arms, masts.
+
+A block is a row of points along the track. Of a wire each point is a node, and cells join
+neighbours. Of everything else two points make a cell: the upper and the lower end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from catenary.meshgen.line import Line
+from catenary.meshgen.mesh import DROPPERS, LineMesh
+
+CLAMPS, ARMS, MASTS = "clamps", "steady_arms", "masts"
+# Parts of a line that are no wires.
+OTHER_PARTS = (DROPPERS, CLAMPS, ARMS, MASTS)
+# Node of a point that stays where it is.
+FIXED = -1
+# Masts stand beside the track, a little higher than the highest wire; arms come down to the wire
+# from there [m].
+_BESIDE, _ABOVE, _ARM_RISE = 3.0, 0.4, 0.3
+_NONE = np.zeros(0, dtype=np.int64)
+_NO_PAIRS = np.zeros((0, 2), dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class RecordedLine:
+    """What of a line snapshots are made of.
+
+    Attributes
+    ----------
+    wires, breaks, droppers, clamps, steady_arms : as of a `LineMesh`
+    masts : (n,) places along the track [m]
+    slope : (n_nodes,) dw/dx of the wires at rest, empty if not known
+    bending_stiffness : of the wires by name [N m2]
+    """
+
+    wires: Mapping[str, np.ndarray]
+    droppers: np.ndarray = field(default_factory=lambda: _NO_PAIRS)
+    breaks: Mapping[str, np.ndarray] = field(default_factory=dict)
+    clamps: np.ndarray = field(default_factory=lambda: _NO_PAIRS)
+    steady_arms: np.ndarray = field(default_factory=lambda: _NONE)
+    masts: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    slope: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    bending_stiffness: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, line: Line, mesh: LineMesh, slope: np.ndarray) -> RecordedLine:
+        """That of a line with its mesh."""
+        return cls(
+            mesh.wires,
+            mesh.droppers,
+            mesh.breaks,
+            mesh.clamps,
+            mesh.steady_arms,
+            line.support_positions,
+            slope,
+            {wire.name: wire.bending_stiffness for wire in line.wires},
+        )
+
+
+@dataclass(frozen=True)
+class Block:
+    """A part of a line at rest.
+
+    Attributes
+    ----------
+    name : of the wire, or one of ``OTHER_PARTS``
+    nodes : (n,) node of the line that each point moves with, ``FIXED`` for one that stays
+    points : (n, 3) at rest [m], in order of x
+    pairs : whether each two points are a cell; neighbours are otherwise
+    breaks : (k,) points at which further pieces of a wire begin
+    first : number of the first cell's dropper, clamp or arm in the line
+    """
+
+    name: str
+    nodes: np.ndarray
+    points: np.ndarray
+    pairs: bool
+    breaks: np.ndarray = field(default_factory=lambda: _NONE)
+    first: int = 0
+
+    @property
+    def is_wire(self) -> bool:
+        """Whether it is a wire."""
+        return not self.pairs
+
+    @property
+    def moves(self) -> bool:
+        """Whether any of its points does."""
+        return bool((self.nodes != FIXED).any())
+
+    def range_over(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """First point and number of points of a cell at least, between places [m]; shapes as those.
+
+        Where nothing stands between them it is the nearest cell.
+        """
+        step = 2 if self.pairs else 1
+        x = self.points[step - 1 :: step, 0]
+        least = 1 if self.pairs else 2
+        begin = np.searchsorted(x, low)
+        begin = np.clip(begin, 0, max(x.size - least, 0))
+        end = np.clip(np.searchsorted(x, high, side="right"), begin + least, x.size)
+        return step * begin, step * (end - begin)
+
+    def cells(self, first: int, count: int) -> np.ndarray:
+        """Cells (m, 2) int32 of ``count`` points from ``first`` on, numbered from there."""
+        if self.pairs:
+            return np.arange(count, dtype=np.int32).reshape(-1, 2)
+        left = np.arange(max(count - 1, 0), dtype=np.int32)
+        here = self.breaks[(self.breaks > first) & (self.breaks < first + count)]
+        return np.delete(np.column_stack([left, left + 1]), here - first - 1, axis=0)
+
+    def between(self, low: float, high: float) -> Block:
+        """The part of it between two places [m]."""
+        begin, size = self.range_over(np.array(low), np.array(high))
+        first, count = int(begin), int(size)
+        own = slice(first, first + count)
+        breaks = self.breaks[(self.breaks > first) & (self.breaks < first + count)] - first
+        start = self.first + first // 2 if self.pairs else 0
+        return replace(
+            self, nodes=self.nodes[own], points=self.points[own], breaks=breaks, first=start
+        )
+
+
+def blocks_of(line: RecordedLine, points: np.ndarray) -> list[Block]:
+    """All blocks of a line whose nodes rest at ``points`` (n_nodes, 3) [m]. Not collective."""
+    blocks = [
+        Block(name, np.asarray(nodes), points[nodes], False, line.breaks.get(name, _NONE))
+        for name, nodes in line.wires.items()
+    ]
+    for name, pairs in ((DROPPERS, line.droppers), (CLAMPS, line.clamps)):
+        nodes = np.asarray(pairs, dtype=np.int64).ravel()
+        if nodes.size:
+            blocks.append(Block(name, nodes, points[nodes], True))
+    if line.steady_arms.size:
+        blocks.append(_arms(line, points))
+    if line.masts.size:
+        blocks.append(_masts(line, points))
+    return blocks
+
+
+def _arms(line: RecordedLine, points: np.ndarray) -> Block:
+    """Steady arms, from their masts down to the wire."""
+    wire = points[line.steady_arms]
+    hinge = np.column_stack([wire[:, 0], np.full(len(wire), _BESIDE), wire[:, 2] + _ARM_RISE])
+    nodes = np.column_stack([np.full(len(wire), FIXED), line.steady_arms]).ravel()
+    return Block(ARMS, nodes, np.stack([hinge, wire], axis=1).reshape(-1, 3), True)
+
+
+def _masts(line: RecordedLine, points: np.ndarray) -> Block:
+    """Masts beside the track, from the ground up."""
+    n = line.masts.size
+    top = float(points[:, 2].max()) + _ABOVE
+    ends = np.zeros((n, 2, 3))
+    ends[:, :, 0], ends[:, :, 1] = line.masts[:, None], _BESIDE
+    ends[:, 0, 2] = top
+    return Block(MASTS, np.full(2 * n, FIXED), ends.reshape(-1, 3), True)

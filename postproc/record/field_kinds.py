@@ -1,0 +1,104 @@
+"""The fields of snapshots: one table of what can be recorded, of which blocks, and from what.
+
+Scene, recorder, files and readers follow from ``FIELDS``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from catenary.meshgen.mesh import DROPPERS
+from catenary.postproc.record.blocks import Block
+
+# Unknowns of a node that fields are made of: upward and lateral displacement, slope dw/dx.
+UP, ASIDE, SLOPE = "w", "v", "theta_y"
+
+
+@dataclass(frozen=True)
+class FieldKind:
+    """A field of snapshots.
+
+    Attributes
+    ----------
+    name : of the field in files
+    unit : SI unit, "-" if none
+    meaning : what it is, and which sign it has
+    components : numbers of a value
+    motions : unknowns that it takes at all nodes, each with whether their rate is meant
+    of_wires : whether wires alone have it; other blocks that move have those that are not
+    of_droppers : whether it belongs to the cells of the droppers
+    number : how it is stored, a type of NumPy
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    components: int = 1
+    motions: tuple[tuple[str, bool], ...] = ()
+    of_wires: bool = False
+    of_droppers: bool = False
+    number: str = "<f4"
+
+    @property
+    def item_bytes(self) -> int:
+        """Bytes of a value."""
+        return int(self.number[-1]) * self.components
+
+    def belongs_to(self, block: Block) -> bool:
+        """Whether a block has it."""
+        if self.of_droppers:
+            return block.name == DROPPERS
+        return block.is_wire if self.of_wires else block.moves
+
+    def values_of(self, n_points: int) -> int:
+        """How many values a block with so many points has."""
+        return n_points // 2 if self.of_droppers else n_points
+
+
+KINDS: dict[str, FieldKind] = {
+    kind.name: kind
+    for kind in (
+        FieldKind("uplift", "m", "displacement upward from rest", motions=((UP, False),)),
+        FieldKind(
+            "displacement",
+            "m",
+            "displacement from rest along x, y, z",
+            components=3,
+            motions=((UP, False), (ASIDE, False)),
+        ),
+        FieldKind(
+            "velocity",
+            "m/s",
+            "velocity along x, y, z",
+            components=3,
+            motions=((UP, True), (ASIDE, True)),
+        ),
+        FieldKind("tension", "N", "tension of the wire ahead of the point", of_wires=True),
+        FieldKind(
+            "bending_moment",
+            "N m",
+            "EI d2w/dx2 of the wire as it hangs, mean of both sides of a node; above 0 where it "
+            "curves upward",
+            motions=((UP, False), (SLOPE, False)),
+            of_wires=True,
+        ),
+        FieldKind("dropper_force", "N", "tension, negative in compression", of_droppers=True),
+        FieldKind(
+            "dropper_state",
+            "-",
+            "1 taut, 0 slack or broken, -1 in compression",
+            of_droppers=True,
+            number="|i1",
+        ),
+    )
+}
+
+# What a scene may choose: the state of droppers comes with their force.
+FIELDS = tuple(name for name in KINDS if name != "dropper_state")
+USUAL_FIELDS = ("uplift", "displacement")
+
+
+def kinds_of(chosen: tuple[str, ...]) -> tuple[FieldKind, ...]:
+    """The kinds that chosen fields bring, in the order of the table."""
+    names = {*chosen, *(("dropper_state",) if "dropper_force" in chosen else ())}
+    return tuple(kind for name, kind in KINDS.items() if name in names)

@@ -1,0 +1,139 @@
+"""Where the values of snapshots stand in their file, known before the first step.
+
+All values of a field and block stand one after another in one table, snapshot by snapshot. Which
+points a snapshot shows follows from the course of the train, so that a window around it takes no
+more room than it shows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catenary.postproc.record.blocks import Block
+from catenary.postproc.record.field_kinds import USUAL_FIELDS, FieldKind, kinds_of
+
+# More than HDF5's tables take for a dataset or a group with its attributes [bytes].
+_TABLES = 1024
+
+
+@dataclass(frozen=True)
+class Course:
+    """Where the last and the first pantograph are at time zero [m], and their speed [m/s]."""
+
+    last: float
+    first: float
+    speed: float
+
+
+@dataclass(frozen=True)
+class FieldRecord:
+    """Which part of the fields is recorded.
+
+    Attributes
+    ----------
+    fields : names of `field_kinds.FIELDS`
+    parts : names of wires and `blocks.OTHER_PARTS`, None for all
+    stretch : from and to along the track [m], None for the whole line
+    window : how far behind the last and ahead of the first pantograph [m], None for everything
+    course : of the train, for the window
+    """
+
+    fields: tuple[str, ...] = USUAL_FIELDS
+    parts: tuple[str, ...] | None = None
+    stretch: tuple[float, float] | None = None
+    window: tuple[float, float] | None = None
+    course: Course = Course(0.0, 0.0, 0.0)
+
+    @property
+    def kinds(self) -> tuple[FieldKind, ...]:
+        """Kinds of the fields."""
+        return kinds_of(self.fields)
+
+    def chosen(self, blocks: list[Block]) -> list[Block]:
+        """The blocks that are recorded, as far as they are."""
+        chosen = [one for one in blocks if self.parts is None or one.name in self.parts]
+        if self.stretch is not None:
+            chosen = [block.between(*self.stretch) for block in chosen]
+        return chosen
+
+    def edges(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """From and to of the window at times [s], shapes as those [m]."""
+        if self.window is None:
+            return np.full(times.shape, -np.inf), np.full(times.shape, np.inf)
+        travelled = self.course.speed * times
+        behind, ahead = self.window
+        return self.course.last + travelled - behind, self.course.first + travelled + ahead
+
+
+@dataclass(frozen=True)
+class Slots:
+    """The places of a block's values in its tables.
+
+    Attributes
+    ----------
+    block : the block
+    kinds : its fields
+    first, count : (n_snapshots,) points that each snapshot shows
+    start : (n_snapshots + 1,) of its first point among those of all snapshots
+    cells : (k, 2) int32 of all snapshots, or of the largest one if they are the same
+    cell_first, cell_count : (n_snapshots,) which of them a snapshot has
+    """
+
+    block: Block
+    kinds: tuple[FieldKind, ...]
+    first: np.ndarray
+    count: np.ndarray
+    start: np.ndarray
+    cells: np.ndarray
+    cell_first: np.ndarray
+    cell_count: np.ndarray
+
+    @property
+    def name(self) -> str:
+        """Name of the block."""
+        return self.block.name
+
+    def rows(self, kind: FieldKind) -> int:
+        """Values of a field in all snapshots."""
+        return kind.values_of(int(self.start[-1]))
+
+    def row_at(self, kind: FieldKind, snapshot: int) -> int:
+        """Number of the first value of a snapshot."""
+        return kind.values_of(int(self.start[snapshot]))
+
+    def shown(self, snapshot: int) -> slice:
+        """Points that a snapshot shows."""
+        return slice(int(self.first[snapshot]), int(self.first[snapshot] + self.count[snapshot]))
+
+    def bytes(self) -> int:
+        """What its tables take [B]."""
+        fields = sum(kind.item_bytes * self.rows(kind) for kind in self.kinds)
+        at_rest = (24 + 8) * len(self.block.points) + self.cells.nbytes
+        return fields + at_rest + 5 * 8 * self.first.size + (6 + len(self.kinds)) * _TABLES
+
+
+def layout_of(record: FieldRecord, blocks: list[Block], times: np.ndarray) -> list[Slots]:
+    """Places of all blocks that are recorded at snapshots of ``times`` [s]. Not collective."""
+    return [_slots(record, block, times) for block in record.chosen(blocks)]
+
+
+def _slots(record: FieldRecord, block: Block, times: np.ndarray) -> Slots:
+    first, count = block.range_over(*record.edges(times))
+    moves = bool(np.ptp(first) or np.ptp(count))
+    if block.breaks.size and moves:
+        own = [block.cells(a, n) for a, n in zip(first.tolist(), count.tolist(), strict=True)]
+        cells = np.concatenate(own)
+        cell_count = np.array([len(one) for one in own])
+        cell_first = np.cumsum(cell_count) - cell_count
+    else:
+        largest = int(count.argmax())
+        cells = block.cells(int(first[largest]), int(count[largest]))
+        cell_first = np.zeros_like(count)
+        cell_count = np.full_like(count, len(cells))
+        if moves:
+            cell_count = count // 2 if block.pairs else count - 1
+    start = np.concatenate([[0], np.cumsum(count)])
+    kinds = tuple(kind for kind in record.kinds if kind.belongs_to(block))
+    return Slots(block, kinds, first, count, start, cells, cell_first, cell_count)

@@ -1,0 +1,124 @@
+"""The values of fields, from what ranks have of the line's motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from catenary.postproc.record.blocks import FIXED, Block, RecordedLine
+from catenary.postproc.record.field_kinds import ASIDE, SLOPE, UP, FieldKind
+from catenary.postproc.record.field_layout import Slots
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """What is known of some snapshots that follow one another, of all nodes and droppers.
+
+    Attributes
+    ----------
+    motions : unknown and whether its rate is meant -> (rows, n_nodes)
+    dropper_force : (rows, n_droppers) [N]
+    tension : (n_nodes,) of each row [N]
+    """
+
+    motions: Mapping[tuple[str, bool], np.ndarray]
+    dropper_force: np.ndarray
+    tension: list[np.ndarray]
+
+
+class FieldValues:
+    """Makes the values of fields. Not collective.
+
+    Parameters
+    ----------
+    line : of the snapshots
+    points : (n_nodes, 3) of its nodes at rest [m]
+    """
+
+    def __init__(self, line: RecordedLine, points: np.ndarray) -> None:
+        self._height = points[:, 2]
+        self._slope = line.slope if line.slope.size else np.zeros(len(points))
+        self._stiffness = line.bending_stiffness
+
+    def of(self, kind: FieldKind, slots: Slots, first: int, known: Gathered) -> np.ndarray:
+        """Values of a field in a block at snapshots from number ``first`` on, one after another.
+
+        Returns
+        -------
+        ndarray, as its type in the file, (n,) or (n, components)
+        """
+        if kind.of_droppers:
+            values = self._of_droppers(kind, slots.block, known)
+        elif kind.name == "tension":
+            values = np.stack(known.tension)[:, slots.block.nodes]
+        elif kind.name == "bending_moment":
+            values = self._bending_moment(slots.block, known)
+        else:
+            values = _motion(kind, slots.block, known)
+        rows = values.shape[0]
+        shown = [slots.shown(first + row) for row in range(rows)]
+        if kind.of_droppers:
+            shown = [slice(part.start // 2, part.stop // 2) for part in shown]
+        whole = slice(0, values.shape[1])
+        if any(part != whole for part in shown):
+            values = np.concatenate([values[row, part] for row, part in enumerate(shown)])
+        else:
+            values = values.reshape(-1, *values.shape[2:])
+        return np.ascontiguousarray(values, dtype=kind.number)
+
+    def _of_droppers(self, kind: FieldKind, block: Block, known: Gathered) -> np.ndarray:
+        own = slice(block.first, block.first + len(block.points) // 2)
+        force = known.dropper_force[:, own]
+        return force if kind.name == "dropper_force" else np.sign(force)
+
+    def _bending_moment(self, block: Block, known: Gathered) -> np.ndarray:
+        nodes = block.nodes
+        height = self._height[nodes] + known.motions[UP, False][:, nodes]
+        slope = self._slope[nodes] + known.motions[SLOPE, False][:, nodes]
+        moment = curvature(block.points[:, 0], height, slope, block.breaks)
+        moment *= self._stiffness.get(block.name, 0.0)
+        return moment
+
+
+def curvature(x: np.ndarray, w: np.ndarray, slope: np.ndarray, breaks: np.ndarray) -> np.ndarray:
+    """d2w/dx2 at the nodes of a wire of cubic elements, the mean of both sides of a node [1/m].
+
+    Parameters
+    ----------
+    x : (n,) [m]
+    w, slope : (rows, n) [m], [-]
+    breaks : nodes at which further pieces begin
+    """
+    length = np.diff(x)
+    joined = np.ones(length.size)
+    joined[breaks - 1] = 0.0
+    length[breaks - 1] = 1.0
+    rise = 6.0 * np.diff(w, axis=1) / length
+    left, right = slope[:, :-1], slope[:, 1:]
+    result = np.zeros(np.shape(w))
+    result[:, :-1] += joined * (rise - 4.0 * left - 2.0 * right) / length
+    result[:, 1:] += joined * (2.0 * left + 4.0 * right - rise) / length
+    beside = np.append(joined, 0.0) + np.append(0.0, joined)
+    return np.asarray(result / np.maximum(beside, 1.0))
+
+
+def _motion(kind: FieldKind, block: Block, known: Gathered) -> np.ndarray:
+    """Displacement or velocity of a block's points, (rows, n) or (rows, n, 3)."""
+    rate = kind.motions[0][1]
+    up = _at_points(known.motions[UP, rate], block)
+    if kind.components == 1:
+        return up
+    result = np.zeros((*up.shape, 3))
+    result[..., 2] = up
+    if (ASIDE, rate) in known.motions:
+        result[..., 1] = _at_points(known.motions[ASIDE, rate], block)
+    return result
+
+
+def _at_points(by_node: np.ndarray, block: Block) -> np.ndarray:
+    values = by_node[:, block.nodes]
+    if block.pairs:
+        values[:, block.nodes == FIXED] = 0.0
+    return values

@@ -1,0 +1,257 @@
+"""The files of snapshots: HDF5 for the numbers, XDMF for their meaning.
+
+All tables have their full length from the first step on and their places never change: a killed
+run cannot spoil them. XDMF's readers take the numbers from these places; hyperslabs of a table
+lose their arrays silently in the Xdmf3 reader.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import logging
+import os
+from pathlib import Path
+
+import h5py
+import numpy as np
+from h5py import h5d, h5p, h5s, h5t
+
+from catenary.postproc.files.checked import set_attribute, text_of
+from catenary.postproc.files.disk import MARGIN, check_in_place, opened, reserve, write_at
+from catenary.postproc.files.own_files import part_of
+from catenary.postproc.read.guard import survives
+from catenary.postproc.record.blocks import Block
+from catenary.postproc.record.field_layout import FieldRecord, Slots, layout_of
+from catenary.postproc.record.field_values import FieldValues, Gathered
+from catenary.postproc.record.growing_xdmf import GrowingXdmf, grids_of
+
+logger = logging.getLogger("catenary.fields")
+
+# What the file is, as its attribute ``format`` says.
+FORMAT = "catenary-fields-2"
+# Tables of a block beside its fields.
+AT_REST = ("points", "nodes", "cells", "first", "count", "cell_first", "cell_count")
+
+
+class FieldsFile:
+    """``fields.h5`` and ``fields.xdmf`` while they are written. Not collective.
+
+    Parameters
+    ----------
+    xdmf : the XDMF file; the numbers go into the file of the same name ending in ``.h5``
+    record, blocks : which part of the line at rest is recorded
+    values : makes the values
+    n_nodes : nodes of the whole line
+    every : time between two snapshots [s]
+    """
+
+    def __init__(
+        self,
+        xdmf: Path,
+        record: FieldRecord,
+        blocks: list[Block],
+        values: FieldValues,
+        n_nodes: int,
+        every: float,
+    ) -> None:
+        self._xdmf, self.path = xdmf, xdmf.with_suffix(".h5")
+        self._record, self._blocks, self._values = record, blocks, values
+        self._n_nodes, self._every = n_nodes, every
+        self._written: list[float] = []
+        self._planned: list[float] = []
+        self._layout: list[Slots] = []
+        self._text: GrowingXdmf | None = None
+        self._handle = -1
+        self._published = False
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it can be appended to."""
+        return self._handle >= 0
+
+    def make(self, numbers: np.ndarray) -> None:
+        """Write a file without a snapshot, under another name until ``publish``.
+
+        Parameters
+        ----------
+        numbers : of the snapshots to come, counted from the start of the run
+
+        Raises
+        ------
+        OSError
+        """
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        self._made_as = part_of(self.path, os.getpid())
+        self._plan(numbers)
+        try:
+            with opened(self._made_as, "w") as file:
+                size = MARGIN + 8 * numbers.size + sum(slots.bytes() for slots in self._layout)
+                reserve(file.id.get_vfd_handle(), 0, size)
+                self._write_tables(file)
+            with h5py.File(self._made_as, "r") as file:
+                self._find_places(file)
+        except BaseException:
+            self._made_as.unlink(missing_ok=True)
+            raise
+        self._handle = os.open(self._made_as, os.O_RDWR)
+
+    def resume(self, numbers: np.ndarray, start_time: float) -> bool:
+        """Continue the file from ``start_time`` [s] on; False if it is not as it was.
+
+        Parameters
+        ----------
+        numbers : of the snapshots to come, counted from the start of the run
+        """
+        if not self.path.exists():
+            return False
+        try:
+            if not survives(self.path):
+                raise ValueError("HDF5 does not read it")
+            with opened(self.path, "r+") as file:
+                times = file["times"]
+                kept = times[...]
+                kept = kept[kept < start_time - 0.01 * self._every]
+                begin = round(float(kept[0]) / self._every) if kept.size else int(numbers[0])
+                self._plan(np.arange(begin, numbers[-1] + 1))
+                self._find_places(file)
+                self._check(file, kept)
+                times[kept.size :] = np.full(times.size - kept.size, np.nan)
+                self._written = kept.tolist()
+        except (OSError, KeyError, RuntimeError, TypeError, ValueError):
+            logger.warning(
+                "%s cannot be continued, it is damaged or of another version: its snapshots now "
+                "begin at t = %.3f s",
+                self.path,
+                start_time,
+            )
+            self._written = []
+            return False
+        self._handle = os.open(self.path, os.O_RDWR)
+        self._published = True
+        self._describe()
+        return True
+
+    def publish(self) -> None:
+        """Give a new file its name, in place of an earlier one; OSError if that fails."""
+        if self._handle < 0 or self._published:
+            return
+        os.replace(self._made_as, self.path)
+        self._published = True
+        self._describe()
+
+    def append(self, times: list[float], known: Gathered) -> None:
+        """Write snapshots at ``times`` [s]; OSError if that fails."""
+        first = len(self._written)
+        for slots, places in zip(self._layout, self._places, strict=True):
+            for kind in slots.kinds:
+                values = self._values.of(kind, slots, first, known)
+                at = places[kind.name] + kind.item_bytes * slots.row_at(kind, first)
+                write_at(self._handle, at, values)
+        write_at(self._handle, self._times_at + 8 * first, np.array(times, dtype="<f8"))
+        self._written += times
+        if self._published:
+            check_in_place(self.path, self._handle)
+            self._describe()
+
+    def close(self) -> None:
+        """Close the files, remove those that were never published."""
+        if self._handle < 0:
+            return
+        os.close(self._handle)
+        self._handle = -1
+        if self._text is not None:
+            self._text.close()
+        if not self._published:
+            with contextlib.suppress(OSError):
+                self._made_as.unlink(missing_ok=True)
+
+    def _plan(self, numbers: np.ndarray) -> None:
+        times = self._every * numbers
+        self._planned = times.tolist()
+        self._layout = layout_of(self._record, self._blocks, times)
+
+    def _write_tables(self, file: h5py.File) -> None:
+        set_attribute(file, "format", FORMAT)
+        set_attribute(file, "n_nodes", self._n_nodes)
+        set_attribute(file, "parts", json.dumps([slots.name for slots in self._layout]))
+        file["times"] = np.full(len(self._planned), np.nan)
+        # Room in the file now, and no zeros written into it.
+        how = h5p.create(h5p.DATASET_CREATE)
+        how.set_alloc_time(h5d.ALLOC_TIME_EARLY)
+        how.set_fill_time(h5d.FILL_TIME_NEVER)
+        for slots in self._layout:
+            group = file.create_group(slots.name)
+            for name, table in _at_rest(slots).items():
+                group[name] = table
+            for kind in slots.kinds:
+                shape = (slots.rows(kind), kind.components)[: 1 + (kind.components > 1)]
+                type_of = h5t.py_create(np.dtype(kind.number))
+                space = h5s.create_simple(shape)
+                h5d.create(group.id, kind.name.encode(), type_of, space, how)
+                set_attribute(group[kind.name], "unit", kind.unit)
+                set_attribute(group[kind.name], "meaning", kind.meaning)
+
+    def _find_places(self, file: h5py.File) -> None:
+        """Where in the file the times and the tables begin [B]; KeyError without one."""
+        self._times_at = file["times"].id.get_offset()
+        self._places: list[dict[str, int]] = []
+        for slots in self._layout:
+            names = "points", "cells", *(kind.name for kind in slots.kinds)
+            group = file[slots.name]
+            self._places.append({name: group[name].id.get_offset() or 0 for name in names})
+
+    def _check(self, file: h5py.File, times: np.ndarray) -> None:
+        """Raise ValueError if a file that is to be continued is not of this run and these places.
+
+        Parameters
+        ----------
+        times : of the snapshots that are kept [s]
+        """
+        if text_of(file.attrs.get("format")) != FORMAT or file["times"].shape != (
+            len(self._planned),
+        ):
+            raise ValueError("format")
+        apart = np.diff(times) - self._every
+        if not (np.abs(apart) <= 0.01 * self._every).all() or not np.isfinite(times).all():
+            raise ValueError("times")
+        spans = [(self._times_at, 8 * len(self._planned))]
+        for slots, places in zip(self._layout, self._places, strict=True):
+            group = file[slots.name]
+            for name, table in _at_rest(slots).items():
+                if not np.array_equal(group[name][...], table):
+                    raise ValueError(name)
+            for kind in slots.kinds:
+                size = kind.item_bytes * slots.rows(kind)
+                if group[kind.name].nbytes != size:
+                    raise ValueError(kind.name)
+                spans.append((places[kind.name], size))
+        # Snapshots are written where they stand: none may reach into another, or beyond the file.
+        spans.sort()
+        starts, sizes = np.array(spans, dtype=np.int64).T
+        ends = starts + sizes
+        if (ends[:-1] > starts[1:]).any() or ends.max() > self.path.stat().st_size:
+            raise ValueError("places")
+
+    def _describe(self) -> None:
+        """List in the XDMF file the snapshots that are there."""
+        if self._text is None:
+            blocks = {
+                slots.name: grids_of(slots, self._planned, self.path.name, places)
+                for slots, places in zip(self._layout, self._places, strict=True)
+            }
+            self._text = GrowingXdmf(self._xdmf, blocks, len(self._written))
+        self._text.show(len(self._written))
+
+
+def _at_rest(slots: Slots) -> dict[str, np.ndarray]:
+    """The tables of a block beside its fields, by ``AT_REST``."""
+    return {
+        "points": slots.block.points.astype("<f8"),
+        "nodes": slots.block.nodes.astype("<i8"),
+        "cells": slots.cells.astype("<i4"),
+        "first": slots.first.astype("<i8"),
+        "count": slots.count.astype("<i8"),
+        "cell_first": slots.cell_first.astype("<i8"),
+        "cell_count": slots.cell_count.astype("<i8"),
+    }
