@@ -69,6 +69,20 @@ def waves(
             "beside theory, and nothing else.",
         ),
     ] = False,
+    separations: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FROM:TO:COUNT",
+            help="Run two pantographs at these separations [m] and one alone, and draw how the "
+            "leading one acts on the trailing one, and nothing else.",
+        ),
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--vary", metavar="KEY=V1,V2,...", help="With --separations: a curve for each value."
+        ),
+    ] = None,
     assignments: Assignments = None,
     shortened: Shortened = False,
     force: Force = False,
@@ -90,6 +104,14 @@ def waves(
         )
     if obstacles and not train:
         raise InputError("--obstacles runs pulses of its own; leave --excite away")
+    if vary and separations is None:
+        raise InputError("--vary belongs to --separations; vary other runs with catenary sweep")
+    if separations is not None:
+        if obstacles or not train:
+            raise InputError("--separations runs the train; leave --obstacles and --excite away")
+        if out is None:
+            raise InputError("-o is missing; it names the folder of the runs")
+        return _separations(case, out, separations, vary or [], given, shortened, force)
     if (folder / "run.h5").is_file():
         if obstacles:
             raise InputError(f"{folder} is a run; --obstacles is for cases")
@@ -123,6 +145,37 @@ def waves(
     text = study.as_text(studied.theory, studied.measured)
     console.say(text + "\n" + "\n".join(map(str, studied.files)))
     return console.DONE
+
+
+def _separations(
+    case: str, out: Path, text: str, vary: list[str], given: list[str], shortened: bool, force: bool
+) -> int:
+    """What --separations does; returns the exit code."""
+    from mpi4py import MPI
+
+    from catenary.cases.cli.sweep import verdict
+    from catenary.cases.process.petsc_options import start_petsc
+    from catenary.cases.result_folder.folder_lock import held
+    from catenary.cases.studies.sweep.jobs import RunOptions
+    from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product
+    from catenary.cases.studies.waves import separation
+    from catenary.cases.studies.waves.study import theory_of
+
+    refuse_impossible(out)
+    values = separation.parse_separations(text)
+    varied = [parse_vary(one) for one in vary]
+    check_keys(product(varied, {}) if varied else [], "on the command line (--vary)")
+    scene = load(case, given, None, shortened)
+    jobs = separation.jobs_of(case, scene, values, varied, given, shortened)
+    start_petsc([])
+    comm = MPI.COMM_SELF
+    with held(out, comm, f"catenary waves {case} --separations {text}"):
+        ended = separation.run(jobs, out, comm, RunOptions(force, (), console.say))
+        theory, span = theory_of(scene)
+        files = separation.write(out, ended, theory, span)
+    said = separation.as_text(separation.curves_of(ended), theory, span)
+    console.say("\n" + said + "\n" + "\n".join(map(str, files)))
+    return verdict(ended, "curve")
 
 
 def _run(scene: object, out: Path, force: bool) -> bool:

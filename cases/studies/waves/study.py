@@ -27,6 +27,7 @@ from catenary.postproc.read.guard import examined
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import figures
 from catenary.solver.base.errors import InputError
+from catenary.solver.statics.elasticity import middle_span
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.waves.excitation import MovingForce
 
@@ -124,6 +125,13 @@ def study_obstacles(scene: Scene, folder: Path, force: bool) -> tuple[str, list[
         for one in results
     ]
     return "\n".join(lines), write_all(folder, content)
+
+
+def theory_of(scene: Scene) -> tuple[WaveTheory, float]:
+    """What theory says of a scene's line, and the length of its middle span [m]. Not collective."""
+    problem = problem_of(scene)
+    first, last = middle_span(problem.line)
+    return wave_theory(problem, line_at_rest(problem, mesh_of(scene))), last - first
 
 
 def _refuse_table(path: Path, force: bool) -> None:

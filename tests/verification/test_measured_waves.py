@@ -1,0 +1,163 @@
+"""Group velocities, Doppler factor and energies that are measured, against theory."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from measuring import check
+from small_lines import (
+    BARE,
+    EN_CONTACT_WIRE,
+    WHOLE,
+    bare_wires,
+    en50318_line,
+    mesh_of,
+    numerics,
+    problem_of,
+    train,
+)
+
+from catenary.cases.studies.waves.energy import EnergyMotion
+from catenary.cases.studies.waves.excited import Asked, excitation_of, march, without_train
+from catenary.cases.studies.waves.measured import arrived, measured_rows
+from catenary.cases.studies.waves.seen import WireMotion
+from catenary.cases.studies.waves.theory import wave_theory
+from catenary.meshgen.mesh import CONTACT_WIRE
+from catenary.solver.statics.line_at_rest import line_at_rest
+from catenary.solver.waves.excitation import MovingForce
+
+SPEED = EN_CONTACT_WIRE.wave_speed
+
+
+def test_the_energy_of_a_band_arrives_at_its_mean_group_velocity() -> None:
+    """A signal that is delayed by d k(w), w^2 = c^2 k^2 (1 + k^2 l^2), with c_g = dw/dk."""
+    time = 1e-3 * np.arange(12_000)
+    bend, distance = 0.8, 300.0
+    k = np.linspace(0.0, 3.0, 4000)
+    omega = SPEED * k * np.sqrt(1.0 + (k * bend) ** 2)
+    nu = np.fft.rfftfreq(time.size, 1e-3)
+    first = np.exp(-0.5 * ((time - 2.0) / 0.02) ** 2)
+    delayed = np.fft.rfft(first) * np.exp(-1j * distance * np.interp(2 * np.pi * nu, omega, k))
+    second = np.fft.irfft(delayed, time.size)
+    velocity = np.gradient(omega, k)
+    for frequency in (4.0, 12.0):
+        found = arrived(time, first, second, distance, frequency, 0.3)
+        expected = found.expected(omega / (2 * np.pi), velocity)
+        check(f"{frequency} Hz [m/s]", found.velocity, expected, within=1e-4 * expected)
+        assert found.velocity > SPEED
+
+
+def test_group_velocities_of_a_periodic_line_are_those_of_its_bloch_waves() -> None:
+    """Within 1 % near 6 and 18 Hz.
+
+    A step of average acceleration slows waves of w by (w dt)^2 / 4, 0.1 % at 18 Hz, and lowers
+    their frequency by a third of that, so that a band of 0.9 Hz lies 0.01 Hz lower.
+    """
+    line = en50318_line(44)
+    problem = problem_of(line, WHOLE, numerics=numerics(5e-4))
+    struck = excitation_of("hammer", Asked(impulse=0.2), problem, 5e-4)
+    rest = line_at_rest(without_train(problem, struck), mesh_of(line, 3))
+    wire = WireMotion(rest.model.contact_nodes, rest.model.contact_x)
+    march(rest, struck, 4e-3, [wire])
+    seen = wire.seen(lambda times: np.zeros((times.size, 0)), 22 * 60.0)
+    rows = {
+        row["name"]: row["value"] for row in measured_rows(wave_theory(rest.problem, rest), seen)
+    }
+    assert len(rows) == 4
+    for number in (1, 2):
+        expected = rows[f"group_velocity_{number}_theory"]
+        assert 110.0 < expected < 118.0
+        check("group velocity [m/s]", rows[f"group_velocity_{number}"], expected,
+              within=0.01 * expected)  # fmt: skip
+
+
+def test_a_moving_force_sends_waves_by_doppler_and_energy_by_its_factor() -> None:
+    """A force F cos(p t) at v on a string: waves of p / (1 - v/c) ahead and p / (1 + v/c) behind.
+
+    Both have the same amplitude, as the wire does not break. Their energies go with the square of
+    the frequency and the length of wire that they have reached, (c - v) t and (c + v) t: ahead is
+    (c + v) / (c - v) times behind.
+    """
+    length, speed, frequency = 1200.0, 60.0, 1.5
+    wire = replace(EN_CONTACT_WIRE, bending_stiffness=1e-3)
+    line = bare_wires(length, contact_wire=wire)
+    course = train(speed, 500.0, 500.0 + 4.0 * speed, raise_time=0.0)
+    problem = problem_of(line, BARE, train=course)
+    moving = MovingForce(100.0, frequency, 500.0, speed, 0.5)
+    rest = line_at_rest(without_train(problem, moving), mesh_of(line, 1200))
+    motion, energy = WireMotion(rest.model.contact_nodes, rest.model.contact_x), EnergyMotion(rest)
+    march(rest, moving, 5e-3, [motion, energy])
+    seen = motion.seen(lambda times: (500.0 + speed * times)[:, None])
+    late = seen.time > 2.5
+    found = []
+    for place in (seen.position[-1, 0] + 30.0, 400.0):
+        signal = seen.velocity[late, np.argmin(np.abs(seen.x - place))].astype(float)
+        found.append(_frequency(seen.time[late], signal))
+    ahead, behind = frequency / (1 - speed / SPEED), frequency / (1 + speed / SPEED)
+    # Average acceleration and elements of 1 m: (w dt)^2 / 12 and (k h)^2 / 24, below 1e-3.
+    check("frequency ahead [Hz]", found[0], ahead, within=2e-3 * ahead)
+    check("frequency behind [Hz]", found[1], behind, within=2e-3 * behind)
+    check("Doppler factor", found[1] / found[0], (SPEED - speed) / (SPEED + speed), within=2e-3)
+    seen_energy = energy.seen()
+    places = (500.0 + speed * seen_energy.time)[:, None]
+    before, between, beyond = seen_energy.parts(places)
+    np.testing.assert_allclose(before + between + beyond, seen_energy.total, rtol=1e-6)
+    # While the force grows over 0.5 s of 4 s, and in what is no whole wave: some per cent.
+    ratio = beyond[-1] / before[-1]
+    check("energy ahead / behind", ratio, (SPEED + speed) / (SPEED - speed), within=0.05 * ratio)
+
+
+def _frequency(time: np.ndarray, signal: np.ndarray) -> float:
+    """Frequency [Hz] of the sine that fits a signal best."""
+    best, apart = 3.0, 0.05
+    for tried in (np.arange(0.3, 6.0, apart), np.arange(-apart, apart, 1e-3)):
+        left = []
+        for nu in (tried if tried[0] > 0.0 else best + tried).tolist():
+            basis = np.column_stack([np.cos(2 * np.pi * nu * time), np.sin(2 * np.pi * nu * time)])
+            weights, *_ = np.linalg.lstsq(basis, signal, rcond=None)
+            left.append((float(((signal - basis @ weights) ** 2).sum()), nu))
+        best = min(left)[1]
+    return best
+
+
+def test_a_standing_wave_keeps_its_energy() -> None:
+    """T k^2 A^2 L / 4 at all times, of one wire; snapshots dt apart take (w dt)^2 / 4 of it and
+    (w dt)^2 / 12 in turn."""
+    length, dt, amplitude = 100.0, 0.01, 0.02
+    wire = replace(EN_CONTACT_WIRE, bending_stiffness=1e-3)
+    line = bare_wires(length, contact_wire=wire)
+    rest = line_at_rest(problem_of(line, BARE), mesh_of(line, 100))
+    nodes = rest.mesh.wires[CONTACT_WIRE]
+    k = 4 * np.pi / length
+    omega = SPEED * k
+    energy = EnergyMotion(rest)
+    for time in (dt * np.arange(60)).tolist():
+        uplift = np.zeros(rest.mesh.n_nodes)
+        uplift[nodes] = amplitude * np.sin(k * rest.mesh.x(nodes)) * np.cos(omega * time)
+        energy.add(time, uplift)
+    seen = energy.seen()
+    expected = EN_CONTACT_WIRE.tension * k**2 * amplitude**2 * length / 4
+    within = ((omega * dt) ** 2 / 4 + 1e-4) * expected
+    check("energy [J]", seen.total, expected, within=within)
+    before, _, beyond = seen.parts(np.full((seen.time.size, 1), 50.0))
+    # The node in the middle counts on one side: its share of the energy is 1e-2 sin^2(k h / 2).
+    np.testing.assert_allclose(before, beyond, rtol=2e-4)
+
+
+def test_slack_droppers_hold_what_their_weights_do() -> None:
+    """A contact wire lifted by u, all droppers slack: N u - N^2 / 2k of each dropper, k u^2 / 2 of
+    each arm, and (1.2 T / h + 12 EI / h^3) u^2 / 2 of each end element, whose end is held."""
+    line = en50318_line(5)
+    rest = line_at_rest(problem_of(line, WHOLE), mesh_of(line, 2))
+    energy, lift = EnergyMotion(rest), 0.3
+    uplift = np.zeros(rest.mesh.n_nodes)
+    uplift[rest.mesh.wires[CONTACT_WIRE]] = lift
+    for time in (0.0, 1.0):
+        energy.add(time, uplift)
+    tension, k = rest.form.dropper_force, rest.model.dropper_stiffness
+    arms = 0.5 * line.steady_arm.stiffness * lift**2 * rest.mesh.steady_arms.size
+    h, wire = 2.5, EN_CONTACT_WIRE
+    end = 0.5 * (1.2 * wire.tension / h + 12 * wire.bending_stiffness / h**3) * lift**2
+    held = float((tension * lift - 0.5 * tension**2 / k).sum()) + arms + 2 * end
+    check("energy [J]", energy.seen().total[0], held, within=1e-9 * held)
