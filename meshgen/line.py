@@ -280,13 +280,20 @@ class SteadyArms:
 class Supports:
     """Supports of one kind under one wire: springs relaxed at the height of its course there.
 
-    ``stiffness`` is vertical [N/m]; ``x`` are their places, ascending [m].
+    Attributes
+    ----------
+    name, wire : their own name, and that of the wire that they carry
+    stiffness : vertical, of each [N/m]
+    x : their places, ascending [m]
+    holds : name of a wire that is to have its wanted height there at rest, by which each support is
+        as high as that takes; empty if they stay at the height of their wire's course
     """
 
     name: str
     stiffness: float
     wire: str
     x: tuple[float, ...]
+    holds: str = ""
 
 
 @dataclass(frozen=True)
@@ -318,6 +325,7 @@ class Line(Spans):
         if twice:
             raise ValueError(f"topology {self.topology}: two parts have the name {twice[0]}")
         asked = {part.wire for part in self.hardware}
+        asked |= {part.holds for part in self.supports if part.holds}
         asked |= {wire for part in self.droppers for wire in (part.upper, part.lower)}
         asked |= {wire for part in self.clamps for wire in (part.upper, part.lower)}
         unknown = sorted(asked - wires)

@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from catenary.meshgen.line import Line
-from catenary.meshgen.topologies import compound, simple, stitched  # noqa: F401  register
+from catenary.meshgen.topologies import (  # noqa: F401  register themselves
+    compound,
+    simple,
+    single,
+    stitched,
+    twin,
+)
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.topologies.registry import registered
 from catenary.solver.base.errors import InputError

@@ -15,7 +15,7 @@ AUXILIARY_WIRE = "auxiliary_wire"
 AUXILIARY_DROPPERS = "auxiliary_droppers"
 
 
-@register(COMPOUND, *HUNG, "auxiliary_wire")
+@register(COMPOUND, (*HUNG, "auxiliary_wire"))
 def compound_catenary(data: LineData) -> Line:
     """The contact wire hangs from an auxiliary wire, which hangs level from the messenger wire."""
     auxiliary = data.auxiliary_wire

@@ -44,6 +44,29 @@ class AuxiliaryWire:
 
 
 @dataclass(frozen=True)
+class Twin:
+    """Two wires side by side in place of one: ``spacing`` between them [m], and whether droppers
+    hang them by turns (``alternating``) or both at each place."""
+
+    spacing: float
+    alternating: bool
+
+
+@dataclass(frozen=True)
+class Bridle:
+    """A wire over each inner support, whose ends are clamped to the contact wire.
+
+    ``length`` from clamp to clamp [m]; of each clamp ``clamp_mass`` [kg], half of it on either
+    wire, and ``clamp_stiffness`` [N/m].
+    """
+
+    conductor: Conductor
+    length: float
+    clamp_mass: float
+    clamp_stiffness: float
+
+
+@dataclass(frozen=True)
 class LineData(Spans):
     """What a scene says of a line.
 
@@ -55,10 +78,10 @@ class LineData(Spans):
     contact_height : height of the contact wire at the supports of the running spans [m]
     encumbrance : height of the messenger wire above ``contact_height`` at the supports [m]
     dropper : what the contact wire hangs by
-    support_stiffness : vertical stiffness of a messenger-wire support [N/m]
+    support_stiffness : vertical stiffness of what carries the topmost wire at a mast [N/m]
     transition_rise : height gained by the contact wire over all transition spans of one end [m]
     topology : name of the topology that makes the line
-    auxiliary_wire, stitch_wire : parts of which some topologies make wires
+    auxiliary_wire, stitch_wire, twin, bridle : parts of which some topologies make wires
     """
 
     dropper_positions: tuple[tuple[float, ...], ...]
@@ -75,6 +98,8 @@ class LineData(Spans):
     topology: str = "simple"
     auxiliary_wire: AuxiliaryWire | None = None
     stitch_wire: StitchWire | None = None
+    twin: Twin | None = None
+    bridle: Bridle | None = None
 
     @cached_property
     def dropper_x(self) -> np.ndarray:
@@ -87,13 +112,10 @@ class LineData(Spans):
         within = [place for places in positions for place in places]
         return np.asarray(starts + np.array(within, dtype=float))
 
-    @property
-    def stitch_clamps(self) -> np.ndarray:
-        """Places of the clamps of stitch wires, ascending [m]; ValueError without these."""
-        if self.stitch_wire is None:
-            raise ValueError("the line has no stitch wires")
-        half = 0.5 * self.stitch_wire.length
-        return np.add.outer(self.support_positions[1:-1], (-half, half)).ravel()
+    def around_supports(self, length: float) -> np.ndarray:
+        """Ends of stretches of ``length`` [m] about inner supports, shape (n_spans - 1, 2) [m]."""
+        half = 0.5 * length
+        return np.add.outer(self.support_positions[1:-1], (-half, half))
 
     @cached_property
     def profile(self) -> Profile:

@@ -14,11 +14,12 @@ Make = Callable[[LineData], Line]
 class Topology(NamedTuple):
     """What makes lines of a topology, and the parts of ``LineData`` that only some of them have.
 
-    ``parts`` must be given for this topology; parts that no entry names here must not.
+    ``parts`` must be given for this topology, ``may`` may be; further ones must not.
     """
 
     make: Make
     parts: tuple[str, ...]
+    may: tuple[str, ...]
 
 
 # Parts of most topologies: wires hang by droppers from a messenger wire.
@@ -27,16 +28,18 @@ HUNG = ("messenger_wire", "dropper")
 _TOPOLOGIES: dict[str, Topology] = {}
 
 
-def register(name: str, *parts: str) -> Callable[[Make], Make]:
+def register(
+    name: str, parts: tuple[str, ...] = HUNG, may: tuple[str, ...] = ()
+) -> Callable[[Make], Make]:
     """Decorator: the function makes lines of the topology ``name``; a second one is an error.
 
-    ``parts`` are names of what it needs of ``LineData``; ``HUNG`` if none is named.
+    ``parts`` are names of what it needs of ``LineData``, ``may`` of what it takes if it is there.
     """
 
     def keep(make: Make) -> Make:
         if name in _TOPOLOGIES:
             raise ValueError(f"topology {name} is registered already")
-        _TOPOLOGIES[name] = Topology(make, parts or HUNG)
+        _TOPOLOGIES[name] = Topology(make, parts, may)
         return make
 
     return keep

@@ -7,13 +7,13 @@ import numpy as np
 from catenary.meshgen.line import Droppers, Line, Piece, Role, SteadyArms, Supports, Wire
 from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE, STEADY_ARMS, SUPPORTS
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.meshgen.topologies.registry import HUNG, register
+from catenary.meshgen.topologies.registry import register
 from catenary.meshgen.topologies.sag import sagging
 
 SIMPLE = "simple"
 
 
-@register(SIMPLE, *HUNG)
+@register(SIMPLE)
 def simple_catenary(data: LineData) -> Line:
     """A contact wire that droppers hang from a messenger wire straight above the track."""
     assert data.dropper is not None

@@ -20,7 +20,7 @@ STITCH_DROPPERS = "stitch_droppers"
 STITCH_CLAMPS = "stitch_clamps"
 
 
-@register(STITCHED, *HUNG, "stitch_wire")
+@register(STITCHED, (*HUNG, "stitch_wire"))
 def stitched_catenary(data: LineData) -> Line:
     """A simple catenary with stitch wires clamped to the messenger wire beside inner supports.
 
@@ -47,7 +47,7 @@ def stitched_catenary(data: LineData) -> Line:
     # First guess: half of the stitch wire and what it carries hang on each clamp.
     carried = GRAVITY * half * (contact.mass_per_length + stitch.conductor.mass_per_length)
     falls = 0.5 * carried * half / stitch.conductor.tension
-    starts, ends = data.stitch_clamps.reshape(-1, 2).T
+    starts, ends = data.around_supports(stitch.length).T
     clamps = [messenger.points(x)[:, 2] for x in (starts, ends)]
     pieces = []
     for a, mast, b, left, right in zip(starts, masts, ends, *clamps, strict=True):
@@ -79,7 +79,7 @@ def stitched_catenary(data: LineData) -> Line:
                 stitch.clamp_mass,
                 MESSENGER_WIRE,
                 STITCH_WIRE,
-                tuple(data.stitch_clamps.tolist()),
+                tuple(data.around_supports(stitch.length).ravel().tolist()),
             ),
         ),
     )
@@ -93,7 +93,7 @@ def _check_lengths(data: LineData, length: float) -> None:
         raise InputError(
             f"stitch wires of {length:g} m overlap in a span of {min(data.span_lengths):g} m"
         )
-    clamps = data.stitch_clamps
+    clamps = data.around_supports(length).ravel()
     apart = np.abs(data.dropper_x[:, None] - clamps).min(axis=0)
     if apart.min() < SHORTEST_GAP:
         at = clamps[int(np.argmin(apart))]

@@ -14,6 +14,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
+from catenary.meshgen.geometry import SAME_CUT
 from catenary.meshgen.line import Line, Wire
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.base.errors import InputError
@@ -84,7 +85,7 @@ class _HangingWires:
         self._w = 2 * model.row_of_node
         n = 2 * model.mesh.n_nodes
         stiffness, self._spring_load = _assembled(model, self._w)
-        nodes, heights = _given_heights(model)
+        nodes, heights, held_at = _given_heights(model)
         self._given = self._w[nodes]
         self._heights = np.zeros(n)
         self._heights[self._given] = heights
@@ -92,7 +93,8 @@ class _HangingWires:
         # Without weight droppers carry nothing: what holds the lower wire pulls at nothing above.
         self._weighted = model.simulated.gravity != 0.0
         upper, lower = self._w[model.mesh.droppers if self._weighted else model.mesh.droppers[:0]].T
-        rows, columns = np.concatenate([self._given, upper]), np.concatenate([self._given, lower])
+        rows = np.concatenate([self._w[held_at], upper])
+        columns = np.concatenate([self._given, lower])
         sign = np.repeat([-1.0, 1.0], [self._given.size, upper.size])
         forces = sparse.csc_matrix((sign, (rows, columns)), shape=(n, n))
         free = np.ones(n)
@@ -120,7 +122,8 @@ def _assembled(model: Model, w: np.ndarray) -> tuple[sparse.csc_matrix, np.ndarr
     """Stiffness of wires, supports and clamps, and the load of relaxed supports.
 
     ``w`` is the number of each node's height; that of its slope follows. A support is a spring
-    relaxed at its height: it gives way under the line's weight. Arms are without force at rest.
+    relaxed at its height: it gives way under the line's weight. Supports that hold a wire at the
+    height wanted do so by an unknown force. Arms are without force at rest.
     """
     mesh, line = model.mesh, model.problem.line
     n = 2 * mesh.n_nodes
@@ -133,6 +136,8 @@ def _assembled(model: Model, w: np.ndarray) -> tuple[sparse.csc_matrix, np.ndarr
         tension = wire.tension_at(0.5 * (mesh.x(first) + mesh.x(second)))
         parts.append((dofs, elements.stiffness(length, wire.bending_stiffness, tension)))
     for number, supports in enumerate(line.supports):
+        if supports.holds:
+            continue
         dofs = w[mesh.supports[mesh.support_group == number]]
         parts.append((dofs[:, None], np.full((dofs.size, 1, 1), supports.stiffness)))
         relaxed = line.wire(supports.wire).points(np.array(supports.x))[:, 2]
@@ -151,8 +156,9 @@ def _assembled(model: Model, w: np.ndarray) -> tuple[sparse.csc_matrix, np.ndarr
     return sparse.csc_matrix((values, (at[0], at[1])), shape=(n, n)), load
 
 
-def _given_heights(model: Model) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes with a given height, droppers' lower ends first, and the heights [m]."""
+def _given_heights(model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes with a given height, droppers' lower ends first, the heights [m], and the nodes at
+    which the forces act by which they are held."""
     mesh, line = model.mesh, model.problem.line
     nodes, heights = [mesh.droppers[:, 1]], [np.zeros(mesh.droppers.shape[0])]
     for number, group in enumerate(line.droppers):
@@ -168,7 +174,14 @@ def _given_heights(model: Model) -> tuple[np.ndarray, np.ndarray]:
             heights.append(np.array(wire.held_heights))
         else:
             heights.append(_wanted(model, wire, nodes[-1]))
-    return np.concatenate(nodes), np.concatenate(heights)
+    held_at = list(nodes)
+    for number, supports in enumerate(line.supports):
+        if supports.holds:
+            held_at.append(mesh.supports[mesh.support_group == number])
+            chain = mesh.wires[supports.holds]
+            nodes.append(chain[np.searchsorted(mesh.x(chain), mesh.x(held_at[-1]) - SAME_CUT)])
+            heights.append(_wanted(model, line.wire(supports.holds), nodes[-1]))
+    return np.concatenate(nodes), np.concatenate(heights), np.concatenate(held_at)
 
 
 def _wanted(model: Model, wire: Wire, nodes: np.ndarray) -> np.ndarray:

@@ -17,6 +17,8 @@ from catenary.meshgen.line import Role
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 
 RE330, COMPOUND = "re330_stitched", "shinkansen_compound"
+TWIN, TRAM = "dc_twin", "tramway"
+BRIDLE = "{tension_N=2000,mass_kg_per_m=0.31,bending_stiffness_N_m2=1.6,length_m=8}"
 WITHOUT_STITCH = ["line.topology=simple", "line.stitch_wire="]
 OLD_TENSIONS = ["line.contact_wire.tension_N=14700", "line.auxiliary_wire.tension_N=14700"]
 
@@ -61,6 +63,23 @@ REFUSED = {
         COMPOUND, ["line.auxiliary_wire.dropper.positions_m=",
                    "line.auxiliary_wire.dropper.patterns=[{span_m=40,positions_m=[25]}]"],
         "line.auxiliary_wire.dropper.patterns .* has no entry for spans of 50 m; it has 40 m"),
+    "twin wires of a simple line": (
+        TWIN, ["line.topology=simple"],
+        "line.twin in .* is no part of the topology simple.* twin or twin_messenger"),
+    "no distance of twins": (TWIN, ["line.twin="], r"line.twin \(two contact .*\) is missing"),
+    "twins in mm": (TWIN, ["line.twin.spacing_m=60"], "it must be at most 1 .m.; usual are .*; is"
+                    "|at most 1 .m."),
+    "droppers in threes": (TWIN, ["line.twin.droppers=threes"], "must be pairs or alternating"),
+    "droppers of a single wire": (
+        TRAM, ["line.dropper={count=3,spacing_m=5,stiffness_N_per_m=1e5}"],
+        "line.dropper on the command line .* is no part of the topology single"),
+    "encumbrance of a single wire": (TRAM, ["line.encumbrance_m=1"], "is no part of the topology"),
+    "bridle of a simple line": (
+        RE330, [f"line.bridle={BRIDLE}"], "line.bridle .* is no part of .* line.topology = single"),
+    "long bridle": (TRAM, [f"line.bridle={BRIDLE}", "line.bridle.length_m=30"],
+                    "it must be less than the shortest span .30 m."),
+    "strong bridle": (TRAM, [f"line.bridle={BRIDLE}", "line.bridle.tension_N=10000"],
+                      "it must be less than line.contact_wire.tension_N .10000 N"),
 }  # fmt: skip
 
 
@@ -88,6 +107,7 @@ def rest_of(case: str, changes: list[str]) -> LineAtRest:
         (RE330, ["line.stitch_wire.tension_N=5000"], 0.450, 0.330),
         (COMPOUND, [], 0.322, 0.183),
         (COMPOUND, OLD_TENSIONS, 0.336, 0.172),
+        (TWIN, [], 0.269, 0.089),
     ],
 )
 def test_elasticity_is_that_of_an_independent_model(
@@ -131,3 +151,11 @@ def test_a_line_of_a_scene_has_its_topology_and_hangs_taut(case: str) -> None:
     contact = np.isin(low, rest.mesh.wires["contact_wire"])
     height = rest.form.height[low[contact]]
     check("height at the droppers [m]", height, line_of(load_scene(case)).wires[0].top, within=1e-9)
+
+
+def test_a_bridle_softens_the_support_of_a_single_wire() -> None:
+    bridled, stiff = rest_of(TRAM, [f"line.bridle={BRIDLE}"]), rest_of(TRAM, [])
+    at_mast = [1e3 * float(rest.lift.lift[0]) for rest in (bridled, stiff)]
+    print(f"at the support {at_mast[0]:.3f} and {at_mast[1]:.3f} mm/N")
+    assert at_mast[0] > 0.5 and at_mast[1] == pytest.approx(0.01, rel=0.05)  # a spring of 1e5 N/m
+    assert [wire.name for wire in bridled.problem.line.wires] == ["contact_wire", "bridle_wire"]

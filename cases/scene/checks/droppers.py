@@ -11,6 +11,7 @@ from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.tables.line import HangingTable
 from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData
+from catenary.meshgen.topologies.twin import TWIN
 from catenary.solver.problem.problem import Problem
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ def estimated_dropper_lengths(line: LineData, gravity: float) -> list[np.ndarray
     messenger, auxiliary = line.messenger_wire, line.auxiliary_wire
     if messenger is None:
         return []
-    hung = line.contact_wire.mass_per_length
+    hung = line.contact_wire.mass_per_length * (2.0 if line.topology == TWIN else 1.0)
     below, positions = 0.0, line.dropper_positions
     if auxiliary is not None:
         hung += auxiliary.conductor.mass_per_length

@@ -33,11 +33,12 @@ def check_topology(scene: Scene) -> Iterator[Fault]:
             key = f"line.{name}"
             meaning = LineTable.model_fields[name].description
             yield Fault(key, f"{key} ({meaning}) is missing {scene.origin.of(key)}")
-    every = {name for one in known.values() for name in _keys(one.parts)}
-    for name in sorted(every - needed.keys()):
+    takes = {name: {**_keys(entry.parts), **_keys(entry.may)} for name, entry in known.items()}
+    every = {name for keys in takes.values() for name in keys}
+    for name in sorted(every - takes[table.topology].keys()):
         if getattr(table, name) is not None:
             key = f"line.{name}"
-            users = [one for one, entry in known.items() if name in _keys(entry.parts)]
+            users = [one for one, keys in takes.items() if name in keys]
             yield Fault(
                 key,
                 f"{key} {scene.origin.of(key)} is no part of the topology {table.topology}; leave "
@@ -54,22 +55,20 @@ def check_parts(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Parts of a topology that do not fit to each other."""
     yield from _stitch_wire(scene, line)
     yield from _auxiliary_wire(scene, line)
+    yield from _bridle(scene, line)
 
 
 def _stitch_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
     stitch, messenger = line.stitch_wire, line.messenger_wire
     if stitch is None or messenger is None:
         return
-    key, shortest = "line.stitch_wire.length_m", min(line.span_lengths)
+    key, tension = "line.stitch_wire.length_m", stitch.conductor.tension
     if line.n_spans < 2:
         why = "a stitched line needs a support, that is two spans"
         yield refusal(scene.origin, "line.n_spans", line.n_spans, why)
         return
-    if stitch.length >= shortest:
-        why = f"it must be less than the shortest span ({shortest:g} m)"
-        yield refusal(scene.origin, key, stitch.length, why)
-        return
-    clamps = line.stitch_clamps
+    yield from _length(scene, line, key, stitch.length)
+    clamps = line.around_supports(stitch.length).ravel()
     apart = abs(line.dropper_x[:, None] - clamps)
     if apart.min() < SHORTEST_GAP:
         at = clamps[apart.min(axis=0).argmin()]
@@ -79,13 +78,32 @@ def _stitch_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
     if nearest > 0.5 * stitch.length:
         why = f"no dropper would hang from it: the nearest one is {nearest:g} m from a support"
         yield refusal(scene.origin, key, stitch.length, why)
-    if stitch.conductor.tension >= messenger.tension:
+    yield from _tension(scene, "stitch_wire", tension, "messenger_wire", messenger.tension)
+
+
+def _bridle(scene: Scene, line: LineData) -> Iterator[Fault]:
+    if line.bridle is not None:
+        yield from _length(scene, line, "line.bridle.length_m", line.bridle.length)
+        tensions = line.bridle.conductor.tension, line.contact_wire.tension
+        yield from _tension(scene, "bridle", tensions[0], "contact_wire", tensions[1])
+
+
+def _length(scene: Scene, line: LineData, key: str, length: float) -> Iterator[Fault]:
+    shortest = min(line.span_lengths)
+    if length >= shortest:
+        why = f"it must be less than the shortest span ({shortest:g} m)"
+        yield refusal(scene.origin, key, length, why)
+
+
+def _tension(scene: Scene, wire: str, tension: float, bearer: str, whole: float) -> Iterator[Fault]:
+    """A wire between clamps that would take all tension of the one that it is clamped to."""
+    if tension >= whole:
         yield refusal(
             scene.origin,
-            "line.stitch_wire.tension_N",
-            stitch.conductor.tension,
-            f"it must be less than line.messenger_wire.tension_N ({messenger.tension:g} N), of "
-            "which it takes its part between the clamps",
+            f"line.{wire}.tension_N",
+            tension,
+            f"it must be less than line.{bearer}.tension_N ({whole:g} N), of which it takes its "
+            "part between the clamps",
         )
 
 

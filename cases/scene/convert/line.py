@@ -9,6 +9,7 @@ import numpy as np
 
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.tables.line import (
+    BridleTable,
     DropperTable,
     HangingTable,
     LineTable,
@@ -18,7 +19,7 @@ from catenary.cases.scene.tables.line import (
 from catenary.cases.scene.tables.units import length_from_mm
 from catenary.meshgen.line import Conductor, DropperKind, Line, SteadyArm
 from catenary.meshgen.topologies.all_topologies import make_line
-from catenary.meshgen.topologies.line_data import AuxiliaryWire, LineData, StitchWire
+from catenary.meshgen.topologies.line_data import AuxiliaryWire, Bridle, LineData, StitchWire, Twin
 from catenary.solver.base.errors import InputError
 
 # Span lengths are written in decimal; two that differ by less are the same one.
@@ -78,6 +79,8 @@ def line_data_of(scene: Scene) -> LineData:
         topology=table.topology,
         auxiliary_wire=_auxiliary(scene, spans),
         stitch_wire=_optional(_stitch, table.stitch_wire),
+        twin=_optional(lambda own: Twin(own.spacing_m, own.droppers == "alternating"), table.twin),
+        bridle=_optional(_bridle, table.bridle),
     )
 
 
@@ -106,6 +109,10 @@ def _stitch(table: StitchWireTable) -> StitchWire:
     return StitchWire(
         _conductor(table), table.length_m, table.clamp_kg, table.clamp_stiffness_N_per_m
     )
+
+
+def _bridle(table: BridleTable) -> Bridle:
+    return Bridle(_conductor(table), table.length_m, table.clamp_kg, table.clamp_stiffness_N_per_m)
 
 
 def _dropper_kind(table: HangingTable, lower_clamp: float) -> DropperKind:

@@ -159,8 +159,27 @@ class StitchWireTable(WireTable):
     )
 
 
+class TwinTable(Table):
+    """Two contact wires in place of one."""
+
+    spacing_m: float = Field(gt=0, le=1, description="distance between the two wires")
+    droppers: Literal["pairs", "alternating"] = Field(
+        "pairs", description="droppers hang both wires at each place, or the two by turns"
+    )
+
+
+class BridleTable(WireTable):
+    """A wire over each inner support, whose ends are clamped to a single contact wire."""
+
+    length_m: float = Field(gt=0, le=100, description="length from clamp to clamp")
+    clamp_kg: float = Field(0.0, ge=0, le=100, description="mass of each of its two clamps")
+    clamp_stiffness_N_per_m: float = Field(
+        1e7, gt=0, le=1e10, description="stiffness of each clamp, in tension and compression"
+    )
+
+
 class SupportTable(Table):
-    """What carries the messenger wire at a mast."""
+    """What carries the topmost wire at a mast."""
 
     stiffness_N_per_m: float = Field(5e5, gt=0, le=1e10, description="vertical stiffness")
 
@@ -248,6 +267,8 @@ class LineTable(Table):
         None, description="wire between messenger and contact wire"
     )
     stitch_wire: StitchWireTable | None = Field(None, description="stitch wires at the supports")
+    twin: TwinTable | None = Field(None, description="two contact wires in place of one")
+    bridle: BridleTable | None = Field(None, description="bridles of a single contact wire")
     dropper: DropperTable | None = Field(None, description="droppers of the contact wire")
     support: SupportTable = Field(default_factory=SupportTable, description="supports")
     steady_arm: SteadyArmTable = Field(default_factory=SteadyArmTable, description="steady arms")

@@ -1,0 +1,150 @@
+"""Twin and single lines at rest against closed forms and equal lines of other topologies."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from measuring import check
+from small_lines import ac_simple_line, bare_wires, problem_of
+
+from catenary.meshgen.build import make_mesh
+from catenary.meshgen.line import Conductor, Line, SteadyArm
+from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
+from catenary.meshgen.topologies.all_topologies import make_line
+from catenary.meshgen.topologies.line_data import Bridle, LineData, Twin
+from catenary.meshgen.topologies.single import BRIDLE_WIRE
+from catenary.meshgen.topologies.twin import second
+from catenary.solver.statics.elasticity import elasticity
+from catenary.solver.statics.equilibrium import Equilibrium, find_form
+
+GRAVITY = 9.81
+TWIN = Twin(0.06, False)
+
+
+def at_rest(line: LineData | Line, n: int = 3) -> tuple[LineMesh, Equilibrium]:
+    line = make_line(line) if isinstance(line, LineData) else line
+    mesh = make_mesh(line, n)
+    return mesh, find_form(problem_of(line), mesh)[1]
+
+
+def heights(mesh: LineMesh, form: Equilibrium, wire: str) -> np.ndarray:
+    return form.height[mesh.wires[wire]]
+
+
+def test_twin_wires_on_pairs_of_droppers_hang_like_one_twice_as_heavy() -> None:
+    """Everything of the contact wire doubled, the same differential equations result."""
+    data = ac_simple_line(5)
+    mesh, form = at_rest(replace(data, topology="twin", twin=TWIN))
+    assert data.dropper is not None
+    one, kind, arm = data.contact_wire, data.dropper, data.steady_arm
+    assert kind.stiffness is not None
+    doubled = replace(
+        data,
+        contact_wire=Conductor(2 * one.tension, 2 * one.mass_per_length, 2 * one.bending_stiffness),
+        dropper=replace(
+            kind,
+            stiffness=2 * kind.stiffness,
+            mass_per_length=2 * kind.mass_per_length,
+            upper_clamp_mass=2 * kind.upper_clamp_mass,
+            lower_clamp_mass=2 * kind.lower_clamp_mass,
+        ),
+        steady_arm=replace(
+            arm, mass_per_length=2 * arm.mass_per_length, clamp_mass=2 * arm.clamp_mass
+        ),
+    )
+    single_mesh, single = at_rest(doubled)
+    for wire, like in (
+        (CONTACT_WIRE, CONTACT_WIRE),
+        (second(CONTACT_WIRE), CONTACT_WIRE),
+        (MESSENGER_WIRE, MESSENGER_WIRE),
+    ):
+        check(wire, heights(mesh, form, wire), heights(single_mesh, single, like), within=1e-9)
+    for number in (0, 1):
+        own = form.dropper_force[mesh.dropper_group == number]
+        check("dropper forces [N]", 2 * own, single.dropper_force, within=1e-6)
+
+
+def test_alternating_droppers_hang_one_wire_each() -> None:
+    data = ac_simple_line(3)
+    line = make_line(replace(data, topology="twin", twin=replace(TWIN, alternating=True)))
+    one, other = (np.array(group.lower_x) for group in line.droppers)
+    np.testing.assert_array_equal(np.sort(np.concatenate([one, other])), data.dropper_x)
+    assert (one[:13] < other).all() and (other < one[1:]).all()
+    sideways = [wire.pieces[0].y for wire in line.wires[:2]]
+    np.testing.assert_allclose(np.subtract(*sideways), 0.06, atol=1e-15)
+
+
+def test_two_simple_catenaries_side_by_side_hang_like_one() -> None:
+    data = ac_simple_line(4)
+    mesh, form = at_rest(replace(data, topology="twin_messenger", twin=TWIN))
+    alone_mesh, alone = at_rest(data)
+    for wire in (CONTACT_WIRE, MESSENGER_WIRE):
+        for name in (wire, second(wire)):
+            check(name, heights(mesh, form, name), heights(alone_mesh, alone, wire), within=1e-10)
+    assert np.isin(mesh.supports, mesh.wires[MESSENGER_WIRE]).sum() == 3
+
+
+def single(bridle: Bridle | None = None) -> LineData:
+    """Spans of 30 m of a string of 0.95 kg/m at 10 kN, on supports that hardly give."""
+    n = 8
+    return replace(
+        bare_wires(30.0),
+        topology="single",
+        span_lengths=(30.0,) * n,
+        dropper_positions=((),) * n,
+        pre_sag=((),) * n,
+        stagger=(0.0,) * (n + 1),
+        contact_wire=Conductor(10e3, 0.95, 0.0),
+        messenger_wire=None,
+        dropper=None,
+        support_stiffness=1e12,
+        steady_arm=SteadyArm(0.0, 0.0, 0.0, 0.0),
+        bridle=bridle,
+    )
+
+
+def test_a_single_string_sags_and_gives_way_as_a_closed_form_says() -> None:
+    """Sag m g x (L - x) / 2 T, elasticity x (L - x) / (T L); elements round off kinks at the masts
+    within some elements, an error of first order beyond: extrapolated."""
+    line = make_line(single())
+    found = []
+    for n in (30, 60):
+        mesh = make_mesh(line, n)
+        model, form = find_form(problem_of(line), mesh)
+        x = np.arange(5.0, 25.5, 1.0)
+        places = mesh.x(mesh.wires[CONTACT_WIRE])
+        own = form.height[mesh.wires[CONTACT_WIRE]][np.searchsorted(places, 90.0 + x - 1e-6)]
+        lift = elasticity(model, 90.0, 120.0)
+        found.append((own, lift.lift[np.searchsorted(lift.x, 90.0 + x - 1e-6)]))
+        at_masts = np.isin(places.round(6), line.support_positions)
+        held = form.height[mesh.wires[CONTACT_WIRE]][at_masts]
+        assert (held == line.wires[0].top).all()  # at the height wanted
+    height, lift = (2.0 * fine - coarse for coarse, fine in zip(*found, strict=True))
+    sag = 0.95 * GRAVITY * x * (30.0 - x) / (2 * 10e3)
+    check("sag [m]", line.wires[0].top - height, sag, within=1e-5)
+    check("elasticity [m/N]", lift, x * (30.0 - x) / (10e3 * 30.0), within=1e-6)
+
+
+def test_a_bridle_hangs_as_statics_says() -> None:
+    """The support's force, the weight of a span, hangs on two halves of the bridle; between its
+    clamps the contact wire has what the bridle leaves of its tension."""
+    bridle = Bridle(Conductor(2e3, 0.31, 0.0), 8.0, 0.4, 1e9)
+    line = make_line(single(bridle))
+    read = []
+    for n in (8, 16):
+        mesh, form = at_rest(line, n)
+        mast = float(line.support_positions[4])
+        nodes = mesh.wires[BRIDLE_WIRE]
+        top = form.height[nodes[np.argmin(np.abs(mesh.x(nodes) - mast))]]
+        contact = mesh.wires[CONTACT_WIRE]
+        at = [form.height[contact[np.argmin(np.abs(mesh.x(contact) - x))]]
+              for x in (mast, mast + 4.0)]  # fmt: skip
+        read.append(np.array([*at, top]))
+        np.testing.assert_allclose(
+            form.height[contact[np.isin(mesh.x(contact).round(6), line.support_positions)]], 5.5
+        )
+    weight = GRAVITY * (0.95 * 30.0 + 0.31 * 8.0 + 2 * 0.4)
+    clamp = 5.5 + GRAVITY * 0.95 * 4.0**2 / (2 * 8e3)
+    rise = (weight / 2 * 4.0 - GRAVITY * 0.31 * 4.0**2 / 2) / 2e3
+    check("heights [m]", 2 * read[1] - read[0], [5.5, clamp, clamp + rise], within=5e-5)
