@@ -26,6 +26,15 @@ def in_line(function: Any) -> Any:
     return _compile(function, forceinline=True)
 
 
+def inner(function: Any) -> Any:
+    """Likewise, for lines that only compiled code calls.
+
+    No entry from Python is made, which takes as long as compiling the lines; a call from there
+    would end the process.
+    """
+    return _compile(function, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
 def _compile(function: Any, **options: Any) -> Any:
     folder = loop_cache.folder(numba.__version__)
     before = _settings.CACHE_DIR

@@ -25,7 +25,7 @@ _IN_TREE = _PACKAGE / "solver" / "__pycache__"
 _LEAST_SPACE = 50e6  # [bytes], of which a run's loops take half
 _OLD = 30 * 86400.0  # [s] without use, after which the loops of other sources are removed
 
-_HAS_LOOPS = re.compile(r"^@(compiled|in_line|intrinsic)\b", re.MULTILINE)
+_HAS_LOOPS = re.compile(r"^@(compiled|in_line|inner|intrinsic)\b", re.MULTILINE)
 _IMPORT = re.compile(r"^\s*(?:from|import) catenary\.([\w.]+)(?: import (\([^)]*\)|.*))?", re.M)
 
 

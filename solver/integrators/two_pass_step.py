@@ -11,9 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.solver.base.bound import bound
+from catenary.solver.base.compiled import compiled, inner
 from catenary.solver.base.pointers import borrowed
 from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps, PredictedLineState, Steps
-from catenary.solver.integrators.state_kernels import compiled, in_line, reserves_within
+from catenary.solver.integrators.state_kernels import reserves_within
 from catenary.solver.linear.lanes import (
     add,
     add_scaled,
@@ -140,7 +141,7 @@ def predict_velocities(motion, changes):
         predicted[i] = y[i] + changes[6] * z[i] + changes[7] * known[i]
 
 
-@in_line
+@inner
 def go_on(layout, at, solution, motion, changes):
     """Take the rank's own station, whose first unknown is ``at``, from one prediction to the next:
     ``kernels.correct`` and ``predict`` at once. What was solved for is its acceleration but for
@@ -158,7 +159,7 @@ def go_on(layout, at, solution, motion, changes):
     store(layout, y, at, add_scaled(v, by_velocity, a))
 
 
-@in_line
+@inner
 def go_on_by_alpha(layout, at, solution, motion, changes):
     """The same for the generalized-alpha method; see ``AlphaAhead``."""
     x, y, z, _, known, _ = motion
@@ -174,7 +175,7 @@ def go_on_by_alpha(layout, at, solution, motion, changes):
     store(layout, z, at, total)
 
 
-@in_line
+@inner
 def _eliminate_row(part, multiplied, factored, loads, station, before, states, outward, answer):
     to_start, here, to_end = states
     positions, velocities = (to_start[0], here[0], to_end[0]), (to_start[1], here[1], to_end[1])
@@ -188,7 +189,7 @@ def _eliminate_row(part, multiplied, factored, loads, station, before, states, o
 eliminate_in = by_make_up(_eliminate_row)
 
 
-@in_line
+@inner
 def eliminate_row(multiplied, factored, loads, station, before, states, outward, answer):
     """``eliminate`` with the right-hand side from a row of the product, and of ``loads`` if there
     are any; ``states`` are what ``read_station`` gives to the start, at and to the end of it."""
@@ -229,7 +230,7 @@ def forth(multiplied, factored, loads, answer):
     meet(factored, middle, right, answer)
 
 
-@in_line
+@inner
 def is_within(unknowns, begin, end):
     """Whether all of a link's unknowns are in [begin, end)."""
     return begin <= unknowns.min() and unknowns.max() < end
@@ -261,7 +262,7 @@ def left_behind(low, high, stretch, starts, unknowns):
     return ranges
 
 
-@in_line
+@inner
 def follow(number, motion, followed):
     """Find the reserve of links that a stretch of the pass back has left behind."""
     links, reserve, ranges, _ = followed
@@ -270,7 +271,7 @@ def follow(number, motion, followed):
     reserves_within(motion[:4], links, before[1], now[1], reserve)
 
 
-@in_line
+@inner
 def _go_back(part, factored, station, inward, answer, motion, changes):
     own = solved(part, factored, station, inward, answer)
     at = first_of(factored, station) - first_of(factored, factored[4])
@@ -281,14 +282,14 @@ def _go_back(part, factored, station, inward, answer, motion, changes):
 go_back_in = by_make_up(_go_back)
 
 
-@in_line
+@inner
 def go_back(factored, station, inward, answer, motion, changes):
     """Solve for an own station from those ``inward`` of it, and take its motion on."""
     layout, make_up = factored[0], make_up_at(factored, station)
     return go_back_in(layout, make_up, factored, station, inward, answer, motion, changes)
 
 
-@in_line
+@inner
 def _begin_back(part, factored, middle, answer, motion, changes):
     own = load(part, answer, first_of(factored, middle))
     at = first_of(factored, middle) - first_of(factored, factored[4])

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numba.extending import overload
 
-from catenary.solver.base.compiled import in_line
+from catenary.solver.base.compiled import inner
 from catenary.solver.linear.lanes import load, part_of, pitch, varies, widened
 from catenary.solver.linear.station_layout import Layout
 
@@ -35,7 +35,7 @@ class Places(NamedTuple):
 ALIKE = Places(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.uint8))
 
 
-@in_line
+@inner
 def start_of(layout, places, station):
     """First unknown of a station in vectors."""
     # Indices are unsigned, which spares a check for negative ones.
@@ -44,7 +44,7 @@ def start_of(layout, places, station):
     return pitch(layout) * np.uint64(station)
 
 
-@in_line
+@inner
 def make_up_of(layout, places, station):
     """Make-up of a station."""
     if varies(layout):
@@ -96,7 +96,7 @@ def _function(names: list[str], body: str, **known: Any) -> Any:
     return eval(f"lambda layout, make_up, {', '.join(names)}: {body}", known)  # noqa: S307
 
 
-@in_line
+@inner
 def block_at(layout, kinds, station, size):
     """Where the blocks of a station begin, of ``size`` numbers each; ``kinds`` holds that itself
     where make-ups vary."""
@@ -105,7 +105,7 @@ def block_at(layout, kinds, station, size):
     return size * np.uint64(kinds[np.uint64(station)])
 
 
-@in_line
+@inner
 def _load(part, array, at):
     return widened(part, load(part, array, at))
 

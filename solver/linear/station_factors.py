@@ -12,7 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from catenary.solver.base.bound import bound
-from catenary.solver.base.compiled import compiled, in_line
+from catenary.solver.base.compiled import compiled, inner
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.base.pointers import borrowed
 from catenary.solver.linear.lane_products import (
@@ -131,53 +131,89 @@ def station_factors(
     return StationFactors(layout, stations, kinds, numbers, low, high, n_kinds)
 
 
+# Of blocks number by number: expressions of whole arrays take Numba ten times as long to compile.
+
+
 @compiled
 def factorise(blocks, middle, factors):
     """Fill ``factors`` (n, 3, b, b), by rows, of ``blocks`` (3, n, b, b); see ``StationFactors``
     and ``neighbours``."""
-    to_start, own, to_end = blocks[0], blocks[1], blocks[2]
-    n = own.shape[0]
+    n, size = blocks.shape[1], blocks.shape[2]
+    pivot = np.empty((size, size))
     for i in range(middle):
-        pivot = own[i].copy()
+        copy(blocks[1, i], pivot)
         if i > 0:
-            factors[i, 2] = factors[i - 1, 1].T
-            pivot += to_start[i] @ factors[i - 1, 1]
+            condense(blocks[0, i], factors[i - 1, 1], pivot, factors[i, 2])
         invert(pivot, factors[i, 0])
-        factors[i, 1] = -(factors[i, 0] @ to_end[i])
+        carry(factors[i, 0], blocks[2, i], factors[i, 1])
     for i in range(n - 1, middle, -1):
-        pivot = own[i].copy()
+        copy(blocks[1, i], pivot)
         if i < n - 1:
-            factors[i, 2] = factors[i + 1, 1].T
-            pivot += to_end[i] @ factors[i + 1, 1]
+            condense(blocks[2, i], factors[i + 1, 1], pivot, factors[i, 2])
         invert(pivot, factors[i, 0])
-        factors[i, 1] = -(factors[i, 0] @ to_start[i])
-    pivot = own[middle].copy()
+        carry(factors[i, 0], blocks[0, i], factors[i, 1])
+    copy(blocks[1, middle], pivot)
     if middle > 0:
-        factors[middle, 2] = factors[middle - 1, 1].T
-        pivot += to_start[middle] @ factors[middle - 1, 1]
+        condense(blocks[0, middle], factors[middle - 1, 1], pivot, factors[middle, 2])
     if middle < n - 1:
-        factors[middle, 1] = factors[middle + 1, 1].T
-        pivot += to_end[middle] @ factors[middle + 1, 1]
+        condense(blocks[2, middle], factors[middle + 1, 1], pivot, factors[middle, 1])
     invert(pivot, factors[middle, 0])
 
 
-@compiled
+@inner
+def copy(block, pivot):
+    """Fill ``pivot`` with a block."""
+    for i in range(pivot.shape[0]):
+        for j in range(pivot.shape[0]):
+            pivot[i, j] = block[i, j]
+
+
+@inner
+def condense(block, carried, pivot, turned):
+    """Add to ``pivot`` what elimination of a station beside it leaves there, the product of the
+    ``block`` that joins both and of what the other has ``carried``, and keep that ``turned``."""
+    for i in range(pivot.shape[0]):
+        for j in range(pivot.shape[0]):
+            turned[i, j] = carried[j, i]
+            total = 0.0
+            for k in range(pivot.shape[0]):
+                total += block[i, k] * carried[k, j]
+            pivot[i, j] += total
+
+
+@inner
+def carry(inverse, block, carried):
+    """Fill ``carried`` with what a station's unknowns are for those beyond: minus the product."""
+    for i in range(inverse.shape[0]):
+        for j in range(inverse.shape[0]):
+            total = 0.0
+            for k in range(inverse.shape[0]):
+                total += inverse[i, k] * block[k, j]
+            carried[i, j] = -total
+
+
+@inner
 def invert(pivot, inverse):
     """Fill in the inverse of a positive definite block, which is overwritten."""
-    inverse[:] = np.eye(pivot.shape[0])
+    size = pivot.shape[0]
+    for i in range(size):
+        for j in range(size):
+            inverse[i, j] = 1.0 if i == j else 0.0
     # A positive definite block needs no exchange of rows.
-    for i in range(pivot.shape[0]):
+    for i in range(size):
         scale = 1.0 / pivot[i, i]
-        pivot[i] *= scale
-        inverse[i] *= scale
-        for j in range(pivot.shape[0]):
+        for k in range(size):
+            pivot[i, k] *= scale
+            inverse[i, k] *= scale
+        for j in range(size):
             if j != i:
                 share = pivot[j, i]
-                pivot[j] -= share * pivot[i]
-                inverse[j] -= share * inverse[i]
+                for k in range(size):
+                    pivot[j, k] -= share * pivot[i, k]
+                    inverse[j, k] -= share * inverse[i, k]
 
 
-@in_line
+@inner
 def factors_of(part, factored, station):
     """Where the blocks of a station are; ``part`` is the layout of its make-up."""
     _, _, kinds, blocks, _, _ = factored
@@ -185,19 +221,19 @@ def factors_of(part, factored, station):
     return numbers_from(blocks, block_at(part, kinds, station, n_blocks * whole_size(part)))
 
 
-@in_line
+@inner
 def first_of(factored, station):
     """First unknown of a station."""
     return start_of(factored[0], factored[1], station)
 
 
-@in_line
+@inner
 def make_up_at(factored, station):
     """Make-up of a station."""
     return make_up_of(factored[0], factored[1], station)
 
 
-@in_line
+@inner
 def eliminate(part, factored, sums, station, before, outward, answer):
     """Leave in ``answer`` what the right-hand side of a station, as ``sums``, is after those
     ``outward`` of it are eliminated, of which ``before`` is the last; ``part`` is the layout of its
@@ -213,7 +249,7 @@ def eliminate(part, factored, sums, station, before, outward, answer):
     return widened(part, left)
 
 
-@in_line
+@inner
 def _eliminate_right(part, factored, right, station, before, outward, answer):
     sums = sums_from(part, load(part, right, first_of(factored, station)))
     return eliminate(part, factored, sums, station, before, outward, answer)
@@ -222,14 +258,14 @@ def _eliminate_right(part, factored, right, station, before, outward, answer):
 eliminate_in = by_make_up(_eliminate_right)
 
 
-@in_line
+@inner
 def eliminate_right(factored, right, station, before, outward, answer):
     """``eliminate`` with the right-hand side of an array."""
     make_up = make_up_at(factored, station)
     return eliminate_in(factored[0], make_up, factored, right, station, before, outward, answer)
 
 
-@in_line
+@inner
 def _meet(part, factored, middle, towards_end, answer):
     here, kinds = first_of(factored, middle), factored[2]
     numbers, left = factors_of(part, factored, middle), load(part, answer, here)
@@ -249,7 +285,7 @@ def _meet(part, factored, middle, towards_end, answer):
 meet_in = by_make_up(_meet)
 
 
-@in_line
+@inner
 def meet(factored, middle, towards_end, answer):
     """Unknowns of the middle station from what ``answer`` holds of it and what is left of the one
     beside it, ``towards_end`` of the line."""
@@ -257,7 +293,7 @@ def meet(factored, middle, towards_end, answer):
     return meet_in(factored[0], make_up, factored, middle, towards_end, answer)
 
 
-@in_line
+@inner
 def solved(part, factored, station, inward, answer):
     """Unknowns of a station, in lanes of ``part``, from what ``answer`` holds of it and those
     ``inward`` of it."""
@@ -268,7 +304,7 @@ def solved(part, factored, station, inward, answer):
     return total_of(part, add_whole(part, sums, numbers, whole_size(part), inward))
 
 
-@in_line
+@inner
 def _substitute_into(part, factored, station, inward, answer):
     own = solved(part, factored, station, inward, answer)
     store(part, answer, first_of(factored, station), own)
@@ -278,7 +314,7 @@ def _substitute_into(part, factored, station, inward, answer):
 substitute_in = by_make_up(_substitute_into)
 
 
-@in_line
+@inner
 def substitute_into(factored, station, inward, answer):
     """``solved`` in lanes of a whole cross-section, left in ``answer``, too."""
     make_up = make_up_at(factored, station)

@@ -16,7 +16,7 @@ from scipy import sparse
 
 from catenary.solver.base import aligned_arrays
 from catenary.solver.base.bound import bound
-from catenary.solver.base.compiled import compiled, in_line
+from catenary.solver.base.compiled import compiled, inner
 from catenary.solver.base.pointers import borrowed
 from catenary.solver.linear.lane_products import (
     add_beside,
@@ -202,7 +202,7 @@ def station_product(
     return StationProduct(layout, stations.places(), kinds, packed, first + 1, n_kinds)
 
 
-@in_line
+@inner
 def row_sums(part, multiplied, row, positions, velocities):
     """Sums of a row of a product, with what the factor and the velocity hold before, at and after
     its station.
@@ -229,7 +229,7 @@ def row_sums(part, multiplied, row, positions, velocities):
     return sums
 
 
-@in_line
+@inner
 def read_station(multiplied, row):
     """What the factor and the velocity hold at the station of a row, which may be one before or
     after all rows."""
@@ -241,7 +241,7 @@ def read_station(multiplied, row):
     return position, position
 
 
-@in_line
+@inner
 def _put_row(part, multiplied, row, positions, velocities, result):
     layout, places, _, _, first, _, _ = multiplied
     total = total_of(part, row_sums(part, multiplied, row, positions, velocities))

@@ -122,7 +122,11 @@ def take(steps, times, drives, rows, kept_motions, counts, shows, first, n_steps
     (start, places), speed, loading = steps.moving, steps.speed, steps.loading
     records, heads, taps, shown = steps.records, steps.heads, steps.taps, steps.shown
     problem, law, switched, outputs = steps.problem, steps.law, steps.switched, steps.outputs
+    clock, free, placing, responding = steps.clock, steps.free, steps.placing, steps.responding
+    superposing, compensating = steps.superposing, steps.compensating
+    ends, of_step = steps.ends, steps.of_step
     solution, depth, motion = problem.unknowns.solution, problem.found[0], shown.motion
+    pressed = problem.heads
     n, n_outputs = problem.gap.place.size, outputs.size
     n_arms = n_outputs + shown.arms.size
     n_shown = n_arms + shown.droppers.law.size
@@ -130,27 +134,25 @@ def take(steps, times, drives, rows, kept_motions, counts, shows, first, n_steps
     for i in range(first, n_steps):
         time = times[i]
         state_kernels.shift(start, places, speed * time)
-        contact_kernels.place(*steps.placing)
+        contact_kernels.place(*placing)
         if loading[0] != 0:
-            steps.clock[0] = time
+            clock[0] = time
             call_held(loading)
-        call_held(steps.free)
+        call_held(free)
         within = True
         for h in range(records.size):
             within &= head_records.predict(records[h], drives[i, h], heads, n)
-        contact_kernels.respond(*steps.responding)
+        contact_kernels.respond(*responding)
         m = find_forces(time, problem, law, switched, n, counts) if within else -1
         if m < 0:
             return i - first, True
-        contact_kernels.superpose(force, *steps.superposing)
+        contact_kernels.superpose(force, *superposing)
         if m:
             slack = solution[n : n + m]
-            contact_kernels.compensate(switched[:m], slack, *steps.compensating)
+            contact_kernels.compensate(switched[:m], slack, *compensating)
         for h in range(records.size):
             head_records.move(records[h], force)
-        contact_kernels.write_outputs(
-            force, law.reported, problem.heads, depth, steps.ends, steps.of_step
-        )
+        contact_kernels.write_outputs(force, law.reported, pressed, depth, ends, of_step)
         if shows:
             row = rows[i]
             row[:n_outputs] = outputs
