@@ -111,6 +111,8 @@ def station_factors(
     n = blocks.shape[1]
     high = n if high is None else high
     stations = Sections.alike(n, layout.pitch) if stations is None else stations
+    # Factors join all of a plane, whatever matrices join: the same kernels serve them all.
+    layout = Layout(layout.widths, make_ups=layout.make_ups)
     station, lacking = np.nonzero(stations.missing())
     blocks[1, station, lacking, lacking] = 1.0
     factors = np.zeros((n, 3, layout.pitch, layout.pitch))

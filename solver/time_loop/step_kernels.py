@@ -155,7 +155,8 @@ def take(steps, times, drives, rows, kept_motions, counts, shows, first, n_steps
         contact_kernels.write_outputs(force, law.reported, pressed, depth, ends, of_step)
         if shows:
             row = rows[i]
-            row[:n_outputs] = outputs
+            for j in range(n_outputs):
+                row[j] = outputs[j]
             uplift, tension = row[n_outputs:n_arms], row[n_arms:n_shown]
             state_kernels.show(shown, uplift, tension)
             for j in range(taps.size):
