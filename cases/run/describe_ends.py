@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from catenary.postproc.evaluate.wording import counted
-from catenary.solver.problem.ends import AbsorbingLayer, EndCondition
+from catenary.solver.problem.ends import AbsorbingLayer, EndCondition, Periodic
 from catenary.solver.problem.problem import Problem
 
 SIDES = ("start", "end")
@@ -19,7 +19,7 @@ def end_sentences(problem: Problem) -> tuple[str, str]:
 
 def lets_waves_out(end: EndCondition) -> bool:
     """Whether an end sends back so little that no wave from there is looked for."""
-    return isinstance(end, AbsorbingLayer)
+    return isinstance(end, AbsorbingLayer | Periodic)
 
 
 def end_warnings(problem: Problem) -> list[str]:
@@ -49,4 +49,6 @@ def _sentence(end: EndCondition) -> str:
             f"{counted(end.n_spans, 'span')} that absorb waves (damping up to {end.damping:g} 1/s),"
             " then fixed"
         )
+    if isinstance(end, Periodic):
+        return "as if the line went on for ever like its last span, without slack droppers there"
     return "fixed"

@@ -1,17 +1,29 @@
-"""Effects of how a line ends: layers that absorb waves."""
+"""Effects of how a line ends: layers that absorb waves, and lines that go on periodically."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from catenary.solver.effects import vertical_effects  # noqa: F401  (built before)
 from catenary.solver.effects.effect import Effect, register
+from catenary.solver.ends.line_beyond import line_beyond
+from catenary.solver.ends.periodic_end import StepSums, periodic_end
 from catenary.solver.model.absorbing_layers import layer_blocks
-from catenary.solver.problem.ends import AbsorbingLayer
-from catenary.solver.problem.problem import Problem
+from catenary.solver.model.loads import MemoryLoad
+from catenary.solver.model.model import Block
+from catenary.solver.problem.ends import AbsorbingLayer, Periodic
+from catenary.solver.problem.integrator_parameters import integration_of
+from catenary.solver.problem.problem import Problem, steps_of
+from catenary.solver.problem.simulated import Simulated
 
 if TYPE_CHECKING:
     from catenary.solver.model.builder import ModelBuilder
+
+# The component that lines beyond an end are in the damping: the line's.
+_BEYOND = "line_beyond"
 
 
 def _layers(builder: ModelBuilder) -> None:
@@ -21,6 +33,29 @@ def _layers(builder: ModelBuilder) -> None:
             begin, outer = masts[last + step * end.n_spans], masts[last]
             for block in layer_blocks(builder.model, float(begin), float(outer), end.damping):
                 builder.add_block(block)
+
+
+def _going_on(laws: Simulated, problem: Problem) -> Simulated:
+    start, end = (isinstance(end, Periodic) for end in problem.ends)
+    return replace(laws, goes_on=(start, end))
+
+
+def _lines_beyond(builder: ModelBuilder) -> None:
+    model, problem = builder.model, builder.problem
+    numerics, damping = problem.numerics, model.damping_of(_BEYOND)
+    integration = integration_of(
+        numerics.integrator, numerics.spectral_radius, numerics.beta, numerics.gamma
+    )
+    sums, ends = StepSums(numerics.dt, integration), []
+    for side, goes_on in enumerate(model.simulated.goes_on):
+        if goes_on:
+            beyond = line_beyond(model, side)
+            ends.append(periodic_end(beyond, side, damping, sums))
+    for end in ends:  # once both are found, as these are no part of what goes on
+        kind = np.zeros(1, dtype=np.int64)
+        matrices = end.mass[None], end.stiffness[None]
+        builder.add_block(Block(_BEYOND, end.unknowns[None], kind, *matrices))
+        builder.add_load(MemoryLoad(end.unknowns, numerics.dt, steps_of(problem), end.memory))
 
 
 def _has(problem: Problem, kind: type) -> bool:
@@ -36,5 +71,17 @@ register(
         default=True,
         applies=lambda p: _has(p, AbsorbingLayer),
         build=_layers,
+    )
+)
+register(
+    Effect(
+        "periodic_ends",
+        "lines that go on beyond their ends",
+        "stiffness, mass and memory of the periodic line beyond; line.ends",
+        "Bloch waves of a span; convolution quadrature (Lubich 1988)",
+        default=True,
+        applies=lambda p: _has(p, Periodic),
+        build=_lines_beyond,
+        law=_going_on,
     )
 )

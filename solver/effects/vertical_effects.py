@@ -30,7 +30,7 @@ def _vertical(builder: ModelBuilder) -> None:
         pairs = mesh.clamps[line.clamp_group == number]
         laws = law(mesh.x(pairs[:, 1]), clamps.stiffness)
         builder.add_links(clamps.name, between_nodes(builder.model, pairs), laws)
-    builder.hold(mesh.anchors, "w")
+    builder.hold(builder.held_ends, "w")
 
 
 def _dropper_mass(builder: ModelBuilder) -> None:

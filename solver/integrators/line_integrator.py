@@ -77,11 +77,13 @@ class LineIntegrator(ABC):
         self._passes: StationPasses | None = None
         self.loads: LineLoads | None = None
         if model.loads:
-            self.loads = LineLoads(model.loads, self.operators.domain, model.constrained)
+            self.loads = LineLoads(model.loads, self.operators.domain, model.constrained, comm)
         self.detour: Detour | None = None
         self.motion = LineState(
             aligned_arrays.zeros(n, 2), aligned_arrays.zeros(n, 3), self.operators.answer, gains
         )
+        if self.loads is not None:
+            self.loads.read(self.motion)
         self.track_links(NO_LINKS, np.zeros(0))
         # PETSc's time loop wants the solution as a vector; it wraps our array.
         self.solution = PETSc.Vec().createWithArray(self.displacement, size=(n, None), comm=comm)
@@ -92,7 +94,7 @@ class LineIntegrator(ABC):
         return self._passes
 
     def load_at(self, time: float) -> None:
-        """Take the loads of the step to ``time`` [s]. Not collective."""
+        """Take the loads of the step to ``time`` [s]. Collective."""
         if self.loads is not None:
             self.loads.at(time)
 
@@ -121,6 +123,8 @@ class LineIntegrator(ABC):
             passes.track_links(*self._links)
         motion.put(self.displacement, self.velocity, self.acceleration)
         self.motion = motion
+        if self.loads is not None:
+            self.loads.read(motion)
 
     def _ahead(self) -> tuple[PredictedLineState, Steps | AlphaSteps] | None:
         """A motion to keep ahead, in the arrays of this one, and the steps it is kept for.
@@ -267,7 +271,25 @@ class LineIntegrator(ABC):
         np.copyto(operators.factor, ahead)
         return np.array([kinetic, elastic])
 
+    @property
+    def remembers(self) -> bool:
+        """Whether ends go on, so that ``past`` is a part of what a step starts from."""
+        return self.loads is not None and self.loads.memories is not None
+
+    def past(self) -> np.ndarray | None:
+        """What ends that go on remember, see ``EndMemories.past``; None if there are none.
+        Collective."""
+        memories = None if self.loads is None else self.loads.memories
+        return None if memories is None else memories.past()
+
+    def recall(self, past: np.ndarray, n_steps: int) -> None:
+        """Remember ``n_steps`` of what ``past`` has returned. Not collective."""
+        if self.loads is not None and self.loads.memories is not None:
+            self.loads.memories.recall(past, n_steps)
+
     def destroy(self) -> None:
         """Free all PETSc objects. Collective."""
+        if self.loads is not None and self.loads.memories is not None:
+            self.loads.memories.destroy()
         self.operators.destroy()
         self.solution.destroy()

@@ -6,20 +6,30 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 from scipy import sparse
 
 from catenary.solver.base import aligned_arrays
 from catenary.solver.base.bound import bound
 from catenary.solver.integrators import load_kernels
+from catenary.solver.integrators.end_memory import NO_MEMORIES, EndMemories
+from catenary.solver.integrators.line_state import LineState
 from catenary.solver.linear.halo import Subdomain
-from catenary.solver.model.loads import CONSTANT, FieldLoad, FunctionLoad, Load, ShapeLoad
+from catenary.solver.model.loads import (
+    CONSTANT,
+    FieldLoad,
+    FunctionLoad,
+    Load,
+    MemoryLoad,
+    ShapeLoad,
+)
 
 # What samples of a load may take [B], and the most slices that are made at once.
 _BYTES, _MOST_SLICES = 2**24, 512
 
 
 class LineLoads:
-    """Forces on all unknowns that a rank solves for. Not collective: each rank finds its own.
+    """Forces on all unknowns that a rank solves for. Collective to make; each rank finds its own.
 
     Forces on held unknowns are left out.
 
@@ -28,9 +38,11 @@ class LineLoads:
     loads : of the model, the same on all ranks
     domain : what the rank solves for
     held : numbers of held unknowns
+    comm : mpi4py communicator of the ranks that the line is on
 
     Attributes
     ----------
+    memories : of ends that go on, None if there are none
     values : (domain.size,) their sum at the latest time [N], [N m]
     changes : whether they change with time
     clock : (1,) the time that ``kernel`` reads [s]
@@ -38,7 +50,13 @@ class LineLoads:
         compiled loops, which ``cover`` the times of their steps before
     """
 
-    def __init__(self, loads: Sequence[Load], domain: Subdomain, held: np.ndarray) -> None:
+    def __init__(
+        self,
+        loads: Sequence[Load],
+        domain: Subdomain,
+        held: np.ndarray,
+        comm: Any = MPI.COMM_SELF,
+    ) -> None:
         self.values = aligned_arrays.zeros(domain.size, 1)
         self.clock = np.zeros(1)
         free = np.ones(domain.size, dtype=bool)
@@ -46,7 +64,11 @@ class LineLoads:
         constant = np.zeros(domain.size)
         shapes: list[tuple[ShapeLoad, np.ndarray, np.ndarray]] = []
         self._sampled: list[_Sampled] = []
+        memories = [load for load in loads if isinstance(load, MemoryLoad)]
+        self.memories = EndMemories(comm, memories, domain, self.values) if memories else None
         for load in loads:
+            if isinstance(load, MemoryLoad):
+                continue
             here = (load.unknowns >= domain.low) & (load.unknowns < domain.high)
             mine = np.flatnonzero(here)
             mine = mine[free[load.unknowns[mine] - domain.low]]
@@ -60,22 +82,33 @@ class LineLoads:
                 shapes.append((load, places, load.forces[mine]))
         self.values[:] = constant
         sampled = _side_by_side(self._sampled)
-        changing, rows = _rows_of(shapes, sampled[3])
+        remembered = np.zeros(0, np.int64) if self.memories is None else self.memories.places
+        changing, rows = _rows_of(shapes, np.concatenate([sampled[3], remembered]))
         self.changes = bool(changing.size)
         functions = _functions_of([load for load, _, _ in shapes])
         self.kernel: Any = load_kernels.evaluate
-        self.arguments = (
+        self._own = (
             *(self.clock, self.values, constant, changing.astype(np.int64)),
             *(rows, functions, sampled),
         )
+        self.read(None)
+
+    def read(self, motion: LineState | None) -> None:
+        """Let forces that remember a motion take it from here. Not collective."""
+        if self.memories is not None:
+            self.memories.read(motion)
+        remembered = NO_MEMORIES if self.memories is None else self.memories.arguments
+        self.arguments = (*self._own, remembered)
         self._evaluate = bound(self.kernel, *self.arguments) if self.changes else None
 
     def at(self, time: float) -> None:
-        """Make ``values`` those at a time [s]."""
+        """Make ``values`` those at a time [s]. Collective with forces that remember a motion."""
         if self._evaluate is not None:
             self.cover(np.array([time]))
             self.clock[0] = time
             self._evaluate()
+        if self.memories is not None:
+            self.memories.share()
 
     def cover(self, times: np.ndarray) -> int:
         """Make ready for ascending ``times`` (n,) [s]; how many of them are, one at least."""

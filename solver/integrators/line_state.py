@@ -198,20 +198,20 @@ class AlphaAhead(PredictedLineState):
         LineState.__init__(self, ahead, velocity, balance, gains)
         self.gains[2] = steps.balance[0]
         self.read[3][:] = [-1.0, -way, -1.0, 1.0, 0.0]
-        self._way, self._balance, self._shown, self.known = way, steps.balance, shown, known
+        self._way, self.balance, self._shown, self.known = way, steps.balance, shown, known
         self.predicted = predicted
 
     @property
     def acceleration(self) -> np.ndarray:
         """The one that balances the forces at the end of the latest step (n_local,) [m/s2]; a new
         array."""
-        of_balanced, of_known = self._balance
+        of_balanced, of_known = self.balance
         return np.asarray((self.read[2] - of_known * self.known) / of_balanced)
 
     def put(self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:
         """Take a state, (n_local,) each, after ``known``."""
         x, y, z, _ = self.read
-        of_balanced, of_known = self._balance
+        of_balanced, of_known = self.balance
         total = of_balanced * acceleration + of_known * self.known
         x[:] = -(displacement + self._way * velocity + total)
         y[:], z[:] = velocity, total

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.solver.base.compiled import compiled
+from catenary.solver.integrators.memory_kernels import remember
 from catenary.solver.model.loads import CONSTANT, TABLE
 
 
@@ -49,7 +50,7 @@ def add_samples(time, sampled, values):
 
 
 @compiled
-def evaluate(clock, values, constant, changing, shapes, functions, sampled):
+def evaluate(clock, values, constant, changing, shapes, functions, sampled, memories):
     """Make ``values`` those at the time ``clock[0]`` [s].
 
     Parameters
@@ -60,6 +61,7 @@ def evaluate(clock, values, constant, changing, shapes, functions, sampled):
     functions : of each term kind and begins of ``numbers`` (n + 1,), numbers, and room (n,)
     sampled : of each field first and last of its places, begin of its times and of its samples
         (s, 4); slices that are held (s,); times, places and samples of all
+    memories : what ``memory_kernels.remember`` takes after the clock and the values
     """
     begins, terms, forces = shapes
     kinds, bounds, numbers, factors = functions
@@ -71,3 +73,6 @@ def evaluate(clock, values, constant, changing, shapes, functions, sampled):
             total += factors[terms[e]] * forces[e]
         values[changing[j]] = total
     add_samples(clock[0], sampled, values)
+    places, accelerations, tables = memories
+    if places[0].size > 0:
+        remember(clock, values, places, accelerations, tables)

@@ -9,6 +9,7 @@ from catenary.solver.model import elements
 from catenary.solver.model.links import BOTH, PULLS, Direction, Links, between_nodes, law
 from catenary.solver.model.loads import Load
 from catenary.solver.model.model import Block, Model, wire_elements
+from catenary.solver.model.stations import SAME_STATION
 from catenary.solver.problem.problem import Problem
 
 
@@ -106,6 +107,15 @@ class ModelBuilder:
         """Element matrices of any kind; those of masses carry no weight."""
         self.model.blocks.append(block)
         self._n_terms += block.dofs.shape[0]
+
+    @property
+    def held_ends(self) -> np.ndarray:
+        """Nodes where pieces of wire are held, but for ends of a line that goes on beyond."""
+        anchors, masts = self.mesh.anchors, self.problem.line.support_positions
+        x, held = self.mesh.x(anchors), np.ones(anchors.size, dtype=bool)
+        for place, goes_on in zip(masts[[0, -1]], self.model.simulated.goes_on, strict=True):
+            held &= (np.abs(x - place) > SAME_STATION) | (not goes_on)
+        return np.asarray(anchors[held])
 
     def hold(self, nodes: np.ndarray, unknown: str) -> None:
         """Hold an unknown of some nodes at its equilibrium value."""

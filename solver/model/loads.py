@@ -114,7 +114,28 @@ class FunctionLoad:
     values: Callable[[float], np.ndarray]
 
 
-Load = ShapeLoad | FieldLoad | FunctionLoad
+@dataclass(frozen=True)
+class MemoryLoad:
+    """Forces -sum over j >= 1 of Q_j b_(n - j) of past accelerations b, such as of a line beyond.
+
+    What the latest acceleration does is in the matrices. The accelerations are those that balance
+    the forces at the ends of steps of ``dt`` [s].
+
+    Attributes
+    ----------
+    unknowns : (m,) numbers of unknowns, of which one rank owns all
+    dt : [s]
+    n_steps : the most steps of a march
+    numbers : of a number of steps n all Q (n, m, m) [N s2/m], Q_0 being zero
+    """
+
+    unknowns: np.ndarray
+    dt: float
+    n_steps: int
+    numbers: Callable[[int], np.ndarray]
+
+
+Load = ShapeLoad | FieldLoad | FunctionLoad | MemoryLoad
 
 
 def along(

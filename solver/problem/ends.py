@@ -22,5 +22,13 @@ class AbsorbingLayer:
     damping: float
 
 
-EndCondition = Fixed | AbsorbingLayer
+@dataclass(frozen=True)
+class Periodic:
+    """The line goes on for ever with spans like the last ones, whose droppers do not slacken.
+
+    Waves leave, and the wires at the end move as at any other mast.
+    """
+
+
+EndCondition = Fixed | AbsorbingLayer | Periodic
 """How one end of a line behaves in motion. The line at rest is held there in either case."""

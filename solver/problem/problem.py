@@ -127,6 +127,12 @@ class Problem:
     ends: tuple[EndCondition, EndCondition] = (Fixed(), Fixed())
 
 
+def steps_of(problem: Problem) -> int:
+    """Steps from the start of a run to its end."""
+    train = problem.train
+    return max(1, math.floor((train.end - train.start) / train.speed / problem.numerics.dt + 1e-9))
+
+
 def n_halvings(dt: float, smallest: float | None) -> int:
     """How often a step of ``dt`` may be halved if it is to be no shorter than ``smallest`` [s]."""
     if smallest is None:

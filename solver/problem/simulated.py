@@ -37,6 +37,7 @@ class Simulated:
     lowering : whether pantographs are lowered as their placements say
     vehicle : motion of the pantographs' bases, None if they move along a straight line
     incidents : of the line, in the order of ``Problem.incidents``
+    goes_on : whether the line goes on beyond its start and beyond its end
     """
 
     contact: ContactLaw
@@ -50,6 +51,7 @@ class Simulated:
     lowering: bool = False
     vehicle: VehicleMotion | None = None
     incidents: tuple[LineIncident, ...] = ()
+    goes_on: tuple[bool, bool] = (False, False)
 
     def target_height(self, wanted: Profile, x: np.ndarray) -> np.ndarray:
         """Height that a wire is to have at rest at positions ``x``, shape as x [m]."""

@@ -11,7 +11,6 @@ part costs what it costs without incidents. What happens at the end of a step is
 from __future__ import annotations
 
 import gc
-import math
 import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -38,7 +37,7 @@ from catenary.solver.linear.petsc_solvers import (
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import Happened, in_steps
-from catenary.solver.problem.problem import Problem
+from catenary.solver.problem.problem import Problem, steps_of
 from catenary.solver.schemes.adaptive_steps import StepLevels
 from catenary.solver.schemes.make_scheme import Parts, SchemeFactory
 from catenary.solver.schemes.scheme import Scheme
@@ -182,7 +181,7 @@ class March:
     def _happen(self, happened: Happened) -> None:
         """Change the line under way; motion, contacts and counters go on. Collective."""
         before, line, scheme = self._changed, self._line, self._scheme
-        after = changed_line(self._first, self._form, happened.incidents)
+        after, step = changed_line(self._first, self._form, happened.incidents), happened.step
         moving = line.displacement, line.velocity
         kept_ratio = self._first.simulated.kept_ratio
         jump = acceleration_jump(
@@ -196,6 +195,9 @@ class March:
             moved = line.state()
             jumped = self._line.state()
             self._line.restore({name: values + moved[name] for name, values in jumped.items()})
+            past = line.past()
+            if past is not None:
+                self._line.recall(past, step)
             self._scheme.restore(scheme.state())
             self._scheme.counters = scheme.counters
         finally:
@@ -212,9 +214,7 @@ class March:
     @property
     def n_steps(self) -> int:
         """Steps from the start of the run to its end."""
-        train = self._problem.train
-        duration = (train.end - train.start) / train.speed
-        return max(1, math.floor(duration / self._problem.numerics.dt + 1e-9))
+        return steps_of(self._problem)
 
     def restore(self, checkpoint: dict[str, Any]) -> None:
         """Continue from what ``StepView.checkpoint`` gave, on any number of ranks.

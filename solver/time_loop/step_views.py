@@ -173,6 +173,10 @@ class Showing:
             name: _like(checkpoint, name, getattr(pantographs, name)) for name in _OF_PANTOGRAPHS
         }
         on_root(self._comm, lambda: self._refuse_other_states(checkpoint))
+        if line.remembers:
+            if "line_past" not in checkpoint:
+                raise _impossible("line_past is missing")
+            line.recall(np.asarray(checkpoint["line_past"]), int(checkpoint["step"]))
         line.restore(states)
         for name, values in outputs.items():
             getattr(pantographs, name)[:] = values
@@ -249,6 +253,7 @@ class Showing:
             name: self._comm.gather(values.copy(), root=0)
             for name, values in line.exact_state().items()
         }
+        past = line.past()
         if self._comm.rank != 0:
             return None
         numbering, in_rows = self._model.numbering, np.argsort(self._model.row_of_node)
@@ -257,6 +262,8 @@ class Showing:
             for name, parts in whole.items()
             if parts
         }
+        if past is not None:
+            result["line_past"] = past
         result["row_of_node"] = self._model.row_of_node
         result["step"] = self._view.step
         result["contact_force"] = pantographs.contact_force.copy()

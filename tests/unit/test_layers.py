@@ -39,7 +39,7 @@ ROOMS = {
         "response", "lumped", "lowering", "roll", "build",
     ),
     "solver": (
-        "base", "problem", "model", "effects", "linear", "statics", "waves", "integrators",
+        "base", "problem", "model", "ends", "effects", "linear", "statics", "waves", "integrators",
         "contact", "contact_problem", "schemes", "time_loop",
     ),
     "postproc": ("standards", "channels", "files", "read", "record", "evaluate", "film", "paraview",

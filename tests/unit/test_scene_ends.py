@@ -9,10 +9,11 @@ from catenary.cases.run.plan import make_plan, plan_text
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.solver.base.errors import InputError
-from catenary.solver.problem.ends import AbsorbingLayer, Fixed
+from catenary.solver.problem.ends import AbsorbingLayer, Fixed, Periodic
 
 END = "line.ends.end"
 LAYER = f"{END}.kind=absorbing_layer"
+PERIODIC = f"{END}.kind=periodic"
 LONG = "line.n_spans=40"
 
 
@@ -26,12 +27,17 @@ def test_a_layer_has_usual_spans_and_damping_and_may_have_others() -> None:
     assert problem_of(load_scene("en50318_2002", own)).ends == (Fixed(), AbsorbingLayer(8, 3.5))
 
 
+def test_a_line_may_go_on_where_no_dropper_breaks() -> None:
+    broken = "incidents=[{type='dropper_break', at_s=1, span=20, dropper=2}]"
+    assert problem_of(load_scene("en50318_2002", [PERIODIC, broken])).ends[1] == Periodic()
+
+
 @pytest.mark.parametrize(
     ("assignments", "sentence"),
     [
         ([f"{END}.kind=dashpot"], "it must not be dashpot: matched dashpots sqrt.* 0.26 to 0.84"),
         ([f"{END}.kind=tensioner"], "fixed is the end of a wire at its tensioner"),
-        ([f"{END}.kind=free"], "it must be fixed or absorbing_layer"),
+        ([f"{END}.kind=free"], "it must be fixed, absorbing_layer or periodic"),
         ([f"{END}.kind=3"], "line.ends.end.kind"),
         ([f"{END}.spans=4"], "takes spans with kind absorbing_layer, not with fixed"),
         ([f"{END}.damping_per_s=4"], "takes damping_per_s with kind absorbing_layer"),
@@ -42,6 +48,31 @@ def test_a_layer_has_usual_spans_and_damping_and_may_have_others() -> None:
         (
             ["line.ends.start.kind=absorbing_layer", "line.ends.start.spans=7"],
             r"reaches to 420 m, into the evaluated stretch \(evaluation.from_m = 360\)",
+        ),
+        ([PERIODIC, f"{END}.spans=4"], "takes spans with kind absorbing_layer, not with periodic"),
+        ([PERIODIC, "numerics.scheme=ts_alpha2"], "not with ts_alpha2"),
+        ([PERIODIC, "numerics.adaptive_tolerance_N=1"], "adaptive_tolerance_N must not be given"),
+        (
+            [PERIODIC, "line.transition.n_spans_end=2"],
+            "line.transition.n_spans_end must be 0, not 2",
+        ),
+        (
+            [
+                PERIODIC,
+                "line.span_m=[60, 62]",
+                "line.dropper.positions_m=",
+                "line.dropper.count=8",
+                "line.dropper.spacing_m=6.5",
+            ],
+            "must have one length .line.span_m., not 60 and 62 m",
+        ),
+        (
+            [PERIODIC, "incidents=[{type='tension_loss', at_s=1, wire='contact_wire', share=0.8}]"],
+            "which incidents.0 lets wires do",
+        ),
+        (
+            [PERIODIC, "incidents=[{type='dropper_break', at_s=1, span=21, dropper=2}]"],
+            "incidents.0 breaks a dropper .span 21",
         ),
         (
             ["line.ends.middle.kind=fixed"],

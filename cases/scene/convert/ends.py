@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from catenary.cases.scene.tables.ends import EndsTable, EndTable
-from catenary.solver.problem.ends import AbsorbingLayer, EndCondition, Fixed
+from catenary.solver.problem.ends import AbsorbingLayer, EndCondition, Fixed, Periodic
 
 
 def ends_of(table: EndsTable) -> tuple[EndCondition, EndCondition]:
@@ -15,4 +15,4 @@ def _end_of(table: EndTable) -> EndCondition:
     if table.kind == "absorbing_layer":
         assert table.spans is not None and table.damping_per_s is not None
         return AbsorbingLayer(table.spans, table.damping_per_s)
-    return Fixed()
+    return Periodic() if table.kind == "periodic" else Fixed()

@@ -13,7 +13,7 @@ USUAL_LAYER = {"spans": 20, "damping_per_s": 2.0}
 # Kinds of ends that are asked for and are none here, and why.
 _NO_KIND = {
     "dashpot": "must not be dashpot: matched dashpots sqrt(T m) send back 0.26 to 0.84 of a wave "
-    "where droppers join two wires; absorbing_layer takes waves up",
+    "where droppers join two wires; periodic and absorbing_layer take waves up",
     "tensioner": "must not be tensioner: its weights move along the wire, of which the vertical "
     "motion does not depend; fixed is the end of a wire at its tensioner",
 }
@@ -22,10 +22,10 @@ _NO_KIND = {
 class EndTable(Table):
     """How the line ends on one side."""
 
-    kind: Literal["fixed", "absorbing_layer"] = Field(
+    kind: Literal["fixed", "absorbing_layer", "periodic"] = Field(
         "fixed",
-        description="wires held in height, or the same after spans whose damping grows towards the "
-        "end and takes waves up",
+        description="wires held in height; the same after spans whose damping grows towards the "
+        "end and takes waves up; or a line that goes on for ever with spans like the last one",
     )
     spans: int | None = Field(
         None, ge=1, le=1000, description="spans of an absorbing layer, 20 if not given"

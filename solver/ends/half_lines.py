@@ -1,0 +1,181 @@
+"""A periodic half line as seen from its end: the stiffness of all spans beyond, at any frequency.
+
+Spans that are alike, each condensed to the unknowns that it shares with the next one, make a chain
+
+    B u_(j-1) + S u_j + B^T u_(j+1) = f_j .
+
+Condensing every second one of these leaves a chain of spans twice as long, whose coupling falls
+with the square each time as soon as waves fade along it (cyclic reduction; R. W. Hockney, J. ACM
+12, 1965). What is left at the first one is the stiffness of the half line.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from catenary.solver.base.compiled import compiled
+from catenary.solver.base.errors import InputError
+
+# Coupling over diagonal at which the rest of a half line is round-off, squared in another pass; and
+# the most passes: spans are 2^40 times as long then.
+_ROUND_OFF, _MOST_PASSES = 1e-9, 40
+
+
+class SpanMatrices(NamedTuple):
+    """A span between two cross-sections, c + m unknowns: M, C and K, one after the other.
+
+    The m unknowns that a span shares with the one before it stand apart from its c others, which
+    are ordered along the track.
+
+    Attributes
+    ----------
+    bands : (3, c, b + 1) rows of the others: ``bands[:, r, b - d]`` joins r and r - d
+    start, end : (3, c, m) what joins the others with what it shares with the ones before and after
+    corner : (3, m, m) of the unknowns that are shared with the one before, both spans' parts
+    across : (3, m, m) rows of the start, columns of the end: what joins them directly
+    """
+
+    bands: np.ndarray
+    start: np.ndarray
+    end: np.ndarray
+    corner: np.ndarray
+    across: np.ndarray
+
+
+class Chain(NamedTuple):
+    """Spans condensed to what they share, at n frequencies.
+
+    Attributes
+    ----------
+    corner : (n, m, m) of the shared unknowns, before spans are condensed
+    start, end : (n, m, m) what a span takes off ``corner`` at its start and at its end
+    next : (n, m, m) rows of one, columns of the one after it
+    """
+
+    corner: np.ndarray
+    start: np.ndarray
+    end: np.ndarray
+    next: np.ndarray
+
+
+def span_matrices(
+    own: np.ndarray, joined: np.ndarray, shared: np.ndarray, most_wide: int
+) -> SpanMatrices:
+    """A span in the form that is condensed.
+
+    Parameters
+    ----------
+    own, joined : (3, n, n) of its unknowns, and rows of these with columns of the next span's
+    shared : (m,) which of them it shares with the one before
+    most_wide : unknowns that an element may join
+
+    Raises
+    ------
+    InputError
+        If spans share more than what is shared with the one before.
+    """
+    if np.delete(joined, shared, axis=2).any():
+        raise InputError("its spans are joined by more than one cross-section")
+    others = np.setdiff1d(np.flatnonzero(own[0].diagonal() > 0.0), shared)
+    inner = own[:, others][:, :, others]
+    rows, columns = np.nonzero(inner.any(axis=0))
+    width = int(np.abs(rows - columns).max(initial=0))
+    if width > most_wide:
+        raise InputError("its nodes do not stand side by side")
+    bands = np.zeros((3, others.size, width + 1))
+    for d in range(width + 1):
+        bands[:, d:, width - d] = np.diagonal(inner, -d, axis1=1, axis2=2)
+    return SpanMatrices(
+        bands,
+        np.ascontiguousarray(own[:, others][:, :, shared]),
+        np.ascontiguousarray(joined[:, others][:, :, shared]),
+        np.ascontiguousarray(own[:, shared][:, :, shared]),
+        np.ascontiguousarray(joined[:, shared][:, :, shared]),
+    )
+
+
+def chain_at(span: SpanMatrices, weights: np.ndarray) -> Chain:
+    """Spans condensed at frequencies whose ``weights`` (n, 3) M, C and K have, complex."""
+    m = span.corner.shape[1]
+    taken = np.zeros((weights.shape[0], 2 * m, 2 * m), dtype=complex)
+    _condense(weights, span.bands, np.concatenate([span.start, span.end], axis=2), taken)
+    corner, across = (
+        np.einsum("nw,wij->nij", weights, part) for part in (span.corner, span.across)
+    )
+    return Chain(corner, taken[:, :m, :m], taken[:, m:, m:], across - taken[:, :m, m:])
+
+
+def half_lines(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness of the half lines after and before a cross-section, (n, m, m) each.
+
+    ``corner`` is in both, with what the elements on either side of the cross-section add to it.
+
+    Raises
+    ------
+    InputError
+        If waves do not fade along the line at one of the frequencies.
+    """
+    after, before = chain.corner - chain.start, chain.corner - chain.end
+    here = after - chain.end
+    ahead, back = chain.next, np.swapaxes(chain.next, 1, 2)
+    for _ in range(_MOST_PASSES):
+        # Coupling may be large in what it does to slopes beside what it does to deflections.
+        to_ahead, to_back = np.linalg.solve(here, ahead), np.linalg.solve(here, back)
+        forth, round_trip = ahead @ to_back, back @ to_ahead
+        after, before = after - forth, before - round_trip
+        here = here - forth - round_trip
+        ahead, back = -ahead @ to_ahead, -back @ to_back
+        left = np.abs(forth).max(axis=(1, 2)) / np.abs(after).max(axis=(1, 2))
+        if left.max() < _ROUND_OFF**2:
+            return after, before
+    raise InputError("waves do not fade along it at some frequency")
+
+
+@compiled
+def _condense(weights, bands, beside, taken):
+    """Fill ``taken`` (n, k, k) with beside^T inverse(bands) beside, with ``weights`` (n, 3) of M, C
+    and K in each; see ``SpanMatrices``. L D L^T without pivots: with waves that fade, all leading
+    blocks are those of damped lines."""
+    n, width, k = bands.shape[1], bands.shape[2] - 1, beside.shape[2]
+    lower = np.empty((n, width + 1), dtype=np.complex128)
+    forth = np.empty((n, k), dtype=np.complex128)
+    begins = np.full(k, n)
+    for j in range(k):
+        for r in range(n):
+            if beside[0, r, j] != 0.0 or beside[1, r, j] != 0.0 or beside[2, r, j] != 0.0:
+                begins[j] = r
+                break
+    for z in range(weights.shape[0]):
+        of_mass, of_damping, of_stiffness = weights[z]
+        for r in range(n):
+            first = max(0, r - width)
+            pivot = 0j
+            for q in range(first, r + 1):
+                d = width - (r - q)
+                total = of_mass * bands[0, r, d] + of_damping * bands[1, r, d]
+                total += of_stiffness * bands[2, r, d]
+                for p in range(max(first, q - width), q):
+                    # lower holds L D; its diagonal 1 / D.
+                    total -= lower[r, width - (r - p)] * lower[q, width - (q - p)] * lower[p, width]
+                if q < r:
+                    lower[r, d] = total
+                else:
+                    pivot = total
+            lower[r, width] = 1.0 / pivot
+            for j in range(k):
+                if r < begins[j]:
+                    forth[r, j] = 0.0
+                    continue
+                right = of_mass * beside[0, r, j] + of_damping * beside[1, r, j]
+                right += of_stiffness * beside[2, r, j]
+                for q in range(max(first, begins[j]), r):
+                    right -= lower[r, width - (r - q)] * lower[q, width] * forth[q, j]
+                forth[r, j] = right
+            for i in range(k):
+                for j in range(i, k):
+                    taken[z, i, j] += forth[r, i] * lower[r, width] * forth[r, j]
+        for i in range(k):
+            for j in range(i):
+                taken[z, i, j] = taken[z, j, i]

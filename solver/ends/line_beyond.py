@@ -1,0 +1,125 @@
+"""The periodic line beyond an end of a model: spans of one kind, and where they begin.
+
+The line beyond is that of the span next to the last one, over and over: on both sides of it stands
+a span. The last span of the model must be of its kind.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from catenary.solver.base.errors import InputError
+from catenary.solver.ends.half_lines import SpanMatrices, span_matrices
+from catenary.solver.model.matrices import iterate_entries
+from catenary.solver.model.model import Model
+
+# Difference of two spans of a kind, over the largest entry: dropper lengths differ by millimetres
+# where a line ends.
+_ALIKE = 0.02
+_TINY = 1e-6  # [m]
+# Unknowns that an element may join, twice a station's: four in lateral motion of six wires.
+_MOST_WIDE = 47
+
+START, END = 0, 1
+SIDES = ("start", "end")
+
+
+class LineBeyond(NamedTuple):
+    """What goes on beyond an end.
+
+    Attributes
+    ----------
+    unknowns : (m,) of the model, where it ends
+    here : (3, m, m) M, C and K that the model has there without the line beyond
+    span : of the line beyond, from the start of the line on
+    """
+
+    unknowns: np.ndarray
+    here: np.ndarray
+    span: SpanMatrices
+
+
+def line_beyond(model: Model, side: int) -> LineBeyond:
+    """The line that goes on beyond the ``START`` or ``END`` of a model. Not collective.
+
+    What effects hold at the end is not left out.
+
+    Raises
+    ------
+    InputError
+        If the two spans there are not of one kind, or nodes of the wires do not stand side by side.
+    """
+    masts, n = model.problem.line.support_positions, model.problem.line.n_spans
+    where = f"line.ends.{SIDES[side]}.kind is periodic, which repeats the span next to the last one"
+    if n < 3:
+        raise InputError(f"{where}, but the line has less than 3 spans (line.n_spans)")
+    # From inside to the end: the span that is repeated, and the last one.
+    marks = [masts[n - 2], masts[n - 1], masts[n]] if side == END else list(masts[2::-1])
+    if abs(abs(marks[1] - marks[0]) - abs(marks[2] - marks[1])) > _TINY:
+        raise InputError(
+            f"{where}: that has {abs(marks[1] - marks[0]):g} m and the last one "
+            f"{abs(marks[2] - marks[1]):g} m; give both one length"
+        )
+    first, low, high = sorted(marks)
+    numbering = model.numbering
+    begins = [int(numbering.within(x - _TINY, np.inf)[0]) for x in (first, low, high)]
+    size = begins[1] - begins[0]
+    last = numbering.size if side == END else begins[2] + size
+    at_end = begins[2] if side == END else begins[0]
+    try:
+        if begins[2] - begins[1] != size or numbering.size - begins[2] < 1:
+            raise InputError("it has other nodes than the last one")
+        # Rows of the repeated span, and columns up to the next cross-section.
+        start = begins[0] if side == END else begins[1]
+        whole = _matrices(model, start, start + size, start, start + 2 * size)
+        own, joined = whole[:, :, :size], whole[:, :, size:]
+        shared = np.flatnonzero(joined.any(axis=(0, 1)))
+        other = begins[1] if side == END else begins[0]
+        beside = _matrices(model, other, other + size, other, other + size)
+        _refuse_unlike(own, beside, shared)
+        span = span_matrices(own, joined, shared, _MOST_WIDE)
+        unknowns = at_end + shared
+        if unknowns[-1] >= last or not _same_places(model, unknowns, start + shared):
+            raise InputError("wires end elsewhere than at its masts")
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    here = _matrices(model, at_end, int(unknowns[-1]) + 1, at_end, int(unknowns[-1]) + 1)
+    return LineBeyond(unknowns, here[:, shared][:, :, shared], span)
+
+
+def _refuse_unlike(own: np.ndarray, beside: np.ndarray, shared: np.ndarray) -> None:
+    """Raise InputError unless spans are of one kind, the cross-section at the mast left out."""
+    inner = np.setdiff1d(np.arange(own.shape[1]), shared)
+    for ours, theirs in zip(own, beside, strict=True):
+        ours, theirs = ours[np.ix_(inner, inner)], theirs[np.ix_(inner, inner)]
+        if np.abs(ours - theirs).max() > _ALIKE * np.abs(ours).max():
+            raise InputError("the last one is of another kind")
+
+
+def _same_places(model: Model, unknowns: np.ndarray, others: np.ndarray) -> bool:
+    """Whether unknowns are those of the same wires by the same names."""
+    return _places(model, unknowns) == _places(model, others)
+
+
+def _places(model: Model, unknowns: np.ndarray) -> list[tuple[int, str]]:
+    numbers, found = model.numbering.numbers, []
+    wire_of = np.full(model.mesh.n_nodes, -1)
+    for number, nodes in enumerate(model.mesh.wires.values()):
+        wire_of[nodes] = number
+    for unknown in unknowns.tolist():
+        nodes, columns = np.nonzero(numbers == unknown)
+        found += [(int(wire_of[n]), model.unknowns[c]) for n, c in zip(nodes, columns, strict=True)]
+    return found
+
+
+def _matrices(model: Model, first: int, last: int, low: int, high: int) -> np.ndarray:
+    """M, C and K of rows [first, last) and columns [low, high), (3, n, m), held ones included."""
+    result = np.zeros((3, last - first, high - low))
+    kinds = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
+    for matrix, (mass, stiffness, damping) in zip(result, kinds, strict=True):
+        for rows, columns, values in iterate_entries(model, first, last, mass, stiffness, damping):
+            near = (columns >= low) & (columns < high)
+            np.add.at(matrix, (rows[near] - first, columns[near] - low), values[near])
+    return result
