@@ -18,7 +18,7 @@ from catenary.mbs.rigid.bodies import Motion, Vector
 from catenary.mbs.rigid.joints import ORIGIN, PrescribedPoint
 from catenary.mbs.rigid.kinematics import Law, point
 from catenary.mbs.rigid.least_squares import least_squares
-from catenary.mbs.rigid.statics import equilibrium
+from catenary.mbs.rigid.statics import at_rest
 from catenary.mbs.rigid.system import System
 from catenary.solver.base.errors import InputError, RunBroken
 
@@ -143,7 +143,7 @@ def reduce_mechanism(
         there = places[0]
         for height in way:
             try:
-                there = raised.to(height, there.motion)
+                there = raised.from_near(height, there)
             except (InputError, RunBroken):
                 if not as_far_as_it_goes:
                     raise
@@ -165,11 +165,13 @@ def reduce_mechanism(
 
 
 class _Place(NamedTuple):
-    """A mechanism at rest at a ``height``: ``columns`` (4,) of its tables there."""
+    """A mechanism at rest at a ``height``: ``columns`` (4,) of its tables there, and its ``way``
+    (6 n,), the displacement per metre of height."""
 
     height: float
     motion: Motion
     columns: np.ndarray
+    way: np.ndarray
 
 
 class _Raised:
@@ -184,10 +186,17 @@ class _Raised:
     def _law(self, time: float) -> Law:
         return Law(self._height, 0.0, 0.0)
 
+    def from_near(self, height: float, near: _Place) -> _Place:
+        """The system at rest with the point at a height [m], from a place near by."""
+        try:
+            return self.to(height, near.motion.moved((height - near.height) * near.way))
+        except (InputError, RunBroken):  # a way that turns soon leads nowhere
+            return self.to(height, near.motion)
+
     def to(self, height: float, near: Motion) -> _Place:
         """The system at rest with the point at a height [m], assembled from a motion near by."""
         system, self._height = self._system, float(height)
-        motion = equilibrium(self._held, near).motion
+        motion, _ = at_rest(self._held, near)
         rows = self._holder.rows(motion, 0.0)
         jacobian = np.vstack([system.constraints(motion, 0.0).jacobian, rows.jacobian])
         # Of all velocities with unit speed of the point those of least kinetic energy.
@@ -199,7 +208,7 @@ class _Raised:
         # Where the third of the six numbers of a body is its velocity upward.
         carried = system.mass[2::6] @ way[2::6]
         columns = np.array([system.mass @ way**2, lift, damping, carried])
-        return _Place(float(height), motion, columns)
+        return _Place(float(height), motion, columns, way)
 
 
 def _refined(raised: _Raised, places: list[_Place], tolerance: float) -> list[_Place]:
@@ -211,7 +220,7 @@ def _refined(raised: _Raised, places: list[_Place], tolerance: float) -> list[_P
         for low, high in doubtful:
             if high.height - low.height > 2.0 * FINEST:
                 middle = 0.5 * (low.height + high.height)
-                there = raised.to(middle, low.motion)
+                there = raised.from_near(middle, low)
                 if abs(lift(middle) - there.columns[1]) > tolerance:
                     missed.add(middle)
                     places.append(there)

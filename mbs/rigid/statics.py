@@ -57,6 +57,18 @@ def equilibrium(
     RunBroken
         There is no equilibrium near by.
     """
+    motion, left = at_rest(system, start, time, tolerance, max_iterations)
+    return Rest(motion, _multipliers(system, motion, time), left)
+
+
+def at_rest(
+    system: System,
+    start: Motion,
+    time: float = 0.0,
+    tolerance: float = 1e-9,
+    max_iterations: int = 60,
+) -> tuple[Motion, float]:
+    """Place and N^T g of ``equilibrium``, without the multipliers."""
     resting = start.with_velocities(np.zeros(6 * start.n_bodies))
     motion = system.assemble(resting, time).motion
     size = float(np.abs(system.generalised_forces(motion, time)).max())
@@ -66,7 +78,7 @@ def equilibrium(
         unbalanced = free.T @ system.generalised_forces(motion, time)
         left = float(np.abs(unbalanced).max(initial=0.0))
         if left <= tolerance * size:
-            return Rest(motion, _multipliers(system, motion, time), left)
+            return motion, left
         tangent = np.empty((free.shape[1],) * 2)
         for k in range(free.shape[1]):
             ahead, behind = (

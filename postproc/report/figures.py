@@ -15,7 +15,7 @@ from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import AutoLocator, LogLocator, MaxNLocator, NullFormatter
 from matplotlib.transforms import ScaledTranslation
 from PIL import Image
 
@@ -28,6 +28,9 @@ _RESOLUTION = 130
 _LEFT, _RIGHT, _ABOVE, _BELOW = 0.9, 0.12, 0.32, 0.52
 # Between panels that share their x axis, whose inner tick labels are not drawn.
 _SHARED_GAP = 0.44
+# Intervals between ticks at most, along x and y, and their sizes: a tick with its label and its
+# line of the grid takes as long to draw as a curve.
+_MOST_TICKS, _STEPS = (8, 5), (1.0, 2.0, 2.5, 5.0, 10.0)
 # Compression of a PNG: a higher level costs half as much time again and saves a twentieth.
 _LEVEL = 3
 
@@ -86,7 +89,10 @@ def colour(pantograph: int) -> str:
 
 
 def tidy(axes: Axes, x_label: str, y_label: str, title: str = "") -> None:
-    """Labels, light grid and no box."""
+    """Labels, light grid, few ticks and no box."""
+    for axis, most in zip((axes.xaxis, axes.yaxis), _MOST_TICKS, strict=True):
+        if isinstance(axis.get_major_locator(), AutoLocator):
+            axis.set_major_locator(MaxNLocator(most, steps=_STEPS))
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
     _fix_labels(axes)

@@ -101,8 +101,9 @@ def write_report(
         pictures = _pictures(results, statistics)
         content: dict[str, bytes | str] = {f"{p.name}.png": p.data for p in pictures}
         content["droppers.csv"] = csv_tables.droppers_csv(results)
-        content["report.html"] = _html(results, statistics, criteria, pictures)
-        content["summary.json"] = as_json(summarise(results, statistics, criteria))
+        found = indicate(results)
+        content["report.html"] = _html(results, statistics, criteria, found, pictures)
+        content["summary.json"] = as_json(summarise(results, statistics, criteria, found))
         verdict = acceptance.verdict(criteria) if results.complete else None
     return Report(write_into(out, content), criteria, verdict)
 
@@ -182,6 +183,7 @@ def _html(
     results: Results,
     statistics: RunStatistics,
     criteria: list[Criterion],
+    indicators: Indicators,
     pictures: list[_Picture],
 ) -> str:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -195,7 +197,6 @@ def _html(
     )
     environment.filters["number"] = _number
     about = results.attributes
-    indicators = indicate(results)
     return environment.get_template("report.html.j2").render(
         about=about,
         results=results,

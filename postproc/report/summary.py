@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from catenary.meshgen.line import Role
-from catenary.postproc.evaluate import error_indicators
+from catenary.postproc.evaluate.error_indicators import Indicators, as_table, indicate
 from catenary.postproc.evaluate.statistics import PantographStatistics, RunStatistics
 from catenary.postproc.evaluate.verdict import Criterion, verdict
 from catenary.postproc.files.disk import plain
@@ -21,9 +21,15 @@ from catenary.postproc.standards.en50367 import KMH
 
 
 def summarise(
-    results: Results, statistics: RunStatistics, criteria: list[Criterion]
+    results: Results,
+    statistics: RunStatistics,
+    criteria: list[Criterion],
+    indicators: Indicators | None = None,
 ) -> dict[str, Any]:
-    """The content of ``summary.json``: plain Python values, NaN as None. Not collective."""
+    """The content of ``summary.json``: plain Python values, NaN as None. Not collective.
+
+    ``indicators`` are those of the run, None to find them here.
+    """
     attributes = results.attributes
     start, end = results.evaluation
     summary = {
@@ -64,7 +70,7 @@ def summarise(
         "static": _static(results),
         "acceptance": [_criterion(c) for c in criteria],
         "passed": verdict(criteria) if results.complete else None,
-        "indicators": error_indicators.as_table(error_indicators.indicate(results)),
+        "indicators": as_table(indicate(results) if indicators is None else indicators),
         "complaints": statistics.complaints + results.damage,
         "effects_on": [name for name, _, _ in attributes["effects_on"]],
         "effects_off": [name for name, _, _ in attributes["effects_off"]],

@@ -56,6 +56,15 @@ def test_texts_lie_within_the_picture_and_beside_each_other(
         assert not [other for other, its in boxes[place + 1 :] if box.overlaps(its)], words
 
 
+@pytest.mark.parametrize("scale", [1.3e-3, 1.0, 3.1e4])
+def test_a_panel_has_few_ticks(scale: float) -> None:
+    """A tick with its label and its line of the grid takes as long to draw as a curve."""
+    figure = panel_of(scale, 1, False)
+    drawn(figure)
+    (axes,) = figure.axes
+    assert 4 <= len(axes.get_xticks()) <= 10 and 4 <= len(axes.get_yticks()) <= 7
+
+
 def test_the_layout_of_panels_is_not_computed() -> None:
     """It takes as long as the drawing."""
     figure, _ = figures.stacked(3.0, 1)
