@@ -62,5 +62,16 @@ class Pantograph(Protocol):
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
 
+    def places(self) -> np.ndarray:
+        """Numbers that say where its masses or bodies are, (k,); a view or a copy.
+
+        Heights of lumped masses and of an arm, and angles of a head; of a mechanism that is moved
+        body by body its positions and Euler parameters.
+        """
+
+    def base(self, time: float) -> float:
+        """Height at ``time`` [s] of the base that a mechanism's points count from [m]; how far a
+        vehicle has lifted it for lumped masses."""
+
     def energy(self) -> float:
         """Kinetic and elastic energy relative to the springs at rest [J]."""

@@ -121,6 +121,14 @@ class LoweredPantograph:
         self._catch = float(state[-2]) if state[-1] >= 1.0 else None
         self._caught = bool(state[-1] == 2.0)
 
+    def places(self) -> np.ndarray:
+        """Where the model's masses or bodies are; those of what is caught as it was then."""
+        return self.model.places()
+
+    def base(self, time: float) -> float:
+        """Height of the model's base [m]."""
+        return self.model.base(time)
+
     def energy(self) -> float:
         """That of the model [J]; what is caught has none."""
         return 0.0 if self._caught else self.model.energy()

@@ -125,6 +125,10 @@ class LumpedPantograph(SteppedHead):
         """The pantograph as `head_records.fill_head` takes it."""
         return {**super().record(), **self._of_step._asdict(), "model": LUMPED}
 
+    def base(self, time: float) -> float:
+        """How far the vehicle has lifted the base [m]."""
+        return 0.0 if self._base is None else float(self._base.vertical(time).place)
+
     def energy(self) -> float:
         """Kinetic energy, and elastic energy of all springs, the base spring included [J]."""
         stretch = self.position - self._base_height * self._level

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from catenary.cases.cli.app import RunFolder, app
 from catenary.cases.terminal import console
 from catenary.solver.base.errors import InputError
+
+if TYPE_CHECKING:
+    from catenary.mbs.shape import Shape
+    from catenary.postproc.read.records import Records
 
 
 @app.command(
@@ -94,7 +98,9 @@ def animate(
     if not folder.is_dir():
         raise InputError(f"{folder} is no folder; name the folder of a run")
     wish = Wish(start, end, rate, width, motion)
-    film = make_film(folder, wish, examined(folder), progress=not console.is_quiet())
+    records = examined(folder)
+    shapes = _shapes(folder, records)
+    film = make_film(folder, wish, records, not console.is_quiet(), shapes)
     pace = (
         f"{film.slowed:.2g} times slower"
         if film.slowed >= 1
@@ -127,8 +133,27 @@ def paraview(
 
     if not folder.is_dir():
         raise InputError(f"{folder} is no folder; name the folder of a run")
-    script, *others = write_script(folder, examined(folder), motion)
+    records = examined(folder)
+    script, *others = write_script(folder, records, motion, _shapes(folder, records))
     console.say("\n".join(map(str, (script, *others))))
     console.say(f"Open it with: paraview --script={script}")
     if shutil.which("paraview") is None:
         console.warn("paraview is not on this machine (Debian, Ubuntu: apt-get install paraview)")
+
+
+def _shapes(folder: Path, records: Records | None) -> list[Shape] | None:
+    """How the pantographs of a run are drawn, None if its scene is not one of this version."""
+    from catenary.cases.scene.convert.problem import problem_of
+    from catenary.cases.scene.input.origin import Origin
+    from catenary.cases.scene.load import scene_from
+    from catenary.mbs.shape import shape_of
+    from catenary.postproc.read.results import Results
+
+    with Results(folder, records) as results:
+        config = results.attributes["config"]
+    try:
+        problem = problem_of(scene_from(config, Origin(str(folder))))
+        return [shape_of(placement.data) for placement in problem.train.placements]
+    except InputError as error:
+        console.warn(f"pantographs are drawn as schematics: {error}")
+        return None

@@ -116,7 +116,7 @@ def _film_bytes(problem: Problem, recording: Recording, n_snapshots: int) -> flo
     n_points += 2 * line.support_positions.size
     text = n_blocks * (_XDMF_BLOCK + _XDMF_FIELD * len(fields.kinds))
     values = share * snapshot_bytes(fields, extent)
-    return _FIELD_TABLES + 40.0 * n_points + n_snapshots * (values + text + 40 * n_blocks)
+    return _FIELD_TABLES + 40.0 * n_points + n_snapshots * (values + text + 40 * n_blocks + 200)
 
 
 def _tables(problem: Problem, recording: Recording) -> dict[str, tuple[Channel, int]]:

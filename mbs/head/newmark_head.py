@@ -70,6 +70,10 @@ class SteppedHead(ABC):
         """Velocities, upward, shape (n,) [m/s] or [rad/s]."""
         return self._state[self._n : 2 * self._n]
 
+    def places(self) -> np.ndarray:
+        """Heights [m] and angles [rad], the head's first, shape (n,); a view of the state."""
+        return self.position
+
     def place(self, head_height: float, velocity: float = 0.0) -> None:
         """Put the pantograph without contact to where its head is at this height [m].
 

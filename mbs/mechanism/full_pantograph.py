@@ -262,6 +262,16 @@ class FullPantograph:
         stepper.forces = values[19 * n : -1]
         self._hold_down.force = float(values[-1])
 
+    def places(self) -> np.ndarray:
+        """Positions (n, 3) [m] and Euler parameters (n, 4) of the bodies, one after the other."""
+        motion = self.motion
+        return np.concatenate([motion.position[:-1].ravel(), motion.parameters[:-1].ravel()])
+
+    def base(self, time: float) -> float:
+        """Height of the base at ``time`` [s], in the line's heights [m]."""
+        moved = 0.0 if self._base is None else float(self._base.vertical(time).place)
+        return self._zero + moved
+
     def energy(self) -> float:
         """Kinetic energy in the base's axes and elastic energy of springs and stops [J].
 

@@ -165,6 +165,11 @@ class RaisingPantograph(SteppedHead):
             "springs give way faster than its lift falls; make them stiffer."
         )
 
+    def base(self, time: float) -> float:
+        """Height of the base at ``time`` [s], in the line's heights [m]."""
+        moved = 0.0 if self._base is None else float(self._base.vertical(time).place)
+        return self._data.base_height + moved
+
     def follow(self, part: Callable[[float], float]) -> None:
         """Let the part ``part(time)`` of the lift act."""
         self._part = part

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from catenary.mbs.shape import Shape
 from catenary.postproc.film.film_data import FilmData, film_data
+from catenary.postproc.film.pantograph_shape import MovingPantographs
 from catenary.postproc.film.scale import Scale, scale_for
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.read.records import Records
@@ -27,6 +29,8 @@ SIZE = (1280, 720)
 _SHARES = (0.62, 0.38)
 # Length of line in a picture beside one pantograph [m].
 _WIDTH = 110.0
+# How far a picture may reach beyond what the snapshots have [m].
+_NEAR = 3.0
 
 
 @dataclass(frozen=True)
@@ -64,13 +68,20 @@ class Film:
     slowed: float
 
 
-def animate(folder: Path, wish: Wish, records: Records | None, progress: bool) -> Film:
+def animate(
+    folder: Path,
+    wish: Wish,
+    records: Records | None,
+    progress: bool,
+    shapes: Sequence[Shape] | None = None,
+) -> Film:
     """Make ``film.mp4`` and ``film.gif`` in the folder of a run. Not collective.
 
     Parameters
     ----------
     records : what ``guard.examined`` found in the result file
     progress : whether a bar shows how far it is, if standard error is a terminal
+    shapes : of the pantographs, None for a schematic
 
     Raises
     ------
@@ -82,10 +93,11 @@ def animate(folder: Path, wish: Wish, records: Records | None, progress: bool) -
         data = film_data(results)
         with Snapshots(folder, len(data.points)) as snapshots:
             numbers = chosen(snapshots.times, wish)
+            pantographs = MovingPantographs(data, snapshots, shapes)
             from catenary.postproc.film import video
 
             pictures = tqdm(
-                _pictures(data, results, snapshots, numbers, wish),
+                _pictures(data, results, snapshots, numbers, wish, pantographs),
                 total=numbers.size,
                 desc="film",
                 unit="picture",
@@ -139,7 +151,12 @@ def _check_libraries() -> None:
 
 
 def _pictures(
-    data: FilmData, results: Results, snapshots: Snapshots, numbers: np.ndarray, wish: Wish
+    data: FilmData,
+    results: Results,
+    snapshots: Snapshots,
+    numbers: np.ndarray,
+    wish: Wish,
+    pantographs: MovingPantographs,
 ) -> Iterator[np.ndarray]:
     """The pictures (height, width, 3) uint8 of the snapshots, in order."""
     import pyvista
@@ -151,6 +168,7 @@ def _pictures(
     rows = data.row_at(float(times[0])), data.row_at(float(times[-1])) + 1
     spread = float(np.ptp(data.position[0]))
     width = wish.width or _WIDTH + 1.1 * spread
+    _check_width(data, snapshots, numbers, width)
     largest = snapshots.largest_uplift(numbers)
     plotter = pyvista.Plotter(
         shape=(2, 1), row_weights=_SHARES, window_size=SIZE, off_screen=True, border=False
@@ -158,7 +176,7 @@ def _pictures(
     plotter.set_background("white")
     plotter.subplot(0, 0)
     scale = _scale(data, width, largest, wish)
-    view = SideView(plotter, data, scale, largest)
+    view = SideView(plotter, data, scale, largest, pantographs, snapshots.parts)
     plotter.enable_parallel_projection()
     words = plotter.add_text(" ", position=(12, 12), font_size=10, color="black")
     plotter.subplot(1, 0)
@@ -173,13 +191,29 @@ def _pictures(
             middle = float(data.position[row].mean())
             low, high = middle - 0.55 * width, middle + 0.45 * width
             curve.update(row, low, high)
-            view.update(row, snapshots.uplift(number), _slack(results, slack_times, time))
+            slack = _slack(results, slack_times, time)
+            view.update(row, snapshots.uplift(number), slack, pantographs.poses(number))
             words.input = _words(data, scale, row)
             _aim(plotter.camera, curve.sides(), low, high, float(scale.drawn(np.array(view.top))))
             plotter.render()
             yield np.asarray(plotter.image)[..., :3]
     finally:
         plotter.close()
+
+
+def _check_width(data: FilmData, snapshots: Snapshots, numbers: np.ndarray, width: float) -> None:
+    """Raise InputError if pictures would show more of the line than the snapshots have."""
+    x = data.points[data.wires[data.contact], 0]
+    for number in numbers[[0, -1]].tolist():
+        middle = float(data.position[data.row_at(float(snapshots.times[number]))].mean())
+        begin, end = snapshots.shown(number)
+        low, high = max(middle - 0.55 * width, x[0]), min(middle + 0.45 * width, x[-1])
+        if begin > low + _NEAR or end < high - _NEAR:
+            raise InputError(
+                f"a picture of {width:g} m shows the line from {low:.0f} to {high:.0f} m at "
+                f"t = {snapshots.times[number]:g} s, and the snapshots have it from {begin:.0f} to "
+                f"{end:.0f} m only; take a smaller --width-m, or a larger output.field_window_m"
+            )
 
 
 def _scale(data: FilmData, width: float, largest: float, wish: Wish) -> Scale:

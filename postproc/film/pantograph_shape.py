@@ -1,19 +1,83 @@
-"""A pantograph as lines: a schematic of two arms and a head, as high as the record says.
+"""The pantographs of a run as lines, snapshot by snapshot.
 
-The record holds the height of the head. What stands below it is drawn as a lower and an upper arm
-of usual lengths, whatever model of the pantograph was simulated.
+Masses and bodies are drawn where the snapshots have them. Where they have none, or nothing is known
+of the pantograph's model, it is a schematic of two arms under the head.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+
+from catenary.mbs.shape import BELOW_HEAD, BODY, HEAD, Pose, Shape
+from catenary.postproc.film.film_data import FilmData
+from catenary.postproc.film.snapshots import Snapshots
 
 # Lower and upper arm, and half the length of a head along the track [m].
 LOWER_ARM, UPPER_ARM, HALF_HEAD = 1.55, 1.95, 0.45
 # How far the foot stands ahead of the head, towards the knee [m].
 _FOOT_AHEAD = 0.6
-# Height of the foot below the head where arms of these lengths stand well [m].
-BELOW_HEAD = 1.6
+
+
+class Schematic:
+    """Two arms and a head, as high as the record says; a shape as `mbs.shape` has them.
+
+    Parameters
+    ----------
+    foot : height of the foot of the arms [m]
+    """
+
+    cells = np.array([[0, 1], [1, 2], [3, 4]])
+    kinds = np.array([BODY, BODY, HEAD])
+    below = BELOW_HEAD
+
+    def __init__(self, foot: float) -> None:
+        self._foot = foot
+
+    def pose(self, places: np.ndarray, base: float, head: float, wire: float) -> Pose:
+        """Where the points are; foot and knee move by none and half of what the head does."""
+        arms, ends = shape(wire, self._foot)
+        xz = np.concatenate([arms, ends])
+        rest = np.column_stack([xz[:, 0], np.zeros(len(xz)), xz[:, 1]])
+        now = rest.copy()
+        now[:, 2] += np.array([0.0, 0.5, 1.0, 1.0, 1.0]) * (head - wire)
+        return Pose(rest, now)
+
+
+class MovingPantographs:
+    """All pantographs of a run. Not collective.
+
+    Attributes
+    ----------
+    shapes : of each
+    roof : height of the roofs that they stand on [m]
+    """
+
+    def __init__(
+        self, data: FilmData, snapshots: Snapshots, shapes: Sequence[Shape] | None
+    ) -> None:
+        self._data, self._snapshots = data, snapshots
+        contact = float(np.median(data.points[data.wires[data.contact], 2]))
+        known = snapshots.n_pantographs == data.n_pantographs
+        if shapes is None or len(shapes) != data.n_pantographs or not known:
+            shapes = [Schematic(contact - BELOW_HEAD)] * data.n_pantographs
+        self.shapes = list(shapes)
+        self.roof = contact - max(one.below for one in self.shapes)
+
+    def poses(self, number: int) -> list[Pose]:
+        """Places of all points in a snapshot, for each pantograph."""
+        data = self._data
+        row = data.row_at(float(self._snapshots.times[number]))
+        wire = data.rest_height(data.position[row])
+        known = self._snapshots.pantographs(number)
+        found = []
+        for p, one in enumerate(self.shapes):
+            base, places = known[p] if p < len(known) else (0.0, np.zeros(0))
+            pose = one.pose(places, base, float(data.head_height[row, p]), float(wire[p]))
+            x = np.array([data.position[row, p], 0.0, 0.0])
+            found.append(Pose(pose.rest + x, pose.now + x))
+        return found
 
 
 def shape(head: float, foot: float) -> tuple[np.ndarray, np.ndarray]:

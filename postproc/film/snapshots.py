@@ -12,7 +12,7 @@ import numpy as np
 from catenary.postproc.files.checked import text_of
 from catenary.postproc.read.guard import survives
 from catenary.postproc.record.blocks import OTHER_PARTS
-from catenary.postproc.record.fields_file import FORMAT
+from catenary.postproc.record.fields_file import FORMAT, PLACES, SIZES
 from catenary.solver.base.errors import InputError
 
 FIELDS_FILE = "fields.h5"
@@ -22,9 +22,10 @@ _SAMPLED = 400
 
 @dataclass(frozen=True)
 class _Wire:
-    """What snapshots show of a wire: nodes of its points, and points and rows of each snapshot."""
+    """What snapshots show of a wire: nodes and places of its points, rows of each snapshot."""
 
     nodes: np.ndarray
+    x: np.ndarray
     first: np.ndarray
     count: np.ndarray
     start: np.ndarray
@@ -38,6 +39,7 @@ class Snapshots:
     ----------
     times : (n,) times of the snapshots that are there, ascending [s]
     parts : names of the wires and other parts of the line that are shown
+    field : name of the field that lifts points, as ParaView's calculator has it
     whole : whether each snapshot shows all nodes
 
     Parameters
@@ -92,6 +94,11 @@ class Snapshots:
                     "them in output.fields"
                 )
             self._wires = [_wire(group) for group in wires]
+            scalar = all("uplift" in wire for wire in wires)
+            self.field = "uplift" if scalar else "displacement_Z"
+            self._sizes = np.asarray(file[SIZES][...], dtype=int)
+            if file[PLACES].shape != (times.size, self._sizes.size + int(self._sizes.sum())):
+                raise ValueError(f"{PLACES} has another size")
         except (KeyError, OSError, TypeError, ValueError) as error:
             raise InputError(f"{path} is damaged: {error}") from error
         shown = sum(wire.count for wire in self._wires)
@@ -102,6 +109,29 @@ class Snapshots:
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         self._file.close()
+
+    def shown(self, number: int) -> tuple[float, float]:
+        """From and to of the wires in a snapshot, as far as each reaches [m]."""
+        ends = [
+            wire.x[[int(wire.first[number]), int(wire.first[number] + wire.count[number]) - 1]]
+            for wire in self._wires
+        ]
+        low, high = np.array(ends).reshape(-1, 2).T
+        return float(low.min(initial=np.inf)), float(high.max(initial=-np.inf))
+
+    @property
+    def n_pantographs(self) -> int:
+        """Number of pantographs whose masses or bodies are known."""
+        return int(self._sizes.size)
+
+    def pantographs(self, number: int) -> list[tuple[float, np.ndarray]]:
+        """Base, and masses or bodies, of each pantograph in a snapshot; see `mbs.interface`."""
+        row = np.asarray(self._file[PLACES][number], dtype=float)
+        if not np.isfinite(row).all():
+            raise InputError(f"{self._path} is damaged at t = {self.times[number]:g} s")
+        n = self._sizes.size
+        places = np.split(row[n:], np.cumsum(self._sizes)[:-1]) if n else []
+        return list(zip(row[:n].tolist(), places, strict=True))
 
     def need_whole(self, for_what: str) -> None:
         """Raise InputError unless each snapshot shows all nodes, as ``for_what`` needs."""
@@ -154,4 +184,4 @@ def _wire(group: h5py.Group) -> _Wire:
     values = group["uplift" if "uplift" in group else "displacement"]
     if values.shape[0] != int(count.sum()):
         raise ValueError(f"{values.name} is too short")
-    return _Wire(group["nodes"][...], first, count, start, values)
+    return _Wire(group["nodes"][...], group["points"][:, 0], first, count, start, values)

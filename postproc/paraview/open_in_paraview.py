@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 
 import numpy as np
 
+from catenary.mbs.shape import BODY, HEAD, SPRING, Shape
 from catenary.postproc.film.film_data import FilmData, film_data
-from catenary.postproc.film.pantograph_shape import BELOW_HEAD
+from catenary.postproc.film.pantograph_shape import MovingPantographs
 from catenary.postproc.film.scale import scale_for
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.paraview import scenery
@@ -22,16 +24,23 @@ SCRIPT, FOLDER = "view.py", "paraview"
 _TEMPLATE = "view.py.template"
 # Line in the window beside one pantograph [m], width over height of the window, and the share of
 # the room between the wires that the arrow of a mean force fills.
+_THICK = ((BODY, 1.4), (HEAD, 2.0), (SPRING, 0.5))
 _WIDTH, _ASPECT, _ARROW = 110.0, 1280.0 / 480.0, 0.4
 
 
-def write_script(folder: Path, records: Records | None, motion: float | None = None) -> list[Path]:
+def write_script(
+    folder: Path,
+    records: Records | None,
+    motion: float | None = None,
+    shapes: Sequence[Shape] | None = None,
+) -> list[Path]:
     """Write ``paraview/view.py`` and its data into the folder of a run. Not collective.
 
     Parameters
     ----------
     records : what ``guard.examined`` found in the result file
     motion : factor by which motions are drawn larger, None for one that fits
+    shapes : of the pantographs, None for a schematic
 
     Raises
     ------
@@ -42,17 +51,18 @@ def write_script(folder: Path, records: Records | None, motion: float | None = N
     with Results(folder, records) as results:
         data = film_data(results)
         with Snapshots(folder, len(data.points)) as snapshots:
-            settings = _settings(folder, data, snapshots, motion)
+            pantographs = MovingPantographs(data, snapshots, shapes)
+            settings = _settings(folder, data, snapshots, motion, pantographs)
             try:
                 target.mkdir(exist_ok=True)
-                files = scenery.write(data, snapshots.times, target)
+                files = scenery.write(data, pantographs, snapshots.times, target)
                 script = _script(settings)
                 part = target / f".{SCRIPT}.{os.getpid()}"
                 part.write_text(script, encoding="utf-8")
                 os.replace(part, target / SCRIPT)
             except OSError as error:
                 raise InputError(f"{target} cannot be written: {error}") from error
-    return [target / SCRIPT, files.pantographs, files.forces, files.surroundings]
+    return [target / SCRIPT, files.pantographs, files.forces, files.train, files.track]
 
 
 def _script(settings: dict[str, object]) -> str:
@@ -62,26 +72,34 @@ def _script(settings: dict[str, object]) -> str:
 
 
 def _settings(
-    folder: Path, data: FilmData, snapshots: Snapshots, motion: float | None
+    folder: Path,
+    data: FilmData,
+    snapshots: Snapshots,
+    motion: float | None,
+    pantographs: MovingPantographs,
 ) -> dict[str, object]:
     """All numbers of the script."""
     times = snapshots.times
     width = _WIDTH + 1.1 * float(np.ptp(data.position[0]))
     heights = data.points[:, 2]
     contact = heights[data.wires[data.contact]]
-    low, high = float(np.median(contact)) - BELOW_HEAD - 0.4, float(heights.max()) + 0.6
+    low, high = pantographs.roof - 0.4, float(heights.max()) + 0.6
     largest = snapshots.largest_uplift(np.arange(times.size))
     between = float(heights.max() - np.median(contact))
     scale = scale_for(width, high - low, _ASPECT, between, largest, motion)
     first = data.row_at(float(times[0]))
+    kinds = {int(kind) for shape in pantographs.shapes for kind in shape.kinds}
     return {
         "folder": str((folder / FOLDER).absolute()),
         "line": "../fields.xdmf",
         "pantographs": scenery.PANTOGRAPHS,
         "forces": scenery.FORCES,
-        "surroundings": scenery.SURROUNDINGS,
+        "train": scenery.TRAIN,
+        "track": scenery.TRACK,
         "blocks": [[name, "wire" if name in data.wires else name] for name in snapshots.parts],
         "names": data.names,
+        "kinds": [[kind, thick] for kind, thick in _THICK if kind in kinds],
+        "uplift": snapshots.field,
         "height": scale.height,
         "motion": scale.motion,
         "largest_uplift_m": largest,

@@ -1,7 +1,7 @@
-"""Writes what moves or stands beside the line: pantographs, contact forces, track.
+"""Writes what moves or stands beside the line: pantographs, contact forces, train, track.
 
 XDMF files of one grid a time, with a common HDF5 file. Points are places at rest; a field
-``uplift`` moves them, as in ``fields.xdmf``, so that one factor draws all motions larger.
+``displacement`` moves them, as in ``fields.xdmf``, so that one factor draws all motions larger.
 """
 
 from __future__ import annotations
@@ -13,37 +13,34 @@ import h5py
 import numpy as np
 
 from catenary.postproc.film.film_data import FilmData
-from catenary.postproc.film.pantograph_shape import BELOW_HEAD, shape
+from catenary.postproc.film.pantograph_shape import MovingPantographs
+from catenary.postproc.film.train import FACES, boxes
 
-NUMBERS, PANTOGRAPHS, FORCES, SURROUNDINGS = (
-    "scenery.h5", "pantographs.xdmf", "forces.xdmf", "surroundings.xdmf",
+NUMBERS, PANTOGRAPHS, FORCES, TRAIN, TRACK = (
+    "scenery.h5", "pantographs.xdmf", "forces.xdmf", "train.xdmf", "track.xdmf",
 )  # fmt: skip
-# Foot, knee and hinge of the arms, and the ends of the head: how far each moves with the head.
-_SHARES = np.array([0.0, 0.5, 1.0, 1.0, 1.0])
-_CELLS = np.array([[0, 1], [1, 2], [3, 4]], dtype=np.int32)
 # Half the distance of the rails [m].
 _HALF_GAUGE = 0.75
 
 
 @dataclass(frozen=True)
 class Scenery:
-    """Files that were written.
-
-    Attributes
-    ----------
-    pantographs, forces, surroundings : XDMF files
-    """
+    """Files that were written, XDMF all of them."""
 
     pantographs: Path
     forces: Path
-    surroundings: Path
+    train: Path
+    track: Path
 
 
-def write(data: FilmData, times: np.ndarray, folder: Path) -> Scenery:
+def write(
+    data: FilmData, pantographs: MovingPantographs, times: np.ndarray, folder: Path
+) -> Scenery:
     """Write the scenery of a run at some times. Not collective.
 
     Parameters
     ----------
+    pantographs : where their points are
     times : (n,) of the snapshots of the line [s]
     folder : where the files go, which exists
 
@@ -53,64 +50,68 @@ def write(data: FilmData, times: np.ndarray, folder: Path) -> Scenery:
         If they cannot be written.
     """
     p = data.n_pantographs
-    points, cells = track(data)
+    rails, lines_of_rails = track(data)
+    cells, number, kind = _lines_of(pantographs)
+    n_points = sum(int(shape.cells.max()) + 1 for shape in pantographs.shapes)
+    n_corners = len(boxes(data.position[0], pantographs.roof))
     with h5py.File(folder / NUMBERS, "w") as file:
-        file["surroundings/points"], file["surroundings/cells"] = points, cells
-        file["pantographs/cells"] = np.concatenate([_CELLS + 5 * i for i in range(p)])
-        file["pantographs/number"] = np.repeat(np.arange(p, dtype=np.int32), len(_CELLS))
-        for number, time in enumerate(times.tolist()):
-            row, name = data.row_at(time), snapshot_name(number)
-            where, uplift = pantographs(data, row)
-            file[f"pantographs/points/{name}"] = where
-            file[f"pantographs/uplift/{name}"] = uplift.astype("<f4")
-            file[f"forces/points/{name}"] = where[2::5]
-            file[f"forces/uplift/{name}"] = uplift[2::5].astype("<f4")
+        file["track/points"], file["track/cells"] = rails, lines_of_rails
+        file["pantographs/cells"] = cells
+        file["pantographs/number"], file["pantographs/kind"] = number, kind
+        starts = 8 * np.arange(n_corners // 8)[:, None, None]
+        file["train/faces"] = (starts + FACES).reshape(-1, 4).astype(np.int32)
+        for k, time in enumerate(times.tolist()):
+            row, name = data.row_at(time), _name(k)
+            poses = pantographs.poses(k)
+            rest = np.concatenate([pose.rest for pose in poses])
+            moved = np.concatenate([pose.now for pose in poses]) - rest
+            file[f"pantographs/points/{name}"] = rest
+            file[f"pantographs/displacement/{name}"] = moved.astype("<f4")
+            heads = np.zeros((2, p, 3))
+            heads[0, :, 0], heads[0, :, 2] = (
+                data.position[row],
+                data.rest_height(data.position[row]),
+            )
+            heads[1, :, 2] = data.head_height[row] - heads[0, :, 2]
+            file[f"forces/points/{name}"] = heads[0]
+            file[f"forces/displacement/{name}"] = heads[1].astype("<f4")
             force = np.zeros((p, 3), dtype="<f4")
             force[:, 2] = data.force[row]
             file[f"forces/force/{name}"] = force
-    files = Scenery(folder / PANTOGRAPHS, folder / FORCES, folder / SURROUNDINGS)
-    lines = _lines("pantographs/cells", len(_CELLS) * p)
-    number_of = _field("number", "Scalar", "Cell", f"{len(_CELLS) * p}", "pantographs/number", True)
-    _write_text(
-        files.pantographs,
-        [
-            (time, lines, _points(f"pantographs/points/{name}", 5 * p), number_of
-             + _field("uplift", "Scalar", "Node", f"{5 * p}", f"pantographs/uplift/{name}"))
-            for name, time in _named(times)
-        ],
-    )  # fmt: skip
+            file[f"train/points/{name}"] = boxes(data.position[row], pantographs.roof)
+    files = Scenery(*(folder / name for name in (PANTOGRAPHS, FORCES, TRAIN, TRACK)))
+    of_cell = "".join(
+        _field(name, "Scalar", "Cell", f"{len(cells)}", f"pantographs/{name}", True)
+        for name in ("number", "kind")
+    )
+    lines = _cells("Polyline", "pantographs/cells", len(cells), 2)
     dots = f'<Topology TopologyType="Polyvertex" NumberOfElements="{p}" NodesPerElement="1"/>'
-    _write_text(
-        files.forces,
-        [
-            (time, dots, _points(f"forces/points/{name}", p),
-             _field("uplift", "Scalar", "Node", f"{p}", f"forces/uplift/{name}")
-             + _field("force", "Vector", "Node", f"{p} 3", f"forces/force/{name}"))
-            for name, time in _named(times)
-        ],
-    )  # fmt: skip
-    standing = _lines("surroundings/cells", len(cells))
-    place = _points("surroundings/points", len(points))
-    _write_text(files.surroundings, [(None, standing, place, "")])
+    faces = _cells("Quadrilateral", "train/faces", 6 * n_corners // 8, 4)
+    grids = [[], [], []]  # type: list[list[tuple[float | None, str, str, str]]]
+    for k, time in enumerate(times.tolist()):
+        name = _name(k)
+        places = _points(f"pantographs/points/{name}", n_points)
+        grids[0].append((time, lines, places, of_cell + _vector("pantographs", name, n_points)))
+        force_at = _field("force", "Vector", "Node", f"{p} 3", f"forces/force/{name}")
+        places = _points(f"forces/points/{name}", p)
+        grids[1].append((time, dots, places, _vector("forces", name, p) + force_at))
+        grids[2].append((time, faces, _points(f"train/points/{name}", n_corners), ""))
+    for path, own in zip((files.pantographs, files.forces, files.train), grids, strict=True):
+        _write_text(path, own)
+    standing = _cells("Polyline", "track/cells", 2, 2)
+    _write_text(files.track, [(None, standing, _points("track/points", 4), "")])
     return files
 
 
-def pantographs(data: FilmData, row: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points of all pantographs under a line at rest (5 p, 3) [m], and their uplift (5 p,) [m]."""
-    rest = data.rest_height(data.position[row])
-    points, uplift = [], []
-    for x, height, head in zip(data.position[row], rest, data.head_height[row], strict=True):
-        arms, ends = shape(float(height), _foot(data))
-        xz = np.concatenate([arms, ends])
-        points.append(np.column_stack([x + xz[:, 0], np.zeros(5), xz[:, 1]]))
-        uplift.append(_SHARES * (head - height))
-    return np.concatenate(points), np.concatenate(uplift)
-
-
-def _foot(data: FilmData) -> float:
-    """Height of the foot of the pantographs' arms [m]."""
-    nodes = data.wires[data.contact]
-    return float(np.median(data.points[nodes, 2])) - BELOW_HEAD
+def _lines_of(pantographs: MovingPantographs) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lines of all pantographs, and of each the number of its pantograph and what it is of."""
+    cells, number, kind, start = [], [], [], 0
+    for p, shape in enumerate(pantographs.shapes):
+        cells.append(shape.cells + start)
+        number.append(np.full(len(shape.cells), p))
+        kind.append(shape.kinds)
+        start += int(shape.cells.max()) + 1
+    return tuple(np.concatenate(part).astype(np.int32) for part in (cells, number, kind))  # type: ignore[return-value]
 
 
 def track(data: FilmData) -> tuple[np.ndarray, np.ndarray]:
@@ -123,13 +124,9 @@ def track(data: FilmData) -> tuple[np.ndarray, np.ndarray]:
 # ---- XDMF --------------------------------------------------------------------------------------
 
 
-def snapshot_name(number: int) -> str:
-    """Name of the dataset of a snapshot in its group."""
+def _name(number: int) -> str:
+    """Name of the tables of a snapshot."""
     return f"{number:06d}"
-
-
-def _named(times: np.ndarray) -> list[tuple[str, float]]:
-    return [(snapshot_name(number), time) for number, time in enumerate(times.tolist())]
 
 
 def _item(path: str, dimensions: str, whole: bool = False, precision: int = 4) -> str:
@@ -140,11 +137,16 @@ def _item(path: str, dimensions: str, whole: bool = False, precision: int = 4) -
     )
 
 
-def _lines(path: str, n: int) -> str:
+def _cells(kind: str, path: str, n: int, each: int) -> str:
     return (
-        f'<Topology TopologyType="Polyline" NodesPerElement="2" NumberOfElements="{n}">'
-        f"{_item(path, f'{n} 2', True)}</Topology>"
+        f'<Topology TopologyType="{kind}" NodesPerElement="{each}" NumberOfElements="{n}">'
+        f"{_item(path, f'{n} {each}', True)}</Topology>"
     )
+
+
+def _vector(of: str, name: str, n: int) -> str:
+    path = f"{of}/displacement/{name}"
+    return _field("displacement", "Vector", "Node", f"{n} 3", path)
 
 
 def _points(path: str, n: int) -> str:

@@ -21,11 +21,13 @@ class Gathered:
     motions : unknown and whether its rate is meant -> (rows, n_nodes)
     dropper_force : (rows, n_droppers) [N]
     tension : (n_nodes,) of each row [N]
+    pantographs : (rows, k) where their bases, masses and bodies are
     """
 
     motions: Mapping[tuple[str, bool], np.ndarray]
     dropper_force: np.ndarray
     tension: list[np.ndarray]
+    pantographs: np.ndarray
 
 
 class FieldValues:

@@ -16,7 +16,7 @@ from catenary.postproc.record.blocks import RecordedLine, blocks_of
 from catenary.postproc.record.column_gather import ColumnGather, next_flush
 from catenary.postproc.record.field_layout import FieldRecord
 from catenary.postproc.record.field_values import FieldValues, Gathered
-from catenary.postproc.record.fields_file import FieldsFile
+from catenary.postproc.record.fields_file import FieldsFile, LineSize
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.base.parallel import on_root
 from catenary.solver.time_loop.observers import Stage, StepView
@@ -67,6 +67,7 @@ class FieldRecorder:
         self._resume, self._wait = resume, wait
         self._buffered: list[float] = []
         self._tension: list[np.ndarray] = []
+        self._pantographs: list[np.ndarray] = []
         self._file: FieldsFile | None = None
         self._broken = False
         kinds = self._record.kinds
@@ -145,6 +146,8 @@ class FieldRecorder:
             self._force[row] = view.dropper_force
         if self._wants_tension:
             self._tension.append(view.wire_tension())
+        if self._comm.rank == 0:
+            self._pantographs.append(view.pantograph_places())
 
     def _flush(self) -> None:
         times, rows = list(self._buffered), len(self._buffered)
@@ -153,11 +156,12 @@ class FieldRecorder:
             whole = gather(kept[:rows])
             motions[motion] = whole.copy() if len(self._motions) > 1 else whole
         force = self._droppers(self._force[:rows]) if self._wants_droppers else np.zeros((rows, 0))
-        known = Gathered(motions, force, self._tension)
+        places = np.array(self._pantographs)
+        known = Gathered(motions, force, self._tension, places)
         self._buffered.clear()
         if times:
             self._guarded(lambda: self._open_file.append(times, known), times[-1])
-        self._tension = []
+        self._tension, self._pantographs = [], []
 
     def _guarded(self, work: Callable[[], None], time: float) -> None:
         """Run ``work`` on rank 0; if it fails, all ranks raise RunBroken. Collective."""
@@ -181,7 +185,8 @@ class FieldRecorder:
         points, every = stage.node_points, self._every * stage.dt
         values = FieldValues(self._line, points)
         blocks = blocks_of(self._line, points)
-        file = FieldsFile(self._xdmf, self._record, blocks, values, len(points), every)
+        known = LineSize(len(points), stage.n_places)
+        file = FieldsFile(self._xdmf, self._record, blocks, values, known, every)
         # Numbers of the snapshots to come.
         first = -(-self._first_step // self._every)
         numbers = np.arange(first, max(first, stage.n_steps // self._every) + 1)

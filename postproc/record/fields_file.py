@@ -12,6 +12,7 @@ import json
 import logging
 import os
 from pathlib import Path
+from typing import NamedTuple
 
 import h5py
 import numpy as np
@@ -20,6 +21,7 @@ from h5py import h5d, h5p, h5s, h5t
 from catenary.postproc.files.checked import set_attribute, text_of
 from catenary.postproc.files.disk import MARGIN, check_in_place, opened, reserve, write_at
 from catenary.postproc.files.own_files import part_of
+from catenary.postproc.files.trimming import trimmed
 from catenary.postproc.read.guard import survives
 from catenary.postproc.record.blocks import Block
 from catenary.postproc.record.field_layout import FieldRecord, Slots, layout_of
@@ -30,8 +32,22 @@ logger = logging.getLogger("catenary.fields")
 
 # What the file is, as its attribute ``format`` says.
 FORMAT = "catenary-fields-2"
+# Where the bases, masses and bodies of the pantographs are, and how many numbers each has of it.
+PLACES, SIZES = "pantograph_places", "pantograph_sizes"
 # Tables of a block beside its fields.
 AT_REST = ("points", "nodes", "cells", "first", "count", "cell_first", "cell_count")
+
+
+class LineSize(NamedTuple):
+    """Nodes of a whole line, and how many numbers say where each pantograph's masses are."""
+
+    n_nodes: int
+    n_places: tuple[int, ...]
+
+    @property
+    def n_numbers(self) -> int:
+        """Numbers of all pantographs, with the heights of their bases."""
+        return len(self.n_places) + sum(self.n_places)
 
 
 class FieldsFile:
@@ -42,7 +58,7 @@ class FieldsFile:
     xdmf : the XDMF file; the numbers go into the file of the same name ending in ``.h5``
     record, blocks : which part of the line at rest is recorded
     values : makes the values
-    n_nodes : nodes of the whole line
+    size : of line and train
     every : time between two snapshots [s]
     """
 
@@ -52,12 +68,12 @@ class FieldsFile:
         record: FieldRecord,
         blocks: list[Block],
         values: FieldValues,
-        n_nodes: int,
+        size: LineSize,
         every: float,
     ) -> None:
         self._xdmf, self.path = xdmf, xdmf.with_suffix(".h5")
         self._record, self._blocks, self._values = record, blocks, values
-        self._n_nodes, self._every = n_nodes, every
+        self._size, self._every = size, every
         self._written: list[float] = []
         self._planned: list[float] = []
         self._layout: list[Slots] = []
@@ -86,11 +102,12 @@ class FieldsFile:
         self._plan(numbers)
         try:
             with opened(self._made_as, "w") as file:
-                size = MARGIN + 8 * numbers.size + sum(slots.bytes() for slots in self._layout)
-                reserve(file.id.get_vfd_handle(), 0, size)
+                reserve(file.id.get_vfd_handle(), 0, self._n_bytes())
                 self._write_tables(file)
-            with h5py.File(self._made_as, "r") as file:
-                self._find_places(file)
+            file = h5py.File(self._made_as, "r+")
+            self._find_places(file)
+            with trimmed(file):
+                file.close()
         except BaseException:
             self._made_as.unlink(missing_ok=True)
             raise
@@ -148,6 +165,8 @@ class FieldsFile:
                 values = self._values.of(kind, slots, first, known)
                 at = places[kind.name] + kind.item_bytes * slots.row_at(kind, first)
                 write_at(self._handle, at, values)
+        pantographs = np.ascontiguousarray(known.pantographs, dtype="<f8")
+        write_at(self._handle, self._places_at + 8 * first * self._size.n_numbers, pantographs)
         write_at(self._handle, self._times_at + 8 * first, np.array(times, dtype="<f8"))
         self._written += times
         if self._published:
@@ -171,30 +190,36 @@ class FieldsFile:
         self._planned = times.tolist()
         self._layout = layout_of(self._record, self._blocks, times)
 
+    def _n_bytes(self) -> int:
+        """What the file takes at most [B]."""
+        of_time = 8 * len(self._planned) * (1 + self._size.n_numbers)
+        return MARGIN + of_time + sum(slots.bytes() for slots in self._layout)
+
     def _write_tables(self, file: h5py.File) -> None:
         set_attribute(file, "format", FORMAT)
-        set_attribute(file, "n_nodes", self._n_nodes)
+        set_attribute(file, "n_nodes", self._size.n_nodes)
         set_attribute(file, "parts", json.dumps([slots.name for slots in self._layout]))
         file["times"] = np.full(len(self._planned), np.nan)
         # Room in the file now, and no zeros written into it.
         how = h5p.create(h5p.DATASET_CREATE)
         how.set_alloc_time(h5d.ALLOC_TIME_EARLY)
         how.set_fill_time(h5d.FILL_TIME_NEVER)
+        _create(file, PLACES, (len(self._planned), self._size.n_numbers), "<f8", how)
+        file[SIZES] = np.array(self._size.n_places, dtype="<i8")
         for slots in self._layout:
             group = file.create_group(slots.name)
             for name, table in _at_rest(slots).items():
                 group[name] = table
             for kind in slots.kinds:
                 shape = (slots.rows(kind), kind.components)[: 1 + (kind.components > 1)]
-                type_of = h5t.py_create(np.dtype(kind.number))
-                space = h5s.create_simple(shape)
-                h5d.create(group.id, kind.name.encode(), type_of, space, how)
+                _create(group, kind.name, shape, kind.number, how)
                 set_attribute(group[kind.name], "unit", kind.unit)
                 set_attribute(group[kind.name], "meaning", kind.meaning)
 
     def _find_places(self, file: h5py.File) -> None:
         """Where in the file the times and the tables begin [B]; KeyError without one."""
         self._times_at = file["times"].id.get_offset()
+        self._places_at = file[PLACES].id.get_offset() or 0
         self._places: list[dict[str, int]] = []
         for slots in self._layout:
             names = "points", "cells", *(kind.name for kind in slots.kinds)
@@ -215,7 +240,12 @@ class FieldsFile:
         apart = np.diff(times) - self._every
         if not (np.abs(apart) <= 0.01 * self._every).all() or not np.isfinite(times).all():
             raise ValueError("times")
-        spans = [(self._times_at, 8 * len(self._planned))]
+        if file[PLACES].shape != (len(self._planned), self._size.n_numbers):
+            raise ValueError(PLACES)
+        spans = [
+            (self._times_at, 8 * len(self._planned)),
+            (self._places_at, 8 * len(self._planned) * self._size.n_numbers),
+        ]
         for slots, places in zip(self._layout, self._places, strict=True):
             group = file[slots.name]
             for name, table in _at_rest(slots).items():
@@ -242,6 +272,14 @@ class FieldsFile:
             }
             self._text = GrowingXdmf(self._xdmf, blocks, len(self._written))
         self._text.show(len(self._written))
+
+
+def _create(
+    group: h5py.Group, name: str, shape: tuple[int, ...], number: str, how: h5p.PropDCID
+) -> None:
+    """A table as ``how`` says."""
+    kind = h5t.py_create(np.dtype(number))
+    h5d.create(group.id, name.encode(), kind, h5s.create_simple(shape), how)
 
 
 def _at_rest(slots: Slots) -> dict[str, np.ndarray]:

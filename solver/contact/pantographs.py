@@ -166,6 +166,14 @@ class Pantographs:
             contact_force, reported, self._heads.affine, depth, self.ends, self.of_step
         )
 
+    def places(self) -> list[np.ndarray]:
+        """Where masses and bodies of each pantograph are now, see `Pantograph.places`; rank 0."""
+        return [model.places() for model in self.models]
+
+    def bases(self, time: float) -> list[float]:
+        """Heights of the pantographs' bases at ``time`` [s], see `Pantograph.base`; rank 0 [m]."""
+        return [model.base(time) for model in self.models]
+
     def records(self) -> np.ndarray | None:
         """The heads as a compiled loop steps them, None if it cannot step one of them."""
         records = np.zeros(self.n, dtype=HEAD)

@@ -14,7 +14,7 @@ import numpy as np
 from catenary.mbs.head.head_records import drive_width
 from catenary.solver.base.bound import bound
 from catenary.solver.base.petsc_events import event
-from catenary.solver.base.pointers import HeldCall, can_hold_calls
+from catenary.solver.base.pointers import HeldCall, address_of, can_hold_calls
 from catenary.solver.contact.line_response import affine
 from catenary.solver.contact_problem.complementarity_kernels import SmallProblem
 from catenary.solver.contact_problem.coupling import Implicit
@@ -60,6 +60,13 @@ class CompiledSteps:
         n = scheme.interaction.line.ownership.n_local
         self.most_motions = min(_MOST_MOTIONS, _MOTION_BYTES // (16 * n)) if shows else 0
         self._motions = np.zeros((self.most_motions, 2, n))
+        # Where masses of the pantographs are, which is kept with a motion.
+        self._place_arrays = scheme.pantographs.places()
+        addresses = [
+            address_of(array) + 8 * at for array in self._place_arrays for at in range(array.size)
+        ]
+        self._place_taps = np.array(addresses, dtype=np.int64)
+        self._places = np.zeros((self.most_motions, len(addresses)))
         # Of each step the number of the motion that keeps it, -1 if none does.
         self._kept = np.full(self.most, -1)
         pantographs, interaction = scheme.pantographs, scheme.interaction
@@ -128,12 +135,14 @@ class CompiledSteps:
         number : of the kept motion
         """
         motion = self._motions[number, 0], self._motions[number, 1]
-        return self._showing.view_of(step, float(self.times[at]), self.rows[at], motion)
+        places = self._places[number]
+        return self._showing.view_of(step, float(self.times[at]), self.rows[at], motion, places)
 
     def _keep_motion(self, number: int) -> None:
         if number >= 0:
             line = self._scheme.interaction.line
             self._motions[number] = line.displacement, line.velocity
+            self._places[number] = np.concatenate(self._place_arrays)
 
     def _take_on(self, n_steps: int) -> bool:
         """Go on with a block as far as the loop can; whether the scheme has to finish a step."""
@@ -186,7 +195,7 @@ class CompiledSteps:
             shown=self._showing.shown,
             taps=self._showing.layout.taps,
         )
-        kept = self._kept, self._motions
+        kept = self._kept, self._motions, self._place_taps, self._places
         return steps, self.times, self._drives, self.rows, kept, self._counts, self._shows
 
 

@@ -29,6 +29,7 @@ class Stage:
     node_points : (n_nodes, 3) static equilibrium shape of the line [m], z up
     owned_nodes : node numbers of what ``StepView.node_motion`` returns, one owner each
     unknowns : names of the unknowns that nodes have
+    n_places : how many numbers say where each pantograph's masses or bodies are; on rank 0
     """
 
     n_pantographs: int
@@ -43,6 +44,7 @@ class Stage:
     owned_nodes: np.ndarray
     n_strips: tuple[int, ...] = ()
     unknowns: tuple[str, ...] = ("w", "theta_y")
+    n_places: tuple[int, ...] = ()
     joints_in_loop: bool = False
 
     @property
@@ -68,6 +70,8 @@ class StepView:
         [-], [1/s], zero for nodes without it; not collective
     wire_tension : () -> (n_nodes,) tension of the wires ahead of all nodes [N], the same array as
         long as it does not change; not collective
+    pantograph_places : () -> heights of the pantographs' bases, then where masses and bodies of
+        each are, see `mbs.interface`, one array on rank 0, empty elsewhere; not collective
     line_state : () -> displacement, velocity and acceleration of the rank's unknowns, by these
         names; not collective
     energies : () -> the values of ``channels.ENERGIES`` but the time, kinetic and elastic energy of
@@ -82,6 +86,7 @@ class StepView:
     node_uplift: Callable[[], np.ndarray]
     node_motion: Callable[[str, bool], np.ndarray]
     wire_tension: Callable[[], np.ndarray]
+    pantograph_places: Callable[[], np.ndarray]
     line_state: Callable[[], Mapping[str, np.ndarray]]
     energies: Callable[[], tuple[float, ...]]
     checkpoint: Callable[[], dict[str, Any] | None]
@@ -121,6 +126,8 @@ class Observer(Protocol):
 @runtime_checkable
 class MotionObserver(Observer, Protocol):
     """A `BlockObserver` that at some steps needs the motion of nodes or ``energies`` and no more.
+
+    The places of pantographs are kept as well.
 
     A block goes on behind them. It is shown these steps by ``observe``; what else a view has, the
     row excepted, is refused.

@@ -112,13 +112,14 @@ def take(steps, times, drives, rows, kept_motions, counts, shows, first, n_steps
     """Take the steps from ``first`` on of ``n_steps`` to ``times`` [s], with ``drives`` of heads.
 
     If ``shows``, ``rows`` take what each shows. ``kept_motions`` holds of each the number of the
-    motion that keeps it, -1 if none does, and the motions (m, 2, n_local).
+    motion that keeps it, -1 if none does, and the motions (m, 2, n_local); then addresses (k,) of
+    numbers that are kept with a motion, and room for them (m, k).
 
     Returns how many were taken, and whether the next one is begun: up to its free step, as its
     forces are left to others.
     """
     steps, times, drives, rows, kept_motions = borrowed((steps, times, drives, rows, kept_motions))
-    motion_of, motions = kept_motions
+    motion_of, motions, kept_taps, kept_numbers = kept_motions
     (start, places), speed, loading = steps.moving, steps.speed, steps.loading
     records, heads, taps, shown = steps.records, steps.heads, steps.taps, steps.shown
     problem, law, switched, outputs = steps.problem, steps.law, steps.switched, steps.outputs
@@ -165,4 +166,6 @@ def take(steps, times, drives, rows, kept_motions, counts, shows, first, n_steps
             if number >= 0:
                 state_kernels.displacements(motion, motions[number, 0])
                 state_kernels.velocities(motion, motions[number, 1])
+                for j in range(kept_taps.size):
+                    kept_numbers[number, j] = numbers_at(kept_taps[j], 1)[0]
     return n_steps - first, False

@@ -77,6 +77,7 @@ class Showing:
         self._sources = Sources(pantographs, interaction, scheme, uplift, tension, by_name)
         self.layout = RowLayout(self._sources, self._shown)
         self._kept_motion: tuple[np.ndarray, np.ndarray] | None = None
+        self._kept_places = np.zeros(0)
         self._view = StepView(
             step=0,
             time=0.0,
@@ -85,6 +86,7 @@ class Showing:
             node_uplift=lambda: self._displacement()[self._node_rows],
             node_motion=self._node_motion,
             wire_tension=lambda: self._tension,
+            pantograph_places=self._pantograph_places,
             line_state=self._line_state,
             energies=self._energies,
             checkpoint=self._checkpoint,
@@ -113,6 +115,7 @@ class Showing:
             owned_nodes=self._owned_nodes,
             n_strips=self._pantographs.n_strips,
             unknowns=self._model.unknowns,
+            n_places=tuple(places.size for places in self._pantographs.places()),
             joints_in_loop=self._pantographs.joints_in_loop,
         )
 
@@ -132,12 +135,15 @@ class Showing:
         time: float,
         row: np.ndarray,
         motion: tuple[np.ndarray, np.ndarray] | None = None,
+        places: np.ndarray | None = None,
     ) -> StepView:
         """The state after a step that a compiled loop has shown as ``row`` of a view.
 
-        If it was not the latest one, ``motion`` is what is left of it: displacement and velocity.
+        If it was not the latest one, ``motion`` is what is left of it: displacement and velocity,
+        and ``places`` those of the pantographs.
         """
         view, self._kept_motion = self._view, motion
+        self._kept_places = np.zeros(0) if places is None else places
         view.step, view.time = step, time
         view.row[:] = row
         self._shown[:] = row[: self._shown.size]
@@ -208,6 +214,11 @@ class Showing:
         numbers = numbering.numbers[self._owned_nodes, numbering.names.index(name)]
         own = numbers - line.ownership.first
         return np.where(numbers >= 0, kept[rate][own], 0.0)
+
+    def _pantograph_places(self) -> np.ndarray:
+        """Heights of the bases, then places of masses and bodies, on rank 0."""
+        now = self._pantographs.places() if self._kept_motion is None else [self._kept_places]
+        return np.concatenate([self._pantographs.bases(self._view.time), *now])
 
     @cached_property
     def _tension(self) -> np.ndarray:

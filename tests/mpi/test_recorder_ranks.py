@@ -108,6 +108,7 @@ def make_view(step: int, share: Share) -> StepView:
         node_uplift=lambda: 1e-3 * step + share(N_NODES),
         node_motion=lambda name, rate: 1e-3 * step + (2.0 if rate else 1.0) * share(N_NODES),
         wire_tension=lambda: 10.0 * step + np.arange(N_NODES),
+        pantograph_places=lambda: np.zeros(0),
         line_state=dict,
         energies=lambda: (COMM.allreduce(1.0), float(step)),
         checkpoint=lambda: checkpoint(step),

@@ -96,21 +96,25 @@ def test_both_readers_play_all_times(folder: Path, reader: str, tmp_path: Path) 
     probe = tmp_path / "probe.py"
     probe.write_text(PROBE)
     names = [folder / "fields.xdmf", *(folder / "paraview" / f"{name}.xdmf" for name in
-             ("pantographs", "forces", "surroundings"))]  # fmt: skip
+             ("pantographs", "forces", "train", "track"))]  # fmt: skip
     text = on_screen("pvpython", probe, reader, *names)
     found = json.loads(text.split("FOUND ", 1)[1].splitlines()[0])
     with Results(folder) as results:
         n, heads = results.n_pantographs, results.extremes("head_height")
         first, last = results.channel("contact_position")[[0, -1]]
-    line, arms, forces, around = (found[str(name)] for name in names)
+    line, arms, forces, train, track = (found[str(name)] for name in names)
     assert line["times"] == arms["times"] == forces["times"] and len(line["times"]) > 20
-    assert [row[0] for row in arms["ranges"]] == [5 * n] * len(arms["times"])
+    assert train["times"] == line["times"]
+    # Head, frame and two springs of each.
+    (points,) = {row[0] for row in arms["ranges"]}
+    assert points == n * (6 + 4 + 2 * 10)
     assert [row[0] for row in forces["ranges"]] == [n] * len(arms["times"])
     for row, place in ((arms["ranges"][0], first), (arms["ranges"][-1], last)):
         low, high = row[1][:2]
-        assert low == pytest.approx(place.min() - 0.45, abs=2.5)
-        assert high >= place.max() and high < place.max() + 4.5
-    assert around["ranges"][0][1][5] < heads.max()
+        assert low == pytest.approx(place.min() - 0.7, abs=2.5)
+        assert high == pytest.approx(place.max() + 0.7, abs=2.5)
+    assert track["ranges"][0][1][5] == 0.0
+    assert all(row[1][5] < heads.max() - 1.0 for row in train["ranges"])
     names = ["contact_wire", "messenger_wire", "droppers", "steady_arms", "masts"]
     if reader == "XDMFReader":
         assert all([name for name, _ in blocks] == names for blocks in line["blocks"])

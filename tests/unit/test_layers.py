@@ -36,7 +36,7 @@ ROOMS = {
         "gmsh_lines", "reader", "build"),
     "mbs": (
         "frame", "interface", "rigid", "time_steps", "vehicle", "head", "mechanism", "lumped_data",
-        "response", "lumped", "lowering", "roll", "build",
+        "response", "lumped", "lowering", "roll", "shape", "build",
     ),
     "solver": (
         "base", "problem", "model", "ends", "effects", "linear", "statics", "waves", "integrators",

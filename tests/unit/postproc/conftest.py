@@ -182,6 +182,7 @@ class March:
             owned_droppers=self.own(self.dropper_x.size),
             node_points=self.mesh.points,
             owned_nodes=self.own(self.mesh.n_nodes),
+            n_places=(2,) * len(self.separations),
         )
 
     def position(self, t: float) -> np.ndarray:
@@ -207,6 +208,12 @@ class March:
             wake = 0.02 * np.exp(np.minimum(ahead, 0.0) / 60.0) * np.sin(0.35 * ahead)
             total += hump + np.where(ahead < 0, wake, 0.0)
         return total
+
+    def places(self, t: float) -> np.ndarray:
+        """Bases at rest, heights of a head and of the frame below it for each pantograph [m]."""
+        x, n = self.position(t), len(self.separations)
+        heads = 5.28 + self.wave(t, x)
+        return np.concatenate([np.zeros(n), np.column_stack([heads, 0.5 * heads]).ravel()])
 
     def motion(self, t: float, x: np.ndarray, name: str, rate: bool) -> np.ndarray:
         """The wave, its slope, or the rate of them."""
@@ -242,6 +249,7 @@ class March:
             node_uplift=lambda: self.wave(t, nodes),
             node_motion=lambda name, rate: self.motion(t, nodes, name, rate),
             wire_tension=lambda: self.tension,
+            pantograph_places=lambda: self.places(t),
             line_state=dict,
             energies=lambda: (2.0 + np.sin(t), 3.0 + np.cos(t)),
             checkpoint=lambda: {"step": step, "state": np.full(50, float(step)), "kind": "made up"},

@@ -9,12 +9,15 @@ import h5py
 import numpy as np
 import pytest
 
-from catenary.postproc.film import animate, pantograph_shape, scale
+from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.shape import BODY, HEAD, shape_of
+from catenary.postproc.film import animate, pantograph_shape, scale, train
 from catenary.postproc.film.animate import SIZE, Wish
 from catenary.postproc.film.film_data import film_data
-from catenary.postproc.film.pantograph_shape import LOWER_ARM, UPPER_ARM
+from catenary.postproc.film.pantograph_shape import LOWER_ARM, UPPER_ARM, MovingPantographs
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.read.results import Results
+from catenary.postproc.record.field_layout import Course, FieldRecord
 from catenary.postproc.record.fields import FieldRecorder
 from catenary.solver.base.errors import InputError
 
@@ -114,6 +117,49 @@ def test_what_cannot_be_shown_is_refused(folder: Path) -> None:
         Snapshots(folder, n_nodes)
 
 
+def test_masses_are_where_the_snapshots_have_them(folder: Path, make_march: Any) -> None:
+    march = make_march(n_steps=1000, separations=(0.0,))
+    shape = shape_of(LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0)))
+    with Results(folder) as results:
+        data = film_data(results)
+        with Snapshots(folder, len(data.points)) as snapshots:
+            moving = MovingPantographs(data, snapshots, [shape])
+            (pose,) = moving.poses(7)
+    row = data.row_at(0.35)
+    boxes = np.unique(shape.cells[shape.kinds == BODY])
+    frame = march.places(0.35)[2]
+    wire = data.rest_height(data.position[row])[0]
+    np.testing.assert_allclose((pose.now - pose.rest)[boxes, 2], frame - wire)
+    head = np.unique(shape.cells[shape.kinds == HEAD])
+    np.testing.assert_allclose(pose.now[head, 2], data.head_height[row, 0])
+    assert pose.now[head, 0].mean() == pytest.approx(data.position[row, 0])
+
+
+def test_a_picture_wider_than_the_snapshots_is_refused(
+    tmp_path: Path, make_march: Any, record_run: Any
+) -> None:
+    march = make_march(n_steps=500, separations=(0.0,))
+    start = float(march.position(0.0)[0])
+    record = FieldRecord(window=(40.0, 30.0), course=Course(start, start, march.speed))
+    path = tmp_path / "fields.xdmf"
+    march.drive(FieldRecorder(march.comm, path, march.recorded, every=50, record=record))
+    record_run(tmp_path / "run.h5", march)
+    with pytest.raises(InputError, match=r"--width-m, or a larger output\.field_window_m"):
+        animate.animate(tmp_path, Wish(width=150.0), None, progress=False)
+    film = animate.animate(tmp_path, Wish(0.1, 0.2, width=60.0), None, progress=False)
+    assert film.n_pictures == 3
+
+
+def test_coaches_carry_all_pantographs() -> None:
+    for position in (np.array([100.0]), np.array([100.0, 0.0]), np.array([400.0, 200.0, 31.0])):
+        spans = train.coaches(position)
+        for x in position:
+            on = (spans[:, 0] - train.GAP < x) & (x < spans[:, 1])
+            assert on.any()
+        np.testing.assert_allclose(spans[:, 1] - spans[:, 0], train.COACH)
+        assert train.boxes(position, 3.6).shape == (8 * len(spans), 3)
+
+
 def test_snapshots_are_chosen_by_time() -> None:
     times = 0.05 * np.arange(21)
     assert animate.chosen(times, Wish()).tolist() == list(range(21))
@@ -136,7 +182,8 @@ def test_the_pantograph_stands_above_its_force_and_the_masts_where_they_are(fold
         data = film_data(results)
         with Snapshots(folder, len(data.points)) as snapshots:
             numbers = animate.chosen(snapshots.times, Wish(0.5, 0.6))
-            pictures = list(animate._pictures(data, results, snapshots, numbers, Wish(width=100.0)))
+            wish, schematic = Wish(width=100.0), MovingPantographs(data, snapshots, None)
+            pictures = list(animate._pictures(data, results, snapshots, numbers, wish, schematic))
     assert [picture.shape for picture in pictures] == [(SIZE[1], SIZE[0], 3)] * 3
     picture = pictures[1]
     red = (0xB2, 0x18, 0x2B)
@@ -157,7 +204,7 @@ def test_the_pantograph_stands_above_its_force_and_the_masts_where_they_are(fold
 
 def masts_of(picture: np.ndarray) -> np.ndarray:
     """Middles of the masts in a picture [columns]."""
-    columns = columns_of(picture, (0xB8, 0xBC, 0xC2), slice(345, 375))
+    columns = columns_of(picture, (0xB8, 0xBC, 0xC2), slice(285, 315))
     groups = np.split(columns, np.flatnonzero(np.diff(columns) > 20) + 1)
     return np.array([group.mean() for group in groups])
 

@@ -40,12 +40,13 @@ def test_heads_arms_and_forces_are_where_the_record_has_them(folder: Path) -> No
         row = data.row_at(time)
         arms.set_active_time_value(time)
         grid = arms.read()
-        height = grid.points[:, 2] + grid.point_data["uplift"]
+        moved = grid.point_data["displacement"]
+        height = grid.points[:, 2] + moved[:, 2]
         # Foot, knee, hinge and both ends of the head of each; the hinge is where the head is.
         np.testing.assert_allclose(height[2::5], data.head_height[row], atol=1e-7)
         np.testing.assert_allclose(grid.points[2::5, 0], data.position[row])
         np.testing.assert_array_equal(grid.cell_data["number"], np.repeat([0, 1], 3))
-        np.testing.assert_array_equal(grid.point_data["uplift"][0::5], 0.0)
+        np.testing.assert_array_equal(moved[0::5], 0.0)
         forces.set_active_time_value(time)
         vectors = forces.read().point_data["force"]
         np.testing.assert_allclose(vectors[:, 2], data.force[row], rtol=1e-6)

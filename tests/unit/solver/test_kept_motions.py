@@ -21,12 +21,14 @@ N_STEPS, EVERY = 250, 7
 
 
 class Looking:
-    """Takes energies and uplift at every seventh step, and rows of all."""
+    """Takes energies, uplift and places of masses at every seventh step, and rows of all."""
 
     def __init__(self) -> None:
         self.rows: list[np.ndarray] = []
         self.energies: list[tuple[float, ...]] = []
         self.uplift: list[np.ndarray] = []
+        self.motion: list[np.ndarray] = []
+        self.places: list[np.ndarray] = []
         self.refused = 0
 
     def start(self, stage: Stage) -> None:
@@ -48,6 +50,10 @@ class Looking:
         if view.step % EVERY == 0:
             self.energies.append(view.energies())
             self.uplift.append(view.node_uplift().copy())
+            motion = [view.node_motion(n, rate) for n in ("w", "theta_y") for rate in (False, True)]
+            self.motion.append(np.array(motion))
+            self.places.append(view.pantograph_places())
+            np.testing.assert_array_equal(self.motion[-1][0], self.uplift[-1])
         try:
             view.checkpoint()
         except RuntimeError:
@@ -100,6 +106,9 @@ def test_kept_motions_are_those_of_single_steps(
     assert np.array_equal(found.rows, expected.rows, equal_nan=True)
     assert np.array_equal(found.energies, expected.energies)
     assert np.array_equal(found.uplift, expected.uplift)
+    assert np.array_equal(found.motion, expected.motion)
+    assert np.array_equal(found.places, expected.places)
+    assert (np.ptp(found.places, axis=0)[1:] > 1e-4).all(), "all masses move"
     assert np.ptp([kinetic for kinetic, _ in found.energies]) > 0.0
 
 

@@ -1,0 +1,78 @@
+"""Pantographs as lines: bodies keep their lengths, heads are where the record has them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from paper_pantograph import data as seven_bodies
+
+from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.mechanism.pantograph_data import stand
+from catenary.mbs.shape import BELOW_HEAD, BODY, HEAD, SPRING, shape_of
+
+THREE = LumpedData((6.0, 9.0, 5.8), (160.0, 15500.0, 7000.0), (100.0, 0.0, 70.0))
+
+
+def test_lumped_masses_move_as_they_do() -> None:
+    shape = shape_of(THREE)
+    pose = shape.pose(np.array([5.1, 5.06, 5.02]), 0.0, 5.1, 5.0)
+    lifted = pose.now - pose.rest
+    np.testing.assert_array_equal(lifted[:, :2], 0.0)
+    points = {kind: np.unique(shape.cells[shape.kinds == kind]) for kind in (HEAD, BODY, SPRING)}
+    np.testing.assert_allclose(pose.now[points[HEAD], 2], 5.1)
+    # Two boxes of four corners below the head.
+    np.testing.assert_allclose(lifted[points[BODY], 2], np.repeat([0.06, 0.02], 4), atol=1e-12)
+    springs = lifted[points[SPRING], 2]
+    assert springs.max() == pytest.approx(0.1) and springs.min() == pytest.approx(0.0)
+    assert pose.rest[:, 2].min() == pytest.approx(5.0 - BELOW_HEAD + 0.06)
+    moved = shape.pose(np.array([5.1, 5.06, 5.02]), 0.01, 5.1, 5.0)
+    assert (moved.now - pose.now)[:, 2].max() == pytest.approx(0.01), "a vehicle lifts the roof"
+
+
+def test_a_single_mass_stands_on_its_spring() -> None:
+    shape = shape_of(LumpedData((10.0,), (100.0,), (50.0,)))
+    assert set(shape.kinds) == {HEAD, SPRING}
+    pose = shape.pose(np.array([5.2]), 0.0, 5.2, 5.0)
+    assert pose.now[:, 2].max() == pytest.approx(5.2)
+
+
+def test_bodies_of_a_reduced_mechanism_keep_their_lengths() -> None:
+    data = seven_bodies()
+    shape, standing = shape_of(data), stand(data)
+    zero = 3.0
+    head = zero + standing.working_height + standing.head.offset
+    bodies = shape.cells[shape.kinds == BODY]
+    lengths, places = [], []
+    for lifted in (-0.45, -0.2, 0.0, 0.13, 0.45):
+        arm = np.array([head + lifted, head + lifted])
+        pose = shape.pose(arm, zero, head + lifted - 0.01, head)
+        np.testing.assert_allclose(
+            pose.now[np.unique(shape.cells[shape.kinds == HEAD]), 2], head + lifted - 0.01, atol=0.2
+        )
+        ends = pose.now[bodies]
+        lengths.append(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1))
+        places.append(pose.now)
+        at_rest = pose.rest[bodies]
+        still = np.linalg.norm(at_rest[:, 0] - at_rest[:, 1], axis=1)
+        np.testing.assert_allclose(lengths[-1], still, atol=2e-3)
+    assert np.ptp(places, axis=0)[:, 2].max() > 0.8 > 0.2 < np.ptp(places, axis=0)[:, 0].max()
+    # The place of a pantograph is that of its head.
+    np.testing.assert_allclose(
+        places[2][np.unique(shape.cells[shape.kinds == HEAD]), 0], 0.0, atol=0.5
+    )
+
+
+def test_all_bodies_are_where_the_loop_has_them() -> None:
+    data = seven_bodies()
+    shape, standing = shape_of(data), stand(data)
+    motion = standing.motion
+    head = 3.0 + standing.working_height + standing.head.offset
+    places = np.concatenate([motion.position[:-1].ravel(), motion.parameters[:-1].ravel()])
+    reduced = shape.pose(np.array([head, head]), 3.0, head, head)
+    whole = shape.pose(places, 3.0, head, head)
+    np.testing.assert_allclose(whole.now, reduced.now, atol=1e-9)
+    # A body that is moved by itself takes its own points along.
+    upper = motion.numbers["upper_arm"]
+    places[3 * upper + 2] += 0.1
+    moved = shape.pose(places, 3.0, head, head).now - whole.now
+    np.testing.assert_allclose(np.unique(np.round(moved[:, 2], 12)), [0.0, 0.1])
