@@ -99,5 +99,5 @@ def _check_heights(line: Line, group: Droppers) -> None:
             f"at the dropper at {at - masts[span - 1]:g} m of span {span} the {over} is expected "
             f"to hang {-length[short[0]]:.3f} m below the {under}: raise the encumbrance "
             f"({upper.top - lower.top:g} m), raise the {over}'s tension or lower the rise of the "
-            "transition spans"
+            "transition spans or of the overlap"
         )

@@ -74,8 +74,9 @@ class Profile:
 
     height : at the masts of the running spans [m]
     sag_x, sag : pre-sag below that height at positions along the track, linear between them [m]
-    rise : height gained over all transition spans of one end [m]
-    ends, running : from and to of the line and of its running spans [m]
+    rise : height gained over all transition spans at the start, and at the end [m]
+    ends, running : from and to of the wire and of where it is level [m]
+    end_rise : height gained at the end if it is another one [m]
     """
 
     height: float
@@ -84,12 +85,20 @@ class Profile:
     rise: float
     ends: tuple[float, float]
     running: tuple[float, float]
+    end_rise: float | None = None
+
+    @property
+    def rises(self) -> bool:
+        """Whether it is higher anywhere than where it is level, pre-sag aside."""
+        at_end = self.rise if self.end_rise is None else self.end_rise
+        rising = self.rise > 0.0 and self.running[0] > self.ends[0]
+        return rising or (at_end > 0.0 and self.running[1] < self.ends[1])
 
     def level(self, x: np.ndarray) -> np.ndarray:
         """Height without pre-sag at positions ``x`` [m], shape as ``x``.
 
         Constant in the running spans; in the transition spans a parabola that leaves the running
-        height without a kink and has gained ``rise`` at the anchor.
+        height without a kink and has gained its rise at the anchor.
         """
         x = np.asarray(x, dtype=float)
         start, end = self.running
@@ -99,7 +108,7 @@ class Profile:
             height += self.rise * into**2
         if end < self.ends[1]:
             into = np.clip((x - end) / (self.ends[1] - end), 0.0, None)
-            height += self.rise * into**2
+            height += (self.rise if self.end_rise is None else self.end_rise) * into**2
         return height
 
     def pre_sag(self, x: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from catenary.meshgen.topologies import (  # noqa: F401  register themselves
     twin,
 )
 from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.topologies.overlap import with_overlap
 from catenary.meshgen.topologies.registry import registered
 from catenary.solver.base.errors import InputError
 
@@ -31,7 +32,8 @@ def make_line(data: LineData) -> Line:
         if getattr(data, part) is None:
             raise InputError(f"the topology {data.topology} needs {part}")
     data.check()
-    return topology.make(data)
+    line = topology.make(data)
+    return line if data.overlap is None else with_overlap(line, data.overlap)
 
 
 __all__ = ["make_line", "registered"]

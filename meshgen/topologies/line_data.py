@@ -67,6 +67,23 @@ class Bridle:
 
 
 @dataclass(frozen=True)
+class Overlap:
+    """Spans in which one tension section ends and the next one begins.
+
+    Attributes
+    ----------
+    first, n_spans : number of its first span, from 0, and how many there are
+    rise : height that contact wires gain from its middle to the end of their section [m]
+    distance : of the wires of the two sections from each other, sideways [m]
+    """
+
+    first: int
+    n_spans: int
+    rise: float
+    distance: float
+
+
+@dataclass(frozen=True)
 class LineData(Spans):
     """What a scene says of a line.
 
@@ -82,6 +99,7 @@ class LineData(Spans):
     transition_rise : height gained by the contact wire over all transition spans of one end [m]
     topology : name of the topology that makes the line
     auxiliary_wire, stitch_wire, twin, bridle : parts of which some topologies make wires
+    overlap : where the line consists of two tension sections, None if of one
     """
 
     dropper_positions: tuple[tuple[float, ...], ...]
@@ -100,6 +118,7 @@ class LineData(Spans):
     stitch_wire: StitchWire | None = None
     twin: Twin | None = None
     bridle: Bridle | None = None
+    overlap: Overlap | None = None
 
     @cached_property
     def dropper_x(self) -> np.ndarray:

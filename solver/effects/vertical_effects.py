@@ -125,9 +125,7 @@ register(
         "target heights of the form finding at both ends",
         "paper section 5, figure 4",
         default=True,
-        applies=lambda p: (
-            any(p.line.n_transition) and any(wanted.rise > 0 for wanted in p.line.profiles)
-        ),
+        applies=lambda p: any(wanted.rises for wanted in p.line.profiles),
         law=lambda laws, p: _shaped(laws, target_heights.transition),
     )
 )

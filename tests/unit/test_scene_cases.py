@@ -64,6 +64,8 @@ def test_estimated_dropper_lengths_come_near_those_of_form_finding() -> None:
     # clamps and that the load is not even; it only has to tell the possible from the impossible.
     for case in shipped():
         scene = load_scene(case)
+        if scene.line.overlap is not None:  # its rise is left out, and looked at elsewhere
+            scene = load_scene(case, ["line.overlap="])
         problem, mesh = problem_of(scene), mesh_of(scene)
         _, form = find_form(problem, mesh)
         data = line_data_of(scene)

@@ -17,7 +17,7 @@ from catenary.meshgen.line import Role
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 
 RE330, COMPOUND = "re330_stitched", "shinkansen_compound"
-TWIN, TRAM = "dc_twin", "tramway"
+TWIN, TRAM, OVERLAP = "dc_twin", "tramway", "overlap"
 BRIDLE = "{tension_N=2000,mass_kg_per_m=0.31,bending_stiffness_N_m2=1.6,length_m=8}"
 WITHOUT_STITCH = ["line.topology=simple", "line.stitch_wire="]
 OLD_TENSIONS = ["line.contact_wire.tension_N=14700", "line.auxiliary_wire.tension_N=14700"]
@@ -76,6 +76,18 @@ REFUSED = {
     "encumbrance of a single wire": (TRAM, ["line.encumbrance_m=1"], "is no part of the topology"),
     "bridle of a simple line": (
         RE330, [f"line.bridle={BRIDLE}"], "line.bridle .* is no part of .* line.topology = single"),
+    "overlap at the end": (
+        OVERLAP, ["line.overlap.first_span=27"],
+        "first_span is 27 .*an overlap of 4 spans needs a running span before it and behind it: "
+        "possible are from 2 to 26"),
+    "overlap of a short line": (OVERLAP, ["line.n_spans=5", "train.start_m=201",
+                                "evaluation.from_m=201", "evaluation.to_m=202",
+                                "train.raise_time_s=0"],
+                                "possible are none, as the line is too short"),
+    "overlap of two spans": (OVERLAP, ["line.overlap.n_spans=2"], "must be at least 3"),
+    "steep overlap": (OVERLAP, ["line.overlap.rise_m=1.2"],
+                      "it must be less than the 1.2 m that the messenger wire is above"),
+    "overlap that rises too far": (OVERLAP, ["line.overlap.rise_m=1.1"], "below the contact wire"),
     "long bridle": (TRAM, [f"line.bridle={BRIDLE}", "line.bridle.length_m=30"],
                     "it must be less than the shortest span .30 m."),
     "strong bridle": (TRAM, [f"line.bridle={BRIDLE}", "line.bridle.tension_N=10000"],

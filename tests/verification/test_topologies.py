@@ -1,20 +1,24 @@
-"""Twin and single lines at rest against closed forms and equal lines of other topologies."""
+"""Twin and single lines and overlaps at rest: closed forms, equal lines, mirror images, balance."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from measuring import check
+from more_wires import data_of
 from small_lines import ac_simple_line, bare_wires, problem_of
 
 from catenary.meshgen.build import make_mesh
-from catenary.meshgen.line import Conductor, Line, SteadyArm
+from catenary.meshgen.line import Conductor, Line, Role, SteadyArm
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line
-from catenary.meshgen.topologies.line_data import Bridle, LineData, Twin
+from catenary.meshgen.topologies.line_data import Bridle, LineData, Overlap, Twin
+from catenary.meshgen.topologies.overlap import of_next
 from catenary.meshgen.topologies.single import BRIDLE_WIRE
 from catenary.meshgen.topologies.twin import second
+from catenary.solver.model import elements
 from catenary.solver.statics.elasticity import elasticity
 from catenary.solver.statics.equilibrium import Equilibrium, find_form
 
@@ -148,3 +152,63 @@ def test_a_bridle_hangs_as_statics_says() -> None:
     clamp = 5.5 + GRAVITY * 0.95 * 4.0**2 / (2 * 8e3)
     rise = (weight / 2 * 4.0 - GRAVITY * 0.31 * 4.0**2 / 2) / 2e3
     check("heights [m]", 2 * read[1] - read[0], [5.5, clamp, clamp + rise], within=5e-5)
+
+
+@pytest.mark.parametrize("n_spans", [3, 4, 5])
+@pytest.mark.parametrize("topology", ["simple", "stitched", "compound", "single"])
+def test_two_sections_of_an_overlap_are_each_other_s_mirror_image(
+    topology: str, n_spans: int
+) -> None:
+    """Both hang as wanted, level where they meet, and carry the weight of what hangs there."""
+    n = n_spans + 4
+    data = single() if topology == "single" else data_of(topology, n)
+    if topology == "single":
+        spans = {"span_lengths": (30.0,) * n, "dropper_positions": ((),) * n, "pre_sag": ((),) * n}
+        data = replace(data, **spans, stagger=(0.0,) * (n + 1))  # type: ignore[arg-type]
+    line = make_line(replace(data, overlap=Overlap(2, n_spans, 0.6, 0.4)))
+    mesh, form = at_rest(line, 2)
+    length = float(line.support_positions[-1])
+    for name in {wire.name.removesuffix("_next") for wire in line.wires}:
+        nodes, others = mesh.wires[name], mesh.wires[of_next(name)][::-1]
+        check("mirrored x [m]", mesh.x(others), length - mesh.x(nodes), within=1e-6)
+        check("mirrored height [m]", form.height[others], form.height[nodes], within=1e-7)
+        apart = np.interp(length / 2, mesh.x(nodes), mesh.points[nodes, 1])
+        assert apart == pytest.approx(0.2 if line.wire(name).role is not Role.STITCH else apart)
+    assert form.dropper_force.min(initial=20.0) > 5.0
+    profile = line.wire(CONTACT_WIRE).profile
+    assert profile is not None and profile.rises
+    step = (0.5 * length, line.support_positions[2 + n_spans])
+    check(
+        "level, risen [m]", profile.level(np.array(step)) - profile.height, [0.0, 0.6], within=1e-12
+    )
+    ends = [piece.x for wire in line.wires_of(Role.CONTACT) for piece in wire.pieces]
+    assert ends[0][-1] == step[1] and ends[1][0] == line.support_positions[2]
+
+
+def test_wires_in_an_overlap_are_in_equilibrium() -> None:
+    """Over a whole line, supports, arms' weights and ends' slopes balance what weighs."""
+    data = replace(ac_simple_line(9), overlap=Overlap(2, 4, 0.6, 0.4))
+    line = make_line(data)
+    mesh, form = at_rest(line, 3)
+    model, _ = find_form(problem_of(line), mesh)
+    weight = -float(model.weight[model.dofs(np.arange(mesh.n_nodes))].sum())
+    tops = np.array([line.wire(group.wire).points(np.array([x]))[0, 2]
+                     for group in line.supports for x in group.x])  # fmt: skip
+    places = np.concatenate([group.x for group in line.supports])
+    nodes = [mesh.supports[mesh.support_group == k] for k in range(len(line.supports))]
+    at = np.concatenate(nodes)
+    np.testing.assert_allclose(mesh.x(at), places, atol=1e-6)
+    held = float((line.supports[0].stiffness * (tops - form.height[at])).sum())
+    for wire in line.wires:
+        first, last = mesh.wires[wire.name][[0, -1]]
+        for end, inner in ((first, mesh.wires[wire.name][1]), (last, mesh.wires[wire.name][-2])):
+            h = abs(float(np.diff(mesh.x(np.array([end, inner])))[0]))
+            out = 1.0 if end == last else -1.0
+            u = np.array([form.height[inner], out * form.slope[inner], form.height[end],
+                          out * form.slope[end]])  # fmt: skip
+            row = elements.stiffness(
+                np.array([h]), wire.bending_stiffness, np.array([wire.tension])
+            )
+            load = GRAVITY * wire.mass_per_length * elements.uniform_load(np.array([h]))[0]
+            held += float(row[0][2] @ u) + load[2]
+    check("vertical balance [N]", held, weight, within=1e-8 * wire.tension)

@@ -10,6 +10,8 @@ import numpy as np
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.tables.line import HangingTable
+from catenary.meshgen.geometry import find_cuts
+from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData
 from catenary.meshgen.topologies.twin import TWIN
 from catenary.solver.problem.problem import Problem
@@ -119,6 +121,8 @@ def estimated_dropper_lengths(line: LineData, gravity: float) -> list[np.ndarray
 def check_dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
     """A messenger wire that would hang below the contact wire."""
     gravity = Problem.gravity if scene.switches().get("gravity", True) else 0.0
+    if line.overlap is not None:
+        find_cuts(make_line(line))  # refuses wires that would cross
     lengths = estimated_dropper_lengths(line, gravity)
     shortest = [float(v.min(initial=np.inf)) for v in lengths] or [np.inf]
     span = int(np.argmin(shortest))

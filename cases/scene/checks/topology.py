@@ -56,6 +56,7 @@ def check_parts(scene: Scene, line: LineData) -> Iterator[Fault]:
     yield from _stitch_wire(scene, line)
     yield from _auxiliary_wire(scene, line)
     yield from _bridle(scene, line)
+    yield from _overlap(scene, line)
 
 
 def _stitch_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -115,4 +116,28 @@ def _auxiliary_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
             "line.auxiliary_wire.height_m",
             auxiliary.height,
             f"it must be less than line.encumbrance_m ({line.encumbrance:g} m)",
+        )
+
+
+def _overlap(scene: Scene, line: LineData) -> Iterator[Fault]:
+    overlap = line.overlap
+    if overlap is None:
+        return
+    first, last = line.n_transition[0] + 2, line.n_spans - line.n_transition[1] - overlap.n_spans
+    if not first <= overlap.first + 1 <= last:
+        inside = f"from {first} to {last}" if first <= last else "none, as the line is too short"
+        yield refusal(
+            scene.origin,
+            "line.overlap.first_span",
+            overlap.first + 1,
+            f"an overlap of {overlap.n_spans} spans needs a running span before it and behind it: "
+            f"possible are {inside}",
+        )
+    free = line.encumbrance - (line.auxiliary_wire.height if line.auxiliary_wire else 0.0)
+    if line.messenger_wire is not None and overlap.rise >= free:
+        yield refusal(
+            scene.origin,
+            "line.overlap.rise_m",
+            overlap.rise,
+            f"it must be less than the {free:g} m that the messenger wire is above at the supports",
         )

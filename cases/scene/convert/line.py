@@ -19,7 +19,14 @@ from catenary.cases.scene.tables.line import (
 from catenary.cases.scene.tables.units import length_from_mm
 from catenary.meshgen.line import Conductor, DropperKind, Line, SteadyArm
 from catenary.meshgen.topologies.all_topologies import make_line
-from catenary.meshgen.topologies.line_data import AuxiliaryWire, Bridle, LineData, StitchWire, Twin
+from catenary.meshgen.topologies.line_data import (
+    AuxiliaryWire,
+    Bridle,
+    LineData,
+    Overlap,
+    StitchWire,
+    Twin,
+)
 from catenary.solver.base.errors import InputError
 
 # Span lengths are written in decimal; two that differ by less are the same one.
@@ -81,6 +88,10 @@ def line_data_of(scene: Scene) -> LineData:
         stitch_wire=_optional(_stitch, table.stitch_wire),
         twin=_optional(lambda own: Twin(own.spacing_m, own.droppers == "alternating"), table.twin),
         bridle=_optional(_bridle, table.bridle),
+        overlap=_optional(
+            lambda own: Overlap(own.first_span - 1, own.n_spans, own.rise_m, own.distance_m),
+            table.overlap,
+        ),
     )
 
 

@@ -34,6 +34,8 @@ TYPICAL: dict[str, str] = {
     "line.bridle.mass_kg_per_m": "bronze strand of 35 mm2 0.31",
     "line.bridle.bending_stiffness_N_m2": "2 to 11 (35 mm2)",
     "line.bridle.length_m": "4 to 12",
+    "line.overlap.first_span": "where a tension section ends, 1200 to 1500 m from the last one",
+    "line.overlap.rise_m": "0.6 over two spans: 0.15 at the next mast",
     "line.dropper.stiffness_N_per_m": "100000 (EN 50318)",
     "line.dropper.axial_stiffness_N": "1.2e6 (bronze rope of 12 mm2 at 100 GPa)",
     "line.dropper.count": "5 to 9",

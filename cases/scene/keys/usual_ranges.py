@@ -32,6 +32,8 @@ USUAL: dict[str, tuple[float, float]] = {
     "line.stitch_wire.tension_N": (1e3, 6e3),
     "line.stitch_wire.mass_kg_per_m": (0.1, 1),
     "line.stitch_wire.length_m": (5, 30),
+    "line.overlap.rise_m": (0.2, 2),
+    "line.overlap.distance_m": (0.2, 0.5),
     "line.twin.spacing_m": (0.02, 0.5),
     "line.bridle.tension_N": (500, 6e3),
     "line.bridle.mass_kg_per_m": (0.1, 1),

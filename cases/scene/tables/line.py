@@ -236,6 +236,21 @@ class TransitionTable(Table):
     )
 
 
+class OverlapTable(Table):
+    """Spans in which one tension section ends and the next one begins."""
+
+    first_span: int = Field(ge=2, le=20_000, description="number of its first span, from 1")
+    n_spans: int = Field(4, ge=3, le=5, description="number of its spans")
+    rise_m: float = Field(
+        gt=0,
+        le=5,
+        description="height that a contact wire gains from the middle to the end of its section",
+    )
+    distance_m: float = Field(
+        0.4, gt=0, le=2, description="distance of the wires of both sections from each other"
+    )
+
+
 class LineTable(Table):
     """The line from anchor to anchor."""
 
@@ -273,6 +288,9 @@ class LineTable(Table):
     support: SupportTable = Field(default_factory=SupportTable, description="supports")
     steady_arm: SteadyArmTable = Field(default_factory=SteadyArmTable, description="steady arms")
     damping: DampingTable = Field(description="proportional damping")
+    overlap: OverlapTable | None = Field(
+        None, description="spans in which the next tension section begins"
+    )
     transition: TransitionTable = Field(
         default_factory=TransitionTable, description="transition spans"
     )
