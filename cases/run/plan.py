@@ -19,6 +19,7 @@ from catenary.postproc.evaluate.wording import counted
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.problem.problem import Numerics, Problem, n_halvings
+from catenary.solver.window.choice import window_sentence
 
 if TYPE_CHECKING:
     from catenary.meshgen.mesh import LineMesh
@@ -55,6 +56,7 @@ class Plan:
     dt, simulated : time step and simulated time [s]
     halved : sentence on steps that adapt, empty if none do
     slack : what a slack dropper does, in words; empty if no dropper slackens
+    window : which part of the line moves, in words; empty if all of it
     memory : estimate of the resident memory on one rank [B]
     march : estimate of the wall time of the time loop on one rank [s]
     files : sizes of the files
@@ -89,6 +91,7 @@ class Plan:
     detour: str
     halved: str
     slack: str
+    window: str
     simulated: float
     memory: float
     march: float
@@ -162,6 +165,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
         detour="" if needs.detour is None else str(needs.detour),
         halved=_halved(problem.numerics),
         slack=_slack(problem),
+        window=window_sentence(problem),
         simulated=simulated_time(problem),
         memory=needs.memory,
         march=needs.march,
@@ -230,6 +234,7 @@ def plan_text(plan: Plan) -> str:
         *([("slower", plan.detour)] if plan.detour else []),
         *([("slack", f"of a slack dropper, {plan.slack}")] if plan.slack else []),
         *([("adapted", plan.halved)] if plan.halved else []),
+        *([("window", plan.window)] if plan.window else []),
         ("memory", f"about {plan.memory / 1e6:.0f} MB on one rank (estimate)"),
         (
             "march",

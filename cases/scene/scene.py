@@ -27,6 +27,7 @@ from catenary.cases.scene.tables.run import (
 )
 from catenary.cases.scene.tables.table import Table
 from catenary.cases.scene.tables.vehicle import VehicleTable
+from catenary.cases.scene.tables.window import WindowTable
 from catenary.solver.effects import all_effects as effect_registry
 from catenary.solver.effects.effect import Limit
 
@@ -48,6 +49,9 @@ class Scene(Table):
         default_factory=ContactTable, description="contact between head and wire"
     )
     numerics: NumericsTable = Field(default_factory=NumericsTable, description="time stepping")
+    window: WindowTable = Field(
+        default_factory=WindowTable, description="the part of the line that moves with the train"
+    )
     evaluation: EvaluationTable = Field(description="the stretch whose statistics are judged")
     incidents: list[Incident] = Field(
         default_factory=list, max_length=1000, description="what happens during the run"

@@ -99,11 +99,12 @@ class Gains(NamedTuple):
 
 class Followed(NamedTuple):
     """Links that a rank follows: their ``numbers`` (n,) in the line, ``links`` (``LinkArrays``) and
-    ``reserve`` (n,) [N], as a free step leaves it."""
+    ``reserve`` (n,) [N], as a free step leaves it; which of them may switch, ``moving`` (2,)."""
 
     numbers: np.ndarray
     links: LinkArrays
     reserve: np.ndarray
+    moving: np.ndarray
 
 
 @compiled
@@ -238,10 +239,10 @@ def meet(motion, touches, gains, answers, line):
 
 
 @in_line
-def n_beyond(reserve, margin):
-    """How many reserves are below a margin, or not finite."""
+def n_beyond(reserve, moving, margin):
+    """How many reserves of ``moving`` links are below a margin, or not finite."""
     count = 0
-    for d in range(reserve.size):
+    for d in range(moving[0], moving[1]):
         count += not (margin <= reserve[d] < np.inf)
     return count
 
@@ -265,7 +266,7 @@ def watch(followed, bounds, touches, answers, gains, rows):
     ``followed`` links stand in the order along the track, with their reserve without contact
     forces. Contacts touch those within reach. -1 if a reserve is not finite.
     """
-    numbers, links, reserve = followed
+    numbers, links, reserve, moving = followed
     by_force, by_slope = answers
     laws, limits, margin = links.law, bounds.force, bounds.loss[0]
     count, n, uses_rate = 0, touches.size, by_slope.shape[1] > 0
@@ -274,10 +275,11 @@ def watch(followed, bounds, touches, answers, gains, rows):
         low, high = min(low, touches[i].x), max(high, touches[i].x)
     first = np.searchsorted(laws.place, low - gains.reach)
     last = np.searchsorted(laws.place, high + gains.reach, side="right")
+    first, last = max(first, moving[0]), min(last, moving[1])
     # Mostly none is near its margin by itself: then those beyond reach are not looked at.
     begin, end = first, last
-    if n_beyond(reserve, margin):
-        begin, end = 0, reserve.size
+    if n_beyond(reserve, moving, margin):
+        begin, end = moving[0], moving[1]
     for d in range(begin, end):
         # Also true for NaN.
         candidate = not (margin <= reserve[d] < np.inf)

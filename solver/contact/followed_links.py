@@ -27,6 +27,8 @@ class FollowedLinks:
     numbers : (n,) numbers in the table of those that may carry
     links : LinkArrays of these, with local unknowns
     reserve : (n,) what was found last, here or by a free step of the line [N]
+    moving : (2,) first of them that may switch and the one after the last; all, if there is no
+        window
     """
 
     def __init__(self, table: LinkTable, line: LineIntegrator) -> None:
@@ -37,13 +39,14 @@ class FollowedLinks:
         self.numbers = np.flatnonzero(mine & ~table.broken)
         self.links = self._local.of(self.numbers)
         self.reserve = np.zeros(self.numbers.size)
+        self.moving = np.array([0, self.numbers.size], dtype=np.int64)
         self._line = line
         line.track_links(self.links, self.reserve)
 
     @property
     def followed(self) -> Followed:
         """The same as kernels take it."""
-        return Followed(self.numbers, self.links, self.reserve)
+        return Followed(self.numbers, self.links, self.reserve, self.moving)
 
     def shown(self, component: str) -> tuple[np.ndarray, LinkArrays]:
         """Numbers among those of its component, and arrays, of all links that this rank owns,

@@ -27,6 +27,7 @@ class ForcesOnLine:
     ----------
     links : FollowedLinks
     link_coupling : LinkCoupling, None if no link switches
+    reach : how far from a force the line moves within a step [m]
     placing : arguments of ``contact_kernels.place``
     superposing, compensating : of ``superpose`` and ``compensate`` after the forces
 
@@ -70,6 +71,7 @@ class ForcesOnLine:
         self._touches = self.wires.on_wires(candidates.wire, candidates.half_length)
         self._answers = Answers(np.zeros((n, n_local)), np.zeros((n, n_local if uses_rate else 0)))
         reach = line.windows.reach + table.half_length.max(initial=0.0)
+        self.reach = reach
         self._gains = Gains(train_speed, line.position_factor, line.velocity_factor, reach)
         touched = self._touches, self._answers
         self.placing = candidates.place, self.wires.nodes, node_columns, *touched

@@ -28,6 +28,7 @@ from catenary.solver.linear.unit_responses import Windows
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
+from catenary.solver.window.moving_window import MovingWindow
 
 
 class LineIntegrator(ABC):
@@ -45,6 +46,7 @@ class LineIntegrator(ABC):
     loads : LineLoads, None if there are none
     solution : the displacement as a PETSc vector, once ``fill_solution`` has filled it
     detour : why ``keep_ahead`` could not, None if it could; the same on all ranks
+    window : MovingWindow, None if all stations move
     """
 
     def __init__(
@@ -79,6 +81,7 @@ class LineIntegrator(ABC):
         if model.loads:
             self.loads = LineLoads(model.loads, self.operators.domain, model.constrained, comm)
         self.detour: Detour | None = None
+        self.window: MovingWindow | None = None
         self.motion = LineState(
             aligned_arrays.zeros(n, 2), aligned_arrays.zeros(n, 3), self.operators.answer, gains
         )
@@ -160,6 +163,8 @@ class LineIntegrator(ABC):
     ) -> None:
         """Start from a state, (n_local,) each, whose acceleration balances its forces."""
         self.motion.put(displacement, velocity, acceleration)
+        if self.window is not None:
+            self.window.wake()
 
     def state(self) -> Mapping[str, np.ndarray]:
         """All that the next step starts from, by name; to be read before that."""
@@ -181,6 +186,8 @@ class LineIntegrator(ABC):
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """Continue from what ``state`` returned, here or elsewhere, or from an ``exact_state``."""
         self.motion.take(state)
+        if self.window is not None:
+            self.window.wake()
 
     def track_links(self, links: LinkArrays, reserve: np.ndarray) -> None:
         """Fill ``reserve`` (n,) [N] at the end of each ``free_step``, see `state_kernels.reserves`.
@@ -190,6 +197,12 @@ class LineIntegrator(ABC):
         self._links = links, reserve
         if self._passes is not None:
             self._passes.track_links(links, reserve)
+
+    def open_window(self, window: MovingWindow) -> None:
+        """Take steps of the stations in a window only from now on. One rank, in two passes."""
+        assert self._passes is not None
+        self.window = window
+        self._passes.open(window.arrays, *self._links)
 
     def free_step(self) -> None:
         """Take the step without contacts and slack droppers: in two passes, or by ``predict``,

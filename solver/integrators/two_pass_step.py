@@ -36,6 +36,7 @@ from catenary.solver.linear.station_factors import (
 )
 from catenary.solver.linear.station_products import StationProduct, read_station, row_sums
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
+from catenary.solver.window.window_kernels import NO_WINDOW, WindowArrays, look
 
 # Unknowns of a stretch of the pass back, after which its droppers are looked at: large enough for
 # memory to be read ahead, 64 kB of each array, which a cache next to a processor holds.
@@ -49,6 +50,8 @@ class StationPasses:
     ----------
     kernel, arguments : the compiled function of a step, and the tuple that it is called with, for
         compiled loops that take steps themselves. ``track_links`` replaces the tuple
+    factors : as given
+    known : what the motion keeps besides x, y and z, or nothing
 
     Parameters
     ----------
@@ -75,11 +78,11 @@ class StationPasses:
         motion: PredictedLineState,
         steps: Steps | AlphaSteps,
     ) -> None:
-        low, high = factors.low, factors.high
+        _, _, low, high, _ = factors.ends.tolist()
         layout = factors.layout
         if isinstance(steps, AlphaSteps):
             layout = layout.remembering()
-        factored = layout, factors.places, factors.kinds, factors.blocks, low, high
+        factored = layout, *factors.factored[1:]
         multiplied = (
             *(product.layout, product.places, product.kinds, product.blocks, product.first),
             *(read, velocity),
@@ -89,18 +92,28 @@ class StationPasses:
         self._stretch = max(1, _STRETCH * (high - low) // max(1, int(starts[-1])))
         self._place = low, high, self._stretch, starts
         self._parts = multiplied, factored, loads, answer, (*motion.read, *more), changes
+        self._window, self.factors = NO_WINDOW, factors
+        self.known = more[0]
         self.track_links(NO_LINKS, np.zeros(0))
 
     def track_links(self, links: LinkArrays, reserve: np.ndarray) -> None:
         """Fill ``reserve`` on the way back, as ``LineIntegrator.track_links``."""
         followed = links, reserve, left_behind(*self._place, links.unknowns), self._stretch
-        self.kernel, self.arguments = forth_and_back, (*self._parts, followed)
+        if self._window is not NO_WINDOW:
+            followed = links, reserve, self._window.ranges, self._window.low.size
+        self.kernel, self.arguments = forth_and_back, (*self._parts, followed, self._window)
         self._step = bound(self.kernel, *self.arguments)
+
+    def open(self, window: WindowArrays, links: LinkArrays, reserve: np.ndarray) -> None:
+        """Take steps of the stations in a window only from now on; links as in ``track_links``."""
+        self._window = window
+        self.track_links(links, reserve)
 
     def predict_velocities(self) -> None:
         """Fill in the rank's own part of what others read of it in a product with C. A step does
         so, too, but only after these have read."""
-        predict_velocities(self._parts[4], self._parts[5])
+        motion = self._parts[4]
+        predict_velocities(motion, self._parts[5], 0, motion[0].size)
 
     def step(self) -> None:
         """Find the accelerations and what the next step starts from."""
@@ -134,10 +147,11 @@ def changes_of(
 
 
 @compiled
-def predict_velocities(motion, changes):
-    """Fill in the velocities that the generalized-alpha method predicts, if products read them."""
+def predict_velocities(motion, changes, begin, end):
+    """Fill in the velocities that the generalized-alpha method predicts from unknown ``begin`` to
+    ``end``, if products read them."""
     _, y, z, _, known, predicted = motion
-    for i in range(predicted.size):
+    for i in range(begin, min(end, predicted.size)):
         predicted[i] = y[i] + changes[6] * z[i] + changes[7] * known[i]
 
 
@@ -203,26 +217,26 @@ def eliminate_row(multiplied, factored, loads, station, before, states, outward,
 def forth(multiplied, factored, loads, answer):
     """Leave in ``answer`` what elimination leaves of the right-hand side; see ``StationPasses``."""
     multiplied, factored, loads, answer = borrowed((multiplied, factored, loads, answer))
-    layout, _, kinds, _, low, high = factored
-    n, middle = kinds.size, (low + high) // 2
-    pairs = min(middle, n - 1 - middle)
+    layout, _, kinds, _, _, ends = factored
+    n, begin, end, middle = kinds.size, ends[0], ends[1], ends[4]
+    pairs = min(middle - begin, end - 1 - middle)
     left = right = zero(layout)
-    before, here = read_station(multiplied, -1), read_station(multiplied, 0)
-    beyond, there = read_station(multiplied, n), read_station(multiplied, n - 1)
-    for i in range(pairs):
-        j = n - 1 - i
+    before, here = read_station(multiplied, begin - 1), read_station(multiplied, begin)
+    beyond, there = read_station(multiplied, end), read_station(multiplied, end - 1)
+    for k in range(pairs):
+        i, j = begin + k, end - 1 - k
         after, ahead = read_station(multiplied, i + 1), read_station(multiplied, j - 1)
         states, others = (before, here, after), (ahead, there, beyond)
         last, following = max(i - 1, 0), min(j + 1, n - 1)
         left = eliminate_row(multiplied, factored, loads, i, last, states, left, answer)
         right = eliminate_row(multiplied, factored, loads, j, following, others, right, answer)
         before, here, beyond, there = here, after, there, ahead
-    for j in range(n - 1 - pairs, middle, -1):
+    for j in range(end - 1 - pairs, middle, -1):
         ahead = read_station(multiplied, j - 1)
         others, following = (ahead, there, beyond), min(j + 1, n - 1)
         right = eliminate_row(multiplied, factored, loads, j, following, others, right, answer)
         beyond, there = there, ahead
-    for i in range(pairs, middle + 1):
+    for i in range(begin + pairs, middle + 1):
         after = read_station(multiplied, i + 1)
         states, last = (before, here, after), max(i - 1, 0)
         left = eliminate_row(multiplied, factored, loads, i, last, states, left, answer)
@@ -305,9 +319,10 @@ def back(factored, motion, answer, changes, followed):
     """Take the rank's own motion on from what ``forth`` has left in ``answer``, and find the
     reserve of its links, which come with their ranges of ``left_behind``."""
     factored, motion, answer, followed = borrowed((factored, motion, answer, followed))
-    layout, _, _, _, low, high = factored
+    layout, _, _, _, _, ends = factored
     stretch = followed[3]
-    middle, pairs = (low + high) // 2, (high - low - 1) // 2
+    low, high, middle = ends[2], ends[3], ends[4]
+    pairs = min(middle - low, high - 1 - middle)
     make_up = make_up_at(factored, middle)
     x = y = begin_back(layout, make_up, factored, middle, answer, motion, changes)
     number = 1
@@ -317,15 +332,23 @@ def back(factored, motion, answer, changes, followed):
             y = go_back(factored, middle + k, y, answer, motion, changes)
         follow(number, motion, followed)
         number += 1
-    # One more towards the start of the line, if there is an even number of them.
+    # Those that one side has more: one, or as many as the middle lies off.
     for i in range(middle - pairs - 1, low - 1, -1):
         x = go_back(factored, i, x, answer, motion, changes)
+    for j in range(middle + pairs + 1, high):
+        y = go_back(factored, j, y, answer, motion, changes)
     follow(number, motion, followed)
 
 
 @compiled
-def forth_and_back(multiplied, factored, loads, answer, motion, changes, followed):
-    """Both passes."""
-    predict_velocities(motion, changes)
+def forth_and_back(multiplied, factored, loads, answer, motion, changes, followed, window):
+    """Both passes, over the stations in a ``window`` if there is one."""
+    begin, end = 0, motion[0].size
+    if window.state.size > 0:
+        if look(window, motion[:4]):
+            links, reserve, _, _ = followed
+            reserves_within(motion[:4], links, 0, reserve.size, reserve)
+        begin, end = window.starts[window.ends[0]], window.starts[window.ends[1]]
+    predict_velocities(motion, changes, begin, end)
     forth(multiplied, factored, loads, answer)
     back(factored, motion, answer, changes, followed)

@@ -84,6 +84,7 @@ class PartSolver:
         is_whole: bool,
         layout: Layout | None = None,
         stations: Sections | None = None,
+        turns: bool = False,
     ) -> None:
         prefix = PREFIX if is_whole else PART_PREFIX
         self.matrix = as_petsc(part, PETSc.COMM_SELF)
@@ -96,7 +97,7 @@ class PartSolver:
         _choose_direct(self._ksp, in_stations)
         self.factors: StationFactors | None = None
         if layout is not None and not _is_given(f"{prefix}pc_"):
-            self.factors = station_factors(part, layout, own.start, own.stop, stations)
+            self.factors = station_factors(part, layout, own.start, own.stop, stations, turns)
         if self.factors is not None:
             self._ksp.getPC().setType(PETSc.PC.Type.PYTHON)
             self._ksp.getPC().setPythonContext(self.factors)

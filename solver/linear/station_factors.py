@@ -8,6 +8,8 @@ A^-1, so that the factors of alike spans are alike, and a solve reads little mor
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 from scipy import sparse
 
@@ -39,6 +41,10 @@ from catenary.solver.linear.station_products import kinds_by_make_up
 # Bytes of factors from which on they share blocks: more would leave no room for the state in a
 # cache next to a processor, of 1 to 2 MB; a product with a transpose waits some longer.
 LARGE = 2**19
+# Where elimination may end at several places, it may at every so many stations.
+MIDDLES = 16
+# Sum of the eigenvalues of S^-1 A - 1 where steps of a part of the line may end.
+_SOFTENED = 1.0
 
 
 class StationFactors:
@@ -53,7 +59,10 @@ class StationFactors:
         layout shares these, the transpose of the second of the station before it in elimination,
         which that multiplies with; packed by the layout. S is a diagonal block after elimination.
         In the middle the second is for elimination from the other end
-    low, high : range of stations in whose middle elimination ends
+    low : first station of a rank's own
+    ends : (5,) int, read at each step: first station that a step solves for and the one after the
+        last, first own one that it takes on and the one after the last, and where elimination ends
+    turning : what may move the place where elimination ends, None if it stays
     n_stations, n_kinds : in the matrix, and how many have different factors
     """
 
@@ -66,14 +75,23 @@ class StationFactors:
         low: int,
         high: int,
         n_kinds: int,
+        turning: Turning | None = None,
     ) -> None:
         self.layout, self.kinds, self.blocks = layout, kinds, blocks
         self.starts, self.places = stations.starts, stations.places()
-        self.low, self.high = low, high
+        self.low, self.turning = low, turning
         self.n_stations, self.n_kinds = kinds.size, n_kinds
-        factored = layout, self.places, kinds, blocks, low, high
+        middle = (low + high) // 2 if turning is None else turning.place(low, high)
+        self.ends = np.array([0, kinds.size, low, high, middle], dtype=np.int64)
+        if turning is not None:
+            turn(kinds, turning.arrays, kinds.size - 1, middle)
         vectors = np.zeros(0), np.zeros(0)
-        self._solve = bound(solve, factored, later=vectors)
+        self._solve = bound(solve, self.factored, later=vectors)
+
+    @property
+    def factored(self) -> tuple[Any, ...]:
+        """What kernels read of them."""
+        return self.layout, self.places, self.kinds, self.blocks, self.low, self.ends
 
     def solve(self, right: np.ndarray, answer: np.ndarray) -> None:
         """Make ``answer`` that to ``right``, of all unknowns, perhaps the same array."""
@@ -97,9 +115,11 @@ def station_factors(
     low: int = 0,
     high: int | None = None,
     stations: Sections | None = None,
+    turns: bool = False,
 ) -> StationFactors | None:
     """Factors of a positive definite matrix in sorted blocks, eliminated towards the middle of the
-    stations from ``low`` to ``high``, all by default. ``stations`` may be of several make-ups.
+    stations from ``low`` to ``high``, all by default. ``stations`` may be of several make-ups. The
+    middle may be moved if it ``turns``.
 
     None if it is not block tridiagonal by stations, or if a station is joined to unknowns of one
     beside it that it lacks itself. A matrix that is not positive definite gives
@@ -115,22 +135,123 @@ def station_factors(
     layout = Layout(layout.widths, make_ups=layout.make_ups)
     station, lacking = np.nonzero(stations.missing())
     blocks[1, station, lacking, lacking] = 1.0
-    factors = np.zeros((n, 3, layout.pitch, layout.pitch))
-    factorise(blocks, (low + high) // 2, factors)
+    if turns:
+        factors = _factors_of_all_middles(blocks)
+        meeting = np.arange(0, n, MIDDLES)
+        make_up = np.concatenate([stations.make_up, stations.make_up, stations.make_up[meeting]])
+    else:
+        factors, make_up = np.zeros((n, 3, layout.pitch, layout.pitch)), stations.make_up
+        factorise(blocks, (low + high) // 2, factors)
 
     def pack(part: Layout, rows: slice | np.ndarray) -> np.ndarray:
         n_blocks = 2 if part.shares else 3
         packed = part.packed(factors[rows, :n_blocks], part.whole_terms)
         return packed.reshape(packed.shape[0], n_blocks * part.whole_terms.sources.size)
 
-    kinds, numbers, n_kinds, count = kinds_by_make_up(layout, stations.make_up, pack)
-    if layout.varies and count != np.count_nonzero(factors) - station.size:
-        return None  # elimination joins what a station lacks
+    kinds, numbers, n_kinds, count = kinds_by_make_up(layout, make_up, pack)
+    if layout.varies:
+        lacks = stations.missing().sum(axis=1)
+        lacks = np.r_[lacks, lacks, lacks[::MIDDLES]] if turns else lacks
+        if count != np.count_nonzero(factors) - lacks.sum():
+            return None  # elimination joins what a station lacks
     sharing = layout.changed(shares=True)
     if numbers.nbytes > LARGE and sharing.shares and not layout.varies:
         layout = sharing
-        kinds, numbers, n_kinds, _ = kinds_by_make_up(layout, stations.make_up, pack)
-    return StationFactors(layout, stations, kinds, numbers, low, high, n_kinds)
+        kinds, numbers, n_kinds, _ = kinds_by_make_up(layout, make_up, pack)
+    if not turns:
+        return StationFactors(layout, stations, kinds, numbers, low, high, n_kinds)
+    turning = Turning(
+        kinds[:n].copy(), kinds[n : 2 * n].copy(), kinds[2 * n :].copy(), *_edges(blocks, factors)
+    )
+    return StationFactors(
+        layout, stations, turning.to_end.copy(), numbers, low, high, n_kinds, turning
+    )
+
+
+class Turning(NamedTuple):
+    """Kinds of stations by where elimination ends: ``to_end`` (n,) where that is further on,
+    ``to_start`` (n,) where it is before, ``here`` (m,) for each station at which it may end, one of
+    ``MIDDLES``. Steps may be taken of a part of the stations: from those in ``begins`` (n + 1,) to
+    before those in ``ends`` (n + 1,), which are the next ones outwards of each; see ``_edges``."""
+
+    to_end: np.ndarray
+    to_start: np.ndarray
+    here: np.ndarray
+    begins: np.ndarray
+    ends: np.ndarray
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What ``turn`` reads."""
+        return self.to_end, self.to_start, self.here
+
+    def place(self, low: int, high: int) -> int:
+        """A station where it may end, near the middle from ``low`` to ``high``."""
+        return int(middle_of(low, high))
+
+
+@compiled
+def middle_of(low, high):
+    """A station where elimination may end, near the middle from ``low`` to ``high``."""
+    return (low + high) // 2 // MIDDLES * MIDDLES
+
+
+@compiled
+def turn(kinds, turning, before, middle):
+    """Let elimination end at ``middle`` in place of ``before``."""
+    to_end, to_start, here = turning
+    for i in range(before, middle):
+        kinds[i] = to_end[i]
+    for i in range(middle + 1, before + 1):
+        kinds[i] = to_start[i]
+    kinds[middle] = here[middle // MIDDLES]
+
+
+def _factors_of_all_middles(blocks: np.ndarray) -> np.ndarray:
+    """Factors of all stations before the middle, of all behind it, and of those where it may be."""
+    n, size = blocks.shape[1], blocks.shape[2]
+    n_middles = len(range(0, n, MIDDLES))
+    factors = np.zeros((2 * n + n_middles, 3, size, size))
+    factorise(blocks, n - 1, factors[:n])
+    factorise(blocks, 0, factors[n : 2 * n])
+    join(blocks, factors[:n], factors[n : 2 * n], factors[2 * n :])
+    return factors
+
+
+def _edges(blocks: np.ndarray, factors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where steps of a part of the line may begin and end, from each station outwards, (n + 1,).
+
+    What is beyond is held, but the factors let it give way by its mass and stiffness D. That leaves
+    M + tau C - D in place of M + tau C there, which must not become negative: it does where
+    elements are so short that the step operator A is mostly stiffness. D is what A has more than
+    the block S after elimination; all eigenvalues of S^-1 A are to be below 2.
+    """
+    n = blocks.shape[1]
+    number = np.arange(n + 1)
+    softened = [
+        np.einsum("nij,nji->n", part[:, 0], blocks[1]) - blocks.shape[2] < _SOFTENED
+        for part in (factors[:n], factors[n : 2 * n])
+    ]
+    can_begin, can_end = np.append(softened[0], True), np.append(True, softened[1])
+    can_begin[0] = can_end[n] = True
+    begins = np.maximum.accumulate(np.where(can_begin, number, 0))
+    ends = np.minimum.accumulate(np.where(can_end, number, n)[::-1])[::-1]
+    return begins, ends
+
+
+@compiled
+def join(blocks, before, behind, here):
+    """Fill in the factors of stations where elimination may end from those to both sides."""
+    for number in range(here.shape[0]):
+        i = number * MIDDLES
+        pivot = blocks[1, i].copy()
+        if i > 0:
+            here[number, 2] = before[i - 1, 1].T
+            pivot += blocks[0, i] @ before[i - 1, 1]
+        if i < blocks.shape[1] - 1:
+            here[number, 1] = behind[i + 1, 1].T
+            pivot += blocks[2, i] @ behind[i + 1, 1]
+        invert(pivot, here[number, 0])
 
 
 # Of blocks number by number: expressions of whole arrays take Numba ten times as long to compile.
@@ -325,11 +446,11 @@ def substitute_into(factored, station, inward, answer):
 
 @compiled
 def solve(factored, right, answer):
-    """Fill ``answer`` from ``right``; ``factored`` are layout, places, kinds, blocks, low and high
-    of ``StationFactors``."""
+    """Fill ``answer`` from ``right``, for all stations; ``factored`` are layout, places, kinds,
+    blocks, low and ends of ``StationFactors``."""
     factored, right, answer = borrowed((factored, right, answer))
-    layout, _, kinds, _, low, high = factored
-    n, middle = kinds.size, (low + high) // 2
+    layout, _, kinds, _, _, ends = factored
+    n, middle = kinds.size, ends[4]
     pairs = min(middle, n - 1 - middle)
     x, y = zero(layout), zero(layout)
     for i in range(pairs):

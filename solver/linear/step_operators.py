@@ -294,7 +294,8 @@ class LineOperators:
             own = slice(*np.searchsorted(stations.starts, [owned.start, owned.stop]).tolist())
             self._layout = self._find_layout(part)
             whole = self._comm.size == 1
-            solver = PartSolver(part, own, self._in_stations, whole, self._layout, stations)
+            turns = whole and self._model.problem.window.moves
+            solver = PartSolver(part, own, self._in_stations, whole, self._layout, stations, turns)
             self._solver, is_direct = solver, solver.is_direct
         self._is_direct = bool(self._comm.allreduce(int(is_direct), op=MPI.MIN))
 

@@ -12,6 +12,7 @@ from catenary.meshgen.line import Line, Role
 from catenary.solver.problem.contact_laws import ContactLaw
 from catenary.solver.problem.ends import EndCondition, Fixed
 from catenary.solver.problem.incidents import LineIncident, TensionLoss
+from catenary.solver.problem.window import WindowChoice
 
 if TYPE_CHECKING:
     from catenary.mbs.build import PantographData
@@ -110,7 +111,8 @@ class Problem:
     ``evaluation`` (from, to) [m] is the stretch whose statistics are judged;
     ``residual_stiffness_ratio`` is the share of its stiffness that a compressed dropper keeps;
     ``slack_dampers_act`` whether the damper of a dropper goes on acting when its spring is slack;
-    ``incidents`` are what happens to the line on the way; ``ends`` how it begins and ends.
+    ``incidents`` are what happens to the line on the way; ``ends`` how it begins and ends;
+    ``window`` which part of it steps take on.
     """
 
     line: Line
@@ -125,6 +127,7 @@ class Problem:
     incidents: tuple[LineIncident, ...] = ()
     slack_dampers_act: bool = False
     ends: tuple[EndCondition, EndCondition] = (Fixed(), Fixed())
+    window: WindowChoice = WindowChoice()
 
 
 def steps_of(problem: Problem) -> int:

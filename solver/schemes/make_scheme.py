@@ -25,6 +25,8 @@ from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.schemes.ts_alpha2 import TSAlpha2
 from catenary.solver.statics.after_incidents import ChangedLine
 from catenary.solver.statics.equilibrium import Equilibrium
+from catenary.solver.window.moving_window import MovingWindow
+from catenary.solver.window.where_possible import refuse_window
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,8 @@ class SchemeFactory:
             uses_rate,
             switching_links(model, self.form.dropper_force),
         )
+        if problem.window.moves:
+            self._open_window(problem, model, line, interaction, pantographs)
         scheme_of: dict[str, Callable[[Problem, Model, ForcesOnLine, Pantographs], Scheme]] = {
             "one_solve": self._one_solve,
             "fixed_point": self._fixed_point,
@@ -91,6 +95,31 @@ class SchemeFactory:
         }
         scheme = scheme_of[problem.numerics.scheme](problem, model, interaction, pantographs)
         return Parts(line, interaction, pantographs, scheme)
+
+    def _open_window(
+        self,
+        problem: Problem,
+        model: Model,
+        line: LineIntegrator,
+        interaction: ForcesOnLine,
+        pantographs: Pantographs,
+    ) -> None:
+        """Let the line's steps take on what is near the train. Collective: refuses on all ranks."""
+        refuse_window(problem, self.comm.size, line.passes is not None)
+        assert line.passes is not None
+        links, reach = interaction.links, interaction.reach
+        window = MovingWindow(
+            problem.window,
+            problem.numerics.dt,
+            model,
+            line.passes.factors,
+            pantographs.candidates.place,
+            reach,
+            links.links.unknowns,
+            links.moving,
+            line.passes.known,
+        )
+        line.open_window(window)
 
     def _one_solve(
         self, problem: Problem, model: Model, interaction: ForcesOnLine, pantographs: Pantographs

@@ -184,6 +184,8 @@ class Showing:
                 raise _impossible("line_past is missing")
             line.recall(np.asarray(checkpoint["line_past"]), int(checkpoint["step"]))
         line.restore(states)
+        if line.window is not None and "window" in checkpoint:
+            line.window.restore(_like(checkpoint, "window", line.window.state()))
         for name, values in outputs.items():
             getattr(pantographs, name)[:] = values
         self._scheme.restore(checkpoint["contacts"])
@@ -282,6 +284,8 @@ class Showing:
         result["wire_height"] = pantographs.wire_height.copy()
         result["strip_force"] = pantographs.strip_force.copy()
         result["contacts"] = self._scheme.state()
+        if line.window is not None:
+            result["window"] = line.window.state()
         for i, pantograph in enumerate(pantographs.models):
             result[f"pantograph_{i}"] = pantograph.state()
         return result

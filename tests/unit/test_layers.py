@@ -39,8 +39,8 @@ ROOMS = {
         "response", "lumped", "lowering", "roll", "shape", "build",
     ),
     "solver": (
-        "base", "problem", "model", "ends", "effects", "linear", "statics", "waves", "integrators",
-        "contact", "contact_problem", "schemes", "time_loop",
+        "base", "problem", "model", "ends", "effects", "linear", "statics", "waves", "window",
+        "integrators", "contact", "contact_problem", "schemes", "time_loop",
     ),
     "postproc": ("standards", "channels", "files", "read", "record", "evaluate", "film", "paraview",
         "report",

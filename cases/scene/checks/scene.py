@@ -33,6 +33,7 @@ from catenary.cases.scene.checks.scheme import check_scheme
 from catenary.cases.scene.checks.topology import check_parts, check_topology
 from catenary.cases.scene.checks.usual import usual_faults
 from catenary.cases.scene.checks.vehicle import check_vehicle
+from catenary.cases.scene.checks.window import check_window
 from catenary.cases.scene.convert.course import end_of, strips_ahead
 from catenary.cases.scene.convert.line import line_data_of
 from catenary.cases.scene.input.faults import Fault, SceneError
@@ -85,7 +86,8 @@ def faults_of(scene: Scene) -> list[Fault]:
     if found.nothing_by(check_mechanisms, scene, line):
         found.nothing_by(check_requirements_of_defaults, scene)
         found.nothing_by(check_vehicle, scene, line)
-        found.nothing_by(check_incidents, scene, line)
+        if found.nothing_by(check_incidents, scene, line):
+            found.nothing_by(check_window, scene)
     return found.faults
 
 

@@ -5,6 +5,7 @@ Conversion is in this folder and nowhere else.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from catenary.cases.scene.convert.contact import contact_law_of
@@ -16,7 +17,10 @@ from catenary.cases.scene.convert.pantograph import pantograph_of, static_force
 from catenary.cases.scene.convert.vehicle import vehicle_of
 from catenary.cases.scene.tables.line import LineTable
 from catenary.cases.scene.tables.units import speed_from_km_h
+from catenary.cases.scene.tables.window import WindowTable
 from catenary.solver.problem.problem import Damping, Numerics, Placement, Problem, Train
+from catenary.solver.problem.window import BOUNDED, WindowChoice
+from catenary.solver.window.choice import spans_of_window
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
@@ -26,7 +30,7 @@ def problem_of(scene: Scene) -> Problem:
     """The problem of a scene."""
     numerics, train, line = scene.numerics, _train(scene), line_of(scene)
     hung = scene.line.dropper
-    return Problem(
+    problem = Problem(
         line=line,
         damping=_damping(scene.line),
         contact=contact_law_of(scene.contact, train.placements[0].static_force),
@@ -54,6 +58,13 @@ def problem_of(scene: Scene) -> Problem:
         slack_dampers_act=hung is not None and hung.slack_damping == "kept",
         ends=ends_of(scene.line.ends),
     )
+    return replace(problem, window=_window(scene.window, problem))
+
+
+def _window(table: WindowTable, problem: Problem) -> WindowChoice:
+    if table.mode == BOUNDED and table.tolerance is None:
+        return spans_of_window(problem, table.spans_ahead, table.spans_behind)
+    return WindowChoice(table.mode, table.tolerance)
 
 
 def _damping(table: LineTable) -> Damping:

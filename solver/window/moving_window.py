@@ -1,0 +1,131 @@
+"""A window of moving stations on a line whose steps are taken in two passes, on one rank."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from catenary.solver.linear.station_factors import StationFactors
+from catenary.solver.model.loads import Load
+from catenary.solver.model.model import Model
+from catenary.solver.problem.window import EXACT, WindowChoice
+from catenary.solver.window import window_kernels
+from catenary.solver.window.window_kernels import IS_FRESH, STEP, WindowArrays
+
+# Steps from one look to the next.
+EVERY = 8
+
+
+class MovingWindow:
+    """Which stations move. Not collective.
+
+    Attributes
+    ----------
+    arrays : WindowArrays
+    unknowns : first unknown that moves and the one after the last, as of the latest look
+
+    Parameters
+    ----------
+    choice : of a window that moves
+    dt : time step [s]
+    model : of the line
+    factors : of its step operator, whose middle may be moved
+    contacts : (n,) where they are [m]; kept by reference
+    reach : how far a step reaches [m]
+    links : (m, k) unknowns of each link, in the order along the track
+    moving_links : (2,) int, filled with the first that may switch and the one after the last
+    known : what the motion keeps besides x, y and z, or nothing
+    """
+
+    def __init__(
+        self,
+        choice: WindowChoice,
+        dt: float,
+        model: Model,
+        factors: StationFactors,
+        contacts: np.ndarray,
+        reach: float,
+        links: np.ndarray,
+        moving_links: np.ndarray,
+        known: np.ndarray,
+    ) -> None:
+        assert factors.turning is not None
+        numbering = model.numbering
+        low = np.ascontiguousarray(numbering.low)
+        starts = numbering.starts.astype(np.int64)
+        n = low.size
+        spacing = (low[-1] - low[0]) / max(1, n - 1)
+        station = np.searchsorted(starts, links.min(axis=1, initial=starts[-1]), side="right") - 1
+        before = np.searchsorted(np.maximum.accumulate(station), np.arange(n + 1))
+        moving_links[:] = 0, len(links)
+        fading = choice.fading * EVERY * dt
+        rule = [choice.by_motion, choice.spans_behind, choice.spans_ahead, fading]
+        self.arrays = WindowArrays(
+            state=np.array([0, 1], dtype=np.int64),
+            every=EVERY,
+            guard=max(1, int(np.ceil(reach / spacing))),
+            rule=np.array([*rule, float(choice.mode == EXACT)]),
+            peak=np.zeros(2),
+            contacts=contacts,
+            loaded=_places_of(model, model.loads),
+            # Links within reach of a contact may switch, and reach as far themselves.
+            margin=2.0 * reach,
+            masts=np.array(model.problem.line.support_positions, dtype=float),
+            low=low,
+            high=np.ascontiguousarray(numbering.high),
+            starts=starts,
+            links_before=before.astype(np.int64),
+            edges=np.stack([factors.turning.begins, factors.turning.ends]),
+            ends=factors.ends,
+            kinds=factors.kinds,
+            turning=factors.turning.arrays,
+            links=moving_links,
+            ranges=np.zeros((3, 2), dtype=np.int64),
+            known=known,
+        )
+        self.arrays.ranges[2, 1] = len(links)
+
+    @property
+    def unknowns(self) -> tuple[int, int]:
+        begin, end = self.arrays.ends[2:4]
+        return int(self.arrays.starts[begin]), int(self.arrays.starts[end])
+
+    @property
+    def n_stations(self) -> int:
+        """How many stations move."""
+        return int(self.arrays.ends[3] - self.arrays.ends[2])
+
+    def state(self) -> np.ndarray:
+        """Steps taken, range of stations and largest motion, as numbers to go on from."""
+        arrays = self.arrays
+        return np.array([*arrays.state, *arrays.ends[2:4], *arrays.peak], dtype=float)
+
+    def wake(self) -> None:
+        """Let all stations move until the next look, as after a change of the line's motion."""
+        arrays = self.arrays
+        arrays.state[:] = 0, 1
+        self._open(0, arrays.low.size)
+
+    def restore(self, state: np.ndarray) -> None:
+        """Go on from a ``state``."""
+        arrays = self.arrays
+        step, is_fresh, begin, end = state[:4].astype(np.int64).tolist()
+        arrays.state[STEP], arrays.state[IS_FRESH] = step, is_fresh
+        self._open(begin, end)
+        arrays.peak[:] = state[4:6]
+
+    def _open(self, begin: int, end: int) -> None:
+        """Make the window that from station ``begin`` to ``end``, and touch no motion."""
+        window_kernels.turn_to(self.arrays, begin, end)
+
+
+def _places_of(model: Model, loads: Sequence[Load]) -> np.ndarray:
+    """First and last place with a load [m]; none if there are no loads."""
+    numbering, result = model.numbering, np.array([np.inf, -np.inf])
+    for load in loads:
+        if load.unknowns.size:
+            station = np.searchsorted(numbering.starts, load.unknowns, side="right") - 1
+            result[0] = min(result[0], numbering.low[station.min()])
+            result[1] = max(result[1], numbering.high[station.max()])
+    return result

@@ -1,0 +1,176 @@
+"""Steps of a window that moves with the train against steps of the whole line."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from measuring import COMM, History, check, start_march
+from small_lines import ac_simple_line, mesh_of, numerics, problem_of, train
+
+from catenary.cases.run.scene_mesh import mesh_of as scene_mesh
+from catenary.cases.scene.convert.problem import problem_of as scene_problem
+from catenary.cases.scene.load import load_scene
+from catenary.meshgen.mesh import LineMesh
+from catenary.solver.base.errors import InputError
+from catenary.solver.linear import station_factors
+from catenary.solver.problem.incidents import DropperBreak
+from catenary.solver.problem.problem import Damping, Problem
+from catenary.solver.problem.window import BOUNDED, EXACT, WindowChoice
+from catenary.solver.window.where_possible import refuse_window
+
+LINE = ac_simple_line(12)
+SPEED, START = 70.0, 330.0
+# The order of sums differs where elimination ends elsewhere; a contact that closes and opens
+# makes 1e-14 of that 1e-12.
+ROUND_OFF = 3e-12
+
+
+def scene(seconds: float, line: Any = LINE, **changes: Any) -> tuple[Problem, LineMesh]:
+    run = train(SPEED, START, START + SPEED * seconds, raise_time=0.2)
+    return problem_of(line, train=run, **changes), mesh_of(line, 2)
+
+
+def steps(problem: Problem, mesh: LineMesh, window: WindowChoice) -> tuple[History, list[int]]:
+    """A march with a window, and how many stations it had after each step."""
+    march, _ = start_march(replace(problem, window=window), mesh)
+    sizes: list[int] = []
+
+    def count(view: object) -> None:
+        moving = march._line.window  # noqa: SLF001
+        sizes.append(0 if moving is None else moving.n_stations)
+
+    history = History(count)
+    try:
+        history.outcome = march.run([history])
+    finally:
+        march.destroy()
+    assert history.outcome.outcome == "done", history.outcome.outcome
+    return history, sizes
+
+
+@pytest.mark.parametrize("behind", [(0.0,), (0.0, 100.0)])
+@pytest.mark.parametrize("shares", [False, True])
+def test_an_exact_window_gives_the_forces_of_the_whole_line(
+    behind: tuple[float, ...], shares: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if shares:
+        monkeypatch.setattr(station_factors, "LARGE", 0)
+    problem, mesh = scene(2.0)
+    train = replace(
+        problem.train,
+        placements=tuple(replace(problem.train.placements[0], behind=b) for b in behind),
+    )
+    problem = replace(problem, train=train)
+    whole, _ = steps(problem, mesh, WindowChoice())
+    found, sizes = steps(problem, mesh, WindowChoice(EXACT))
+    for channel in ("contact_force", "head_height", "arm_uplift", "dropper_force"):
+        expected = whole[channel]
+        check(channel, found[channel], expected, within=ROUND_OFF * np.abs(expected).max())
+    assert sizes[10] < 0.9 * max(sizes), "the window grows with the waves"
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"numerics": numerics(1e-3, integrator="hht", spectral_radius=0.8)},
+        {"damping": Damping(2e-3, 0.0, {"droppers": (1e-4, 0.0)})},
+    ],
+    ids=["hht", "components"],
+)
+def test_other_methods_and_dampings_have_windows_too(changes: dict[str, Any]) -> None:
+    problem, mesh = scene(0.6, **changes)
+    whole, _ = steps(problem, mesh, WindowChoice())
+    found, sizes = steps(problem, mesh, WindowChoice(EXACT))
+    expected = whole["contact_force"]
+    check("force", found["contact_force"], expected, within=ROUND_OFF * np.abs(expected).max())
+    assert 0 < sizes[20] < max(sizes)
+
+
+def test_a_bounded_window_follows_the_train_and_errs_little() -> None:
+    """Waves fade within the window by the line's damping on stiffness."""
+    problem, mesh = scene(3.0, ac_simple_line(24), damping=Damping(0.02, 0.0))
+    whole, _ = steps(problem, mesh, WindowChoice())
+    expected = whole["contact_force"][500:]
+    errors = []
+    for spans in (2, 4):
+        found, sizes = steps(problem, mesh, WindowChoice(BOUNDED, None, spans, spans))
+        off = found["contact_force"][500:] - expected
+        errors.append(float(off.std() / expected.std()))
+        assert max(sizes[10:]) < 0.5 * sizes[0]
+    print("error of the force history in sigma, 2 and 4 spans to both sides:", errors)
+    assert errors[0] < 1e-6
+    assert errors[1] < 1e-2 * errors[0]
+    found, sizes = steps(problem, mesh, WindowChoice(BOUNDED, 1e-6))
+    off = found["contact_force"][500:] - expected
+    assert off.std() < 1e-5 * expected.std()
+    assert max(sizes[10:]) < sizes[0]
+
+
+def test_no_window_ends_where_elements_are_too_short_to_be_held(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where the step operator is stiffness more than mass, a held end is unstable: the shipped
+    case has elements of 0.275 m in the spans that a train starts in."""
+    given = ("train.pantographs=[{name='lumped'}]", "window.mode=bounded")
+    spans = ("window.spans_ahead=2", "window.spans_behind=2")
+    made = load_scene("ambrosio2012", (*given, *spans))
+    problem, mesh = scene_problem(made), scene_mesh(made)
+    problem = replace(problem, train=replace(problem.train, end=problem.train.start + 66.0))
+    found, _ = steps(problem, mesh, problem.window)
+    assert np.abs(found["dropper_force"]).max() < 1e3
+    monkeypatch.setattr(station_factors, "_SOFTENED", 1e9)
+    broken, _ = steps(problem, mesh, problem.window)
+    assert np.abs(broken["dropper_force"]).max() > 1e6
+
+
+def test_a_window_goes_on_after_a_restart_as_if_nothing_had_happened() -> None:
+    problem, mesh = scene(0.5)
+    problem = replace(problem, window=WindowChoice(BOUNDED, None, 2, 2))
+    kept: list[Any] = []
+    whole = History(lambda view: kept.append(view.checkpoint()) if view.step == 203 else None)
+    march, _ = start_march(problem, mesh)
+    march.run([whole])
+    march.destroy()
+    rest = History()
+    again, _ = start_march(problem, mesh)
+    again.restore(kept[0])
+    again.run([rest])
+    again.destroy()
+    assert np.array_equal(rest["contact_force"], whole["contact_force"][203:])
+
+
+def test_what_happens_ahead_of_an_exact_window_is_part_of_it() -> None:
+    problem, mesh = scene(0.5, ac_simple_line(24))
+    droppers = np.sort(mesh.x(mesh.droppers[:, 1]))
+    far = float(droppers[np.searchsorted(droppers, START + 700.0)])
+    incidents = (DropperBreak(0.1, far),)
+    effects = problem.effects | {"dropper_break"}
+    problem = replace(problem, incidents=incidents, effects=effects)
+    whole, _ = steps(problem, mesh, WindowChoice())
+    found, sizes = steps(problem, mesh, WindowChoice(EXACT))
+    for channel in ("contact_force", "arm_uplift"):
+        expected = whole[channel]
+        check(channel, found[channel], expected, within=ROUND_OFF * np.abs(expected).max())
+    assert sizes[99] < sizes[110]
+
+
+@pytest.mark.parametrize(
+    ("changed", "ranks", "says"),
+    [
+        ({"scheme": "fixed_point"}, 1, "numerics.scheme is fixed_point"),
+        ({"coupling": "explicit"}, 1, "numerics.coupling is explicit"),
+        ({"adaptive_tolerance": 1.0}, 1, "numerics.adaptive_tolerance_N lets steps be halved"),
+        ({}, 2, "the run has 2 ranks"),
+    ],
+)
+def test_a_window_that_cannot_be_is_refused(changed: dict[str, Any], ranks: int, says: str) -> None:
+    problem, _ = scene(0.1)
+    problem = replace(
+        problem, window=WindowChoice(EXACT), numerics=replace(problem.numerics, **changed)
+    )
+    with pytest.raises(InputError, match=f"window.mode is exact.*{says}"):
+        refuse_window(problem, ranks, True)
+    assert COMM.size == 1

@@ -1,0 +1,54 @@
+"""Keys of the window: what they become, and what is refused."""
+
+from __future__ import annotations
+
+import pytest
+
+from catenary.cases.run.plan import make_plan, plan_text
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
+from catenary.solver.base.errors import InputError
+from catenary.solver.problem.window import WindowChoice
+
+BOUNDED = "window.mode=bounded"
+AHEAD, BEHIND = "window.spans_ahead=6", "window.spans_behind=4"
+
+
+def test_keys_reach_the_problem() -> None:
+    def window(*keys: str) -> WindowChoice:
+        return problem_of(load_scene("en50318_2002", keys)).window
+
+    assert not window().moves
+    assert window("window.mode=exact").mode == "exact"
+    assert window(BOUNDED, "window.tolerance=1e-6").by_motion == 1e-6
+    spans = window(BOUNDED, AHEAD, BEHIND)
+    assert (spans.by_motion, spans.spans_ahead, spans.spans_behind) == (0.0, 6.0, 4.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("window.mode=short",), "window.mode .* must be off, exact or bounded"),
+        (("window.tolerance=1e-6",), "must not give tolerance, which belongs to mode bounded"),
+        (("window.mode=exact", AHEAD), "must not give spans_ahead, which belongs to mode bounded"),
+        ((BOUNDED, "window.tolerance=0.1"), "window.tolerance .* must be at most 0.01"),
+        ((BOUNDED, "window.spans_ahead=1", BEHIND), "window.spans_ahead .* must be at least 2"),
+        ((BOUNDED, "window.spans_behind=0", AHEAD), "window.spans_behind .* must be at least 2"),
+        ((BOUNDED, AHEAD), "must give spans_behind with spans_ahead, or neither"),
+        ((BOUNDED, AHEAD, BEHIND, "window.tolerance=1e-6"), "takes tolerance or spans_ahead"),
+        ((BOUNDED, "numerics.scheme=fixed_point"), "window.mode is .*bounded.* it must be off, as"),
+        (("window.mode=exact", "numerics.coupling=explicit"), "it must be off, as .* explicit"),
+    ],
+)
+def test_what_cannot_be_is_refused(words: tuple[str, ...], says: str) -> None:
+    with pytest.raises(InputError, match=says) as refused:
+        load_scene("en50318_2002", words)
+    assert len(str(refused.value).splitlines()) == 1
+
+
+def test_the_plan_says_what_moves() -> None:
+    assert "window" not in plan_text(make_plan(load_scene("en50318_2002")))
+    bounded = plan_text(make_plan(load_scene("en50318_2002", (BOUNDED, AHEAD, BEHIND))))
+    assert "6 spans move ahead of the train and 4 behind" in bounded
+    exact = plan_text(make_plan(load_scene("en50318_2002", ("window.mode=exact",))))
+    assert "whatever a wave has reached moves" in exact
