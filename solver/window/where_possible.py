@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from catenary.solver.base.errors import InputError
+from catenary.solver.problem.ends import Periodic
 from catenary.solver.problem.problem import Problem
 
 
@@ -15,6 +16,8 @@ def why_no_window(problem: Problem) -> str:
         return "numerics.coupling is explicit"
     if numerics.adaptive_tolerance is not None:
         return "numerics.adaptive_tolerance_N lets steps be halved"
+    if any(isinstance(end, Periodic) for end in problem.ends):
+        return "an end of the line is periodic, and remembers every step"
     return ""
 
 

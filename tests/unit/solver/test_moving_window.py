@@ -16,6 +16,7 @@ from catenary.cases.scene.load import load_scene
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.base.errors import InputError
 from catenary.solver.linear import station_factors
+from catenary.solver.problem.ends import Fixed, Periodic
 from catenary.solver.problem.incidents import DropperBreak
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.problem.window import BOUNDED, EXACT, WindowChoice
@@ -164,6 +165,7 @@ def test_what_happens_ahead_of_an_exact_window_is_part_of_it() -> None:
         ({"coupling": "explicit"}, 1, "numerics.coupling is explicit"),
         ({"adaptive_tolerance": 1.0}, 1, "numerics.adaptive_tolerance_N lets steps be halved"),
         ({}, 2, "the run has 2 ranks"),
+        ({}, 1, "an end of the line is periodic"),
     ],
 )
 def test_a_window_that_cannot_be_is_refused(changed: dict[str, Any], ranks: int, says: str) -> None:
@@ -171,6 +173,8 @@ def test_a_window_that_cannot_be_is_refused(changed: dict[str, Any], ranks: int,
     problem = replace(
         problem, window=WindowChoice(EXACT), numerics=replace(problem.numerics, **changed)
     )
+    if not changed and ranks == 1:
+        problem = replace(problem, ends=(Fixed(), Periodic()))
     with pytest.raises(InputError, match=f"window.mode is exact.*{says}"):
         refuse_window(problem, ranks, True)
     assert COMM.size == 1
