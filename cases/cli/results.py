@@ -124,18 +124,26 @@ def paraview(
         float | None,
         typer.Option("--motion", min=1, max=1e5, help="Factor by which motions are drawn larger."),
     ] = None,
+    state: Annotated[
+        bool,
+        typer.Option(help="Let ParaView write view.pvsm, which opens the same without Python."),
+    ] = True,
 ) -> None:
     """Serial."""
     import shutil
 
     from catenary.postproc.paraview.open_in_paraview import write_script
+    from catenary.postproc.paraview.state import write_state
     from catenary.postproc.read.guard import examined
 
     if not folder.is_dir():
         raise InputError(f"{folder} is no folder; name the folder of a run")
     records = examined(folder)
     script, *others = write_script(folder, records, motion, _shapes(folder, records))
-    console.say("\n".join(map(str, (script, *others))))
+    made, why = write_state(script) if state else (None, "")
+    console.say("\n".join(map(str, (script, *others, *([made] if made else [])))))
+    if why and shutil.which("paraview") is not None:
+        console.warn(why)
     console.say(f"Open it with: paraview --script={script}")
     if shutil.which("paraview") is None:
         console.warn("paraview is not on this machine (Debian, Ubuntu: apt-get install paraview)")

@@ -16,7 +16,7 @@ from catenary.solver.time_loop.channels import CHANNELS, ENERGIES
 logger = logging.getLogger("catenary.record")
 
 RUN_FILE = "run.h5"
-FIELD_FILES = ("fields.h5", "fields.xdmf")
+FIELD_FILES = ("fields.h5", "fields.xdmf", "fields.vtkhdf")
 REPORT_FILES = (
     "summary.json",
     "report.html",

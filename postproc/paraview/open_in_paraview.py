@@ -14,10 +14,11 @@ from catenary.mbs.shape import BODY, HEAD, SPRING, Shape
 from catenary.postproc.film.film_data import FilmData, film_data
 from catenary.postproc.film.pantograph_shape import MovingPantographs
 from catenary.postproc.film.scale import scale_for
-from catenary.postproc.film.snapshots import Snapshots
+from catenary.postproc.film.snapshots import FIELDS_FILE, Snapshots
 from catenary.postproc.paraview import scenery
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
+from catenary.postproc.record.vtkhdf import write_vtkhdf
 from catenary.solver.base.errors import InputError
 
 SCRIPT, FOLDER = "view.py", "paraview"
@@ -55,6 +56,7 @@ def write_script(
             settings = _settings(folder, data, snapshots, motion, pantographs)
             try:
                 target.mkdir(exist_ok=True)
+                vtkhdf = write_vtkhdf(folder / FIELDS_FILE)
                 files = scenery.write(data, pantographs, snapshots.times, target)
                 script = _script(settings)
                 part = target / f".{SCRIPT}.{os.getpid()}"
@@ -62,7 +64,8 @@ def write_script(
                 os.replace(part, target / SCRIPT)
             except OSError as error:
                 raise InputError(f"{target} cannot be written: {error}") from error
-    return [target / SCRIPT, files.pantographs, files.forces, files.train, files.track]
+    scene = [files.pantographs, files.forces, files.train, files.track]
+    return [target / SCRIPT, *scene, vtkhdf]
 
 
 def _script(settings: dict[str, object]) -> str:

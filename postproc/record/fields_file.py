@@ -27,6 +27,7 @@ from catenary.postproc.record.blocks import Block
 from catenary.postproc.record.field_layout import FieldRecord, Slots, layout_of
 from catenary.postproc.record.field_values import FieldValues, Gathered
 from catenary.postproc.record.growing_xdmf import GrowingXdmf, grids_of
+from catenary.postproc.record.vtkhdf import SUFFIX, write_vtkhdf
 
 logger = logging.getLogger("catenary.fields")
 
@@ -181,6 +182,12 @@ class FieldsFile:
         self._handle = -1
         if self._text is not None:
             self._text.close()
+        if self._published and len(self._written) > 1:
+            try:
+                write_vtkhdf(self.path)
+            except (OSError, KeyError, RuntimeError, ValueError) as error:
+                words = "%s is not written (%s); `catenary paraview` writes it"
+                logger.warning(words, self.path.with_suffix(SUFFIX), error)
         if not self._published:
             with contextlib.suppress(OSError):
                 self._made_as.unlink(missing_ok=True)

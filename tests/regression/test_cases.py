@@ -16,7 +16,7 @@ from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.load import load_scene
 
 CASES = shipped()
-FILES = {"run.h5", "fields.xdmf", "fields.h5", "summary.json", "report.html"}
+FILES = {"run.h5", "fields.xdmf", "fields.h5", "fields.vtkhdf", "summary.json", "report.html"}
 
 # What other programs rely on in summary.json: keys and the kind of their values.
 NUMBER = (int, float)

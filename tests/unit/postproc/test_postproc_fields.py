@@ -10,6 +10,8 @@ import h5py
 import numpy as np
 import pytest
 import pyvista
+from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
+from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE
 from catenary.postproc.record import fields_file, growing_xdmf
@@ -431,3 +433,38 @@ def test_a_full_disk_breaks_the_run_and_keeps_the_snapshots(
             watcher.observe(march.view(step))
     watcher.finish("the disk is full")
     assert pyvista.get_reader(path).time_values == pytest.approx([0.0, 0.05, 0.1, 0.15, 0.2])
+
+
+@pytest.mark.parametrize("window", [None, (30.0, 20.0)])
+def test_vtkhdf_shows_what_xdmf_shows(
+    window: tuple[float, float] | None, tmp_path: Path, make_march: Any
+) -> None:
+    march, path = make_march(n_steps=500), tmp_path / "fields.xdmf"
+    place = march.position(0.0)
+    course = Course(float(place.min()), float(place.max()), march.speed)
+    march.drive(watch(march, path, record=FieldRecord(FIELDS, window=window, course=course)))
+    hdf = tmp_path / "fields.vtkhdf"
+    assert hdf.stat().st_size < 200e3, "numbers are not stored twice"
+    reader = vtkHDFReader()
+    reader.SetFileName(str(hdf))
+    reader.UpdateInformation()
+    assert reader.GetNumberOfSteps() == 11
+    for number in (10, 4, 0):
+        reader.SetStep(number)
+        reader.Update()
+        blocks = reader.GetOutputDataObject(0)
+        expected = blocks_at(path, 0.05 * number)
+        assert tuple(expected) == BLOCKS and blocks.GetNumberOfPartitionedDataSets() == len(BLOCKS)
+        for i, name in enumerate(BLOCKS):
+            assert blocks.GetMetaData(i).Get(vtkCompositeDataSet.NAME()) == name
+            found = pyvista.wrap(blocks.GetPartitionedDataSet(i).GetPartition(0))
+            wanted = expected[name]
+            np.testing.assert_array_equal(found.points, wanted.points)
+            cells = wanted.cell_connectivity
+            np.testing.assert_array_equal(found.cell_connectivity, cells)
+            for one, other in (
+                (found.point_data, wanted.point_data), (found.cell_data, wanted.cell_data)
+            ):  # fmt: skip
+                assert set(one.keys()) == set(other.keys())
+                for field in one.keys():
+                    np.testing.assert_array_equal(one[field], other[field])

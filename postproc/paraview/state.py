@@ -1,0 +1,59 @@
+"""Writes a state of ParaView, which opens a run without Python: ParaView's own program makes it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+STATE = "view.pvsm"
+_PROGRAM, _SCREEN = "pvpython", "xvfb-run"
+# Longest that ParaView may take [s].
+_PATIENCE = 300.0
+
+
+def write_state(script: Path) -> tuple[Path | None, str]:
+    """Write ``view.pvsm`` beside the script that opens a run. Not collective.
+
+    Returns
+    -------
+    The state, and an empty text; or None, and one sentence that says why there is none.
+    """
+    command, why = _command()
+    if not command:
+        return None, why
+    state = script.with_name(STATE)
+    part = script.with_name(f".{script.stem}.{os.getpid()}{state.suffix}")
+    try:
+        done = subprocess.run(
+            [*command, str(script), "--state", str(part)],
+            capture_output=True,
+            text=True,
+            timeout=_PATIENCE,
+            check=False,
+        )
+        if done.returncode == 0 and part.is_file():
+            os.replace(part, state)
+            return state, ""
+        words = (done.stderr.strip() or "it wrote nothing").splitlines()[-1]
+        why = f"{_PROGRAM} failed: {words}"
+    except (OSError, subprocess.TimeoutExpired) as error:
+        why = f"{_PROGRAM} failed: {error}"
+    finally:
+        part.unlink(missing_ok=True)
+    return None, f"no state is written, the script does the same ({why})"
+
+
+def _command() -> tuple[Sequence[str], str]:
+    """How ParaView's Python is started here, or why it cannot be."""
+    if shutil.which(_PROGRAM) is None:
+        return (), f"no state is written: {_PROGRAM} is not on this machine"
+    if os.environ.get("DISPLAY") or not sys.platform.startswith("linux"):
+        return (_PROGRAM,), ""
+    # Debian's draws on a screen only.
+    if shutil.which(_SCREEN) is None:
+        return (), f"no state is written: {_PROGRAM} needs a screen, or {_SCREEN}"
+    return (_SCREEN, "-a", "-s", "-screen 0 1600x900x24", _PROGRAM), ""
