@@ -9,8 +9,6 @@ import numpy as np
 
 from catenary.solver.effects import vertical_effects  # noqa: F401  (built before)
 from catenary.solver.effects.effect import Effect, register
-from catenary.solver.ends.line_beyond import line_beyond
-from catenary.solver.ends.periodic_end import StepSums, periodic_end
 from catenary.solver.model.absorbing_layers import layer_blocks
 from catenary.solver.model.loads import MemoryLoad
 from catenary.solver.model.model import Block
@@ -41,6 +39,10 @@ def _going_on(laws: Simulated, problem: Problem) -> Simulated:
 
 
 def _lines_beyond(builder: ModelBuilder) -> None:
+    # Compiled loops and transforms, which lines that do not go on need not import.
+    from catenary.solver.ends.line_beyond import line_beyond
+    from catenary.solver.ends.periodic_end import StepSums, periodic_end
+
     model, problem = builder.model, builder.problem
     numerics, damping = problem.numerics, model.damping_of(_BEYOND)
     integration = integration_of(

@@ -12,7 +12,7 @@ import numpy as np
 
 from catenary.solver.base.errors import InputError
 from catenary.solver.ends.half_lines import SpanMatrices, span_matrices
-from catenary.solver.model.matrices import iterate_entries
+from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model
 
 # Difference of two spans of a kind, over the largest entry: dropper lengths differ by millimetres
@@ -87,6 +87,36 @@ def line_beyond(model: Model, side: int) -> LineBeyond:
         raise InputError(f"{where}: {error}") from None
     here = _matrices(model, at_end, int(unknowns[-1]) + 1, at_end, int(unknowns[-1]) + 1)
     return LineBeyond(unknowns, here[:, shared][:, :, shared], span)
+
+
+def span_between(model: Model, mast: float, following: float) -> tuple[np.ndarray, SpanMatrices]:
+    """Unknowns (m,) that a span shares at its first mast, and its matrices. Not collective.
+
+    Nothing is left out, whatever effects hold.
+
+    Parameters
+    ----------
+    mast, following : places of both masts along the track [m]
+
+    Raises
+    ------
+    InputError
+        If spans are joined by more than a cross-section at a mast.
+    """
+    first, last = (int(model.numbering.within(x - _TINY, np.inf)[0]) for x in (mast, following))
+    end = min(model.numbering.size, 2 * last - first)
+    whole = np.zeros((3, last - first, 2 * (last - first)))
+    whole[:, :, : end - first] = _matrices(model, first, last, first, end)
+    own, joined = whole[:, :, : last - first], whole[:, :, last - first :]
+    shared = np.flatnonzero(joined.any(axis=(0, 1)))
+    return first + shared, span_matrices(own, joined, shared, _MOST_WIDE)
+
+
+def shared_at(model: Model, unknowns: np.ndarray) -> np.ndarray:
+    """M, C and K of some neighbouring unknowns, (3, m, m), held ones included. Not collective."""
+    low, high = int(unknowns[0]), int(unknowns[-1]) + 1
+    at = unknowns - low
+    return _matrices(model, low, high, low, high)[:, at][:, :, at]
 
 
 def _refuse_unlike(own: np.ndarray, beside: np.ndarray, shared: np.ndarray) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from catenary.solver.model.matrices import iterate_entries
+from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model
 from catenary.solver.model.stations import SAME_STATION
 

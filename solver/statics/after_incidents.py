@@ -33,9 +33,9 @@ from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.step_operators import LineOperators
 from catenary.solver.linear.unit_responses import Windows
 from catenary.solver.model import elements
+from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.links import Direction
 from catenary.solver.model.loads import ShapeLoad
-from catenary.solver.model.matrices import iterate_entries
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.problem.incidents import DropperBreak, LineIncident

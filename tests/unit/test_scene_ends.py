@@ -22,7 +22,7 @@ def test_lines_are_fixed_unless_the_scene_says_otherwise() -> None:
 
 
 def test_a_layer_has_usual_spans_and_damping_and_may_have_others() -> None:
-    assert problem_of(load_scene("en50318_2002", [LONG, LAYER])).ends[1] == AbsorbingLayer(20, 2.0)
+    assert problem_of(load_scene("en50318_2002", [LONG, LAYER])).ends[1] == AbsorbingLayer(20, 1.5)
     own = [LONG, LAYER, f"{END}.spans=8", f"{END}.damping_per_s=3.5"]
     assert problem_of(load_scene("en50318_2002", own)).ends == (Fixed(), AbsorbingLayer(8, 3.5))
 

@@ -54,7 +54,8 @@ def test_the_verb_runs_a_case_and_reads_a_run(tmp_path: Path) -> None:
     assert done.code == 0, done.stderr
     assert "sqrt(T/m) of the contact wire: 121.7 m/s" in done.stdout
     names = ("space_time.png", "train_frame.png", "wavenumbers.png", "waves.csv", "pass_bands.csv",
-             "energy.png", "energy.csv")  # fmt: skip
+             "energy.png", "energy.csv",
+             "end_reflection.png", "end_reflection.csv")  # fmt: skip
     assert all((out / name).stat().st_size > 100 for name in names)
     rows = (out / "pass_bands.csv").read_text().splitlines()
     assert any(row.startswith("pass band,0.8") for row in rows)

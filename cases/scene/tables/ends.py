@@ -8,8 +8,9 @@ from pydantic import Field, field_validator, model_validator
 
 from catenary.cases.scene.tables.table import Table
 
-# Spans and largest damping of a layer that sends back 2 % at most of what outruns a train.
-USUAL_LAYER = {"spans": 20, "damping_per_s": 2.0}
+# Spans and largest damping of a layer: on the line of EN 50318 less damping lets waves through, and
+# more sends back waves beside the gaps between bands.
+USUAL_LAYER = {"spans": 20, "damping_per_s": 1.5}
 # Kinds of ends that are asked for and are none here, and why.
 _NO_KIND = {
     "dashpot": "must not be dashpot: matched dashpots sqrt(T m) send back 0.26 to 0.84 of a wave "
@@ -34,7 +35,7 @@ class EndTable(Table):
         None,
         gt=0,
         le=100,
-        description="damping on mass at the outer end of an absorbing layer, 2 if not given; it "
+        description="damping on mass at the outer end of an absorbing layer, 1.5 if not given; it "
         "grows as the square of the way into it",
     )
 

@@ -14,7 +14,7 @@ from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.output import as_csv
-from catenary.cases.studies.waves import obstacles, pictures
+from catenary.cases.studies.waves import ends, obstacles, pictures
 from catenary.cases.studies.waves.energy import EnergyMotion, EnergySeen
 from catenary.cases.studies.waves.excited import Asked, excitation_of, march, without_train
 from catenary.cases.studies.waves.measured import measured_rows
@@ -67,7 +67,8 @@ def study_waves(folder: Path) -> Studied:
             rest = line_at_rest(problem, mesh_of(scene))
             energy = EnergyMotion(rest, _numbers_in(data, rest))
             seen = waves_seen(data, snapshots, [energy])
-    return _write(folder, wave_theory(problem, rest), seen, energy.seen(), data.supports, "train")
+    theory = wave_theory(problem, rest)
+    return _write(folder, theory, rest, seen, energy.seen(), data.supports, "train")
 
 
 def study_excited(scene: Scene, kind: str, asked: Asked, folder: Path, force: bool) -> Studied:
@@ -101,7 +102,8 @@ def study_excited(scene: Scene, kind: str, asked: Asked, folder: Path, force: bo
         seen = wire.seen(lambda times: np.zeros((times.size, 0)), excitation.at)
     theory = wave_theory(problem, rest)
     supports = problem.line.support_positions[1:-1]
-    return _write(folder, theory, seen, energy.seen(), supports, "force" if moves else "blow")
+    what = "force" if moves else "blow"
+    return _write(folder, theory, rest, seen, energy.seen(), supports, what)
 
 
 def study_obstacles(scene: Scene, folder: Path, force: bool) -> tuple[str, list[Path]]:
@@ -150,6 +152,7 @@ def _numbers_in(data: FilmData, rest: LineAtRest) -> np.ndarray:
 def _write(
     folder: Path,
     theory: WaveTheory,
+    rest: LineAtRest,
     seen: WavesSeen,
     energy: EnergySeen,
     supports: np.ndarray,
@@ -157,7 +160,10 @@ def _write(
 ) -> Studied:
     """Pictures and tables of what is seen and what theory says."""
     moving = "pantographs" if what == "train" else what
-    measured = measured_rows(theory, seen)
+    reflections = ends.reflections_of(rest)
+    measured = [
+        *measured_rows(theory, seen), *ends.reflection_rows(reflections, theory.speed)
+    ]  # fmt: skip
     content: dict[str, bytes | str] = {
         "space_time.png": figures.png(pictures.space_time(seen, theory, supports, moving)),
         "wavenumbers.png": figures.png(pictures.wavenumbers(seen, theory)),
@@ -166,6 +172,10 @@ def _write(
         TABLE: as_csv([*as_rows(theory), *measured]),
         "pass_bands.csv": as_csv(band_rows(theory)),
     }
+    if reflections:
+        drawn = ends.picture(reflections, rest.problem.ends, theory.speed)
+        content["end_reflection.png"] = figures.png(drawn)
+        content["end_reflection.csv"] = as_csv(ends.curve_rows(reflections))
     if seen.position.shape[1]:
         ahead_of = "first pantograph" if what == "train" else what
         content["train_frame.png"] = figures.png(

@@ -1,0 +1,37 @@
+"""Entries of M, K and C of a model, without PETSc."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from catenary.solver.model.model import Model
+
+
+def iterate_entries(
+    model: Model, first: int, last: int, mass: float, stiffness: float, damping: float
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Entries (rows, columns, values) of ``mass`` M + ``stiffness`` K + ``damping`` C.
+
+    Only rows in [first, last); rows and columns of constrained unknowns are left out.
+    """
+    free = np.ones(model.n_dofs, dtype=bool)
+    free[model.constrained] = False
+    for block in model.blocks:
+        alpha, beta = model.damping_of(block.component)
+        near = ((block.dofs >= first) & (block.dofs < last)).any(axis=1)
+        if not near.any():
+            continue
+        dofs, kind = block.dofs[near], block.kind[near]
+        matrix = np.zeros((dofs.shape[0], dofs.shape[1], dofs.shape[1]))
+        if block.mass is not None:
+            matrix += (mass + damping * beta) * block.mass[kind]
+        if block.stiffness is not None:
+            matrix += (stiffness + damping * alpha) * block.stiffness[kind]
+        if block.damping is not None:
+            matrix += damping * block.damping[kind]
+        rows = np.broadcast_to(dofs[:, :, None], matrix.shape)
+        columns = np.broadcast_to(dofs[:, None, :], matrix.shape)
+        keep = (rows >= first) & (rows < last) & free[rows] & free[columns]
+        yield rows[keep], columns[keep], matrix[keep]

@@ -1,0 +1,157 @@
+"""What the end of a line sends back of the waves of the periodic line before it.
+
+At s = i omega + epsilon a wave of the periodic line grows with time and fades as it travels, by
+exp(-epsilon L / v) a span of length L for the group velocity v. That divides waves that come from
+those that go, and travelling ones from those that do not (principle of limiting absorption). An
+incoming wave and all outgoing ones balance the forces where the end begins, whose spans answer with
+their own stiffness. Amplitudes are those of unit energy flux. Droppers are taut; of damping there
+is only that of absorbing layers, unless that of the line is included in both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from catenary.solver.ends.half_lines import Chain, chain_at, half_lines
+from catenary.solver.ends.line_beyond import END, shared_at, span_between
+from catenary.solver.model.model import Model
+from catenary.solver.problem.ends import AbsorbingLayer, Periodic
+from catenary.solver.problem.problem import Damping
+
+# epsilon [1/s], and the least group velocity of a wave that counts as one that travels [m/s].
+_GROWTH, _SLOWEST = 1e-3, 2.0
+
+
+@dataclass(frozen=True)
+class EndReflection:
+    """What an end sends back, f frequencies and m waves that may come at each.
+
+    Attributes
+    ----------
+    frequency : (f,) [Hz]
+    group_velocity : (f, m) of the waves that come, NaN where there are fewer [m/s]
+    reflected : (f, m) amplitude of all that goes back, in the root of the energy [-]
+    """
+
+    frequency: np.ndarray
+    group_velocity: np.ndarray
+    reflected: np.ndarray
+
+    def of_faster(self, speed: float) -> tuple[float, float]:
+        """Largest and rms reflection of waves that outrun a train [m/s]; NaN if none does."""
+        found = self.reflected[self.group_velocity > speed]
+        if not found.size:
+            return np.nan, np.nan
+        return float(found.max()), float(np.sqrt((found**2).mean()))
+
+
+def end_reflection(
+    model: Model, side: int, frequency: np.ndarray, own_damping: bool = False
+) -> EndReflection:
+    """What the ``START`` or ``END`` of a model sends back at frequencies (f,) [Hz]. Not collective.
+
+    The line before the end is taken to repeat its span next to that. ``own_damping`` is whether
+    both have the damping of the line, alpha and beta of the whole; it counts from where the end
+    begins.
+
+    Raises
+    ------
+    InputError
+        If spans are joined by more than a cross-section at a mast.
+    """
+    damping = model.simulated.damping if own_damping else Damping(0.0, 0.0)
+    laws = replace(model.simulated, damping=damping)
+    whole = replace(model, simulated=laws, constrained=model.numbering.missing)
+    s = _GROWTH + 2j * np.pi * frequency
+    weights = np.stack([s**2, s, np.ones_like(s)], axis=1)
+    line, end = model.problem.line, model.problem.ends[side]
+    # From the end inwards.
+    masts = line.support_positions[:: -1 if side == END else 1]
+    n_end = end.n_spans if isinstance(end, AbsorbingLayer) else 1
+    incoming = _chain(whole, masts[n_end + 1], masts[n_end], weights)
+    after, before = half_lines(incoming)
+    if isinstance(end, Periodic):
+        answer = after
+    else:
+        answer = _held(whole, model, side, masts[: n_end + 1], weights)
+    fading = _GROWTH + 0.5 * (damping.beta + damping.alpha * np.abs(s) ** 2)
+    length = fading * abs(masts[n_end + 1] - masts[n_end])
+    return _reflection(frequency, incoming, after, before, answer, length)
+
+
+def _chain(model: Model, inner: float, outer: float, weights: np.ndarray) -> Chain:
+    """A span towards an end, its first mast being the ``inner`` one; ``corner`` is that of its
+    first mast along the track."""
+    chain = chain_at(span_between(model, min(inner, outer), max(inner, outer))[1], weights)
+    if inner < outer:
+        return chain
+    return Chain(chain.corner, chain.end, chain.start, np.swapaxes(chain.next, 1, 2))
+
+
+def _held(
+    whole: Model, model: Model, side: int, masts: np.ndarray, weights: np.ndarray
+) -> np.ndarray:
+    """What the spans between ``masts``, from the end inwards, answer at the last one; held at the
+    first."""
+    unknowns = _unknowns_at(whole, side, masts)
+    free = np.flatnonzero(~np.isin(unknowns[0], model.constrained))
+    answer = _at(whole, unknowns[0], weights)[:, free][:, :, free]
+    for number in range(1, len(masts)):
+        chain = _chain(whole, masts[number], masts[number - 1], weights)
+        joined = chain.next[:, :, free]
+        outer = answer - chain.end[:, free][:, :, free]
+        answer = _at(whole, unknowns[number], weights) - chain.start
+        answer = answer - joined @ np.linalg.solve(outer, np.swapaxes(joined, 1, 2))
+        free = np.arange(unknowns[number].size)
+    return answer
+
+
+def _unknowns_at(model: Model, side: int, masts: np.ndarray) -> list[np.ndarray]:
+    """Unknowns that spans share at each mast, from the end inwards."""
+    inner = np.sort(masts)
+    found = [
+        span_between(model, low, high)[0] for low, high in zip(inner[:-1], inner[1:], strict=True)
+    ]
+    # The last mast along the track begins no span: its unknowns stand as at the one before.
+    starts = [int(model.numbering.within(x - 1e-6, np.inf)[0]) for x in inner[-2:]]
+    found.append(found[-1] - starts[0] + starts[1])
+    return found[::-1] if side == END else found
+
+
+def _at(model: Model, unknowns: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    return np.asarray(np.einsum("nw,wij->nij", weights, shared_at(model, unknowns)))
+
+
+def _reflection(
+    frequency: np.ndarray,
+    line: Chain,
+    after: np.ndarray,
+    before: np.ndarray,
+    answer: np.ndarray,
+    fading: np.ndarray,
+) -> EndReflection:
+    m = after.shape[1]
+    velocity, reflected = np.full((2, frequency.size, m), np.nan)
+    for i in range(frequency.size):
+        ahead, back = line.next[i], line.next[i].T
+        factors, waves = np.linalg.eig(-np.linalg.solve(after[i] - line.end[i], back))
+        inwards = -np.linalg.solve(before[i] - line.start[i], ahead)
+        _, leaving = np.linalg.eig(inwards)
+        speed = -fading[i] / np.log(np.maximum(np.abs(factors), 1e-300))
+        here = answer[i] - line.end[i]
+        # Imaginary parts are energy that goes by, in either direction.
+        out = _flux(leaving, before[i])
+        for w in np.flatnonzero(speed > _SLOWEST):
+            wave = waves[:, w]
+            come = back @ wave / factors[w] + here @ wave
+            gone = np.linalg.solve(leaving, np.linalg.solve(back @ inwards + here, -come))
+            share = (np.abs(gone) ** 2 * out).sum() / _flux(waves[:, [w]], after[i])[0]
+            velocity[i, w], reflected[i, w] = speed[w], np.sqrt(max(share, 0.0))
+    return EndReflection(frequency, velocity, reflected)
+
+
+def _flux(waves: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
+    """Energy flux of waves (m, k) into a half line, over half the angular frequency."""
+    return np.asarray(np.einsum("ik,ij,jk->k", waves.conj(), stiffness, waves).imag)

@@ -1,0 +1,93 @@
+"""What ends of a line send back, against closed forms and against figures found by other means."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from measuring import check
+from small_lines import BARE, bare_wires, en50318_line, mesh_of, problem_of
+
+from catenary.meshgen.topologies.line_data import LineData
+from catenary.solver.effects.build_model import build
+from catenary.solver.ends.line_beyond import END, START
+from catenary.solver.model.model import Model
+from catenary.solver.problem.ends import AbsorbingLayer, EndCondition, Fixed, Periodic
+from catenary.solver.waves.end_reflection import EndReflection, end_reflection
+
+ENDS = {"periodic_ends", "absorbing_layers", "arm_stiffness"}
+# Waves of these outrun a train at 250 km/h.
+FREQUENCY = np.arange(2.0, 20.0, 0.1)
+
+
+def model_of(line: LineData, end: EndCondition, elements: int = 2, side: int = END) -> Model:
+    ends = (Fixed(), end) if side == END else (end, Fixed())
+    problem = problem_of(line, BARE | ENDS, ends=ends)
+    mesh = mesh_of(line, elements)
+    return build(problem, mesh, np.full(mesh.droppers.shape[0], 1.0))
+
+
+def en_reflection(end: EndCondition, side: int = END, n_spans: int = 4) -> EndReflection:
+    return end_reflection(model_of(en50318_line(n_spans), end, 2, side), side, FREQUENCY)
+
+
+@pytest.mark.parametrize("side", [START, END])
+def test_ends_that_are_held_send_back_all_and_periodic_ones_nothing(side: int) -> None:
+    held, goes_on = en_reflection(Fixed(), side), en_reflection(Periodic(), side)
+    there = np.isfinite(held.reflected)
+    assert there.any(axis=1).sum() > 0.5 * FREQUENCY.size
+    np.testing.assert_array_equal(there, np.isfinite(goes_on.reflected))
+    # Waves fade by exp(-1e-3 L / v) in the last span, which slow ones take 60 s for... 1e-3 x 2 x
+    # 60 m / 2 m/s = 6 % at worst, of those that outrun a train 0.2 %.
+    assert np.nanmin(held.reflected) > 0.93 and np.nanmax(held.reflected) < 1.0 + 1e-9
+    check("of fast ones", held.of_faster(70.0)[1], 1.0, within=2e-3)
+    assert np.nanmax(goes_on.reflected) < 1e-10
+
+
+@pytest.mark.parametrize(("n", "damping"), [(4, 3.0), (8, 1.5)])
+def test_a_layer_on_a_single_wire_takes_what_the_closed_form_says(n: int, damping: float) -> None:
+    """exp(-b l / (3 c)): waves fade by exp(-b (x/l)^2 / 2 dt) on their way there and back.
+
+    The layer begins smoothly, so that short waves are not sent back by it (b / omega = 0.02).
+    """
+    line, n_spans = bare_wires(30.0), n + 3
+    line = replace(
+        line, span_lengths=(30.0,) * n_spans, dropper_positions=((15.0,),) * n_spans,
+        pre_sag=((0.0,),) * n_spans, stagger=(0.0,) * (n_spans + 1),
+        dropper=replace(line.dropper, stiffness=1e-6), support_stiffness=1e-6,
+    )  # fmt: skip
+    found = end_reflection(
+        model_of(line, AbsorbingLayer(n, damping), 16), END, np.array([18.0, 20.0])
+    )
+    wires = (line.contact_wire, line.messenger_wire)
+    expected = sorted(np.exp(-damping * 30.0 * n / 3.0 / wire.wave_speed) for wire in wires)
+    # Bending makes waves faster by 1.5 EI w^2 m / T^2 = 1 % at 20 Hz.
+    for row in found.reflected:
+        check("reflection", sorted(row[np.isfinite(row)]), expected, within=0.02)
+
+
+# Spans, damping [1/s], and rms reflection of what outruns 250 km/h by another program, which lets
+# waves of some frequencies in. Beside the narrow gaps between bands, where a wave slows down within
+# 0.05 Hz, the layer itself is a mirror: the largest twentieth is left out.
+LAYERS = [(4, 3.0, 0.13), (8, 2.0, 0.056), (12, 2.0, 0.018), (20, 2.0, 0.005)]
+
+
+@pytest.mark.parametrize(("n", "damping", "rms"), LAYERS)
+def test_layers_of_the_reference_line(n: int, damping: float, rms: float) -> None:
+    found = en_reflection(AbsorbingLayer(n, damping), n_spans=n + 3)
+    fast = np.sort(found.reflected[found.group_velocity > 250.0 / 3.6])
+    most = fast[: int(0.95 * fast.size)]
+    trimmed = float(np.sqrt((most**2).mean()))
+    print(
+        f"{n} spans: largest {fast[-1]:.3f}, rms {found.of_faster(250.0 / 3.6)[1]:.4f}, of 95 % "
+        f"{trimmed:.4f}, median {np.median(fast):.5f}; other program rms {rms}"
+    )
+    assert rms / 3.0 < trimmed < 2.0 * rms
+
+
+def test_the_usual_layer_sends_little_back() -> None:
+    found = en_reflection(AbsorbingLayer(20, 1.5), n_spans=23)
+    fast = found.reflected[found.group_velocity > 250.0 / 3.6]
+    print(f"median {np.median(fast):.4f}, above 2 %: {(fast > 0.02).mean():.3f} of the frequencies")
+    assert (fast > 0.02).mean() < 0.08 and np.median(fast) < 0.006
