@@ -83,22 +83,34 @@ def check(
 
 @app.command(
     "mesh",
-    help="Write the mesh of a case as a Gmsh file.",
-    epilog="Example: catenary mesh ac_simple -o ac_simple.msh --set mesh.elements_per_gap=6",
+    help="Write the mesh of a case as a Gmsh file, or a drawing to scale of its line at rest.",
+    epilog="Example: catenary mesh re330_stitched -o re330.svg",
 )
 @console.guarded
 @console.serial
 def mesh(
     case: Case,
-    out: Annotated[Path, typer.Option("-o", "--out", help="Mesh file to write, *.msh.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "-o",
+            "--out",
+            help="File to write: *.msh is the mesh; *.png and *.svg draw side view, plan view and "
+            "a cross-section.",
+        ),
+    ],
     extras: MoreAssignments = None,
     assignments: Assignments = None,
     force: Force = False,
 ) -> None:
     """Serial."""
     scene = load(case, assignments, extras)
-    from catenary.cases.run.scene_mesh import write_mesh_of
+    from catenary.cases.run.scene_mesh import DRAWN, draw_scene, write_mesh_of
 
+    if out.suffix in DRAWN:
+        first, last = draw_scene(scene, out, force)
+        console.say(f"{out}: the line at rest from {first:g} to {last:g} m")
+        return
     made = write_mesh_of(scene, out, force)
     console.say(f"{out}: {made.n_nodes} nodes, {counted(made.droppers.shape[0], 'dropper')}")
 

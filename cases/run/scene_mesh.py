@@ -13,6 +13,9 @@ from catenary.meshgen.build import make_mesh, use_mesh
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.base.errors import InputError
 
+# Suffixes of drawings.
+DRAWN = (".png", ".svg")
+
 
 def mesh_of(scene: Scene, path: Path | None = None) -> LineMesh:
     """The mesh of a scene. Not collective: call it on one rank.
@@ -50,5 +53,38 @@ def write_mesh_of(scene: Scene, path: Path, force: bool) -> LineMesh:
         raise InputError(
             f"mesh.file {scene.origin.of('mesh.file')} names a mesh already; there is none to make"
         )
-    new_file(path, (".msh",), force)
+    new_file(path, (".msh", *DRAWN), force)
     return mesh_of(scene, path)
+
+
+def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
+    """Draw a scene's line at rest into a new file; from where to where [m]. Not collective.
+
+    Three running spans in the middle, or the overlap with a span on either side.
+
+    Raises
+    ------
+    InputError
+        If the file must not be written, or the line has no equilibrium.
+    """
+    new_file(path, DRAWN, force)
+    # Matplotlib takes long to import.
+    from catenary.cases.scene.convert.problem import problem_of
+    from catenary.postproc.report.line_drawing import draw_line
+    from catenary.solver.statics.equilibrium import find_form
+
+    problem, mesh = problem_of(scene), mesh_of(scene)
+    _, form = find_form(problem, mesh)
+    line, masts = problem.line, problem.line.support_positions
+    overlap = scene.line.overlap
+    if overlap is not None:
+        spans = overlap.first_span - 2, overlap.first_span + overlap.n_spans
+    else:
+        first, last = line.n_transition[0], line.n_spans - line.n_transition[1]
+        middle = (first + last) // 2
+        spans = max(middle - 1, 0), min(middle + 2, line.n_spans)
+    stretch = float(masts[spans[0]]), float(masts[spans[1]])
+    lengths = [scene.pantographs[place.name].strips.length_m for place in scene.train.pantographs]
+    known = [0.5 * length for length in lengths if length is not None]
+    draw_line(line, mesh, form, path, stretch, min(known, default=None))
+    return stretch
