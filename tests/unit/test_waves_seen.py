@@ -8,7 +8,11 @@ import numpy as np
 import pytest
 from program import catenary
 
+from catenary.cases.studies.waves import pictures
 from catenary.cases.studies.waves.seen import WavesSeen
+from catenary.cases.studies.waves.study import as_rows
+from catenary.cases.studies.waves.theory import MOST_SPEEDS, WaveTheory
+from catenary.solver.waves.bloch import BlochWaves
 
 SPEED = 40.0
 
@@ -45,6 +49,23 @@ def test_the_frame_of_the_train_moves_with_it() -> None:
     # What moves with the train stands still in its frame.
     _, still = travelling(0.3, 0.3 * SPEED / (2 * np.pi)).in_the_train(10.0, 30.0)
     assert np.ptp(still[:700], axis=0).max() < 0.01
+
+
+def test_a_line_of_many_wires_has_a_line_of_speed_for_each() -> None:
+    frequency = np.array([[1.0], [2.0]])
+    waves = BlochWaves(50.0, np.array([0.0, np.pi]), frequency, 90.0 * frequency / 2.0,
+                       np.zeros((2, 1, 0), dtype=complex), np.zeros(0))  # fmt: skip
+    wires = tuple((f"wire_{n}", 100.0 + n) for n in range(5))
+    theory = WaveTheory(SPEED, 100.0, wires, 0.4, np.nan, np.nan, waves, "")
+    assert len(theory.speeds()) == MOST_SPEEDS
+    few = WaveTheory(SPEED, 100.0, wires[:3], 0.4, np.nan, np.nan, waves, "")
+    assert few.speeds()[-1] == (90.0, "fastest energy of the line (2.0 Hz)")
+    axes = pictures.space_time(travelling(0.5, 7.5), few, np.array([60.0])).axes[0]
+    # Each speed runs both ways from the train, beside its own course and a support.
+    assert len(axes.get_lines()) == 1 + 2 * len(few.speeds()) + 1
+    # What a line of many wires does not have is no row.
+    names = {row["name"] for row in as_rows(theory)}
+    assert "doppler_factor" in names and "amplification" not in names
 
 
 @pytest.mark.process

@@ -34,14 +34,16 @@ from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Damping, Numerics, Problem
 from catenary.solver.waves.scattering import answer
 
-# Wire to both sides of the obstacle, elements, and stations before and behind it [m]. Elements are
-# so short for the bending beside a stiff obstacle, which falls off over sqrt(EI / T), 0.1 m.
-HALF, ELEMENT, STATION = 600.0, 0.2, 60.0
+# Wire to both sides of the obstacle, and stations before and behind it [m].
+HALF, STATION = 600.0, 60.0
+# Elements are twice as long as what bends beside a stiff obstacle, sqrt(EI / T), in bounds [m].
+_SHORTEST, _LONGEST = 0.1, 0.2
 DT = 1e-3
 # Length of the pulse in time, one standard deviation: a third of its largest spectrum at 20 Hz [s].
 _PULSE = 0.012
-# Signals are taken until a wave of the fastest wire has run so many halves.
-_HALVES = 1.6
+# Signals are taken until a wave of the fastest wire has run so many halves: at 2.1 the first echo
+# of an end is at a station.
+_HALVES = 1.9
 _KEPT = frozenset({"vertical", "dropper_mass", "clamp_mass", "arm_inertia", "arm_stiffness"})
 
 
@@ -129,7 +131,10 @@ def _model(bench: Bench, problem: Problem) -> Model:
         tuple(part for part in bench.parts if isinstance(part, SteadyArms)),
         tuple(part for part in bench.parts if isinstance(part, Supports)),
     )
-    mesh = make_mesh(line, round(HALF / ELEMENT))
+    bends = min(np.sqrt(wire.bending_stiffness / wire.tension) for wire in bench.wires)
+    # A whole number of them up to the stations, too.
+    a_station = round(STATION / float(np.clip(2.0 * bends, _SHORTEST, _LONGEST)))
+    mesh = make_mesh(line, a_station * round(HALF / STATION))
     alone = replace(
         problem, line=line, damping=Damping(0.0, 0.0), effects=problem.effects & _KEPT, incidents=()
     )
@@ -142,7 +147,7 @@ def _model(bench: Bench, problem: Problem) -> Model:
 def _change(model: Model, wire: Wire, beyond: Conductor) -> None:
     """Make a wire another one beyond the middle: its elements gain what that has more."""
     dofs, length = wire_elements(model, wire.name, ("w", "theta_y"))
-    there = model.mesh.x(model.mesh.elements(wire.name)).min(axis=1) > HALF - 1e-6 * ELEMENT
+    there = model.mesh.x(model.mesh.elements(wire.name)).min(axis=1) > HALF - 1e-6
     dofs, length = dofs[there], length[there]
     mass = elements.mass(length, beyond.mass_per_length - wire.mass_per_length)
     stiffness = elements.stiffness(
@@ -163,7 +168,8 @@ def _signals(
         nodes = [model.mesh.wires[wire.name] for wire in bench.wires]
         at = [own[np.argmin(np.abs(model.mesh.x(own) - place))] for own in nodes]
         rows.append(model.dofs(np.array(at)))
-    lasts = _HALVES * HALF / max(wire.wave_speed for wire in bench.wires)
+    beyond = [] if bench.beyond is None else [bench.beyond]
+    lasts = _HALVES * HALF / max(wire.wave_speed for wire in [*bench.wires, *beyond])
     time = DT * np.arange(int(lasts / DT))
     found = np.empty((time.size, 2, len(bench.wires)))
     numerics = Numerics(DT, "one_solve", 0.25, 0.5, 1e-9, 1e-9, 1)

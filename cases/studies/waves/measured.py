@@ -12,6 +12,8 @@ from catenary.solver.waves.bloch import BlochWaves
 
 # A band is so many widths to both sides, and lies within a branch [-]; its largest width [Hz].
 _WIDTHS, _WIDEST = 4.0, 0.2
+# Narrower bands last too long [Hz]; in which share of the record waves are to arrive [-].
+_NARROWEST, _IN_TIME = 0.03, 0.8
 # The fastest waves up to these frequencies are measured [Hz].
 _UP_TO = (0.5 * HIGHEST, HIGHEST)
 # Spans from the blow to the first station, least spans from there to the second, and which share of
@@ -96,6 +98,9 @@ def measured_rows(theory: WaveTheory, seen: WavesSeen) -> list[dict[str, Any]]:
         frequency, velocity = branch_of_fastest(waves, highest)
         at, wide = 0.5 * (frequency[0] + frequency[-1]), frequency[-1] - frequency[0]
         width = min(_WIDEST, float(wide) / (2.2 * _WIDTHS))
+        slowest = velocity[np.abs(frequency - at) < _WIDTHS * width].min()
+        if width < _NARROWEST or distance / slowest > _IN_TIME * float(np.ptp(seen.time)):
+            continue
         found = arrived(seen.time, first, second, distance, float(at), width)
         what = f"of energy around {at:.1f} Hz over {distance:.0f} m"
         rows += [

@@ -20,9 +20,10 @@ from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.waves.scattering import change_of_wire, scattered
 
 # Frequencies at which obstacles are measured [Hz].
-FREQUENCIES = np.arange(1.0, HIGHEST + 0.5, 0.5)
-# Shares that go on below this one are compared with it and not with themselves: see `Result.error`.
-LEAST = 0.1
+FREQUENCIES = np.arange(2.0, HIGHEST + 0.5, 0.5)
+# Shares below these are compared with them and not with themselves, what comes back and what goes
+# on: see `Result.error`.
+LEAST = (0.01, 0.1)
 
 
 class Obstacle(NamedTuple):
@@ -61,12 +62,11 @@ class Result(NamedTuple):
     def error(self) -> np.ndarray:
         """Difference of measured and theoretical shares, as complex numbers, (2, f, n, n) [-].
 
-        Of what comes back over the theoretical share, of what goes on over that or `LEAST`: behind
-        a support there is no wave to speak of.
+        Over the theoretical share, or over `LEAST`: an arm sends nothing back at its own frequency,
+        and behind a support there is no wave to speak of.
         """
-        back = np.abs(self.back[0] - self.back[1]) / np.maximum(np.abs(self.back[1]), 1e-12)
-        onward = np.abs(self.onward[0] - self.onward[1])
-        return np.stack([back, onward / np.maximum(np.abs(self.onward[1]), LEAST)])
+        pairs = zip((self.back, self.onward), LEAST, strict=True)
+        return np.stack([np.abs(m - t) / np.maximum(np.abs(t), least) for (m, t), least in pairs])
 
 
 def obstacles_of(rest: LineAtRest) -> list[Obstacle]:

@@ -36,8 +36,9 @@ def space_time(
     for number, (speed, label) in enumerate(theory.speeds()):
         for end in (seen.x[-1], seen.x[0]):
             axes.plot(
-                [place, end], [start, start + abs(end - place) / speed], _DASHES[number],
-                color="black", linewidth=1.0, label=label if end == seen.x[-1] else None,
+                [place, end], [start, start + abs(end - place) / speed],
+                linestyle=_DASHES[number], color="black", linewidth=1.0,
+                label=label if end == seen.x[-1] else None,
             )  # fmt: skip
     _supports(axes, supports)
     axes.set_xlim(seen.x[0], seen.x[-1])

@@ -196,7 +196,7 @@ def energy_rows(energy: EnergySeen, seen: WavesSeen) -> list[Row]:
 
 
 def as_rows(theory: WaveTheory) -> list[Row]:
-    """Figures with unit and meaning."""
+    """Figures with unit and meaning; those that the line does not have are left out."""
     rows = [
         ("train_speed", theory.speed, "m/s", "speed of the train"),
         ("wave_speed", theory.wave_speed, "m/s", "sqrt(T/m) of the contact wire"),
@@ -213,6 +213,7 @@ def as_rows(theory: WaveTheory) -> list[Row]:
     return [
         {"name": name, "value": value, "unit": unit, "meaning": meaning}
         for name, value, unit, meaning in rows
+        if np.isfinite(value)
     ]
 
 
