@@ -56,6 +56,7 @@ from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest, line_at_rest_on_all
 from catenary.solver.time_loop.march import March, Outcome
 from catenary.solver.time_loop.observers import Observer
+from catenary.solver.window.choice import window_sentence
 
 logger = logging.getLogger("catenary.runner")
 
@@ -374,6 +375,7 @@ def _header(order: _Order, problem: Problem, at_rest: LineAtRest) -> Header:
             "pantographs": header_words(scene, problem),
             "incidents": incident_facts(scene, problem),
             "arrivals": arrival_facts(scene, problem),
+            "window": window_sentence(problem),
             "versions": versions(),
             "config": resolved(scene),
             "wires": wire_roles(line),

@@ -54,6 +54,7 @@ def summary_text(summary: Mapping[str, Any], folder: Path) -> str:
         f"{counted(summary['n_ranks'], 'rank')}, "
         f"real-time factor {_number(summary['real_time_factor'], 2)}",
         *([f"  {summary['detour']}"] if summary.get("detour") else []),
+        *([f"  {summary['window']}"] if summary.get("window") else []),
         *_sizes_of_steps(summary.get("inner_iterations", {})),
         "",
     ]

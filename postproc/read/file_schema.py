@@ -201,6 +201,7 @@ ATTRIBUTES: dict[str, Attribute] = {
     ),
     "line_record": Attribute("what is recorded of the line", _line_record, True, None),
     "detour": _text(""),
+    "window": _text(""),
     "phase_wall_s": Attribute("a table of numbers", _table_of_numbers, True, {}),
     "inner_iterations": Attribute("a table of numbers", _table_of_numbers, True, {}),
 }

@@ -289,6 +289,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
         ("unknowns", f"{about['n_dofs']}"),
         ("ranks", f"{about['n_ranks']}"),
         *([("speed of steps", about["detour"])] if about.get("detour") else []),
+        *([("window", about["window"])] if about.get("window") else []),
         *(
             (f"incident at {fact['time_s']:.4g} s", fact["says"])
             for fact in about.get("incidents", [])

@@ -47,6 +47,7 @@ def summarise(
         "phase_wall_s": attributes.get("phase_wall_s", {}),
         "inner_iterations": attributes.get("inner_iterations", {}),
         "detour": attributes.get("detour") or None,
+        "window": attributes.get("window") or None,
         "evaluation_m": [start, end],
         "pantographs": [
             _pantograph(*row)

@@ -9,6 +9,7 @@ from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.solver.base.errors import InputError
 from catenary.solver.problem.window import WindowChoice
+from catenary.solver.window.choice import estimated_error
 
 BOUNDED = "window.mode=bounded"
 AHEAD, BEHIND = "window.spans_ahead=6", "window.spans_behind=4"
@@ -46,9 +47,31 @@ def test_what_cannot_be_is_refused(words: tuple[str, ...], says: str) -> None:
     assert len(str(refused.value).splitlines()) == 1
 
 
+def test_spans_follow_from_damping_and_speed() -> None:
+    """Waves that fade within a span need few of them; the estimate falls with each further one."""
+
+    def ahead(case: str, *keys: str) -> float:
+        return problem_of(load_scene(case, (BOUNDED, *keys))).window.spans_ahead
+
+    assert ahead("en50318_2002") == 30
+    assert ahead("en50318_2002", "train.speed_km_h=300") < 30
+    light = ahead("ambrosio2012", "line.damping.alpha_s=0.00275")
+    assert ahead("ambrosio2012") <= light < 10
+    problem = problem_of(load_scene("en50318_2002", (BOUNDED,)))
+    errors = [estimated_error(problem, n, 0.8 * n) for n in (4, 10, 20, 30, 40)]
+    assert errors == sorted(errors, reverse=True)
+    assert errors[3] < 0.1
+    assert (problem.window.fading, light_fading()) == (1.0, 0.0)
+
+
+def light_fading() -> float:
+    return problem_of(load_scene("ambrosio2012", (BOUNDED,))).window.fading
+
+
 def test_the_plan_says_what_moves() -> None:
     assert "window" not in plan_text(make_plan(load_scene("en50318_2002")))
     bounded = plan_text(make_plan(load_scene("en50318_2002", (BOUNDED, AHEAD, BEHIND))))
     assert "6 spans move ahead of the train and 4 behind" in bounded
+    assert "% of its standard deviation (estimate)" in bounded
     exact = plan_text(make_plan(load_scene("en50318_2002", ("window.mode=exact",))))
     assert "whatever a wave has reached moves" in exact
