@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.compiled import compiled
+from catenary.solver.base.compiled import compiled, in_line
 
 # Columns of a row of what a head depends on in a step besides its state. A chain of lumped masses
 # has the first alone, the force on its last mass [N]; a reduced mechanism has the part of the full
@@ -90,7 +90,7 @@ class RaisedHead(NamedTuple):
     coefficients: np.ndarray
 
 
-@compiled
+@in_line
 def respond(inverse, newmark, head):
     """Fill ``head.by_force`` and ``head.out`` for accelerations by ``inverse`` (n, n)."""
     touch, free, by_force, out = head.touch, head.free, head.by_force, head.out
@@ -118,7 +118,7 @@ def respond(inverse, newmark, head):
             out[at], out[at + s * s] = height, velocity
 
 
-@compiled
+@in_line
 def linear_step(linear, newmark, head, drive):
     """Step a head without contact under ``drive``, the force on its last mass [N]."""
     state, free = head.state, head.free
@@ -207,7 +207,7 @@ def invert(matrix):
                     matrix[i, j] -= share * matrix[k, j]
 
 
-@compiled
+@in_line
 def take(head, contact_force):
     """Make ``head.state`` the state under contact forces (s,), after a step without."""
     for i in range(head.state.size):

@@ -70,7 +70,7 @@ def arrays_of(head):
     )
 
 
-@compiled
+@in_line
 def predict(head, drive, numbers, n_contacts):
     """Predict a head from a row ``drive`` of numbers: its strips' part of ``numbers``.
 
@@ -116,7 +116,7 @@ def predict(head, drive, numbers, n_contacts):
     return within
 
 
-@compiled
+@in_line
 def move(head, force):
     """Move a head on under the forces (n,) at all contacts, after ``predict``."""
     head_kernels.take(arrays_of(head), force[head.first : head.first + head.s])

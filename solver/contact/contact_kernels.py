@@ -107,7 +107,7 @@ class Followed(NamedTuple):
     moving: np.ndarray
 
 
-@compiled
+@in_line
 def locate(x, nodes, touches):
     """Make ``touches`` those at places ``x`` (n,) [m], each on its own wire.
 
@@ -158,7 +158,7 @@ def clear(answer, low, high):
         answer[j] = 0.0
 
 
-@compiled
+@in_line
 def place(x, nodes, data, touches, answers):
     """Make ``touches`` those at places ``x`` (n,) [m], and ``answers`` those to forces there.
 
@@ -188,7 +188,7 @@ def place(x, nodes, data, touches, answers):
         touch.filled[0], touch.filled[1] = min(low, high), high
 
 
-@compiled
+@in_line
 def heights(motion, touches, train_speed, height, rate):
     """Owned share of the wire's height and of its total rate dw/dt + V dw/dx at each touch."""
     for i in range(touches.size):
@@ -215,7 +215,7 @@ def answer_at(local, weights, answer):
     return total
 
 
-@compiled
+@in_line
 def meet(motion, touches, gains, answers, line):
     """A rank's share of heights, rates and what forces add to both, into ``line`` (``Affine``).
 
@@ -259,7 +259,7 @@ def spread(link, links, answer):
     return total
 
 
-@compiled
+@in_line
 def watch(followed, bounds, touches, answers, gains, rows):
     """Number of links that may switch within ``bounds``; a row each, as far as they fit.
 
@@ -316,7 +316,7 @@ def watch(followed, bounds, touches, answers, gains, rows):
     return count
 
 
-@compiled
+@in_line
 def respond(motion, touches, gains, answers, bounds, followed, share):
     """A rank's share of the small problem; links as for ``watch``."""
     for i in range(touches.size):
@@ -332,7 +332,7 @@ def respond(motion, touches, gains, answers, bounds, followed, share):
     flags.missing = count if count > room else 0
 
 
-@compiled
+@in_line
 def superpose(force, answers, touches, motion, gains):
     """Add the answers to contact forces to the state.
 
@@ -352,7 +352,7 @@ def superpose(force, answers, touches, motion, gains):
                 y[j] += gains[1] * change
 
 
-@compiled
+@in_line
 def compensate(numbers, compensation, start, offset, data, motion, gains):
     """Add the answers to compensations of some links to the state.
 
@@ -371,7 +371,7 @@ def compensate(numbers, compensation, start, offset, data, motion, gains):
                 y[begin + j] -= gains[1] * change
 
 
-@compiled
+@in_line
 def write_outputs(force, reported, heads, depth, ends, outputs):
     """Contact force, head height and wire height of each pantograph, then the force of each strip.
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.compiled import compiled
+from catenary.solver.base.compiled import compiled, in_line
 from catenary.solver.contact.line_response import Affine, Bounds, Coupled, Rows
 
 
@@ -72,7 +72,7 @@ class SmallProblem(NamedTuple):
 NOWHERE = -1.0
 
 
-@compiled
+@in_line
 def subtract(heads, line, present, gap):
     """Depths and rates at the contacts without forces, and what forces take off them, into ``gap``.
 
@@ -91,7 +91,7 @@ def subtract(heads, line, present, gap):
     return np.isfinite(total)
 
 
-@compiled
+@in_line
 def press(gap, tangents, push, softness):
     """Right-hand side and matrix of the contact forces when no link has switched."""
     own, offset, by_depth, by_rate = tangents
@@ -123,7 +123,7 @@ def hertz(depth, rate, speed, stiffness, exponent, hysteresis, tangents, force):
         offset[i] = force[i] - by_depth[i] * d - by_rate[i] * rate[i]
 
 
-@compiled
+@in_line
 def any_switched(rows, count, force):
     """Whether contact forces alone take any of the links beyond its reserve."""
     for d in range(count):
@@ -242,7 +242,7 @@ def settle(matrix, right, always, solution, max_rounds):
     return -max_rounds
 
 
-@compiled
+@in_line
 def under(gap, rows, force, compensation, found):
     """Fill ``found`` (2, n): depths and rates at the contacts under forces and compensations.
 
@@ -262,7 +262,7 @@ def under(gap, rows, force, compensation, found):
     return np.isfinite(total)
 
 
-@compiled
+@in_line
 def leaves_out(force, compensation, rows, bounds, coupled):
     """Whether a link without a row may have switched, as the ``bounds`` were too small.
 
@@ -294,7 +294,7 @@ def leaves_out(force, compensation, rows, bounds, coupled):
     return largest > bounds.loss[0]
 
 
-@compiled
+@in_line
 def solve(problem):
     """Contact forces and compensations for a law's tangents: rounds needed, and unknowns used.
 
@@ -305,13 +305,13 @@ def solve(problem):
     rows. Rounds are not positive if the active set did not settle; the problem then stands in
     matrix and right-hand side.
     """
-    gap, rows, bounds, tangents = problem.gap, problem.rows, problem.bounds, problem.tangents
-    coupled, present, max_rounds = problem.coupled, problem.present, problem.max_rounds
-    always, matrix, right, solution = problem.unknowns
-    n, count = gap.place.size, int(problem.flags[0].rows)
-    finite = subtract(problem.heads, problem.line, present, gap)
+    heads, line, gap, present, pulls, flags, rows, bounds = problem[:8]
+    tangents, coupled, unknowns, found, max_rounds = problem[8:]
+    always, matrix, right, solution = unknowns
+    n, count = gap.place.size, int(flags[0].rows)
+    finite = subtract(heads, line, present, gap)
     for i in range(n):
-        always[i] = problem.pulls and present[i] != 0.0
+        always[i] = pulls and present[i] != 0.0
     press(gap, tangents, right, matrix)
     force = solution[:n]
     rounds = settle(matrix[:n, :n], right[:n], always[:n], force, max_rounds)
@@ -322,6 +322,6 @@ def solve(problem):
         rounds = settle(
             matrix[:size, :size], right[:size], always[:size], solution[:size], max_rounds
         )
-    finite &= under(gap, rows, force, solution[n:size], problem.found)
+    finite &= under(gap, rows, force, solution[n:size], found)
     complete = not leaves_out(force, solution[n:size], rows, bounds, coupled)
     return rounds, size, finite, complete

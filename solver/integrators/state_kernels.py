@@ -45,7 +45,7 @@ def correct(displacement, velocity, acceleration, position_factor, velocity_fact
         displacement[i] += position_factor * a
 
 
-@compiled
+@in_line
 def shift(start, places, way):
     """Places a way ahead of where they started."""
     for i in range(start.size):

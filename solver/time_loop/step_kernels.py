@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.mbs.head import head_records
-from catenary.solver.base.compiled import compiled
+from catenary.solver.base.compiled import compiled, in_line
 from catenary.solver.base.pointers import borrowed, call_held, numbers_at
 from catenary.solver.contact import contact_kernels
 from catenary.solver.contact_problem import complementarity_kernels
@@ -67,7 +67,7 @@ class Steps(NamedTuple):
     taps: np.ndarray
 
 
-@compiled
+@in_line
 def report(time, force, law):
     """Whether the contact law holds for ``force`` (n,) at ``time`` [s]; if so it is remembered.
 
@@ -88,7 +88,7 @@ def report(time, force, law):
     return True
 
 
-@compiled
+@in_line
 def find_forces(time, problem, law, switched, n, counts):
     """Contact forces and compensations into the solution of the problem.
 
