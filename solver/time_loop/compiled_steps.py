@@ -1,6 +1,6 @@
 """Many steps of the scheme ``one_solve`` in one call, on one rank, as far as a loop can take them.
 
-A step whose forces the loop does not find, because an active set cycles, a bound was too small, or
+A step whose forces the loop does not find, because an active set cycles, a link finds no room, or
 something is no number, is finished by the scheme itself, from where the loop has left it.
 """
 
@@ -22,7 +22,7 @@ from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.time_loop import step_kernels
 from catenary.solver.time_loop.observers import StepView
-from catenary.solver.time_loop.step_kernels import ROUNDS, SLACK, Steps
+from catenary.solver.time_loop.step_kernels import N_COUNTS, REPEATED, ROUNDS, SLACK, Steps
 from catenary.solver.time_loop.step_views import Showing
 
 # What rows of a block may take, so that it stays in the caches [B], and the most of them.
@@ -84,7 +84,7 @@ class CompiledSteps:
         self._heads = np.zeros(2 * n * (1 + n))
         self._at_contacts = affine(self._heads, n)
         self._drives = np.zeros((self.most, pantographs.n, drive_width(pantographs.most_contacts)))
-        self._counts = np.zeros(2, dtype=np.int64)
+        self._counts = np.zeros(N_COUNTS, dtype=np.int64)
         self._bound_to: tuple[Any, Any] = None, None
         self._bound: Callable[[int, int], tuple[int, bool]]
         self._event = event("Steps")
@@ -154,6 +154,7 @@ class CompiledSteps:
         counters.solves += done
         counters.rounds += int(counts[ROUNDS])
         counters.slack_dropper_steps += int(counts[SLACK])
+        counters.repeated_steps += int(counts[REPEATED])
         self.taken += done
         self._event.end()
         return bool(begun)

@@ -20,7 +20,10 @@ from catenary.solver.contact_problem.law_tangents import ReportedForces
 from catenary.solver.integrators import state_kernels
 
 # Numbers of ``counts``, named as in `schemes.Counters`.
-ROUNDS, SLACK = 0, 1
+ROUNDS, SLACK, REPEATED = 0, 1, 2
+N_COUNTS = 3
+# In place of a number of compensations: forces are left to others, or bounds were too small.
+LEFT, TOO_SMALL = -1, -2
 
 
 class Steps(NamedTuple):
@@ -92,19 +95,31 @@ def report(time, force, law):
 def find_forces(time, problem, law, switched, n, counts):
     """Contact forces and compensations into the solution of the problem.
 
-    Returns the number of links with a compensation, -1 if that is left to others.
+    Returns the number of links with a compensation, ``TOO_SMALL``, or ``LEFT``.
     """
     flags, solution = problem.flags[0], problem.unknowns.solution
     if flags.broken or flags.missing or n + int(flags.rows) > solution.size:
-        return -1
+        return LEFT
     rounds, size, finite, complete = complementarity_kernels.solve(problem)
-    if rounds <= 0 or not finite or not complete or not report(time, solution[:n], law):
-        return -1
+    if rounds <= 0 or not finite:
+        return LEFT
+    if not complete:
+        return TOO_SMALL
+    if not report(time, solution[:n], law):
+        return LEFT
     counts[ROUNDS] += rounds
     for k in range(size - n):
         switched[k] = int(problem.rows.number[k])
         counts[SLACK] += solution[n + k] != 0.0 and problem.coupled.slackens[switched[k]]
     return size - n
+
+
+@in_line
+def widen(bounds):
+    """Double the bounds of what may switch."""
+    bounds.loss[0] *= 2.0
+    for i in range(bounds.force.size):
+        bounds.force[i] *= 2.0
 
 
 @compiled
@@ -143,8 +158,13 @@ def take(steps, times, drives, rows, kept_motions, counts, shows, first, n_steps
         within = True
         for h in range(records.size):
             within &= head_records.predict(records[h], drives[i, h], heads, n)
-        contact_kernels.respond(*responding)
-        m = find_forces(time, problem, law, switched, n, counts) if within else -1
+        m = TOO_SMALL if within else LEFT
+        while m == TOO_SMALL:
+            contact_kernels.respond(*responding)
+            m = find_forces(time, problem, law, switched, n, counts)
+            if m == TOO_SMALL:
+                widen(problem.bounds)
+                counts[REPEATED] += 1
         if m < 0:
             return i - first, True
         contact_kernels.superpose(force, *superposing)
