@@ -20,7 +20,7 @@ from catenary.mbs.head.head_kernels import (
     NewmarkFactors,
     RaisedHead,
 )
-from catenary.solver.base.compiled import compiled, in_line
+from catenary.solver.base.compiled import in_line
 from catenary.solver.base.pointers import address_of, cube_at, numbers_at, table_at_address
 
 # Models, as `head_kernels` steps them.

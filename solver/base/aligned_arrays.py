@@ -11,13 +11,13 @@ import numpy as np
 
 LINE, PAGE = 64, 4096
 # From one place of a page to the next: far enough for no two arrays to be in each other's way.
-_APART = 13 * LINE
+_APART = 9 * LINE
 
 
 def zeros(size: int, place: int = 0) -> np.ndarray:
     """Array of ``size`` zeros that begins at a cache line, at a ``place`` of a page: 0, 1, ...
 
-    Arrays of different place (of four) are not in each other's way.
+    Arrays of different place (of seven) are not in each other's way.
     """
     room = np.zeros(size + PAGE // 8)
     begin = (place * _APART - room.ctypes.data) % PAGE // 8

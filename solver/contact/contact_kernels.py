@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.solver.integrators.state_kernels import (
-    compiled,
     displacement_at,
     in_line,
     velocity_at,

@@ -47,7 +47,7 @@ class GeneralizedAlphaLine(LineIntegrator):
         beta, gamma, mass_weight, force_weight = integration
         ratio = (1.0 - force_weight) / (1.0 - mass_weight)
         super().__init__(comm, model, ownership, ratio * beta * dt**2, ratio * gamma * dt)
-        self._known = aligned_arrays.zeros(ownership.n_local, 3)
+        self._known = aligned_arrays.zeros(ownership.n_local, 4)
         self._by = AlphaFactors(
             dt=dt,
             ratio=ratio,
@@ -82,7 +82,7 @@ class GeneralizedAlphaLine(LineIntegrator):
             self._beta_share,
         )
         operators, (shown, rate, _, _) = self.operators, self.motion.read
-        total = aligned_arrays.zeros(shown.size, 1)
+        total = aligned_arrays.zeros(shown.size, 5)
         # What products with C read, if there are any.
         predicted = rate[:0] if self._proportional else operators.rate
         motion = AlphaAhead(operators.factor, rate, total, self._known, shown, steps, predicted)

@@ -261,7 +261,7 @@ class LineOperators:
         in. Collective when first asked for."""
         pad, domain = self._pad, self.domain
         if self._rate_halo is None:
-            self._rate_padded = aligned_arrays.zeros(self._read_padded.size, 3)
+            self._rate_padded = aligned_arrays.zeros(self._read_padded.size, 6)
             read = self._rate_padded[pad : self._rate_padded.size - pad]
             self._rate_halo = Halo(self._comm, self._ownership, domain.read_low, read)
         read = self._rate_padded[pad : self._rate_padded.size - pad]

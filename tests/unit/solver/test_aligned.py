@@ -10,7 +10,7 @@ from catenary.solver.base import aligned_arrays
 
 @pytest.mark.parametrize("size", [0, 1, 7, 5000, 200_000])
 def test_arrays_begin_at_a_cache_line_each_at_its_place_of_a_page(size: int) -> None:
-    arrays = [aligned_arrays.zeros(size, place) for place in range(4)]
+    arrays = [aligned_arrays.zeros(size, place) for place in range(7)]
     assert all(array.size == size and not array.any() for array in arrays)
     if size:
         begins = [array.ctypes.data % aligned_arrays.PAGE for array in arrays]
