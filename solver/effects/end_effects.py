@@ -10,7 +10,6 @@ import numpy as np
 from catenary.solver.effects import vertical_effects  # noqa: F401  (built before)
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.model.absorbing_layers import layer_blocks
-from catenary.solver.model.loads import MemoryLoad
 from catenary.solver.model.model import Block
 from catenary.solver.problem.ends import AbsorbingLayer, Periodic
 from catenary.solver.problem.integrator_parameters import integration_of
@@ -42,6 +41,7 @@ def _lines_beyond(builder: ModelBuilder) -> None:
     # Compiled loops and transforms, which lines that do not go on need not import.
     from catenary.solver.ends.line_beyond import line_beyond
     from catenary.solver.ends.periodic_end import StepSums, periodic_end
+    from catenary.solver.model.loads import MemoryLoad
 
     model, problem = builder.model, builder.problem
     numerics, damping = problem.numerics, model.damping_of(_BEYOND)
