@@ -58,7 +58,11 @@ def layout_of(
     widths = _without_gaps(_planes(joined))
     if max(widths) > WIDEST:
         return None
-    return _joining(Layout(widths, (), (), make_ups=make_ups), stiffness)
+    # A plane of one or two wires has the terms of beams that droppers join, some of which a bare or
+    # a straight line lacks: few kernels serve them all.
+    usual = ((0, 1, 2), (0, 1)) if max(widths) in (3, 4) else ((0, 1), (0, 1))
+    own, beside = usual if max(widths) <= 4 else ((), ())
+    return _joining(Layout(widths, own, beside, make_ups=make_ups), stiffness)
 
 
 def with_damping(layout: Layout, damping: np.ndarray | None) -> Layout:
