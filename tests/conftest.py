@@ -9,11 +9,14 @@ from pathlib import Path
 import pytest
 
 # Files to begin with, as cores become free: those that compile most. The first and the third share
-# loops; the second has others, and takes as long as both: no two cores compile the same at a time.
+# loops, the second has others and takes as long as both: no two cores compile the same at a time.
 FIRST = (
     "unit/solver/test_repeated_blocks.py",
     "regression/test_hard_cases.py",
     "unit/solver/test_station_passes.py",
+    "unit/solver/test_varying_stations.py",
+    "unit/solver/test_lines_in_two_passes.py",
+    "unit/solver/test_wires_that_come_and_go.py",
 )
 
 sys.path.insert(0, str(Path(__file__).with_name("support")))
