@@ -353,6 +353,12 @@ class Line(Spans):
                 return wire
         raise KeyError(f"the line has no wire {name}")
 
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of all wires and groups, which damping may be given for."""
+        parts = (*self.wires, *self.droppers, *self.hardware, *self.clamps)
+        return tuple(part.name for part in parts)
+
     def wires_of(self, role: Role) -> tuple[Wire, ...]:
         """The wires of a role, in the order of ``wires``."""
         return tuple(wire for wire in self.wires if wire.role is role)
@@ -383,8 +389,22 @@ class Line(Spans):
         return np.asarray(x[(x > masts[span]) & (x < masts[span + 1])])
 
     def with_shares(self, shares: Mapping[str, float]) -> Line:
-        """The line with the tension of the named wires a share of what it was."""
+        """The line with the tension of the named wires a share of what it was.
+
+        A wire that is clamped to others carries the same share of what it took of their tension.
+        """
+        clamped = {
+            (piece.x[0], piece.x[-1]): shares.get(wire.name, 1.0)
+            for wire in self.wires
+            for piece in wire.pieces
+            if End.CLAMPED in piece.ends
+        }
         wires = (
-            replace(wire, tension=shares.get(wire.name, 1.0) * wire.tension) for wire in self.wires
+            replace(
+                wire,
+                tension=shares.get(wire.name, 1.0) * wire.tension,
+                taken=tuple((a, b, clamped.get((a, b), 1.0) * less) for a, b, less in wire.taken),
+            )
+            for wire in self.wires
         )
         return replace(self, wires=tuple(wires))

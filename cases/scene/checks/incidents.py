@@ -16,6 +16,8 @@ from catenary.cases.scene.tables.incidents import (
     LoweringTable,
     TensionLossTable,
 )
+from catenary.meshgen.line import Role
+from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.effects.effect import Limit
@@ -112,9 +114,18 @@ def _dropper(scene: Scene, i: int, table: DropperBreakTable, line: LineData) -> 
 
 def _tension(scene: Scene, i: int, table: TensionLossTable, line: LineData) -> Iterator[Fault]:
     yield from _hangs(scene, i, table)
-    if table.wire != "contact_wire" or not scene.holds(Limit.WAVE_SPEED):
+    wire = make_line(line).wire(table.wire)
+    most = max((less for _, _, less in wire.taken), default=0.0)
+    if table.share * wire.tension <= most:
+        why = (
+            f"wires that are clamped to {wire.name} take {most:g} N of its {wire.tension:g} N: it "
+            f"must be greater than {most / wire.tension:.3g}"
+        )
+        yield _refusal(scene, i, "share", table.share, why)
         return
-    wave = 3.6 * line.contact_wire.wave_speed
+    if wire.role is not Role.CONTACT or not scene.holds(Limit.WAVE_SPEED):
+        return
+    wave = 3.6 * wire.wave_speed
     if scene.train.speed_km_h >= math.sqrt(table.share) * wave:
         least = (scene.train.speed_km_h / wave) ** 2
         yield _refusal(

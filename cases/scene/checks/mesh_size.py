@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from catenary.cases.scene.convert.line import span_lengths
+import numpy as np
+
+from catenary.cases.scene.convert.line import line_of, span_lengths
 from catenary.cases.scene.cost_model import estimate_memory, estimate_start
-from catenary.cases.scene.input.faults import Fault
-from catenary.meshgen.line import Role
-from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.cases.scene.input.faults import Fault, SceneError
+from catenary.cases.scene.tables.line import TransitionTable
+from catenary.meshgen.division import divisions_of
+from catenary.meshgen.geometry import find_cuts
+from catenary.meshgen.line import Line
+from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
-    from catenary.cases.scene.tables.line import DropperTable
 
 # 20 000 spans of ten gaps with ten elements each; their run takes 27 GB.
 MOST_NODES = 4_000_000
@@ -23,16 +27,8 @@ MOST_NODES = 4_000_000
 MANY_NODES = 50_000
 
 
-class _Wire(NamedTuple):
-    name: str
-    role: Role
-
-
-_WIRES = (_Wire(CONTACT_WIRE, Role.CONTACT), _Wire(MESSENGER_WIRE, Role.MESSENGER))
-
-
 class Size(NamedTuple):
-    """Number of spans, droppers, nodes of both wires, and unknowns of a line."""
+    """Number of spans, droppers, nodes of all wires, and unknowns of a line."""
 
     spans: int
     droppers: int
@@ -50,35 +46,67 @@ class Size(NamedTuple):
 
 
 def size_of(scene: Scene) -> Size | None:
-    """The size of the mesh that a scene's line will have; None if it brings its own."""
+    """The size of the mesh that a scene's line will have; None if it brings its own, or if its line
+    cannot be made, which other checks report.
+
+    Counted on a line that has each length of span once: a line of thousands of spans is not made.
+    """
     if scene.mesh.file is not None:
         return None
-    per_gap, refined = scene.mesh.elements_per_gap, scene.mesh.support_refinement
-    nodes_of_a_wire, droppers = 1, 0
-    for length, spans in Counter(span_lengths(scene.line)).items():
-        hanging = _droppers_in(scene.line.dropper, length)
-        # The gaps at both masts are refined; without droppers they are one.
-        gaps = 2 * refined + hanging - 1 if hanging else refined
-        nodes_of_a_wire += spans * per_gap * gaps
-        droppers += spans * hanging
+    lengths = span_lengths(scene.line)
+    try:
+        sample, times = _sample(scene, lengths)
+        cuts = find_cuts(sample)
+    except (InputError, SceneError):
+        return None
+    gaps = divisions_of(cuts, scene.mesh.elements_per_gap, scene.mesh.support_refinement)
+    masts = sample.support_positions
+    span_of_gap = np.searchsorted(masts, 0.5 * (cuts.x[1:] + cuts.x[:-1])) - 1
+    weighted = gaps * times[span_of_gap]
+    nodes = dict.fromkeys((wire.name for wire in sample.wires), 0)
+    for piece in cuts.pieces:
+        last = piece.first + len(piece.points) - 1
+        # A piece of less than a span is there as often as the support that it goes by.
+        whole = piece.points[-1, 0] - piece.points[0, 0] >= min(lengths)
+        often = 1 if whole else times[span_of_gap[last - 1]]
+        nodes[piece.wire] += int(weighted[piece.first : last].sum() + often)
+    hanging = np.searchsorted(masts, sample.dropper_x) - 1
     switches = scene.switches()
     chosen = (effect for name, effect in effects.registry().items() if switches[name])
-    nodes = 2 * nodes_of_a_wire
-    groups = effects.unknown_groups(chosen, _WIRES)
-    unknowns = nodes_of_a_wire * sum(len(own) for group in groups for own in group.values())
-    return Size(scene.line.n_spans, droppers, nodes, unknowns)
+    groups = effects.unknown_groups(chosen, sample.wires)
+    unknowns = sum(nodes[wire] * len(own) for group in groups for wire, own in group.items())
+    return Size(scene.line.n_spans, int(times[hanging].sum()), sum(nodes.values()), unknowns)
 
 
-def _droppers_in(table: DropperTable | None, span: float) -> int:
-    """Droppers of a span of that length [m]; none if the table has no such pattern."""
-    if table is None:
-        return 0
-    if table.positions_m is not None:
-        return len(table.positions_m)
-    for pattern in table.patterns or []:
-        if abs(pattern.span_m - span) < 1e-6:
-            return len(pattern.positions_m)
-    return table.count or 0
+def _sample(scene: Scene, lengths: tuple[float, ...]) -> tuple[Line, np.ndarray]:
+    """A line of the first span, of one span of each length, of those of an overlap, and of the last
+    span; how often each of these is in the line of the scene.
+
+    Raises
+    ------
+    InputError
+        If there is no such line.
+    """
+    table, n = scene.line, len(lengths)
+    both = range(0)
+    if table.overlap is not None:
+        first = table.overlap.first_span - 1
+        both = range(first, first + table.overlap.n_spans)
+        if both.stop > n:
+            raise InputError("the overlap is beyond the line")
+    inner = Counter(lengths[i] for i in range(1, n - 1) if i not in both)
+    kept = [lengths[i] for i in both if i < n - 1]
+    spans = [lengths[0], *inner, *kept, lengths[-1]][:n]
+    changes: dict[str, Any] = {
+        "n_spans": len(spans),
+        "span_m": spans,
+        "transition": TransitionTable(),
+    }
+    if table.overlap is not None:
+        overlap = table.overlap.model_copy(update={"first_span": 2 + len(inner)})
+        changes["overlap"] = overlap
+    sample = scene.model_copy(update={"line": table.model_copy(update=changes)})
+    return line_of(sample), np.array([1, *inner.values(), *(1 for _ in kept), 1])
 
 
 def size_faults(scene: Scene) -> Iterator[Fault]:

@@ -30,7 +30,7 @@ from catenary.cases.scene.checks.mesh_size import size_faults
 from catenary.cases.scene.checks.output import check_output, check_recorded_parts
 from catenary.cases.scene.checks.pantograph import check_mechanisms, check_pantographs
 from catenary.cases.scene.checks.scheme import check_scheme
-from catenary.cases.scene.checks.topology import check_parts, check_topology
+from catenary.cases.scene.checks.topology import check_names, check_parts, check_topology
 from catenary.cases.scene.checks.usual import usual_faults
 from catenary.cases.scene.checks.vehicle import check_vehicle
 from catenary.cases.scene.checks.window import check_window
@@ -69,11 +69,14 @@ def faults_of(scene: Scene) -> list[Fault]:
         found.nothing_by(check_pantographs, scene)
         found.nothing_by(check_scheme, scene)
     # What is too large is not made, and what follows from a wrong unit is not reported.
-    sound = found.nothing_by(size_faults, scene) and found.nothing_by(usual_faults, scene)
+    sound = not whole or found.nothing_by(size_faults, scene)
+    sound = sound and found.nothing_by(usual_faults, scene)
     line = _line(scene, found) if sound and whole else None
     if line is None:
         return found.faults
     if not found.nothing_by(check_parts, scene, line):
+        return found.faults
+    if not found.nothing_by(check_names, scene, line):
         return found.faults
     for of_line in (check_dropper_lengths, check_recorded_parts, _speed):
         found.nothing_by(of_line, scene, line)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
+from catenary.cases.scene.tables.incidents import TensionLossTable
 from catenary.cases.scene.tables.line import LineTable
-from catenary.meshgen.topologies.all_topologies import registered
+from catenary.meshgen.topologies.all_topologies import make_line, registered
 from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData
 
 if TYPE_CHECKING:
@@ -57,6 +58,25 @@ def check_parts(scene: Scene, line: LineData) -> Iterator[Fault]:
     yield from _auxiliary_wire(scene, line)
     yield from _bridle(scene, line)
     yield from _overlap(scene, line)
+
+
+def check_names(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Names of parts of the line in other tables: damping by component, wires of incidents."""
+    made = make_line(line)
+    for name in scene.line.damping.per_component:
+        yield from _known(scene, f"line.damping.per_component.{name}", name, made.components)
+    wires = tuple(wire.name for wire in made.wires)
+    for i, table in enumerate(scene.incidents):
+        if isinstance(table, TensionLossTable):
+            yield from _known(scene, f"incidents.{i}.wire", table.wire, wires)
+
+
+def _known(scene: Scene, key: str, name: str, known: tuple[str, ...]) -> Iterator[Fault]:
+    if name not in known:
+        near = difflib.get_close_matches(name, known, n=1)
+        meant = f"did you mean {near[0]}? " if near else ""
+        why = f"{meant}the line has {', '.join(known)}"
+        yield refusal(scene.origin, key, name, why)
 
 
 def _stitch_wire(scene: Scene, line: LineData) -> Iterator[Fault]:

@@ -68,15 +68,12 @@ def _window(table: WindowTable, problem: Problem) -> WindowChoice:
 
 
 def _damping(table: LineTable) -> Damping:
-    components = table.damping.per_component
-    given = {name: getattr(components, name) for name in type(components).model_fields}
     return Damping(
         alpha=table.damping.alpha_s,
         beta=table.damping.beta_per_s,
         per_component={
             name: (value.alpha_s, value.beta_per_s)
-            for name, value in given.items()
-            if value is not None
+            for name, value in table.damping.per_component.items()
         },
     )
 

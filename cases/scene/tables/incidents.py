@@ -33,7 +33,11 @@ class TensionLossTable(IncidentTable):
     """A wire that has only a share of its tension from then on."""
 
     type: Literal["tension_loss"] = Field(description="kind of incident")
-    wire: Literal["contact_wire", "messenger_wire"] = Field(description="which wire")
+    wire: str = Field(
+        min_length=1,
+        max_length=100,
+        description="name of a wire of the line, such as contact_wire, messenger_wire",
+    )
     share: float = Field(
         ge=LEAST_SHARE,
         lt=1,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from catenary.cases.scene.tables.ends import EndsTable
 from catenary.cases.scene.tables.table import TAKE_AWAY, OneOrMore, Table, ascending, exactly_one
@@ -207,21 +207,20 @@ class ProportionalDamping(Table):
     beta_per_s: float = Field(ge=0, le=100, description="factor on mass")
 
 
-class ComponentDamping(Table):
-    """Damping of single components, in place of the line's."""
-
-    contact_wire: ProportionalDamping | None = Field(None, description="contact wire")
-    messenger_wire: ProportionalDamping | None = Field(None, description="messenger wire")
-    droppers: ProportionalDamping | None = Field(None, description="droppers")
-    steady_arms: ProportionalDamping | None = Field(None, description="steady arms")
-    supports: ProportionalDamping | None = Field(None, description="messenger-wire supports")
+def _given(value: Any) -> Any:
+    """Without components of no damping of their own, which earlier result files name."""
+    if not isinstance(value, dict):
+        return value
+    return {name: own for name, own in value.items() if own is not None}
 
 
 class DampingTable(ProportionalDamping):
     """C = alpha K + beta M of the whole line."""
 
-    per_component: ComponentDamping = Field(
-        default_factory=ComponentDamping, description="damping of single components"
+    per_component: Annotated[dict[str, ProportionalDamping], BeforeValidator(_given)] = Field(
+        default_factory=dict,
+        description="damping of single components by name, in place of the line's: a wire or a "
+        "group, such as contact_wire, messenger_wire, droppers, steady_arms, supports",
     )
 
 

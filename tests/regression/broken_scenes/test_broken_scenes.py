@@ -84,7 +84,10 @@ ASSIGNMENTS = {
     "only transition spans": (["line.transition.n_spans_start=22"], "more spans"),
     "encumbrance too small": (["line.encumbrance_m=0.3"], "below the contact wire"),
     "slack messenger wire": (["line.messenger_wire.tension_N=2000"], "below the contact wire"),
-    "no damping component": (["line.damping.per_component.dropper.alpha_s=1"], "droppers"),
+    "no damping component": (
+        ["line.damping.per_component.dropper={alpha_s=1.0,beta_per_s=0.0}"],
+        "did you mean droppers? the line has contact_wire, messenger_wire, droppers",
+    ),
     "half a damping": (["line.damping.per_component.droppers.alpha_s=1"], "beta_per_s"),
     "no elements": (["mesh.elements_per_gap=0"], "at least 1"),
     "too many elements": (["mesh.elements_per_gap=65"], "at most 64"),
