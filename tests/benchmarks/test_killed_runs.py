@@ -1,0 +1,55 @@
+"""A run that is killed again and again at random ends as one that never was (`make long-runs`).
+
+``CATENARY_KILLS`` and ``CATENARY_SPANS`` choose how often, and how long the line is.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from program import MPIRUN, assert_same_histories, catenary_started, n_rows
+
+KILLS = int(os.environ.get("CATENARY_KILLS", "8"))
+SPANS = int(os.environ.get("CATENARY_SPANS", "0"))
+RANKS = 2
+# Longest time that a part of the run goes on once it has written rows, and that anything takes [s].
+_MOST, _LONGEST = 1.5, 7200.0
+
+
+def words() -> list[str]:
+    """The scene: the shipped case, or the paper's line as long as asked for."""
+    if not SPANS:
+        return ["run", "en50318_2002"]
+    return ["run", "ambrosio2012", "--set", f"line.n_spans={SPANS}"]
+
+
+@pytest.mark.skipif(MPIRUN is None, reason="needs mpirun")
+def test_a_run_that_is_killed_many_times_ends_as_one_that_never_was(tmp_path: Path) -> None:
+    whole, out = tmp_path / "whole", tmp_path / "killed"
+    with catenary_started(*words(), "-o", str(whole), cwd=tmp_path, ranks=RANKS) as program:
+        done = program.end(_LONGEST)
+    assert done.code == 0, done.stderr
+    random, kills = np.random.default_rng(7), 0
+    begin = [*words(), "-o", str(out)]
+    while kills < KILLS:
+        known = n_rows(out / "run.h5")
+        with catenary_started(*begin, cwd=tmp_path, ranks=RANKS) as program:
+            program.limit = _LONGEST
+            program.wait_for(lambda: n_rows(out / "run.h5") > known, may_have_ended=True)  # noqa: B023
+            time.sleep(float(random.uniform(0.0, _MOST)))
+            if program.process.poll() is not None:
+                break
+            os.kill(program.pid_of_rank(int(random.integers(RANKS))), signal.SIGKILL)
+            program.end()
+            kills += 1
+        begin = ["restart", str(out)]
+    print(f"killed {kills} times")
+    assert kills >= min(KILLS, 2), "it had ended before it was killed"
+    with catenary_started("restart", str(out), cwd=tmp_path, ranks=RANKS) as program:
+        program.end(_LONGEST)
+    assert_same_histories(out, whole)
