@@ -182,7 +182,7 @@ class FieldRecorder:
     # ---- rank 0 ------------------------------------------------------------------------------
 
     def _open(self, stage: Stage) -> None:
-        points, every = stage.node_points, self._every * stage.dt
+        points, every = stage.node_points, (self._every, stage.dt)
         values = FieldValues(self._line, points)
         blocks = blocks_of(self._line, points)
         known = LineSize(len(points), stage.n_places)

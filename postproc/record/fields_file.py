@@ -60,7 +60,7 @@ class FieldsFile:
     record, blocks : which part of the line at rest is recorded
     values : makes the values
     size : of line and train
-    every : time between two snapshots [s]
+    every : steps between two snapshots, and the time of a step [s]
     """
 
     def __init__(
@@ -70,11 +70,12 @@ class FieldsFile:
         blocks: list[Block],
         values: FieldValues,
         size: LineSize,
-        every: float,
+        every: tuple[int, float],
     ) -> None:
         self._xdmf, self.path = xdmf, xdmf.with_suffix(".h5")
         self._record, self._blocks, self._values = record, blocks, values
-        self._size, self._every = size, every
+        self._size, (self._steps, self._dt) = size, every
+        self._every = self._steps * self._dt
         self._written: list[float] = []
         self._planned: list[float] = []
         self._layout: list[Slots] = []
@@ -193,7 +194,8 @@ class FieldsFile:
                 self._made_as.unlink(missing_ok=True)
 
     def _plan(self, numbers: np.ndarray) -> None:
-        times = self._every * numbers
+        # To the last digit the times of the steps: readers take any other for a time of its own.
+        times = self._steps * numbers * self._dt
         self._planned = times.tolist()
         self._layout = layout_of(self._record, self._blocks, times)
 

@@ -30,6 +30,16 @@ def watch(march: Any, path: Path, **options: Any) -> FieldRecorder:
     return FieldRecorder(march.comm, path, march.recorded, **known)
 
 
+def test_xdmf_has_the_times_of_the_steps_to_the_last_digit(tmp_path: Path, make_march: Any) -> None:
+    """What stands beside the line has the times of the file; any others would be more times."""
+    march, path = make_march(n_steps=990, dt=1.1e-3), tmp_path / "fields.xdmf"
+    march.drive(watch(march, path, every=7))
+    with h5py.File(tmp_path / "fields.h5") as file:
+        times = file["times"][...].tolist()
+    assert times_in(path) == times * len(BLOCKS)
+    assert times == [step * march.dt for step in range(0, 991, 7)]
+
+
 def blocks_at(path: Path, time: float) -> dict[str, pyvista.DataSet]:
     """The blocks of a file at a time by name."""
     reader = pyvista.get_reader(path)
