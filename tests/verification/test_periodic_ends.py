@@ -135,11 +135,11 @@ class Rows:
         return step + 64
 
     def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        self.forces += rows[:, 0].tolist()
+        self.forces += rows[:, 1].tolist()  # after the position
         self.in_blocks += len(rows)
 
     def observe(self, view: StepView) -> None:
-        self.forces.append(float(view.row[0]))
+        self.forces.append(float(view.row[1]))
 
     def finish(self, outcome: str) -> None:
         assert outcome == "done"
