@@ -93,7 +93,7 @@ def test_an_overlap_passes_the_force_without_a_jump_and_keeps_the_energy() -> No
         calm = LumpedData((2.0, 15.0), (4200.0, 50.0), (800.0, 500.0))
         run = train(20.0, 6.0, 42.0, data=calm, static_force=120.0, raise_time=0.3)
         run = replace(run, placements=(replace(run.placements[0], nominal_height=5.5),))
-        effects = WHOLE - {"dropper_slackening"}
+        effects = WHOLE - {"dropper_slackening", "transition_spans"}
         problem = problem_on(
             line, damping=Damping(0.0, 0.0), train=run, numerics=numerics(dt), effects=effects
         )
