@@ -23,6 +23,7 @@ REPORT_FILES = (
     "droppers.csv",
     "contact_force.png",
     "strip_forces.png",
+    "wire_forces.png",
     "statistics.png",
     "histogram.png",
     "uplift.png",

@@ -230,7 +230,13 @@ CONSTANTS: dict[str, Constant] = {
 }
 
 # Letters of the columns of a channel: those that are recorded, and all that there are.
-_LETTERS = {channels.PANTOGRAPH: "P", channels.STRIP: "S", channels.ARM: "a", channels.DROPPER: "d"}
+_LETTERS = {
+    channels.PANTOGRAPH: "P",
+    channels.STRIP: "S",
+    channels.WIRE: "F",
+    channels.ARM: "a",
+    channels.DROPPER: "d",
+}
 _ALL_OF = {channels.ARM: "A", channels.DROPPER: "D"}
 CLOCK = Growing("s", "", essential=True)
 LINE_CLOCK = "line_channels/time"

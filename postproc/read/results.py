@@ -242,7 +242,8 @@ class Results:
         of = {channels.ARM: "line/arm_x", channels.DROPPER: "line/dropper_x"}
         channel = channels.CHANNELS[name]
         if not channel.of_line:
-            return channel.n_columns(channels.Train(tuple(self.n_strips()), False))
+            n_wires = len(self.wires_of(Role.CONTACT))
+            return channel.n_columns(channels.Train(tuple(self.n_strips()), False, n_wires))
         return int(self._file[of[channel.per]].shape[0])
 
     def _unrecorded(self, name: str, part: slice) -> np.ndarray:
@@ -278,6 +279,12 @@ class Results:
             return []
         whole = self.channel("strip_force")
         return [whole[:, columns.start : columns.stop] for columns in self.strip_columns()]
+
+    def wire_columns(self) -> list[dict[str, int]]:
+        """Column of ``contact_wire_force`` by the name of a contact wire, of each pantograph."""
+        names = self.wires_of(Role.CONTACT)
+        numbers = itertools.count()
+        return [{name: next(numbers) for name in names} for _ in range(self.n_pantographs)]
 
     @property
     def has_violations(self) -> bool:

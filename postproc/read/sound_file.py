@@ -232,6 +232,9 @@ class SoundFile:
             return ["static/contact_x does not ascend"]
         if self._sizes.get("W", len(contact)) != len(contact):
             return [f"static/elasticity_of_wires is of {self._sizes['W']} wires of {len(contact)}"]
+        shares = self._sizes["P"] * len(contact)
+        if self._sizes.get("F", shares) != shares:
+            return [f"channels/contact_wire_force does not have {shares} columns"]
         tensions = np.size(self.facts["contact_wire_tension"])
         if tensions != len(contact):
             return [f"its facts are of {tensions} contact wires of {len(contact)}"]

@@ -9,7 +9,7 @@ from catenary.postproc.read.results import Results
 from catenary.postproc.report.envelope import thinned
 from catenary.postproc.report.figures import COLOURS, colour, legend_above, stacked, tidy
 from catenary.postproc.report.plots import mark_line, travelled
-from catenary.solver.time_loop.channels import ARM, CHANNELS, ENERGIES, STRIP, Channel
+from catenary.solver.time_loop.channels import ARM, CHANNELS, ENERGIES, STRIP, WIRE, Channel
 
 
 def channel_pictures(results: Results) -> list[tuple[str, str, Figure]]:
@@ -43,9 +43,18 @@ def _label(channel: Channel) -> str:
 def _of_train(results: Results, channel: Channel) -> Figure:
     """A panel for each pantograph, a curve for each of its columns."""
     names = results.pantograph_names()
-    columns = results.strip_columns()
-    if channel.per != STRIP:
-        columns = [range(p, p + 1) for p in range(len(names))]
+    labels = [[channel.name.replace("_", " ")]] * len(names)
+    columns = [range(p, p + 1) for p in range(len(names))]
+    if channel.per == STRIP:
+        columns = results.strip_columns()
+        labels = [
+            [f"strip {n + 1}" for n in range(len(own))] if len(own) > 1 else labels[0]
+            for own in columns
+        ]
+    elif channel.per == WIRE:
+        by_wire = results.wire_columns()
+        columns = [range(min(own.values()), max(own.values()) + 1) for own in by_wire]
+        labels = [list(own) for own in by_wire]
     start, end = travelled(results)
     figure, panels = stacked(0.7 + 2.7 * len(names), len(names), shared=True)
     for p, axes in enumerate(panels):
@@ -55,8 +64,8 @@ def _of_train(results: Results, channel: Channel) -> Figure:
             values = results.column(channel.name, column)
             chosen = thinned(values)
             several = len(columns[p]) > 1
-            label = f"strip {number + 1}" if several else channel.name.replace("_", " ")
             own = colour(number if several else p)
+            label = labels[p][number]
             axes.plot(position[chosen], values[chosen], color=own, linewidth=1.2, label=label)
         tidy(axes, "", _label(channel), names[p].capitalize())
         legend_above(axes)

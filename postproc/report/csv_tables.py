@@ -87,6 +87,9 @@ def write_pantographs_csv(results: Results, stream: TextIO) -> None:
         if len(columns) > 1:
             heads += [f"{prefix}strip {n + 1} {c.label}" for c in by_strip for n in range(2)]
             strips.append(slice(columns.start, columns.stop))
+    by_wire = [c for c in there if c.per == channels.WIRE]
+    for prefix, wires in zip(prefixes, results.wire_columns(), strict=True):
+        heads += [f"{prefix}{name} {c.label}" for c in by_wire for name in wires]
     stream.write(csv_text(heads, ()))
     for start in range(0, results.n_rows("time"), _ROWS):
         part = slice(start, min(start + _ROWS, results.n_rows("time")))
@@ -94,4 +97,11 @@ def write_pantographs_csv(results: Results, stream: TextIO) -> None:
         blocks += [results.rows(channel.name, part) for channel in tables]
         rows = [results.rows(channel.name, part) for channel in by_strip]
         blocks += [values[:, own] for own in strips for values in rows]
+        blocks += _by_pantograph([results.rows(c.name, part) for c in by_wire], len(prefixes))
         np.savetxt(stream, np.hstack(blocks), fmt="%.9g", delimiter=",")
+
+
+def _by_pantograph(tables: list[np.ndarray], n: int) -> list[np.ndarray]:
+    """Tables (rows, n columns each) of several channels, pantograph by pantograph."""
+    split = [np.split(table, n, axis=1) for table in tables]
+    return [own[p] for p in range(n) for own in split]

@@ -110,6 +110,34 @@ def strip_forces(results: Results) -> Figure:
     return figure
 
 
+def wire_forces(results: Results) -> Figure:
+    """Share of each contact wire in the contact force along the track, 20 Hz low-pass."""
+    names = results.pantograph_names()
+    start, end = travelled(results)
+    figure, panels = stacked(0.7 + 2.7 * len(names), len(names), shared=True)
+    for p, (axes, columns) in enumerate(zip(panels, results.wire_columns(), strict=True)):
+        mark_line(axes, results, start, end)
+        position = results.column("contact_position", p)
+        for number, (name, column) in enumerate(columns.items()):
+            force = results.column("contact_wire_force", column)
+            with contextlib.suppress(InputError):  # sampled too slowly; the report says so
+                force = filters.low_pass(force, results.dt)
+            # Two wires side by side may have the same force: the second is dashed.
+            style: dict[str, Any] = {"linewidth": 1.2, "linestyle": ("-", "--")[number % 2]}
+            chosen = thinned(force)
+            axes.plot(
+                position[chosen],
+                force[chosen],
+                color=colour(number),
+                label=name.replace("_", " "),
+                **style,
+            )
+        tidy(axes, "", "force on a contact wire [N]", names[p].capitalize())
+        legend_above(axes)
+    panels[-1].set_xlabel("position of the pantograph along the track [m]")
+    return figure
+
+
 def force_statistics(results: Results, statistics: RunStatistics) -> Figure:
     """Bars of mean, deviation, extremes and mean +- 3 sigma of each pantograph."""
     groups = ("mean", "std", "maximum", "minimum", "stat_max", "stat_min")

@@ -149,6 +149,9 @@ def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
         if results.several_strips:
             caption = "Shares of the collector strips in the contact force, below 20 Hz."
             drawn.append(("strip_forces", caption, plots.strip_forces(results)))
+        if results.has("contact_wire_force"):
+            caption = "Shares of the contact wires in the contact force, below 20 Hz."
+            drawn.append(("wire_forces", caption, plots.wire_forces(results)))
         if len(statistics.complaints) < len(statistics.pantographs):
             drawn += [
                 (

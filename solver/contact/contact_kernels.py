@@ -372,13 +372,19 @@ def compensate(numbers, compensation, start, offset, data, motion, gains):
 
 @in_line
 def write_outputs(force, reported, heads, depth, ends, outputs):
-    """Contact force, head height and wire height of each pantograph, then the force of each strip.
+    """Contact force, head height and wire height of each pantograph, then the force of each strip,
+    and, of several contact wires, that on each wire from each pantograph.
 
-    These are the 3 n_pantographs + n_strips numbers of ``outputs``; ``heads`` are those of the
-    contacts, ``ends`` are ``Ends``. A pantograph's force is the sum over its contacts, heights are
-    means over its strips; of several wires over a strip the lowest counts.
+    These are the 3 n_pantographs + n_strips numbers of ``outputs``, and the n_pantographs n_wires
+    behind them; ``heads`` are those of the contacts, ``ends`` are ``Ends``. A pantograph's force is
+    the sum over its contacts, heights are means over its strips; of several wires over a strip the
+    lowest counts.
     """
     n = ends.of_pantograph.size - 1
+    shares = 3 * n + ends.of_strip.size - 1
+    for share in range(shares, outputs.size):
+        outputs[share] = 0.0
+    several = outputs.size > shares
     for p in range(n):
         total, mean, mean_of_wire = 0.0, 0.0, 0.0
         first, last = ends.of_pantograph[p], ends.of_pantograph[p + 1]
@@ -390,6 +396,9 @@ def write_outputs(force, reported, heads, depth, ends, outputs):
                 for j in range(begin, end):
                     height -= heads.by_force[i, j] * force[j]
                 own += reported[i]
+                if several:
+                    n_wires = ends.of_strip[strip + 1] - ends.of_strip[strip]
+                    outputs[shares + p * n_wires + i - ends.of_strip[strip]] += reported[i]
                 height_of_strip += height
                 lowest = min(lowest, height - depth[i])
             total += own

@@ -72,9 +72,10 @@ class ContactWires:
         touches["element"], touches["half_length"] = touches["first"], half_length
         return touches
 
-    def touches(self, x: np.ndarray, wire: int = 0) -> np.ndarray:
-        """Places on a wire at positions ``x`` (n,) [m], records of ``TOUCH`` (n,)."""
-        touches = self.on_wires(np.full(x.size, wire))
+    def touches(self, x: np.ndarray, wire: int | np.ndarray = 0) -> np.ndarray:
+        """Places on a wire, or on wires (n,), at positions ``x`` (n,) [m], records of ``TOUCH``
+        (n,)."""
+        touches = self.on_wires(np.broadcast_to(wire, x.shape))
         contact_kernels.locate(x, self.nodes, touches)
         return touches
 

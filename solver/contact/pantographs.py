@@ -51,6 +51,8 @@ class Pantographs:
     contact_force, head_height, wire_height : (n,) after the latest step, rank 0 only: the sum over
         a pantograph's strips, and their means
     strip_force : (n_strips,) the sum over the wires that each strip touches
+    contact_wire_force : (n * n_wires,) the sum over the strips that touch each wire, pantograph by
+        pantograph; empty if there is one wire
     joints_in_loop : whether a pantograph has joints that may open, all ranks
     constraint_violation : (n,) largest open joint after the latest step [m], NaN for pantographs
         without joints in the loop, rank 0 only
@@ -90,7 +92,8 @@ class Pantographs:
         # Places of contacts and of pantographs move together, in one sum.
         self.n_contacts = n_wires * strip_start.size
         self._all_start = np.concatenate([np.repeat(strip_start, n_wires), self._start])
-        sizes = (self.n, 3 * self.n, strip_start.size, self.n)
+        shares = self.n * n_wires if n_wires > 1 else 0
+        sizes = (self.n, 3 * self.n, strip_start.size, shares, self.n)
         places_and_outputs = np.zeros(self.n_contacts + sum(sizes))
         self._all_places = places_and_outputs[: self._all_start.size]
         self.moving = self._all_start, self._all_places
@@ -101,12 +104,12 @@ class Pantographs:
             np.repeat(np.repeat(half_length, counts), n_wires),
         )
         self.outputs = places_and_outputs[self.n_contacts :]
-        self.position, forces, self.strip_force, self.constraint_violation = np.split(
-            self.outputs, np.cumsum(sizes)[:-1]
-        )
+        parts = np.split(self.outputs, np.cumsum(sizes)[:-1])
+        self.position, forces, self.strip_force, self.contact_wire_force = parts[:-1]
+        self.constraint_violation = parts[-1]
         self._all_places[:] = self._all_start
         self.contact_force, self.head_height, self.wire_height = forces.reshape(3, self.n)
-        self.of_step = self.outputs[self.n : 4 * self.n + strip_start.size]
+        self.of_step = self.outputs[self.n : -self.n]
         self.wire_height[:] = wires.rest_height(self._start)
         self.head_height[:] = self.wire_height - train.start_below
         self._heads = Heads(self.n_contacts)
@@ -119,6 +122,11 @@ class Pantographs:
     def n(self) -> int:
         """Number of pantographs."""
         return int(self._start.size)
+
+    @property
+    def n_wires(self) -> int:
+        """Number of contact wires."""
+        return self._wires.n_wires
 
     @property
     def n_strips(self) -> tuple[int, ...]:

@@ -22,6 +22,7 @@ PANTOGRAPH = "pantograph"
 ARM = "steady arm"
 DROPPER = "dropper"
 STRIP = "strip"
+WIRE = "contact wire"
 RUN = "run"
 
 
@@ -49,11 +50,12 @@ class Energies(NamedTuple):
 
 
 class Train(NamedTuple):
-    """What decides which channels a run has: strips of each pantograph in running order, and
-    whether a pantograph has joints that may open."""
+    """What decides which channels a run has: strips of each pantograph in running order, whether a
+    pantograph has joints that may open, and the number of contact wires."""
 
     n_strips: tuple[int, ...]
     joints_in_loop: bool
+    n_wires: int = 1
 
     @property
     def several_strips(self) -> bool:
@@ -70,8 +72,8 @@ class Channel:
     name : name of the dataset in the result file
     unit : SI unit, "-" if none
     meaning : what it is and which sign it has, in words
-    per : what a column stands for: ``PANTOGRAPH``, ``STRIP``, ``ARM`` or ``DROPPER``; ``RUN`` for
-        one value a row
+    per : what a column stands for: ``PANTOGRAPH``, ``STRIP``, ``ARM`` or ``DROPPER``; ``WIRE`` for
+        each contact wire under each pantograph; ``RUN`` for one value a row
     values : which array (columns,) of contiguous doubles holds the values after a step. Of arms and
         droppers these are the rank's own; of pantographs and strips rank 0 has them, and the array
         may be empty elsewhere. A function () -> (columns,) is called after each step, which then
@@ -108,8 +110,9 @@ class Channel:
         return self.per in (ARM, DROPPER)
 
     def n_columns(self, train: Train) -> int:
-        """Columns of a channel of pantographs or strips."""
-        return sum(train.n_strips) if self.per == STRIP else len(train.n_strips)
+        """Columns of a channel of pantographs, strips or contact wires."""
+        n = len(train.n_strips)
+        return {STRIP: sum(train.n_strips), WIRE: n * train.n_wires}.get(self.per, n)
 
 
 TIME = Channel("time", "s", "time since the start of the run", RUN)
@@ -161,6 +164,16 @@ CHANNELS: dict[str, Channel] = {
             STRIP,
             lambda sources: sources.pantographs.strip_force,
             when=lambda train: train.several_strips,
+            own_picture=True,
+        ),
+        Channel(
+            "contact_wire_force",
+            "N",
+            "share of a contact wire in the contact force, pantograph by pantograph, in the order "
+            "of the wires",
+            WIRE,
+            lambda sources: sources.pantographs.contact_wire_force,
+            when=lambda train: train.n_wires > 1,
             own_picture=True,
         ),
         Channel(

@@ -21,6 +21,7 @@ class Stage:
     n_pantographs : number of pantographs
     n_strips : of each pantograph in running order
     joints_in_loop : whether a pantograph has joints that may open, all its bodies being moved
+    n_wires : number of contact wires
     dt, start_time : time step and time of the initial state [s]
     n_steps : steps planned
     arm_x, dropper_x : positions of steady arms and droppers [m]
@@ -46,11 +47,13 @@ class Stage:
     unknowns: tuple[str, ...] = ("w", "theta_y")
     n_places: tuple[int, ...] = ()
     joints_in_loop: bool = False
+    n_wires: int = 1
 
     @property
     def train(self) -> Train:
         """What decides which channels are recorded."""
-        return Train(self.n_strips or (1,) * self.n_pantographs, self.joints_in_loop)
+        strips = self.n_strips or (1,) * self.n_pantographs
+        return Train(strips, self.joints_in_loop, self.n_wires)
 
 
 @dataclass

@@ -27,6 +27,7 @@ from catenary.solver.time_loop.row_layout import RowLayout
 # What every state of a line has, and what is kept of the pantographs beside their own states.
 _MOTION = ("displacement", "velocity", "acceleration")
 _OF_PANTOGRAPHS = ("contact_force", "head_height", "wire_height", "strip_force")
+_ON_WIRES = "contact_wire_force"
 
 
 class Showing:
@@ -117,6 +118,7 @@ class Showing:
             unknowns=self._model.unknowns,
             n_places=tuple(places.size for places in self._pantographs.places()),
             joints_in_loop=self._pantographs.joints_in_loop,
+            n_wires=self._pantographs.n_wires,
         )
 
     def view(self, step: int, time: float) -> StepView:
@@ -175,8 +177,9 @@ class Showing:
             if name in checkpoint or name in _MOTION:
                 by_row = np.reshape(_like(checkpoint, name, np.empty(n_nodes * names)), (-1, names))
                 states[name] = model.numbering.as_vector(by_row[row_of_node])[owned]
+        names_of_outputs = (*_OF_PANTOGRAPHS, *((_ON_WIRES,) if pantographs.n_wires > 1 else ()))
         outputs = {
-            name: _like(checkpoint, name, getattr(pantographs, name)) for name in _OF_PANTOGRAPHS
+            name: _like(checkpoint, name, getattr(pantographs, name)) for name in names_of_outputs
         }
         on_root(self._comm, lambda: self._refuse_other_states(checkpoint))
         if line.remembers:
@@ -283,6 +286,8 @@ class Showing:
         result["head_height"] = pantographs.head_height.copy()
         result["wire_height"] = pantographs.wire_height.copy()
         result["strip_force"] = pantographs.strip_force.copy()
+        if pantographs.n_wires > 1:
+            result[_ON_WIRES] = pantographs.contact_wire_force.copy()
         result["contacts"] = self._scheme.state()
         if line.window is not None:
             result["window"] = line.window.state()

@@ -70,13 +70,20 @@ def checkpoint(view: Any) -> Any:
 def test_a_march_is_that_of_dense_matrices_with_every_set_tried(name: str) -> None:
     line = twins(0.3) if name == "unequal twins" else overlap()
     problem, mesh = problem_on(line), mesh_of(line, 2)
-    seen = march(problem, mesh, lambda view: view.checkpoint() if view.step == 0 else None)
+    shares = []
+
+    def watch(view: Any) -> Any:
+        shares.append(view.contact_wire_force.copy())
+        return view.checkpoint() if view.step == 0 else None
+
+    seen = march(problem, mesh, watch)
     _, forces = in_dense(problem, mesh, seen)
     touching = forces > 0.0
     both, single = touching.all(axis=1), touching.sum(axis=1) == 1
     print(f"{name}: both touch in {both.sum()} of {len(both)} steps, one in {single.sum()}")
     assert both.sum() > 20 and touching.any(axis=0).all() and single.sum() > 5
     check("contact force [N]", seen["contact_force"][1:, 0], forces.sum(axis=1), within=1e-8)
+    check("force on each wire [N]", np.array(shares)[1:], forces, within=1e-8)
 
 
 def test_an_overlap_passes_the_force_without_a_jump_and_keeps_the_energy() -> None:

@@ -253,8 +253,10 @@ class Watcher:
         assert wire is not None and balance is not None
         k, seen = len(self._states), self._work.size
         states = dict(zip(_MOTION, map(np.array, zip(*self._states, strict=True)), strict=True))
-        force = self._channel("contact_force", k)
-        touches = wire.touches(self._channel("contact_position", k).ravel())
+        several = wire.n_wires > 1
+        force = self._channel("contact_wire_force" if several else "contact_force", k)
+        place = np.repeat(self._channel("contact_position", k), wire.n_wires, axis=1).ravel()
+        touches = wire.touches(place, np.arange(place.size) % wire.n_wires)
         elements = touches["element"][:, None] + np.array([0, 1])
         dofs = wire.dofs[elements].reshape(k, -1)
         pushed = (force.reshape(-1, 1) * touches["whole_value"]).reshape(k, -1)

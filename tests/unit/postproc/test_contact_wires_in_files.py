@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import shutil
 from dataclasses import replace
@@ -28,6 +30,7 @@ from catenary.postproc.files.checked import seal_attributes
 from catenary.postproc.film.film_data import film_data
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
+from catenary.postproc.report import csv_tables, plots
 from catenary.postproc.report.report import write_report
 from catenary.solver.problem.problem import Damping
 from catenary.solver.statics.line_at_rest import line_at_rest
@@ -103,6 +106,25 @@ def test_the_report_shows_each_wire(tmp_path: Path, usual: dict[str, Any]) -> No
     told = json.loads((tmp_path / "summary.json").read_text())["static"]
     own = told["elasticity_of_wires_mm_per_N"]
     assert own[FIRST]["max"] > own[SECOND]["max"] > told["elasticity_mm_per_N"]["max"]
+
+
+def test_the_force_on_each_wire_is_recorded_told_and_drawn(
+    tmp_path: Path, usual: dict[str, Any]
+) -> None:
+    path = recorded(overlap(), tmp_path, usual)
+    with Results(path) as results:
+        assert results.damage == []
+        shares, force = results.channel("contact_wire_force"), results.channel("contact_force")
+        assert (shares.max(axis=0) > 0.0).all() and shares.shape == (force.shape[0], 2)
+        np.testing.assert_allclose(shares.sum(axis=1), force[:, 0], rtol=1e-13, atol=1e-10)
+        assert results.wire_columns() == [{FIRST: 0, SECOND: 1}]
+        rows = list(csv.reader(io.StringIO(csv_tables.pantographs_csv(results))))
+        curves = {line.get_label() for line in plots.wire_forces(results).axes[0].lines}
+    assert {"contact wire", "contact wire 2"} <= curves
+    for number, name in enumerate((FIRST, SECOND)):
+        column = rows[0].index(f"{name} contact_wire_force [N]")
+        written = [float(row[column]) for row in rows[1:]]
+        np.testing.assert_allclose(written, shares[:, number], rtol=1e-8)
 
 
 def test_indicators_are_those_of_the_less_damped_wire(
