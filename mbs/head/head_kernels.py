@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.solver.base.compiled import compiled, in_line
+from catenary.solver.base.inverse import invert
 
 # Columns of a row of what a head depends on in a step besides its state. A chain of lumped masses
 # has the first alone, the force on its last mass [N]; a reduced mechanism has the part of the full
@@ -188,23 +189,6 @@ def raising_step(raised, newmark, head, drive):
         free[2 * n + i] = acceleration
     respond(matrix, newmark, head)
     return height
-
-
-@compiled
-def invert(matrix):
-    """Invert in place a matrix whose masses outweigh all else, or that is positive definite."""
-    n = matrix.shape[0]
-    for k in range(n):
-        pivot = 1.0 / matrix[k, k]
-        matrix[k, k] = 1.0
-        for j in range(n):
-            matrix[k, j] *= pivot
-        for i in range(n):
-            if i != k:
-                share = matrix[i, k]
-                matrix[i, k] = 0.0
-                for j in range(n):
-                    matrix[i, j] -= share * matrix[k, j]
 
 
 @in_line

@@ -15,6 +15,14 @@ from catenary.solver.base.compiled import compiled, inner
 from catenary.solver.base.pointers import borrowed
 from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps, PredictedLineState, Steps
 from catenary.solver.integrators.state_kernels import reserves_within
+from catenary.solver.linear.factors.station_factors import StationFactors
+from catenary.solver.linear.factors.substitution import (
+    eliminate,
+    first_of,
+    make_up_at,
+    meet,
+    solved,
+)
 from catenary.solver.linear.lanes import (
     add,
     add_scaled,
@@ -26,14 +34,6 @@ from catenary.solver.linear.lanes import (
     zero,
 )
 from catenary.solver.linear.make_ups import by_make_up
-from catenary.solver.linear.station_factors import (
-    StationFactors,
-    eliminate,
-    first_of,
-    make_up_at,
-    meet,
-    solved,
-)
 from catenary.solver.linear.station_products import StationProduct, read_station, row_sums
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
 from catenary.solver.window.window_kernels import NO_WINDOW, WindowArrays, look

@@ -17,8 +17,8 @@ from scipy import sparse
 
 from catenary.solver.base.errors import InputError
 from catenary.solver.base.petsc import PETSc
+from catenary.solver.linear.factors.station_factors import StationFactors, station_factors
 from catenary.solver.linear.sections import Sections
-from catenary.solver.linear.station_factors import StationFactors, station_factors
 from catenary.solver.linear.station_layout import Layout
 from catenary.solver.model.matrices import as_petsc
 from catenary.solver.model.partition import Ownership

@@ -17,6 +17,7 @@ from catenary.solver.base import aligned_arrays
 from catenary.solver.base.errors import NotConverged, RunBroken
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.base.petsc_events import event
+from catenary.solver.linear.factors.station_factors import StationFactors
 from catenary.solver.linear.halo import Halo, Subdomain
 from catenary.solver.linear.petsc_solvers import (
     DIRECT,
@@ -28,7 +29,6 @@ from catenary.solver.linear.petsc_solvers import (
     wants_view,
 )
 from catenary.solver.linear.sections import Sections, neighbours
-from catenary.solver.linear.station_factors import StationFactors
 from catenary.solver.linear.station_layout import WIDEST, Layout
 from catenary.solver.linear.station_products import (
     StationProduct,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from catenary.solver.linear.station_factors import StationFactors
+from catenary.solver.linear.factors.station_factors import StationFactors
 from catenary.solver.model.loads import Load
 from catenary.solver.model.model import Model
 from catenary.solver.problem.window import EXACT, WindowChoice

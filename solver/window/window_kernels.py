@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.solver.base.compiled import compiled, in_line
-from catenary.solver.linear.station_factors import middle_of, turn
+from catenary.solver.linear.factors.meeting_station import middle_of, turn
 
 # Numbers of ``WindowArrays.state``.
 STEP, IS_FRESH = 0, 1

@@ -23,7 +23,7 @@ from catenary.solver.base import aligned_arrays
 from catenary.solver.integrators.line_state import PredictedLineState, Steps
 from catenary.solver.integrators.newmark import NewmarkLine
 from catenary.solver.integrators.two_pass_step import StationPasses
-from catenary.solver.linear.station_factors import station_factors
+from catenary.solver.linear.factors.station_factors import station_factors
 from catenary.solver.linear.station_products import station_product
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.equilibrium import find_form

@@ -23,6 +23,7 @@ MAY_IMPORT = {
 LEAVES = {
     "catenary.solver.base.bound",
     "catenary.solver.base.compiled",
+    "catenary.solver.base.inverse",
     "catenary.solver.base.loop_cache",
     "catenary.solver.base.pointers",
     "catenary.solver.base.errors",

@@ -15,7 +15,7 @@ from catenary.cases.scene.convert.problem import problem_of as scene_problem
 from catenary.cases.scene.load import load_scene
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.base.errors import InputError
-from catenary.solver.linear import station_factors
+from catenary.solver.linear.factors import meeting_station, station_factors
 from catenary.solver.problem.ends import Fixed, Periodic
 from catenary.solver.problem.incidents import DropperBreak
 from catenary.solver.problem.problem import Damping, Problem
@@ -122,7 +122,7 @@ def test_no_window_ends_where_elements_are_too_short_to_be_held(
     problem = replace(problem, train=replace(problem.train, end=problem.train.start + 66.0))
     found, _ = steps(problem, mesh, problem.window)
     assert np.abs(found["dropper_force"]).max() < 1e3
-    monkeypatch.setattr(station_factors, "_SOFTENED", 1e9)
+    monkeypatch.setattr(meeting_station, "_SOFTENED", 1e9)
     broken, _ = steps(problem, mesh, problem.window)
     assert np.abs(broken["dropper_force"]).max() > 1e6
 

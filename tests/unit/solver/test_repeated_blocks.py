@@ -8,9 +8,9 @@ from repeating_line import layout, line
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from catenary.solver.linear import station_factors as module
+from catenary.solver.linear.factors import station_factors as module
+from catenary.solver.linear.factors.station_factors import station_factors
 from catenary.solver.linear.sections import neighbours
-from catenary.solver.linear.station_factors import station_factors
 from catenary.solver.linear.station_layout import WIDEST, Layout
 from catenary.solver.linear.station_products import layout_of, station_product
 

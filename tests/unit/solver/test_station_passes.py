@@ -9,8 +9,8 @@ from repeating_line import layout, line
 from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_state import LineState, PredictedLineState, Steps
 from catenary.solver.integrators.two_pass_step import StationPasses
-from catenary.solver.linear import station_factors as module
-from catenary.solver.linear.station_factors import station_factors
+from catenary.solver.linear.factors import station_factors as module
+from catenary.solver.linear.factors.station_factors import station_factors
 from catenary.solver.linear.station_products import station_product
 from catenary.solver.model.switching_links import RESERVE, LinkArrays
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from repeating_line import holding, lacking, line, sections_of
 
+from catenary.solver.linear.factors.station_factors import StationFactors, station_factors
 from catenary.solver.linear.sections import neighbours
-from catenary.solver.linear.station_factors import StationFactors, station_factors
 from catenary.solver.linear.station_products import (
     StationProduct,
     layout_of,

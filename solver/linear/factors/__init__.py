@@ -1,0 +1,1 @@
+"""The step operator factored by stations: elimination, and solves with its factors."""

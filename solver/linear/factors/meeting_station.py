@@ -1,0 +1,103 @@
+"""Where elimination from both ends meets: factors for every such station, and how it moves."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from catenary.solver.base.compiled import compiled
+from catenary.solver.base.inverse import invert
+from catenary.solver.linear.factors.elimination import factorise
+
+# Where elimination may end at several places, it may at every so many stations.
+MIDDLES = 16
+# Sum of the eigenvalues of S^-1 A - 1 where steps of a part of the line may end.
+_SOFTENED = 1.0
+
+
+class Turning(NamedTuple):
+    """Kinds of stations by where elimination ends: ``to_end`` (n,) where that is further on,
+    ``to_start`` (n,) where it is before, ``here`` (m,) for each station at which it may end, one of
+    ``MIDDLES``. Steps may be taken of a part of the stations: from those in ``begins`` (n + 1,) to
+    before those in ``ends`` (n + 1,), which are the next ones outwards of each; see ``edges``."""
+
+    to_end: np.ndarray
+    to_start: np.ndarray
+    here: np.ndarray
+    begins: np.ndarray
+    ends: np.ndarray
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What ``turn`` reads."""
+        return self.to_end, self.to_start, self.here
+
+    def place(self, low: int, high: int) -> int:
+        """A station where it may end, near the middle from ``low`` to ``high``."""
+        return int(middle_of(low, high))
+
+
+@compiled
+def middle_of(low, high):
+    """A station where elimination may end, near the middle from ``low`` to ``high``."""
+    return (low + high) // 2 // MIDDLES * MIDDLES
+
+
+@compiled
+def turn(kinds, turning, before, middle):
+    """Let elimination end at ``middle`` in place of ``before``."""
+    to_end, to_start, here = turning
+    for i in range(before, middle):
+        kinds[i] = to_end[i]
+    for i in range(middle + 1, before + 1):
+        kinds[i] = to_start[i]
+    kinds[middle] = here[middle // MIDDLES]
+
+
+def factors_of_all_middles(blocks: np.ndarray) -> np.ndarray:
+    """Factors of all stations before the middle, of all behind it, and of those where it may be."""
+    n, size = blocks.shape[1], blocks.shape[2]
+    n_middles = len(range(0, n, MIDDLES))
+    factors = np.zeros((2 * n + n_middles, 3, size, size))
+    factorise(blocks, n - 1, factors[:n])
+    factorise(blocks, 0, factors[n : 2 * n])
+    join(blocks, factors[:n], factors[n : 2 * n], factors[2 * n :])
+    return factors
+
+
+def edges(blocks: np.ndarray, factors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where steps of a part of the line may begin and end, from each station outwards, (n + 1,).
+
+    What is beyond is held, but the factors let it give way by its mass and stiffness D. That leaves
+    M + tau C - D in place of M + tau C there, which must not become negative: it does where
+    elements are so short that the step operator A is mostly stiffness. D is what A has more than
+    the block S after elimination; all eigenvalues of S^-1 A are to be below 2.
+    """
+    n = blocks.shape[1]
+    number = np.arange(n + 1)
+    softened = [
+        np.einsum("nij,nji->n", part[:, 0], blocks[1]) - blocks.shape[2] < _SOFTENED
+        for part in (factors[:n], factors[n : 2 * n])
+    ]
+    can_begin, can_end = np.append(softened[0], True), np.append(True, softened[1])
+    can_begin[0] = can_end[n] = True
+    begins = np.maximum.accumulate(np.where(can_begin, number, 0))
+    ends = np.minimum.accumulate(np.where(can_end, number, n)[::-1])[::-1]
+    return begins, ends
+
+
+@compiled
+def join(blocks, before, behind, here):
+    """Fill in the factors of stations where elimination may end from those to both sides."""
+    for number in range(here.shape[0]):
+        i = number * MIDDLES
+        pivot = here[number, 0]
+        pivot[:] = blocks[1, i]
+        if i > 0:
+            here[number, 2] = before[i - 1, 1].T
+            pivot += blocks[0, i] @ before[i - 1, 1]
+        if i < blocks.shape[1] - 1:
+            here[number, 1] = behind[i + 1, 1].T
+            pivot += blocks[2, i] @ behind[i + 1, 1]
+        invert(pivot)

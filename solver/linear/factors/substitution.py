@@ -1,0 +1,160 @@
+"""A solve with the factors: elimination of the right-hand side, then back substitution."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from catenary.solver.base.compiled import compiled, inner
+from catenary.solver.base.pointers import borrowed
+from catenary.solver.linear.lane_products import (
+    add_transposed,
+    add_whole,
+    numbers_from,
+    sums_from,
+    total_of,
+)
+from catenary.solver.linear.lanes import (
+    load,
+    narrowed,
+    shares,
+    store,
+    whole_size,
+    widened,
+    zero,
+)
+from catenary.solver.linear.make_ups import block_at, by_make_up, make_up_of, start_of
+
+
+@inner
+def factors_of(part, factored, station):
+    """Where the blocks of a station are; ``part`` is the layout of its make-up."""
+    _, _, kinds, blocks, _, _ = factored
+    n_blocks = np.uint64(2) if shares(part) else np.uint64(3)
+    return numbers_from(blocks, block_at(part, kinds, station, n_blocks * whole_size(part)))
+
+
+@inner
+def first_of(factored, station):
+    """First unknown of a station."""
+    return start_of(factored[0], factored[1], station)
+
+
+@inner
+def make_up_at(factored, station):
+    """Make-up of a station."""
+    return make_up_of(factored[0], factored[1], station)
+
+
+@inner
+def eliminate(part, factored, sums, station, before, outward, answer):
+    """Leave in ``answer`` what the right-hand side of a station, as ``sums``, is after those
+    ``outward`` of it are eliminated, of which ``before`` is the last; ``part`` is the layout of its
+    make-up."""
+    outward = narrowed(part, outward)
+    if shares(part):
+        numbers, total = factors_of(part, factored, before), total_of(part, sums)
+        left = add_transposed(part, total, numbers, whole_size(part), outward)
+    else:
+        numbers, skipped = factors_of(part, factored, station), np.uint64(2) * whole_size(part)
+        left = total_of(part, add_whole(part, sums, numbers, skipped, outward))
+    store(part, answer, first_of(factored, station), left)
+    return widened(part, left)
+
+
+@inner
+def _eliminate_right(part, factored, right, station, before, outward, answer):
+    sums = sums_from(part, load(part, right, first_of(factored, station)))
+    return eliminate(part, factored, sums, station, before, outward, answer)
+
+
+eliminate_in = by_make_up(_eliminate_right)
+
+
+@inner
+def eliminate_right(factored, right, station, before, outward, answer):
+    """``eliminate`` with the right-hand side of an array."""
+    make_up = make_up_at(factored, station)
+    return eliminate_in(factored[0], make_up, factored, right, station, before, outward, answer)
+
+
+@inner
+def _meet(part, factored, middle, towards_end, answer):
+    here, kinds = first_of(factored, middle), factored[2]
+    numbers, left = factors_of(part, factored, middle), load(part, answer, here)
+    towards_end = narrowed(part, towards_end)
+    if shares(part):
+        beyond = factors_of(part, factored, min(middle + 1, kinds.size - 1))
+        left = add_transposed(part, left, beyond, whole_size(part), towards_end)
+    else:
+        sums = sums_from(part, left)
+        left = total_of(part, add_whole(part, sums, numbers, whole_size(part), towards_end))
+    sums = sums_from(part, zero(part))
+    own = total_of(part, add_whole(part, sums, numbers, np.uint64(0), left))
+    store(part, answer, here, own)
+    return widened(part, own)
+
+
+meet_in = by_make_up(_meet)
+
+
+@inner
+def meet(factored, middle, towards_end, answer):
+    """Unknowns of the middle station from what ``answer`` holds of it and what is left of the one
+    beside it, ``towards_end`` of the line."""
+    make_up = make_up_at(factored, middle)
+    return meet_in(factored[0], make_up, factored, middle, towards_end, answer)
+
+
+@inner
+def solved(part, factored, station, inward, answer):
+    """Unknowns of a station, in lanes of ``part``, from what ``answer`` holds of it and those
+    ``inward`` of it."""
+    numbers = factors_of(part, factored, station)
+    left = load(part, answer, first_of(factored, station))
+    sums = add_whole(part, sums_from(part, zero(part)), numbers, np.uint64(0), left)
+    inward = narrowed(part, inward)
+    return total_of(part, add_whole(part, sums, numbers, whole_size(part), inward))
+
+
+@inner
+def _substitute_into(part, factored, station, inward, answer):
+    own = solved(part, factored, station, inward, answer)
+    store(part, answer, first_of(factored, station), own)
+    return widened(part, own)
+
+
+substitute_in = by_make_up(_substitute_into)
+
+
+@inner
+def substitute_into(factored, station, inward, answer):
+    """``solved`` in lanes of a whole cross-section, left in ``answer``, too."""
+    make_up = make_up_at(factored, station)
+    return substitute_in(factored[0], make_up, factored, station, inward, answer)
+
+
+@compiled
+def solve(factored, right, answer):
+    """Fill ``answer`` from ``right``, for all stations; ``factored`` are layout, places, kinds,
+    blocks, low and ends of ``StationFactors``."""
+    factored, right, answer = borrowed((factored, right, answer))
+    layout, _, kinds, _, _, ends = factored
+    n, middle = kinds.size, ends[4]
+    pairs = min(middle, n - 1 - middle)
+    x, y = zero(layout), zero(layout)
+    for i in range(pairs):
+        j = n - 1 - i
+        x = eliminate_right(factored, right, i, max(i - 1, 0), x, answer)
+        y = eliminate_right(factored, right, j, min(j + 1, n - 1), y, answer)
+    for i in range(pairs, middle + 1):
+        x = eliminate_right(factored, right, i, max(i - 1, 0), x, answer)
+    for j in range(n - 1 - pairs, middle, -1):
+        y = eliminate_right(factored, right, j, min(j + 1, n - 1), y, answer)
+    x = y = meet(factored, middle, y, answer)
+    for k in range(1, pairs + 1):
+        x = substitute_into(factored, middle - k, x, answer)
+        y = substitute_into(factored, middle + k, y, answer)
+    for i in range(middle - pairs - 1, -1, -1):
+        x = substitute_into(factored, i, x, answer)
+    for j in range(middle + pairs + 1, n):
+        y = substitute_into(factored, j, y, answer)
