@@ -56,8 +56,8 @@ def check(
             console.complain(line)
         return console.BAD_INPUT
     # What a refusal does not need is imported once the scene is sound.
-    from catenary.cases.run.describe_arrivals import arrival_facts
-    from catenary.cases.run.describe_pantographs import kind_lines
+    from catenary.cases.run.describe.arrivals import arrival_facts
+    from catenary.cases.run.describe.pantographs import kind_lines
     from catenary.cases.run.scene_mesh import mesh_of
     from catenary.cases.scene.convert.problem import problem_of
     from catenary.solver.statics.equilibrium import find_form

@@ -69,7 +69,7 @@ def run(
         return load_scene(case, [*(assignments or []), *more], shortened), options
 
     comm, scene, arguments = begin(read, verbose, lambda scene: scene)
-    from catenary.cases.run.describe_arrivals import arrival_warnings
+    from catenary.cases.run.describe.arrivals import arrival_warnings
     from catenary.cases.run.runner import run_case
 
     def warn() -> None:

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.cases.result_folder.output_folder import volume
-from catenary.cases.run.describe_arrivals import arrival_facts
-from catenary.cases.run.describe_ends import end_sentences
-from catenary.cases.run.describe_incidents import incident_facts
-from catenary.cases.run.describe_pantographs import kind_lines
+from catenary.cases.run.describe.arrivals import arrival_facts
+from catenary.cases.run.describe.ends import end_sentences
+from catenary.cases.run.describe.incidents import incident_facts
+from catenary.cases.run.describe.pantographs import kind_lines
 from catenary.cases.run.file_sizes import FileSizes
 from catenary.cases.run.needs import needs_with_mesh, simulated_time
 from catenary.cases.run.recording import extent_of

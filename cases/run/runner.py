@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import json
 import logging
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -26,15 +25,16 @@ from catenary.cases.result_folder.output_folder import (
     prepare,
 )
 from catenary.cases.run.continuing import refuse_other_run, state_to_continue
-from catenary.cases.run.describe_arrivals import arrival_facts
-from catenary.cases.run.describe_incidents import incident_facts
-from catenary.cases.run.describe_pantographs import header_words
+from catenary.cases.run.describe.arrivals import arrival_facts
+from catenary.cases.run.describe.incidents import incident_facts
+from catenary.cases.run.describe.pantographs import header_words
 from catenary.cases.run.needs import (
     flush_cadence,
     needs_before_meshing,
     needs_with_mesh,
     run_size,
 )
+from catenary.cases.run.performance import Phases, performance
 from catenary.cases.run.plan import effect_rows
 from catenary.cases.run.recording import extent_of, recording_of
 from catenary.cases.run.scene_mesh import mesh_of
@@ -51,7 +51,6 @@ from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
 from catenary.solver.base.errors import CatenaryError, RunBroken
 from catenary.solver.base.parallel import on_root
-from catenary.solver.base.petsc import PETSc
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest, line_at_rest_on_all
 from catenary.solver.time_loop.march import March, Outcome
@@ -74,30 +73,6 @@ class RunOutcome:
     outcome: str
     accepted: bool | None
     summary: dict[str, Any] = field(default_factory=dict)
-
-
-class Phases:
-    """Wall time of the phases of a run [s], each shown while it lasts, and also a PETSc log stage.
-
-    Collective by use.
-    """
-
-    def __init__(self, progress: Progress) -> None:
-        self.wall: dict[str, float] = {}
-        self.progress = progress
-
-    @contextmanager
-    def __call__(self, name: str) -> Iterator[None]:
-        """Time what happens inside."""
-        begin = time.perf_counter()
-        stage = PETSc.Log.Stage(name)
-        stage.push()
-        try:
-            with self.progress.phase(name):
-                yield
-        finally:
-            stage.pop()
-            self.wall[name] = time.perf_counter() - begin
 
 
 def run_case(
@@ -233,7 +208,7 @@ def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
         with StopRequest() as stop:
             with phases("march"):
                 outcome = march.run(observers, stop)
-            recorder.close(_performance(outcome, phases, comm.size))
+            recorder.close(performance(outcome, phases, comm.size))
     if not recorder.begun:
         raise RunBroken(outcome.outcome)
     order.tell(outcome.outcome)
@@ -389,23 +364,6 @@ def _header(order: _Order, problem: Problem, at_rest: LineAtRest) -> Header:
         },
         facts=facts_of(problem, at_rest.mesh, at_rest.model.dropper_lengths),
     )
-
-
-def _performance(outcome: Outcome, phases: Phases, n_ranks: int) -> dict[str, Any]:
-    """What is known at the end; after a restart, of the last part."""
-    counted: dict[str, float] = dict(outcome.counters)
-    if outcome.traffic is not None:
-        # Of the rank that sends most; a whole number unless droppers of other ranks slacken.
-        counted["messages_per_step"], counted["message_bytes_per_step"] = (
-            round(value, 3) for value in outcome.traffic
-        )
-    return {
-        "n_ranks": n_ranks,
-        "march_wall_s": outcome.wall,
-        "phase_wall_s": phases.wall,
-        "inner_iterations": counted,
-        "detour": outcome.detour,
-    }
 
 
 def _refuse_other_run(out_dir: Path, header: Header | None, problem: Problem) -> None:

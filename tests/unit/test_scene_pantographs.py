@@ -10,7 +10,7 @@ import pytest
 from measuring import check
 from paper_pantograph import corrections, data, number_at, table
 
-from catenary.cases.run.describe_pantographs import header_words, kind_lines
+from catenary.cases.run.describe.pantographs import header_words, kind_lines
 from catenary.cases.scene.checks.pantograph import check_pantographs
 from catenary.cases.scene.convert.mechanism import multibody_of
 from catenary.cases.scene.convert.pantograph import static_force

@@ -8,7 +8,7 @@ import math
 import pytest
 from measuring import check
 
-from catenary.cases.run.describe_arrivals import arrival_facts, wave_line
+from catenary.cases.run.describe.arrivals import arrival_facts, wave_line
 from catenary.cases.run.wave_arrivals import (
     Course,
     WaveLine,

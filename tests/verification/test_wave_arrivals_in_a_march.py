@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from measuring import COMM
 
-from catenary.cases.run.describe_arrivals import arrival_facts, wave_line
+from catenary.cases.run.describe.arrivals import arrival_facts, wave_line
 from catenary.cases.run.wave_arrivals import Course, from_far_end
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene

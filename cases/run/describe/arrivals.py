@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from catenary.cases.run.describe_ends import end_sentences, end_warnings, lets_waves_out
+from catenary.cases.run.describe.ends import end_sentences, end_warnings, lets_waves_out
 from catenary.cases.run.wave_arrivals import (
     SHORT_RUN_IN,
     Arrivals,

@@ -1,0 +1,1 @@
+"""Sentences on a run: its pantographs, incidents, ends of the line, waves that come back."""
