@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from catenary.meshgen.line import End, Line
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import (
     ANCHORS,
     CONTACT_WIRE,
@@ -17,6 +17,7 @@ from catenary.meshgen.mesh import (
     SUPPORTS,
     LineMesh,
 )
+from catenary.meshgen.wires import End
 from catenary.solver.base.errors import InputError
 
 # Nodes closer than this are taken for one place [m].

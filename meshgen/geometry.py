@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.meshgen.line import Droppers, End, Line
+from catenary.meshgen.hardware import Droppers
+from catenary.meshgen.line import Line
+from catenary.meshgen.wires import End
 from catenary.solver.base.errors import InputError
 
 # Places closer than this along the track are one cut [m].

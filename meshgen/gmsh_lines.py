@@ -11,7 +11,8 @@ import numpy as np
 
 from catenary.meshgen.division import check_counts, divisions_of
 from catenary.meshgen.geometry import Cuts, find_cuts
-from catenary.meshgen.line import Droppers, Line
+from catenary.meshgen.hardware import Droppers
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import ANCHORS
 from catenary.solver.base.errors import InputError
 from catenary.solver.base.python_signals import python_signals_kept

@@ -124,7 +124,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
     import numpy as np
 
     from catenary.cases.run.scene_mesh import mesh_of
-    from catenary.meshgen.line import Role
+    from catenary.meshgen.wires import Role
 
     problem = problem_of(scene)
     mesh = mesh_of(scene) if mesh is None else mesh

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from catenary.cases.scene.input.case_files import CaseEntry
-from catenary.meshgen.line import Line, Role
+from catenary.meshgen.line import Line
+from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate.comparing import decimals_that_tell
 from catenary.postproc.evaluate.wording import counted, fixed
 

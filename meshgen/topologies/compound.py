@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from catenary.meshgen.line import Droppers, Line, Piece, Profile, Role, Wire
+from catenary.meshgen.hardware import Droppers
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import MESSENGER_WIRE
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.topologies.registry import HUNG, register
 from catenary.meshgen.topologies.simple import hung_messenger, simple_catenary
+from catenary.meshgen.wires import Piece, Profile, Role, Wire
 
 COMPOUND = "compound"
 AUXILIARY_WIRE = "auxiliary_wire"

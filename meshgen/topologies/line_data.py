@@ -7,8 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from catenary.meshgen.line import Conductor, DropperKind, Profile, SteadyArm
+from catenary.meshgen.hardware import DropperKind, SteadyArm
 from catenary.meshgen.spans import Spans
+from catenary.meshgen.wires import Conductor, Profile
 from catenary.solver.base.errors import InputError
 
 # Two cuts of a wire closer than this are taken for a slip of the pen [m].

@@ -8,18 +8,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from catenary.meshgen.line import (
-    Clamps,
-    Droppers,
-    End,
-    Line,
-    Piece,
-    Profile,
-    SteadyArms,
-    Supports,
-    Wire,
-)
+from catenary.meshgen.hardware import Clamps, Droppers, SteadyArms, Supports
+from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.line_data import Overlap
+from catenary.meshgen.wires import End, Piece, Profile, Wire
 
 _SAME_PLACE = 1e-6  # [m]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.meshgen.line import Piece
 from catenary.meshgen.spans import Spans
+from catenary.meshgen.wires import Piece
 
 # Only for the first guess of a sag; equilibrium uses the scene's value [m/s2].
 GRAVITY = 9.81

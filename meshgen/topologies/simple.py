@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.meshgen.line import Droppers, Line, Piece, Role, SteadyArms, Supports, Wire
+from catenary.meshgen.hardware import Droppers, SteadyArms, Supports
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE, STEADY_ARMS, SUPPORTS
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.topologies.registry import register
 from catenary.meshgen.topologies.sag import sagging
+from catenary.meshgen.wires import Piece, Role, Wire
 
 SIMPLE = "simple"
 

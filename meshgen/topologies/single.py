@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.meshgen.line import Clamps, End, Line, Piece, Role, SteadyArms, Supports, Wire
+from catenary.meshgen.hardware import Clamps, SteadyArms, Supports
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, STEADY_ARMS, SUPPORTS
 from catenary.meshgen.topologies.line_data import Bridle, LineData
 from catenary.meshgen.topologies.registry import register
 from catenary.meshgen.topologies.sag import GRAVITY
+from catenary.meshgen.wires import End, Piece, Role, Wire
 from catenary.solver.base.errors import InputError
 
 SINGLE = "single"

@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from catenary.meshgen.line import Clamps, End, Line, Piece, Role, Wire
+from catenary.meshgen.hardware import Clamps
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import MESSENGER_WIRE
 from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData
 from catenary.meshgen.topologies.registry import HUNG, register
 from catenary.meshgen.topologies.sag import GRAVITY
 from catenary.meshgen.topologies.simple import simple_catenary
+from catenary.meshgen.wires import End, Piece, Role, Wire
 from catenary.solver.base.errors import InputError
 
 STITCHED = "stitched"

@@ -7,11 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.meshgen.line import Droppers, Line, SteadyArms, Supports, Wire
+from catenary.meshgen.hardware import Droppers, SteadyArms, Supports
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE, STEADY_ARMS, SUPPORTS
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.topologies.registry import HUNG, register
 from catenary.meshgen.topologies.simple import hung_messenger, simple_catenary
+from catenary.meshgen.wires import Wire
 
 TWIN, TWIN_MESSENGER = "twin", "twin_messenger"
 

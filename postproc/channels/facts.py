@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from catenary.meshgen.line import Role, Wire
+from catenary.meshgen.wires import Role, Wire
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.problem.contact_laws import ContactLaw, HertzLaw, LinearLaw
 from catenary.solver.problem.integrator_parameters import Integration, integration_of

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from catenary.meshgen.line import Line, Role
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.wires import Role
 from catenary.postproc.channels.facts import FACTS
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import linalg, optimize, signal
 
-from catenary.meshgen.line import Role
+from catenary.meshgen.wires import Role
 from catenary.postproc.channels.facts import FACTS, WIRE
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import covers

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.meshgen.line import Role
+from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate import filters
 from catenary.postproc.read.results import Results
 from catenary.solver.base.errors import InputError

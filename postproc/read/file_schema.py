@@ -9,8 +9,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from catenary.meshgen.line import Role
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.meshgen.wires import Role
 from catenary.postproc.channels.line_record import LineRecord, from_table
 from catenary.postproc.standards.en50367 import EDITIONS, SYSTEMS
 from catenary.solver.time_loop import channels

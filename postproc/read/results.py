@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from catenary.meshgen.line import Role
 from catenary.meshgen.mesh import elements_of
+from catenary.meshgen.wires import Role
 from catenary.postproc.channels.line_record import LineRecord, from_table
 from catenary.postproc.files import block_reading
 from catenary.postproc.files.result_file import DONE, FORMAT, LINE_TIME, RUNNING, complete_rows

@@ -10,7 +10,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from catenary.meshgen.line import Role
+from catenary.meshgen.wires import Role
 from catenary.postproc.files.checked import text_of
 from catenary.postproc.files.kept_extremes import extremes_at
 from catenary.postproc.files.result_file import COMPLETE, FORMAT

@@ -10,8 +10,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from catenary.meshgen.line import Line, Role
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.wires import Role
 from catenary.postproc.report.figures import COLOURS, GREY, LIGHT
 from catenary.solver.statics.equilibrium import Equilibrium
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from catenary.meshgen.line import Role
+from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate.error_indicators import Indicators, as_table, indicate
 from catenary.postproc.evaluate.statistics import PantographStatistics, RunStatistics
 from catenary.postproc.evaluate.verdict import Criterion, verdict

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.meshgen.line import Role
+from catenary.meshgen.wires import Role
 from catenary.solver.contact import contact_kernels
 from catenary.solver.contact.contact_kernels import NODE, SLIP, TOUCH
 from catenary.solver.model.model import Model

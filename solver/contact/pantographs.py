@@ -19,7 +19,7 @@ from catenary.mbs.lowering import LoweredPantograph
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.roll import roll_of
 from catenary.mbs.vehicle.base_motion import BaseMotion
-from catenary.meshgen.line import Role
+from catenary.meshgen.wires import Role
 from catenary.solver.base.bound import bound
 from catenary.solver.base.parallel import on_root
 from catenary.solver.contact import contact_kernels

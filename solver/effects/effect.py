@@ -14,7 +14,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
-    from catenary.meshgen.line import Role
+    from catenary.meshgen.wires import Role
     from catenary.solver.model.builder import ModelBuilder
     from catenary.solver.problem.problem import Problem
     from catenary.solver.problem.simulated import Simulated
@@ -28,7 +28,7 @@ class Limit(Enum):
 
 
 class NamedWire(Protocol):
-    """What an effect sees of a wire, such as ``meshgen.line.Wire``."""
+    """What an effect sees of a wire, such as ``meshgen.wires.Wire``."""
 
     @property
     def name(self) -> str: ...

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.meshgen.line import Profile
+from catenary.meshgen.wires import Profile
 
 
 def pre_sag(wanted: Profile, x: np.ndarray) -> np.ndarray:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catenary.meshgen.line import Role
 from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.wires import Role
 from catenary.solver.model.links import Links
 from catenary.solver.model.unknowns import Unknowns
 from catenary.solver.problem.problem import Problem

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from catenary.mbs.vehicle.motion_sources import VehicleMotion
-from catenary.meshgen.line import Line, Role
+from catenary.meshgen.line import Line
+from catenary.meshgen.wires import Role
 from catenary.solver.problem.contact_laws import ContactLaw
 from catenary.solver.problem.ends import EndCondition, Fixed
 from catenary.solver.problem.incidents import LineIncident, TensionLoss

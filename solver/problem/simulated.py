@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.mbs.vehicle.motion_sources import VehicleMotion
-from catenary.meshgen.line import Profile
+from catenary.meshgen.wires import Profile
 from catenary.solver.problem.contact_laws import ContactLaw
 from catenary.solver.problem.incidents import LineIncident
 from catenary.solver.problem.problem import Damping

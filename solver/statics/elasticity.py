@@ -9,8 +9,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from catenary.meshgen.line import Role
 from catenary.meshgen.spans import Spans
+from catenary.meshgen.wires import Role
 from catenary.solver.model.links import Direction, at_nodes, at_places
 from catenary.solver.model.matrices import part_of
 from catenary.solver.model.model import Model

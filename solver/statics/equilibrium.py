@@ -15,8 +15,9 @@ from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from catenary.meshgen.geometry import SAME_CUT
-from catenary.meshgen.line import Line, Wire
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.wires import Wire
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects.build_model import build
 from catenary.solver.model import elements

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from catenary.meshgen.line import Role
+from catenary.meshgen.wires import Role
 from catenary.solver.base.errors import CatenaryError, InputError, RunBroken
 from catenary.solver.base.flush_to_zero import flushed
 from catenary.solver.base.freed_memory import give_back

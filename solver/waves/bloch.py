@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
-from catenary.meshgen.line import Role
+from catenary.meshgen.wires import Role
 from catenary.solver.base.errors import InputError
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.meshgen.line import Conductor
+from catenary.meshgen.wires import Conductor
 
 
 class Answer(NamedTuple):

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from catenary.meshgen.line import Role
+from catenary.meshgen.wires import Role
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.window import BOUNDED, EXACT, ROUND_OFF, WindowChoice
 

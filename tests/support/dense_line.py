@@ -15,8 +15,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from catenary.mbs.lumped_data import LumpedData
-from catenary.meshgen.line import Role
 from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.wires import Role
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.equilibrium import Equilibrium
 

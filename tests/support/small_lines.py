@@ -8,10 +8,12 @@ import numpy as np
 
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.geometry import find_cuts
-from catenary.meshgen.line import Conductor, DropperKind, Line, SteadyArm
+from catenary.meshgen.hardware import DropperKind, SteadyArm
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.wires import Conductor
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import (
     Damping,

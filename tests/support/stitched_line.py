@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 from small_lines import WHOLE, en50318_line, make_line, mesh_of, problem_of
 
-from catenary.meshgen.line import Conductor, Line, Piece, Role, Wire
+from catenary.meshgen.line import Line
+from catenary.meshgen.wires import Conductor, Piece, Role, Wire
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.statics.equilibrium import find_form

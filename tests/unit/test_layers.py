@@ -33,8 +33,8 @@ LEAVES = {
 # The rooms of each part from below to above: each imports only itself and those before it. A file
 # beside sub-packages is a room of its own.
 ROOMS = {
-    "meshgen": ("spans", "line", "mesh", "topologies", "geometry", "chains", "division",
-        "gmsh_lines", "reader", "build"),
+    "meshgen": ("spans", "wires", "hardware", "line", "mesh", "topologies", "geometry", "chains",
+        "division", "gmsh_lines", "reader", "build"),
     "mbs": (
         "frame", "interface", "rigid", "time_steps", "vehicle", "head", "mechanism", "lumped_data",
         "response", "lumped", "lowering", "roll", "shape", "build",

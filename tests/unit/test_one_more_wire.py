@@ -30,14 +30,11 @@ from small_lines import HANGING, WHOLE, mesh_of, numerics, problem_of, train
 from static_line import absolute_rest, first_rest
 
 from catenary.meshgen.build import make_mesh, use_mesh
-from catenary.meshgen.line import (
-    DropperKind,
-    Droppers,
-    Line,
-    Role,
-)
+from catenary.meshgen.hardware import DropperKind, Droppers
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE, LineMesh, elements_of
 from catenary.meshgen.topologies.all_topologies import make_line
+from catenary.meshgen.wires import Role
 from catenary.postproc.channels.header import line_datasets
 from catenary.postproc.record.blocks import RecordedLine, blocks_of
 from catenary.solver.base.errors import InputError

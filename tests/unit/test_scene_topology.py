@@ -13,7 +13,7 @@ from catenary.cases.scene.convert.line import line_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.scene.load import load_scene
-from catenary.meshgen.line import Role
+from catenary.meshgen.wires import Role
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 
 RE330, COMPOUND = "re330_stitched", "shinkansen_compound"

@@ -17,8 +17,8 @@ from typer.testing import CliRunner
 from catenary.cases.cli.app import app
 from catenary.cases.scene.load import load_scene
 from catenary.cases.terminal import console
-from catenary.meshgen.line import Profile
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.meshgen.wires import Profile
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects.build_model import build
 from catenary.solver.effects.effect import Effect, Limit, register, unregister

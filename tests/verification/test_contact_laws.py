@@ -12,8 +12,8 @@ import numpy as np
 from measuring import History, check, march, print_table
 from small_lines import BARE, FREE_MASS, bare_wires, mesh_of, numerics, problem_of, train
 
-from catenary.meshgen.line import Conductor
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
+from catenary.meshgen.wires import Conductor
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.statics.equilibrium import Equilibrium
 

@@ -30,7 +30,7 @@ from scipy import linalg
 from scipy.sparse import linalg as sparse_linalg
 from small_lines import BARE, HANGING, bare_wires, en50318_line, mesh_of, numerics, problem_of
 
-from catenary.meshgen.line import Conductor
+from catenary.meshgen.wires import Conductor
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.loads import ShapeLoad, table
 from catenary.solver.model.matrices import stiffness_matrix

@@ -13,8 +13,8 @@ import pytest
 from measuring import COMM, check, march, matrix_of, registered, solve_free
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.meshgen.line import Conductor, Role
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
+from catenary.meshgen.wires import Conductor, Role
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.integrators.make_line import make_line

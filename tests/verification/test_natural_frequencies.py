@@ -26,7 +26,7 @@ from measuring import check, free_dofs, free_matrices, print_table
 from scipy.sparse import linalg as sparse_linalg
 from small_lines import BARE, bare_wires, mesh_of, problem_of
 
-from catenary.meshgen.line import Conductor
+from catenary.meshgen.wires import Conductor
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
 

@@ -14,8 +14,8 @@ import numpy as np
 from measuring import check, print_table
 from small_lines import bare_wires, mesh_of, problem_of
 
-from catenary.meshgen.line import Conductor
 from catenary.meshgen.mesh import CONTACT_WIRE
+from catenary.meshgen.wires import Conductor
 from catenary.solver.model.shape_functions import shape_slopes, shape_values
 from catenary.solver.statics.equilibrium import find_form
 

@@ -11,13 +11,15 @@ from more_wires import data_of
 from small_lines import ac_simple_line, bare_wires, problem_of
 
 from catenary.meshgen.build import make_mesh
-from catenary.meshgen.line import Conductor, Line, Role, SteadyArm
+from catenary.meshgen.hardware import SteadyArm
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import Bridle, LineData, Overlap, Twin
 from catenary.meshgen.topologies.overlap import of_next
 from catenary.meshgen.topologies.single import BRIDLE_WIRE
 from catenary.meshgen.topologies.twin import second
+from catenary.meshgen.wires import Conductor, Role
 from catenary.solver.model import elements
 from catenary.solver.statics.elasticity import elasticity
 from catenary.solver.statics.equilibrium import Equilibrium, find_form

@@ -16,9 +16,9 @@ from catenary.cases.scene.tables.incidents import (
     LoweringTable,
     TensionLossTable,
 )
-from catenary.meshgen.line import Role
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.effects.effect import Limit
 

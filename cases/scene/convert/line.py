@@ -17,7 +17,8 @@ from catenary.cases.scene.tables.line import (
     WireTable,
 )
 from catenary.cases.scene.tables.units import length_from_mm
-from catenary.meshgen.line import Conductor, DropperKind, Line, SteadyArm
+from catenary.meshgen.hardware import DropperKind, SteadyArm
+from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import (
     AuxiliaryWire,
@@ -27,6 +28,7 @@ from catenary.meshgen.topologies.line_data import (
     StitchWire,
     Twin,
 )
+from catenary.meshgen.wires import Conductor
 from catenary.solver.base.errors import InputError
 
 # Span lengths are written in decimal; two that differ by less are the same one.

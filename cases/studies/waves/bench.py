@@ -15,16 +15,9 @@ from mpi4py import MPI
 from scipy.sparse.linalg import splu
 
 from catenary.meshgen.build import make_mesh
-from catenary.meshgen.line import (
-    Conductor,
-    Droppers,
-    Line,
-    Piece,
-    Profile,
-    SteadyArms,
-    Supports,
-    Wire,
-)
+from catenary.meshgen.hardware import Droppers, SteadyArms, Supports
+from catenary.meshgen.line import Line
+from catenary.meshgen.wires import Conductor, Piece, Profile, Wire
 from catenary.solver.effects.build_model import build
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model import elements

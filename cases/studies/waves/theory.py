@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.meshgen.line import Role
+from catenary.meshgen.wires import Role
 from catenary.solver.base.errors import InputError
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.elasticity import middle_span

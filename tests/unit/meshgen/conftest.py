@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from catenary.meshgen.line import Conductor, DropperKind, SteadyArm
+from catenary.meshgen.hardware import DropperKind, SteadyArm
 from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.wires import Conductor
 
 
 def _line(**changes: object) -> LineData:

@@ -11,10 +11,12 @@ import pytest
 from mpi4py import MPI
 
 from catenary.mbs.lumped_data import LumpedData
-from catenary.meshgen.line import Conductor, DropperKind, Line, SteadyArm
+from catenary.meshgen.hardware import DropperKind, SteadyArm
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line as make_line_of
 from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.wires import Conductor
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
 from catenary.postproc.record.blocks import RecordedLine

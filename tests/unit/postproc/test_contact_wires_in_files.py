@@ -17,7 +17,8 @@ from contact_wires import overlap, problem_on, twins
 from mpi4py import MPI
 from small_lines import mesh_of
 
-from catenary.meshgen.line import Line, Role
+from catenary.meshgen.line import Line
+from catenary.meshgen.wires import Role
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import (
     Header,

@@ -1,0 +1,114 @@
+"""What hangs between wires and stands under them: droppers, clamps, steady arms, supports."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class DropperKind:
+    """What all droppers of a group share.
+
+    Exactly one of ``stiffness`` [N/m] and ``axial_stiffness`` EA [N] is given; with EA the
+    stiffness of each dropper is EA over its own length. Clamp masses in kg.
+    """
+
+    stiffness: float | None
+    axial_stiffness: float | None
+    mass_per_length: float
+    upper_clamp_mass: float
+    lower_clamp_mass: float
+
+    def stiffness_at(self, length: np.ndarray) -> np.ndarray:
+        """Stiffness of droppers of these lengths (n,) [m], shape as ``length`` [N/m]."""
+        if self.stiffness is not None:
+            return np.full(length.shape, self.stiffness)
+        assert self.axial_stiffness is not None
+        return np.asarray(self.axial_stiffness / length)
+
+
+@dataclass(frozen=True)
+class Droppers:
+    """A group of droppers from one wire down to another.
+
+    Attributes
+    ----------
+    name : of their group in a mesh file and of their component in the damping
+    upper, lower : names of the wires that they join
+    upper_x, lower_x : positions of their ends, in ascending order of ``lower_x`` [m]
+    """
+
+    name: str
+    kind: DropperKind
+    upper: str
+    lower: str
+    upper_x: tuple[float, ...]
+    lower_x: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Clamps:
+    """Clamps by which one wire hangs from another without a dropper: links that push as well.
+
+    Attributes
+    ----------
+    name : of their component in the damping
+    stiffness, mass : of each; half of the mass at either wire [N/m], [kg]
+    upper, lower : names of the wires
+    x : their places, ascending [m]
+    """
+
+    name: str
+    stiffness: float
+    mass: float
+    upper: str
+    lower: str
+    x: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class SteadyArm:
+    """A steady arm hinged at its registration end and clamped to a wire.
+
+    length [m], mass per length [kg/m], clamp mass [kg], vertical stiffness at the wire [N/m].
+    ``holds_height``: whether the arm holds the wire at its height at rest and so carries weight
+    there; otherwise the wire hangs freely between the droppers next to the arm.
+    """
+
+    length: float
+    mass_per_length: float
+    clamp_mass: float
+    stiffness: float
+    holds_height: bool = False
+
+
+@dataclass(frozen=True)
+class SteadyArms:
+    """Steady arms of one kind on one wire; ``x`` are their places, ascending [m]."""
+
+    name: str
+    kind: SteadyArm
+    wire: str
+    x: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Supports:
+    """Supports of one kind under one wire: springs relaxed at the height of its course there.
+
+    Attributes
+    ----------
+    name, wire : their own name, and that of the wire that they carry
+    stiffness : vertical, of each [N/m]
+    x : their places, ascending [m]
+    holds : name of a wire that is to have its wanted height there at rest, by which each support is
+        as high as that takes; empty if they stay at the height of their wire's course
+    """
+
+    name: str
+    stiffness: float
+    wire: str
+    x: tuple[float, ...]
+    holds: str = ""

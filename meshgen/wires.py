@@ -1,0 +1,194 @@
+"""Wires: conductor and role, the pieces in which each runs, and the heights wanted of it.
+
+SI units. Axes: x along the track from the first anchor, y lateral, z up from the top of rail.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+# Places closer than this along the track are one [m].
+_SAME_PLACE = 1e-6
+
+
+class Role(str, Enum):
+    """What a wire is there for."""
+
+    CONTACT = "contact"
+    MESSENGER = "messenger"
+    AUXILIARY = "auxiliary"
+    STITCH = "stitch"
+
+
+class End(str, Enum):
+    """How a piece of wire ends: held in height by a tensioner, or carried by a clamp there."""
+
+    HELD = "held"
+    CLAMPED = "clamped"
+
+
+@dataclass(frozen=True)
+class Conductor:
+    """A tensioned conductor: tension [N], mass per length [kg/m], bending stiffness EI [N m2]."""
+
+    tension: float
+    mass_per_length: float
+    bending_stiffness: float
+
+    @property
+    def wave_speed(self) -> float:
+        """Speed of transverse waves on it as a string, sqrt(F/rho) [m/s] (paper eq. 1.1)."""
+        return float(np.sqrt(self.tension / self.mass_per_length))
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A wire from end to end: points that it passes before form finding, straight in between.
+
+    x : positions along the track, ascending [m]
+    y : lateral positions [m]
+    z : heights; of an end that is held and of a support those at which it stays [m]
+    ends : how it begins and ends
+    """
+
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    z: tuple[float, ...]
+    ends: tuple[End, End] = (End.HELD, End.HELD)
+
+    def points(self, x: np.ndarray) -> np.ndarray:
+        """Points of the piece at positions ``x`` (n,) along the track, shape (n, 3) [m]."""
+        return np.column_stack([x, np.interp(x, self.x, self.y), np.interp(x, self.x, self.z)])
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Heights that a wire is to have at rest where it is held: at its droppers' lower ends.
+
+    height : at the masts of the running spans [m]
+    sag_x, sag : pre-sag below that height at positions along the track, linear between them [m]
+    rise : height gained over all transition spans at the start, and at the end [m]
+    ends, running : from and to of the wire and of where it is level [m]
+    end_rise : height gained at the end if it is another one [m]
+    """
+
+    height: float
+    sag_x: tuple[float, ...]
+    sag: tuple[float, ...]
+    rise: float
+    ends: tuple[float, float]
+    running: tuple[float, float]
+    end_rise: float | None = None
+
+    @property
+    def rises(self) -> bool:
+        """Whether it is higher anywhere than where it is level, pre-sag aside."""
+        at_end = self.rise if self.end_rise is None else self.end_rise
+        rising = self.rise > 0.0 and self.running[0] > self.ends[0]
+        return rising or (at_end > 0.0 and self.running[1] < self.ends[1])
+
+    def level(self, x: np.ndarray) -> np.ndarray:
+        """Height without pre-sag at positions ``x`` [m], shape as ``x``.
+
+        Constant in the running spans; in the transition spans a parabola that leaves the running
+        height without a kink and has gained its rise at the anchor.
+        """
+        x = np.asarray(x, dtype=float)
+        start, end = self.running
+        height = np.full_like(x, self.height)
+        if start > self.ends[0]:
+            into = np.clip((start - x) / (start - self.ends[0]), 0.0, None)
+            height += self.rise * into**2
+        if end < self.ends[1]:
+            into = np.clip((x - end) / (self.ends[1] - end), 0.0, None)
+            height += (self.rise if self.end_rise is None else self.end_rise) * into**2
+        return height
+
+    def pre_sag(self, x: np.ndarray) -> np.ndarray:
+        """Pre-sag at positions ``x`` [m], shape as ``x``."""
+        return np.interp(x, self.sag_x, self.sag)
+
+
+@dataclass(frozen=True)
+class Wire(Conductor):
+    """A wire of a line.
+
+    Attributes
+    ----------
+    name : of the wire, of its group in a mesh file and of its component in the damping
+    role : what it is there for
+    pieces : where it runs, one piece or several by ascending x that do not overlap
+    profile : heights wanted at its droppers' lower ends; None if none hangs it
+    taken : stretches (from, to, tension) over which wires that are clamped to it carry that much of
+        its tension, in ascending order [m], [m], [N]
+    """
+
+    name: str
+    role: Role
+    pieces: tuple[Piece, ...]
+    profile: Profile | None = None
+    taken: tuple[tuple[float, float, float], ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        conductor: Conductor,
+        name: str,
+        role: Role,
+        pieces: tuple[Piece, ...],
+        profile: Profile | None = None,
+        taken: tuple[tuple[float, float, float], ...] = (),
+    ) -> Wire:
+        """A wire made of a conductor."""
+        return cls(
+            conductor.tension,
+            conductor.mass_per_length,
+            conductor.bending_stiffness,
+            name,
+            role,
+            pieces,
+            profile,
+            taken,
+        )
+
+    def tension_at(self, x: np.ndarray | float) -> np.ndarray:
+        """Tension at positions ``x`` [m], shape as ``x`` [N]."""
+        tension = np.full(np.shape(x), self.tension)
+        if self.taken:
+            start, end, less = np.array(self.taken).T
+            which = np.clip(np.searchsorted(start, x, side="right") - 1, 0, None)
+            tension -= np.where((x >= start[which]) & (x < end[which]), less[which], 0.0)
+        return tension
+
+    @property
+    def length(self) -> float:
+        """Length of all pieces along the track [m]."""
+        return sum(piece.x[-1] - piece.x[0] for piece in self.pieces)
+
+    @property
+    def top(self) -> float:
+        """Height at the masts of the running spans, or the greatest one without a profile [m]."""
+        if self.profile is not None:
+            return self.profile.height
+        return max(max(piece.z) for piece in self.pieces)
+
+    @property
+    def held_heights(self) -> list[float]:
+        """Heights of its ends that are held, in order of x [m]."""
+        ends = ((piece, end) for piece in self.pieces for end in (0, -1))
+        return [piece.z[end] for piece, end in ends if piece.ends[end] is End.HELD]
+
+    def points(self, x: np.ndarray) -> np.ndarray:
+        """Points of the wire at positions ``x`` (n,) inside its pieces, shape (n, 3) [m]."""
+        starts = [piece.x[0] for piece in self.pieces]
+        which = np.clip(np.searchsorted(starts, x + _SAME_PLACE, side="right") - 1, 0, None)
+        points = np.empty((x.size, 3))
+        for number in np.unique(which):
+            here = which == number
+            points[here] = self.pieces[number].points(x[here])
+        if self.profile is not None:
+            points[:, 2] = self.profile.level(x) - self.profile.pre_sag(x)
+        return points
