@@ -1,4 +1,4 @@
-"""Operators of a step: a product with K, and a solve with A.
+"""Operators of a step: products with K and C, and a solve with A.
 
 Every rank holds the rows of its own part of the line and of its overlap with the neighbours'. One
 halo exchange a step; product and solve then need no communication.
@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
-from scipy import sparse
 
 from catenary.solver.base import aligned_arrays
 from catenary.solver.base.errors import NotConverged, RunBroken
@@ -19,6 +18,7 @@ from catenary.solver.base.petsc import PETSc
 from catenary.solver.base.petsc_events import event
 from catenary.solver.linear.factors.station_factors import StationFactors
 from catenary.solver.linear.halo import Halo, Subdomain
+from catenary.solver.linear.line_products import LineProducts
 from catenary.solver.linear.petsc_solvers import (
     DIRECT,
     PREFIX,
@@ -28,27 +28,17 @@ from catenary.solver.linear.petsc_solvers import (
     wants_distributed_solver,
     wants_view,
 )
-from catenary.solver.linear.sections import Sections, neighbours
-from catenary.solver.linear.station_layout import WIDEST, Layout
-from catenary.solver.linear.station_products import (
-    StationProduct,
-    layout_of,
-    station_product,
-    with_damping,
-)
+from catenary.solver.linear.sections import Sections
+from catenary.solver.linear.station_layout import WIDEST
+from catenary.solver.linear.station_products import StationProduct
 from catenary.solver.linear.unit_responses import Windows
-from catenary.solver.model.matrices import as_petsc, columns_of, part_of
+from catenary.solver.model.matrices import columns_of, part_of
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 
 logger = logging.getLogger(__name__)
 
 Loads = list[tuple[np.ndarray, np.ndarray]]
-_COEFFICIENTS = {
-    "mass": (1.0, 0.0, 0.0),
-    "stiffness": (0.0, 1.0, 0.0),
-    "damping": (0.0, 0.0, 1.0),
-}
 
 
 class ByStations(NamedTuple):
@@ -86,9 +76,7 @@ class LineOperators:
     # None on a rank that owns nothing.
     _solver: PartSolver | SchwarzSolver | None = None
     _is_direct = True
-    _layout: Layout | None = None
     _rate_halo: Halo | None = None
-    _stiffness: sparse.bsr_matrix | None = None  # kept until its product is made
 
     def __init__(
         self,
@@ -133,9 +121,7 @@ class LineOperators:
             if comm.size > 1 and comm.rank == 0 and wants_view():
                 self._solver.view()  # one for all; on one rank PETSc shows it at its first solve
             self._solver.hurry()
-        for name in ("stiffness", "mass"):
-            self._station_product(name)  # that no step, and no energy, has to wait for them
-        self._stiffness = None
+        self._products.prepare()
 
     def by_stations(self, damped: bool) -> ByStations | None:
         """What a step in two passes works on, None unless all goes by stations. Not collective.
@@ -143,7 +129,7 @@ class LineOperators:
         The operator is then factored and multiplied by stations, and solved for in one application.
         ``damped`` steps need a product with C, of ``rate``, too.
         """
-        product, solver = self._station_product("stiffness", damped), self._solver
+        product, solver = self._products.by_stations("stiffness", damped), self._solver
         if product is None or not isinstance(solver, PartSolver):
             return None
         if solver.factors is None or not self._is_direct:
@@ -163,7 +149,7 @@ class LineOperators:
         found = 1
         if not self._in_stations:
             found = 2
-        elif self._layout is None and isinstance(self._solver, PartSolver):
+        elif self._products.layout is None and isinstance(self._solver, PartSolver):
             found = 3
         return reasons[self._comm.allreduce(found, op=MPI.MAX)]
 
@@ -179,12 +165,12 @@ class LineOperators:
     def multiply_stiffness(self) -> None:
         """Make K ``factor`` the internal force. Right after ``exchange``. Not collective."""
         self._product_event.begin()
-        self._multiply("stiffness", self._force.array, self._force_here)
+        self._products.multiply("stiffness", self._force.array, self._force_here)
         self._product_event.end()
 
     def add_damping(self) -> None:
         """Add C ``factor`` to the internal force. Right after ``exchange``. Not collective."""
-        self._multiply("damping", self._loaded.array, self._loaded_here)
+        self._products.multiply("damping", self._loaded.array, self._loaded_here)
         self._force.array[:] += self._loaded.array
 
     def add_force(self, force: np.ndarray) -> None:
@@ -233,7 +219,7 @@ class LineOperators:
         self.exchange()
         if not self.domain.size:
             return 0.0
-        self._multiply(name, self._loaded.array, self._loaded_here)
+        self._products.multiply(name, self._loaded.array, self._loaded_here)
         return float(self._loaded.array[self.domain.owned] @ self.factor)
 
     def residual(self) -> float:
@@ -277,7 +263,7 @@ class LineOperators:
         for halo in (self._halo, self._loaded_halo, self._rate_halo):
             if halo is not None:
                 halo.destroy()
-        for held in (self._solver, *self._products.values(), *self._vectors):
+        for held in (self._solver, self._products, *self._vectors):
             if held is not None:
                 held.destroy()
 
@@ -290,12 +276,14 @@ class LineOperators:
             rows = (low, high)
             part = part_of(self._model, rows, rows, self._coefficients, 1.0, self._block)
             owned = self.domain.owned
-            stations = self._sections(low, high)
+            products, stations = self._products, Sections.of(self._model.numbering, low, high)
             own = slice(*np.searchsorted(stations.starts, [owned.start, owned.stop]).tolist())
-            self._layout = self._find_layout(part)
+            if self._in_stations:
+                products.find_layout(part)
             whole = self._comm.size == 1
             turns = whole and self._model.problem.window.moves
-            solver = PartSolver(part, own, self._in_stations, whole, self._layout, stations, turns)
+            layout = products.layout
+            solver = PartSolver(part, own, self._in_stations, whole, layout, stations, turns)
             self._solver, is_direct = solver, solver.is_direct
         self._is_direct = bool(self._comm.allreduce(int(is_direct), op=MPI.MIN))
 
@@ -351,77 +339,11 @@ class LineOperators:
         ]
         self._read_domain = read_domain.vector
         self._vectors = (*here, *(pair.vector for pair in solved))
-        self._products: dict[str, PETSc.Mat] = {}
-        self._by_stations: dict[str, StationProduct | None] = {}
+        self._products = LineProducts(self._model, domain, self._read_padded, self._read)
         self.factor, self.answer = read[domain.owned_of_read], answer[domain.owned]
         self._halo = Halo(self._comm, own, read_low, read)
         self._loaded_halo = Halo(self._comm, own, low, loaded)
         self._rate_halo = None
-
-    def _product(self, name: str) -> PETSc.Mat:
-        """M, K or C for the rows of the subdomain, made when it is first asked for."""
-        if name not in self._products:
-            self._products[name] = as_petsc(self._rows_of(name), PETSc.COMM_SELF)
-        return self._products[name]
-
-    def _multiply(self, name: str, result: np.ndarray, wrapped: PETSc.Vec) -> None:
-        """Make ``result``, and the vector around it, the product of M, K or C with what is
-        read."""
-        by_stations = self._station_product(name)
-        if by_stations is not None:
-            by_stations.multiply(self._read_padded, result)
-        elif self.domain.size:
-            self._product(name).mult(self._read, wrapped)
-
-    def _station_product(self, name: str, damped: bool = False) -> StationProduct | None:
-        """Products with M, K or C by stations, made when they are first asked for; None if they
-        cannot be. ``damped`` ones subtract a product with C."""
-        key = f"damped {name}" if damped else name
-        if key not in self._by_stations:
-            domain, product = self.domain, None
-            if self._layout is not None and domain.size:
-                columns, first = self._columns()
-                layout, damping = self._layout, None
-                if damped:
-                    damping = self._rows_of("damping")
-                    layout = with_damping(layout, neighbours(damping, first, columns))
-                product = station_product(self._rows_of(name), first, layout, damping, columns)
-            self._by_stations[key] = product
-        return self._by_stations[key]
-
-    def _find_layout(self, part: sparse.bsr_matrix) -> Layout | None:
-        """How unknowns of a station stand in lanes; None if they cannot, or nodes do not pair."""
-        if not self._in_stations:
-            return None
-        rows, (columns, first) = self._sections(self.domain.low, self.domain.high), self._columns()
-        operator = neighbours(part, 0, rows)
-        self._stiffness = self._rows_of("stiffness")
-        stiffness = neighbours(self._stiffness, first, columns)
-        if operator is None or stiffness is None:
-            return None
-        return layout_of(operator, stiffness, rows.make_ups if rows.varies else ())
-
-    def _sections(self, low: int, high: int) -> Sections:
-        return Sections.of(self._model.numbering, low, high)
-
-    def _columns(self) -> tuple[Sections, int]:
-        """Stations that products read, and which of them is the first that is solved for."""
-        domain = self.domain
-        columns = self._sections(domain.read_low, domain.read_high)
-        return columns, int(np.searchsorted(columns.starts, domain.low - domain.read_low))
-
-    def _rows_of(self, name: str) -> sparse.bsr_matrix:
-        if name == "stiffness" and self._stiffness is not None:
-            return self._stiffness
-        domain = self.domain
-        return part_of(
-            self._model,
-            (domain.low, domain.high),
-            (domain.read_low, domain.read_high),
-            _COEFFICIENTS[name],
-            0.0,
-            self._block,
-        )
 
     def _solve(self, right: Wrapped) -> None:
         if self._solver is not None:

@@ -1,0 +1,128 @@
+"""Products with M, K and C of the line for the rows of a subdomain, by stations or by PETSc."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from catenary.solver.base.petsc import PETSc
+from catenary.solver.linear.halo import Subdomain
+from catenary.solver.linear.sections import Sections, neighbours
+from catenary.solver.linear.station_layout import Layout
+from catenary.solver.linear.station_products import (
+    StationProduct,
+    layout_of,
+    station_product,
+    with_damping,
+)
+from catenary.solver.model.matrices import as_petsc, part_of
+from catenary.solver.model.model import Model
+
+_COEFFICIENTS = {
+    "mass": (1.0, 0.0, 0.0),
+    "stiffness": (0.0, 1.0, 0.0),
+    "damping": (0.0, 0.0, 1.0),
+}
+
+
+class LineProducts:
+    """Products with M, K and C, each made when it is first asked for. Not collective.
+
+    Parameters
+    ----------
+    model : Model
+    domain : Subdomain, whose rows are multiplied
+    padded : what products by stations read, with one station more at both ends
+    read : a vector around the same without these
+
+    Attributes
+    ----------
+    layout : how unknowns of a station stand in lanes; None until it is found, or if they cannot
+    """
+
+    def __init__(
+        self, model: Model, domain: Subdomain, padded: np.ndarray, read: PETSc.Vec
+    ) -> None:
+        self._model, self._domain, self._padded, self._read = model, domain, padded, read
+        self.layout: Layout | None = None
+        self._stiffness: sparse.bsr_matrix | None = None  # kept until its product is made
+        self._matrices: dict[str, PETSc.Mat] = {}
+        self._products: dict[str, StationProduct | None] = {}
+
+    def prepare(self) -> None:
+        """Make those that no step, and no energy, is to wait for."""
+        for name in ("stiffness", "mass"):
+            self.by_stations(name)
+        self._stiffness = None
+
+    def destroy(self) -> None:
+        """Free all PETSc objects."""
+        for matrix in self._matrices.values():
+            matrix.destroy()
+
+    def _matrix(self, name: str) -> PETSc.Mat:
+        """M, K or C for the rows of the subdomain."""
+        if name not in self._matrices:
+            self._matrices[name] = as_petsc(self._rows_of(name), PETSc.COMM_SELF)
+        return self._matrices[name]
+
+    def multiply(self, name: str, result: np.ndarray, wrapped: PETSc.Vec) -> None:
+        """Make ``result``, and the vector around it, the product of M, K or C with what is
+        read."""
+        by_stations = self.by_stations(name)
+        if by_stations is not None:
+            by_stations.multiply(self._padded, result)
+        elif self._domain.size:
+            self._matrix(name).mult(self._read, wrapped)
+
+    def by_stations(self, name: str, damped: bool = False) -> StationProduct | None:
+        """The product with M, K or C by stations; None if there is none. A ``damped`` one subtracts
+        a product with C."""
+        key = f"damped {name}" if damped else name
+        if key not in self._products:
+            domain, product = self._domain, None
+            if self.layout is not None and domain.size:
+                columns, first = self._columns()
+                layout, damping = self.layout, None
+                if damped:
+                    damping = self._rows_of("damping")
+                    layout = with_damping(layout, neighbours(damping, first, columns))
+                product = station_product(self._rows_of(name), first, layout, damping, columns)
+            self._products[key] = product
+        return self._products[key]
+
+    def find_layout(self, part: sparse.bsr_matrix) -> None:
+        """Find how unknowns of a station stand in lanes, if they can, from this and the operator
+        ``part`` that is solved with. Only where nodes form stations."""
+        rows, (columns, first) = (
+            self._sections(self._domain.low, self._domain.high),
+            self._columns(),
+        )
+        operator = neighbours(part, 0, rows)
+        self._stiffness = self._rows_of("stiffness")
+        stiffness = neighbours(self._stiffness, first, columns)
+        if operator is None or stiffness is None:
+            return
+        self.layout = layout_of(operator, stiffness, rows.make_ups if rows.varies else ())
+
+    def _sections(self, low: int, high: int) -> Sections:
+        return Sections.of(self._model.numbering, low, high)
+
+    def _columns(self) -> tuple[Sections, int]:
+        """Stations that products read, and which of them is the first that is solved for."""
+        domain = self._domain
+        columns = self._sections(domain.read_low, domain.read_high)
+        return columns, int(np.searchsorted(columns.starts, domain.low - domain.read_low))
+
+    def _rows_of(self, name: str) -> sparse.bsr_matrix:
+        if name == "stiffness" and self._stiffness is not None:
+            return self._stiffness
+        domain = self._domain
+        return part_of(
+            self._model,
+            (domain.low, domain.high),
+            (domain.read_low, domain.read_high),
+            _COEFFICIENTS[name],
+            0.0,
+            self._model.numbering.block,
+        )
