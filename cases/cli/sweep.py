@@ -146,7 +146,9 @@ def run_study(
 
 def verdict(ended: Sequence[Ended], what: str) -> int:
     """The exit code; prints which variants broke. Not collective."""
-    if ended and ended[-1].outcome == "interrupted":
+    from catenary.cases.studies.sweep.jobs import interrupted
+
+    if interrupted(ended):
         console.complain(f"the {what} was interrupted; the same command continues it")
         return console.BROKEN
     broken = [one for one in ended if not one.done]

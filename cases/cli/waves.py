@@ -7,7 +7,15 @@ from typing import Annotated
 
 import typer
 
-from catenary.cases.cli.app import Assignments, Force, MoreAssignments, Shortened, app, load
+from catenary.cases.cli.app import (
+    Assignments,
+    Force,
+    MoreAssignments,
+    Shortened,
+    app,
+    folder_option,
+    load,
+)
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
 from catenary.solver.base.errors import InputError
@@ -34,7 +42,7 @@ def waves(
     extras: MoreAssignments = None,
     out: Annotated[
         Path | None,
-        typer.Option("-o", "--out", parser=console.folder, metavar="<path>", help="For a case."),
+        folder_option("For a case."),
     ] = None,
     excite: Annotated[
         str,

@@ -22,7 +22,14 @@ from typing import Any, NamedTuple
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, Job, RunOptions, make_jobs
+from catenary.cases.studies.sweep.jobs import (
+    AS_USUAL,
+    Ended,
+    Job,
+    RunOptions,
+    interrupted,
+    make_jobs,
+)
 from catenary.cases.studies.sweep.variants import Variant, slug
 from catenary.solver.base.errors import InputError
 from catenary.solver.base.parallel import on_root
@@ -121,7 +128,7 @@ def run(
     begin = time.perf_counter()
     module = _load(plan.path)
     ended = run_jobs(plan.jobs, out_dir / RUNS, comm, options, measure=module.measure)
-    if ended and ended[-1].outcome == "interrupted":
+    if interrupted(ended):
         return None, ended
     text = on_root(comm, lambda: _conclude(plan, module, out_dir, ended, begin), takes_long=True)
     return text, ended

@@ -13,11 +13,10 @@ from scipy.interpolate import CubicSpline
 
 from catenary.cases.studies.accuracy.analysis import Found, Row, compare, separate, uncertainties
 from catenary.cases.studies.accuracy.plan import Plan, PlannedAxis, again
-from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, RunOptions
+from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, RunOptions, interrupted
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import covers
-from catenary.postproc.files.result_file import INTERRUPTED
 from catenary.postproc.read.results import Results
 
 RUNS = "runs"
@@ -88,7 +87,7 @@ def run(
     """
     folder = out_dir / RUNS
     ended = run_jobs(plan.jobs, folder, comm, options, measure=measure)
-    if _interrupted(ended):
+    if interrupted(ended):
         return None, ended
     every = list(ended)
     times = {one.variant.name: [one.summary["march_wall_s"]] for one in ended if one.done}
@@ -100,7 +99,7 @@ def run(
         short.reverse()  # whatever else the machine does now and then meets others
         repeated = run_jobs([again(job, number) for job in short], folder, comm, options)
         every += repeated
-        if _interrupted(repeated):
+        if interrupted(repeated):
             return None, every
         for job, one in zip(short, repeated, strict=True):
             if one.done:
@@ -179,7 +178,3 @@ def _estimate(summary: dict[str, Any]) -> float:
 
 def _work(one: Ended) -> float:
     return float(one.summary["n_steps"]) * float(one.summary["n_dofs"])
-
-
-def _interrupted(ended: Sequence[Ended]) -> bool:
-    return bool(ended) and ended[-1].outcome == INTERRUPTED

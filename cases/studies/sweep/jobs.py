@@ -100,6 +100,11 @@ class Ended:
         return self.outcome == "done"
 
 
+def interrupted(ended: Sequence[Ended]) -> bool:
+    """Whether a signal ended the last of some runs, after which no other began."""
+    return bool(ended) and ended[-1].outcome == "interrupted"
+
+
 def _assigned(variant: Variant) -> list[Assigned]:
     """The assignments of a variant, each with what gave it."""
     own = len(variant.assignments) - sum(key != NAMES for key in variant.varied)
