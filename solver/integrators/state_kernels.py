@@ -133,11 +133,11 @@ def energy_of_switching(displacement, links):
 
 
 @compiled
-def forces(motion, links, result):
-    """Force of each of ``links`` [N], positive where it pulls."""
-    reserves_within(motion, links, 0, result.size, result)
+def forces_within(motion, links, begin, end, result):
+    """Force of each of the links from ``begin`` to ``end`` [N], positive where it pulls."""
+    reserves_within(motion, links, begin, end, result)
     laws = links.law
-    for link in range(result.size):
+    for link in range(begin, end):
         law = laws[link]
         share = law.carried
         if result[link] < 0.0:
@@ -154,6 +154,7 @@ class Shown(NamedTuple):
     arms : (k,) int, unknowns of vertical displacement at steady arms
     droppers, others : ``LinkArrays`` of droppers and of all other links
     other_force : (m,) room for the forces of the latter [N]
+    columns : ``Columns`` of arms, droppers and others
     """
 
     motion: tuple[Any, ...]
@@ -161,14 +162,17 @@ class Shown(NamedTuple):
     droppers: Any
     others: Any
     other_force: np.ndarray
+    columns: Any
 
 
 @compiled
-def show(shown, uplift, dropper_force):
-    """Displacement at arms, forces of droppers and of other links [N]; ``shown`` is ``Shown``."""
+def show(shown, uplift, dropper_force, begin, end):
+    """Displacement at arms, forces of droppers and of other links [N], as far as they follow from
+    stations from ``begin`` to ``end``; ``shown`` is ``Shown``."""
     motion, arms = shown.motion, shown.arms
-    for i in range(arms.size):
+    first, last = shown.columns.first[begin], shown.columns.last[end]
+    for i in range(first[0], last[0]):
         uplift[i] = displacement_at(arms[i], motion)
-    forces(motion, shown.droppers, dropper_force)
+    forces_within(motion, shown.droppers, first[1], last[1], dropper_force)
     if shown.other_force.size:
-        forces(motion, shown.others, shown.other_force)
+        forces_within(motion, shown.others, first[2], last[2], shown.other_force)

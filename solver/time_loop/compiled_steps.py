@@ -24,9 +24,12 @@ from catenary.solver.time_loop import step_kernels
 from catenary.solver.time_loop.observers import StepView
 from catenary.solver.time_loop.step_kernels import N_COUNTS, REPEATED, ROUNDS, SLACK, Steps
 from catenary.solver.time_loop.step_views import Showing
+from catenary.solver.window.moving_columns import MovedStations
 
 # What rows of a block may take, so that it stays in the caches [B], and the most of them.
 _BLOCK_BYTES, _MOST_ROWS = 2**19, 512
+# Rows of a block at least, if what moves is a part of the line only.
+_ROWS_OF_PART = 64
 # The same of motions that are kept. A step of a line of which not one fits takes far longer than
 # the end of a block.
 _MOTION_BYTES, _MOST_MOTIONS = 2**21, 16
@@ -53,9 +56,11 @@ class CompiledSteps:
     def __init__(self, scheme: OneSolve, showing: Showing, dt: float, shows: bool) -> None:
         self._scheme, self._showing, self._dt, self._shows = scheme, showing, dt, shows
         width = showing.layout.width
-        self.most = max(1, min(_MOST_ROWS, _BLOCK_BYTES // (8 * width)))
+        least = 1 if scheme.interaction.line.window is None else _ROWS_OF_PART
+        self.most = max(least, min(_MOST_ROWS, _BLOCK_BYTES // (8 * width)))
         self.rows = np.zeros((self.most if shows else 0, width))
         self.times = np.zeros(self.most)
+        self._moved = MovedStations(len(self.rows), showing.shown.columns)
         self.taken = 0
         n = scheme.interaction.line.ownership.n_local
         self.most_motions = min(_MOST_MOTIONS, _MOTION_BYTES // (16 * n)) if shows else 0
@@ -106,6 +111,7 @@ class CompiledSteps:
         if self._loads is not None:
             n_steps = self._loads.cover(times)
             times = times[:n_steps]
+        self._moved.begin(step)
         self._kept[:n_steps] = -1
         for number, at in enumerate(kept):
             self._kept[at] = number
@@ -119,6 +125,7 @@ class CompiledSteps:
                     self.rows[self.taken] = self._showing.view(number, time).row
                     self._keep_motion(int(self._kept[self.taken]))
                 self.taken += 1
+        self._moved.end(step + n_steps, n_steps)
 
     def last_view(self, step: int) -> StepView:
         """The state after the latest block, ``step`` being the number of its last step."""
@@ -197,7 +204,8 @@ class CompiledSteps:
             taps=self._showing.layout.taps,
         )
         kept = self._kept, self._motions, self._place_taps, self._places
-        return steps, self.times, self._drives, self.rows, kept, self._counts, self._shows
+        rows = self.rows, (self._moved.now, self._moved.behind)
+        return steps, self.times, self._drives, *rows, kept, self._counts, self._shows
 
 
 def compiled_steps(

@@ -18,6 +18,7 @@ from catenary.solver.contact_problem import complementarity_kernels
 from catenary.solver.contact_problem.complementarity_kernels import SmallProblem
 from catenary.solver.contact_problem.law_tangents import ReportedForces
 from catenary.solver.integrators import state_kernels
+from catenary.solver.window.window_kernels import take_in
 
 # Numbers of ``counts``, named as in `schemes.Counters`.
 ROUNDS, SLACK, REPEATED = 0, 1, 2
@@ -123,17 +124,19 @@ def widen(bounds):
 
 
 @compiled
-def take(steps, times, drives, rows, kept_motions, counts, shows, first, n_steps):
+def take(steps, times, drives, rows, moved, kept_motions, counts, shows, first, n_steps):
     """Take the steps from ``first`` on of ``n_steps`` to ``times`` [s], with ``drives`` of heads.
 
-    If ``shows``, ``rows`` take what each shows. ``kept_motions`` holds of each the number of the
-    motion that keeps it, -1 if none does, and the motions (m, 2, n_local); then addresses (k,) of
-    numbers that are kept with a motion, and room for them (m, k).
+    If ``shows``, ``rows`` take what each shows; ``moved`` are ``now`` and ``behind`` of
+    ``MovedStations``, beside which a row is up to date. ``kept_motions`` holds of each the number
+    of the motion that keeps it, -1 if none does, and the motions (m, 2, n_local); then addresses
+    (k,) of numbers that are kept with a motion, and room for them (m, k).
 
     Returns how many were taken, and whether the next one is begun: up to its free step, as its
     forces are left to others.
     """
     steps, times, drives, rows, kept_motions = borrowed((steps, times, drives, rows, kept_motions))
+    now, behind = borrowed(moved)
     motion_of, motions, kept_taps, kept_numbers = kept_motions
     (start, places), speed, loading = steps.moving, steps.speed, steps.loading
     records, heads, taps, shown = steps.records, steps.heads, steps.taps, steps.shown
@@ -155,6 +158,7 @@ def take(steps, times, drives, rows, kept_motions, counts, shows, first, n_steps
             clock[0] = time
             call_held(loading)
         call_held(free)
+        take_in(now, shown.columns.ends)
         within = True
         for h in range(records.size):
             within &= head_records.predict(records[h], drives[i, h], heads, n)
@@ -179,7 +183,8 @@ def take(steps, times, drives, rows, kept_motions, counts, shows, first, n_steps
             for j in range(n_outputs):
                 row[j] = outputs[j]
             uplift, tension = row[n_outputs:n_arms], row[n_arms:n_shown]
-            state_kernels.show(shown, uplift, tension)
+            begin, end = min(now[0], behind[i, 0]), max(now[1], behind[i, 1])
+            state_kernels.show(shown, uplift, tension, begin, end)
             for j in range(taps.size):
                 row[n_shown + j] = numbers_at(taps[j], 1)[0]
             number = motion_of[i]

@@ -23,6 +23,7 @@ from catenary.solver.statics.equilibrium import Equilibrium
 from catenary.solver.time_loop.channels import Energies, Sources, energies_of
 from catenary.solver.time_loop.observers import Stage, StepView
 from catenary.solver.time_loop.row_layout import RowLayout
+from catenary.solver.window.moving_columns import columns_of
 
 # What every state of a line has, and what is kept of the pantographs beside their own states.
 _MOTION = ("displacement", "velocity", "acceleration")
@@ -94,9 +95,19 @@ class Showing:
         )
 
         self.shown = state_kernels.Shown(
-            self._line.motion.read, self._arm_rows, droppers, others, other_force
+            self._line.motion.read,
+            self._arm_rows,
+            droppers,
+            others,
+            other_force,
+            columns_of(
+                (self._arm_rows[:, None], droppers.unknowns, others.unknowns),
+                self._line.ownership.n_local,
+                None if self._line.window is None else self._line.window.stations,
+            ),
         )
-        self._show = bound(state_kernels.show, self.shown, uplift, tension)
+        n = self.shown.columns.n_stations
+        self._show = bound(state_kernels.show, self.shown, uplift, tension, 0, n)
 
     def stage(self, dt: float, start_time: float, n_steps: int) -> Stage:
         """What stays the same for the whole run."""

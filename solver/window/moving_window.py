@@ -92,6 +92,12 @@ class MovingWindow:
         return int(self.arrays.starts[begin]), int(self.arrays.starts[end])
 
     @property
+    def stations(self) -> tuple[np.ndarray, np.ndarray]:
+        """The first station that moves and the one after the last, kept up to date, and first
+        unknowns (n + 1,) of all stations."""
+        return self.arrays.ends, self.arrays.starts
+
+    @property
     def n_stations(self) -> int:
         """How many stations move."""
         return int(self.arrays.ends[3] - self.arrays.ends[2])

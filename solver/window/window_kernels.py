@@ -249,3 +249,9 @@ def slow_down(window, motion, station, loss):
         change = -loss * (shares[3] * y[i] + shares[4] * z[i])
         y[i] += change
         x[i] -= shares[1] / shares[0] * change
+
+
+@in_line
+def take_in(now, ends):
+    """Let a range of stations ``now`` take in what moves."""
+    now[0], now[1] = min(now[0], ends[0]), max(now[1], ends[1])

@@ -20,7 +20,12 @@ from catenary.solver.problem.ends import Fixed, Periodic
 from catenary.solver.problem.incidents import DropperBreak
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.problem.window import BOUNDED, EXACT, WindowChoice
+from catenary.solver.time_loop import compiled_steps
+from catenary.solver.time_loop import march as time_loop
+from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.window.moving_columns import MovedStations, columns_of
 from catenary.solver.window.where_possible import refuse_window
+from catenary.solver.window.window_kernels import take_in
 
 LINE = ac_simple_line(12)
 SPEED, START = 70.0, 330.0
@@ -108,6 +113,77 @@ def test_a_bounded_window_follows_the_train_and_errs_little() -> None:
     off = found["contact_force"][500:] - expected
     assert off.std() < 1e-5 * expected.std()
     assert max(sizes[10:]) < sizes[0]
+
+
+class Rows:
+    """Keeps the rows of all steps, which come in blocks."""
+
+    def __init__(self) -> None:
+        self.rows: list[np.ndarray] = []
+
+    def start(self, stage: Stage) -> None:
+        """Nothing is needed of the stage."""
+
+    def next_state(self, step: int) -> int:
+        return step + 1 if step % 90 == 0 else step - step % 90 + 90
+
+    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
+        self.rows += list(rows.copy())
+
+    def observe(self, view: StepView) -> None:
+        self.rows.append(view.row.copy())
+
+    def finish(self, outcome: str) -> None:
+        assert outcome == "done"
+
+
+def rows_of(problem: Problem, mesh: LineMesh, window: WindowChoice) -> np.ndarray:
+    seen = Rows()
+    march, _ = start_march(replace(problem, window=window), mesh)
+    with march:
+        march.run([seen])
+    return np.array(seen.rows)
+
+
+@pytest.mark.parametrize("n_rows", [1, 7, 64])
+def test_rows_of_blocks_show_what_moves_and_what_rests(
+    n_rows: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Bit by bit what steps one by one show, which look at the whole line."""
+    problem, mesh = scene(0.5, ac_simple_line(24))
+    monkeypatch.setattr(compiled_steps, "_BLOCK_BYTES", 0)
+    monkeypatch.setattr(compiled_steps, "_ROWS_OF_PART", n_rows)
+    choices = WindowChoice(EXACT), WindowChoice(BOUNDED, None, 2, 2), WindowChoice(BOUNDED, 1e-3)
+    for window in choices:
+        with monkeypatch.context() as patch:
+            patch.setattr(time_loop, "compiled_steps", lambda *arguments: None)
+            expected = rows_of(problem, mesh, window)
+        found = rows_of(problem, mesh, window)
+        assert np.array_equal(found, expected, equal_nan=True), window
+        rest = np.ptp(found[9:], axis=0) == 0.0
+        print(window, "columns that rest:", np.count_nonzero(rest), "of", rest.size)
+        assert 0.2 < rest.mean() < 0.95
+
+
+def test_a_row_is_out_of_date_where_anything_moved_since_it_was_filled() -> None:
+    ends, starts = np.array([0, 2]), np.arange(0, 22, 2)
+    wires = np.array([[3, 5], [4, 8], [0, 1], [18, 19]])
+    columns = columns_of((wires,), 20, (ends, starts))
+    assert columns.first[:, 0].tolist() == [0, 0, 0, 1, 1, 3, 3, 3, 3, 3, 4]
+    assert columns.last[:, 0].tolist() == [0, 3, 3, 3, 3, 3, 3, 3, 3, 3, 4]
+    moved = MovedStations(2, columns)
+    moved.begin(0)
+    assert moved.behind.tolist() == [[0, 10], [0, 10]] and moved.now.tolist() == [0, 2]
+    ends[:] = 1, 4
+    take_in(moved.now, ends)
+    moved.end(1, 1)
+    assert moved.behind.tolist() == [[0, 4], [0, 10]]
+    moved.begin(1)
+    assert moved.now.tolist() == [1, 4]
+    moved.end(3, 2)
+    assert moved.behind.tolist() == [[1, 4], [1, 4]]
+    moved.begin(4)
+    assert moved.behind.tolist() == [[0, 10], [0, 10]], "a step was taken elsewhere"
 
 
 def test_no_window_ends_where_elements_are_too_short_to_be_held(

@@ -1,0 +1,83 @@
+"""Which columns of what a step shows change with which stations of a line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Columns(NamedTuple):
+    """Columns of several tables by the stations that they follow from, as kernels take them.
+
+    Attributes
+    ----------
+    ends : the first station that moves and the one after the last, kept up to date by a window
+    starts : (n + 1,) first unknown of each station
+    first : (n + 1, k) of each of k tables the first column of those that follow from a station or
+        one behind it
+    last : (n + 1, k) the one after the last column of those that follow from stations before one
+    """
+
+    ends: np.ndarray
+    starts: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
+
+    @property
+    def n_stations(self) -> int:
+        return self.starts.size - 1
+
+
+def columns_of(
+    tables: Sequence[np.ndarray], n_unknowns: int, stations: tuple[np.ndarray, np.ndarray] | None
+) -> Columns:
+    """Columns of ``tables``: unknowns (m, l) that each of m columns follows from. Not collective.
+
+    ``stations`` are ``ends`` and ``starts``; without them the line is one station, which moves.
+    """
+    ends, starts = (np.array([0, 1]), np.array([0, n_unknowns])) if stations is None else stations
+    n = starts.size - 1
+    first = np.empty((n + 1, len(tables)), dtype=np.int64)
+    last = np.zeros_like(first)
+    for k, unknowns in enumerate(tables):
+        of_column = np.searchsorted(starts, unknowns, side="right") - 1
+        columns = np.arange(len(unknowns))
+        first[:, k] = len(unknowns)
+        np.minimum.at(first[:, k], of_column.max(axis=1, initial=0), columns)
+        np.maximum.at(last[:, k], of_column.min(axis=1, initial=n) + 1, columns + 1)
+    first = np.minimum.accumulate(first[::-1], axis=0)[::-1]
+    last = np.maximum.accumulate(last, axis=0)
+    return Columns(ends, starts.astype(np.int64), np.ascontiguousarray(first), last)
+
+
+class MovedStations:
+    """For each of several rows that are filled again and again: where they are out of date.
+
+    Only what has moved since a row was filled last has to be filled in again. Not collective.
+
+    Attributes
+    ----------
+    now : (2,) first station that moved in the present block of steps and the one after the last
+    behind : (n_rows, 2) the same of each row, since it was filled
+    """
+
+    def __init__(self, n_rows: int, columns: Columns) -> None:
+        self._columns = columns
+        self.behind = np.zeros((n_rows, 2), dtype=np.int64)
+        self.now = np.zeros(2, dtype=np.int64)
+        self._last_step = -1
+
+    def begin(self, step: int) -> None:
+        """Before a block of steps after the one of number ``step``."""
+        self.now[:] = self._columns.ends[:2]
+        if step != self._last_step:
+            self.behind[:] = 0, self._columns.n_stations
+
+    def end(self, step: int, filled: int) -> None:
+        """After a block up to step ``step``, of which the first rows were ``filled``."""
+        self.behind[:filled] = self.now
+        np.minimum(self.behind[filled:, 0], self.now[0], out=self.behind[filled:, 0])
+        np.maximum(self.behind[filled:, 1], self.now[1], out=self.behind[filled:, 1])
+        self._last_step = step
