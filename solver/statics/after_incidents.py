@@ -76,10 +76,13 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
     after = replace(problem, line=problem.line.with_shares(shares))
     model = build(after, mesh, first.dropper_lengths, broken)
     load, energy = np.zeros(model.n_dofs), 0.0
-    for wire, share in shares.items():
-        dofs, length = first.wire_elements(wire)
-        lost = (share - 1.0) * problem.line.wire(wire).tension
-        pairs = mesh.elements(wire)
+    for wire, now in zip(problem.line.wires, after.line.wires, strict=True):
+        pairs = mesh.elements(wire.name)
+        middle = mesh.x(pairs).mean(axis=1)
+        lost = now.tension_at(middle) - wire.tension_at(middle)
+        if not lost.any():
+            continue
+        dofs, length = first.wire_elements(wire.name)
         shape = np.stack([form.height[pairs], form.slope[pairs]], axis=2).reshape(-1, 4)
         pull = np.einsum("nij,nj->ni", elements.stiffness(length, 0.0, lost), shape)
         np.add.at(load, dofs, -pull)

@@ -8,6 +8,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
+from catenary.meshgen.wires import End
 from catenary.solver.model import elements
 from catenary.solver.model.model import Model
 from catenary.solver.statics.equilibrium import Equilibrium
@@ -29,7 +30,14 @@ def absolute_rest(
     for wire in mesh.wires:
         dofs, length = model.wire_elements(wire)
         data = line.wire(wire)
-        taken = data.tension - data.tension_at(mesh.x(mesh.elements(wire)).mean(axis=1))
+        middle = mesh.x(mesh.elements(wire)).mean(axis=1)
+        # Between its clamps a wire takes its tension from the one that carries it.
+        taken = np.zeros(middle.size)
+        for other in line.wires if data.taken else ():
+            for piece in other.pieces:
+                if End.CLAMPED in piece.ends:
+                    inside = (middle > piece.x[0]) & (middle < piece.x[-1])
+                    taken[inside] += tensions[other.name]
         stiffness = elements.stiffness(length, data.bending_stiffness, tensions[wire] - taken)
         for own, values in zip(dofs, stiffness, strict=True):
             matrix[np.ix_(own, own)] += values
