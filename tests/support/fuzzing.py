@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from fuzzing_broken import INCIDENTS, a_way
 from fuzzing_more import SLACK_DAMPINGS, as_assignments, mechanism, put_more
+from fuzzing_topologies import put_topology
 
 BASE = "en50318_2002"
 N_STEPS = 200
@@ -36,6 +37,18 @@ def wide_scene(seed: int, n_steps: int = N_STEPS) -> RandomScene:
     return sound_scene(seed, n_steps, wide=rng)
 
 
+def topology_scene(seed: int, n_steps: int = N_STEPS) -> RandomScene:
+    """A scene of any topology, with and without an overlap, and more of the schema in it.
+
+    It is sound, or two of its parts do not fit to each other.
+    """
+    rng = random.Random(f"topology {seed}")
+    words = _words(seed, n_steps, rng)
+    span = words["line.span_m"]
+    put_topology(rng, words, float(str(span[0] if isinstance(span, list) else span)))
+    return RandomScene(seed, as_assignments(words))
+
+
 def sound_scene(
     seed: int, n_steps: int = N_STEPS, wide: random.Random | None = None
 ) -> RandomScene:
@@ -43,6 +56,11 @@ def sound_scene(
 
     It runs for ``n_steps``; with ``wide`` it has parts of `fuzzing_more`.
     """
+    return RandomScene(seed, as_assignments(_words(seed, n_steps, wide)))
+
+
+def _words(seed: int, n_steps: int, wide: random.Random | None) -> dict[str, object]:
+    """Keys and values of `sound_scene`."""
     rng = random.Random(seed)
     span = rng.uniform(30.0, 70.0)
     n_spans = rng.randint(2, 5)
@@ -114,7 +132,7 @@ def sound_scene(
     if wide is not None:
         room = min(start - (rear if behind else 0.0), length - way - start)
         put_more(wide, words, span, room, n_steps)
-    return RandomScene(seed, as_assignments(words))
+    return words
 
 
 def _positions(rng: random.Random, span: float, count: int) -> list[float]:

@@ -33,6 +33,9 @@ class Needs(Table):
     """What must happen in a run for it to be the hard case that it is named after."""
 
     switches: int = Field(0, ge=0, description="droppers that slacken or tighten, summed")
+    passes: int = Field(
+        0, ge=0, description="times the greater part of the force passes to another contact wire"
+    )
     lost_m: float = Field(0, ge=0, description="longest way without contact, regained after it")
     lost_share_below: float | None = Field(
         None, gt=0, description="share of the steps without contact in the later half of the run"

@@ -136,6 +136,8 @@ def _needs(case: HardCase, rest: LineAtRest, base: Watched) -> list[Criterion]:
     needs, found = case.needs, []
     if needs.switches:
         found.append(_reaches(case, "switches of droppers", base.switches().sum(), needs.switches))
+    if needs.passes:
+        found.append(_reaches(case, "passes between wires", passes(base), needs.passes))
     if needs.lost_m:
         found.append(_reaches(case, "way without contact [m]", lost_way(base), needs.lost_m))
     if needs.lost_share_below is not None:
@@ -170,6 +172,17 @@ def _needs(case: HardCase, rest: LineAtRest, base: Watched) -> list[Criterion]:
         last = float(base.position[-1, 0])
         found.append(_reaches(case, "end of the run [m]", last, needs.ends_at_m - 0.2))
     return found
+
+
+def passes(run: Watched) -> int:
+    """How often the contact wire with the greatest force of a pantograph changes, summed.
+
+    Steps without contact are left out.
+    """
+    n = run.force.shape[1]
+    shares = run.on_wires.reshape(len(run.on_wires), n, -1)
+    touched = [own[own.any(axis=1)].argmax(axis=1) for own in np.moveaxis(shares, 1, 0)]
+    return int(sum(np.count_nonzero(np.diff(first)) for first in touched))
 
 
 def broken(rest: LineAtRest, run: Watched) -> np.ndarray:

@@ -26,6 +26,7 @@ from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.matrices import stiffness_matrix, whole_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
+from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.incidents import in_steps
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all
@@ -48,6 +49,7 @@ class Watched:
     ----------
     outcome : "done", or the sentence of what broke
     time : (n,) [s]; position, force, height, wire : (n, n_pantographs) [m], [N], [m], [m]
+    on_wires : (n, n_pantographs n_wires) force on each contact wire [N]; no columns if there is one
     taut : (n, n_droppers) whether a dropper carries anything; only on one rank
     energy : (n,) of the line [J]; work : (n,) of the contact forces on it since the start [J];
         both empty without ``with_work``
@@ -64,6 +66,7 @@ class Watched:
     force: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     height: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     wire: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    on_wires: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     taut: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
     energy: np.ndarray = field(default_factory=lambda: np.zeros(0))
     work: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -127,7 +130,9 @@ class LineBalance:
         newmark = numerics.integrator == "newmark"
         dt, gamma = numerics.dt, numerics.gamma if newmark else 0.5
         excess = numerics.beta - 0.5 * gamma if newmark else 0.0
-        self.weights = 1.0 - gamma, gamma
+        # Recorded forces of a kinematic contact are those means over the step already.
+        kinematic = isinstance(problem.contact, KinematicLaw)
+        self.weights = (0.0, 1.0) if kinematic else (1.0 - gamma, gamma)
         self._terms: list[tuple[str, csr_matrix]] = []
         if gamma != 0.5 or excess != 0.0:
             damping = whole_matrix(model, damping=0.5 * dt * (gamma - 0.5))
@@ -234,6 +239,7 @@ class Watcher:
             force=self._channel("contact_force"),
             height=self._channel("head_height"),
             wire=self._channel("wire_height"),
+            on_wires=self._channel("contact_wire_force"),
             taut=self._channel("dropper_force") > 0.0,
             energy=np.array(self._energy),
             work=self._work,

@@ -1,0 +1,102 @@
+"""Scenes of all topologies, with and without an overlap: what makes one of a simple line."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+
+Words = dict[str, object]
+# Shares of the scenes.
+_OVERLAPS, _BRIDLES = 0.4, 0.5
+# Words of a simple line that no line of a single contact wire has.
+_NOT_SINGLE = (
+    "line.messenger_wire.",
+    "line.dropper.",
+    "line.encumbrance_m",
+    "line.damping.per_component.messenger_wire",
+    "line.damping.per_component.droppers",
+    "effects.residual_dropper_stiffness",
+    "incidents",
+)
+
+
+def put_topology(rng: random.Random, words: Words, span: float) -> str:
+    """Give a simple line of spans of at least ``span`` [m] any topology; returns its name, with
+    ``+overlap`` where two sections overlap."""
+    name = rng.choice(tuple(_TOPOLOGIES))
+    words["line.topology"] = f"'{name}'"
+    _TOPOLOGIES[name](rng, words, span)
+    if rng.random() >= _OVERLAPS:
+        return name
+    _overlap(rng, words)
+    return f"{name}+overlap"
+
+
+def _simple(rng: random.Random, words: Words, span: float) -> None:
+    """As it is."""
+
+
+def _stitched(rng: random.Random, words: Words, span: float) -> None:
+    words["line.n_spans"] = max(2, int(str(words["line.n_spans"])))
+    messenger = float(str(words["line.messenger_wire.tension_N"]))
+    wire = _wire(rng, rng.uniform(0.05, 0.4) * messenger, 0.31)
+    length = rng.uniform(0.2, 0.6) * span
+    words["line.stitch_wire"] = f"{{{wire},length_m={length!r},clamp_kg={rng.uniform(0.0, 0.5)!r}}}"
+
+
+def _compound(rng: random.Random, words: Words, span: float) -> None:
+    wire = _wire(rng, 10 ** rng.uniform(3.8, 4.4), rng.uniform(0.5, 1.5))
+    count = rng.randint(1, 5)
+    places = [round(span * (i + 0.5) / count, 3) for i in range(count)]
+    hung = f"stiffness_N_per_m={10 ** rng.uniform(4.0, 6.0)!r}"
+    if isinstance(words["line.span_m"], list):  # a pattern for each length
+        spans = (
+            f"{{span_m={one!r},positions_m={places!r}}}" for one in sorted(words["line.span_m"])
+        )
+        hung += f",patterns=[{','.join(spans)}]"
+    else:
+        hung += f",positions_m={places!r}"
+    height = rng.uniform(0.3, 0.9)
+    words["line.auxiliary_wire"] = f"{{{wire},height_m={height!r},dropper={{{hung}}}}}"
+
+
+def _twin(rng: random.Random, words: Words, span: float) -> None:
+    droppers = rng.choice(("pairs", "alternating"))
+    words["line.twin"] = f"{{spacing_m={rng.uniform(0.02, 0.2)!r},droppers='{droppers}'}}"
+
+
+def _single(rng: random.Random, words: Words, span: float) -> None:
+    for key in [key for key in words if key.startswith(_NOT_SINGLE)]:
+        del words[key]
+    words |= {f"line.{key}": "" for key in ("messenger_wire", "dropper", "encumbrance_m")}
+    words["mesh.elements_per_gap"] = rng.randint(8, 64)
+    if rng.random() < _BRIDLES:
+        words["line.n_spans"] = max(2, int(str(words["line.n_spans"])))
+        tension = float(str(words["line.contact_wire.tension_N"]))
+        wire = _wire(rng, rng.uniform(0.05, 0.5) * tension, 0.31)
+        words["line.bridle"] = f"{{{wire},length_m={rng.uniform(0.1, 0.4) * span!r}}}"
+
+
+def _overlap(rng: random.Random, words: Words) -> None:
+    """In the spans that trains run on, as far as there can be one."""
+    n_spans = rng.randint(3, 5)
+    words["line.n_spans"] = n = max(n_spans + 2, int(str(words["line.n_spans"])))
+    words["line.overlap"] = (
+        f"{{first_span={rng.randint(2, n - n_spans)},n_spans={n_spans},"
+        f"rise_m={rng.uniform(0.05, 0.8)!r},distance_m={rng.uniform(0.1, 1.0)!r}}}"
+    )
+
+
+def _wire(rng: random.Random, tension: float, mass: float) -> str:
+    bending = rng.choice([0.0, rng.uniform(1.0, 50.0)])
+    return f"tension_N={tension!r},mass_kg_per_m={mass!r},bending_stiffness_N_m2={bending!r}"
+
+
+_TOPOLOGIES: dict[str, Callable[[random.Random, Words, float], None]] = {
+    "simple": _simple,
+    "stitched": _stitched,
+    "compound": _compound,
+    "twin": _twin,
+    "twin_messenger": _twin,
+    "single": _single,
+}
