@@ -21,7 +21,7 @@ from catenary.cases.run.recording import (
 )
 from catenary.cases.scene.convert.course import resolved
 from catenary.mbs.build import has_joints
-from catenary.meshgen.line import Role
+from catenary.meshgen.wires import Role
 from catenary.postproc.channels.line_record import GZIP
 from catenary.postproc.files.chunk_shapes import Chunk, chunks_of
 from catenary.solver.problem.problem import Problem
