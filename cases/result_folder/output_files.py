@@ -14,7 +14,8 @@ from catenary.postproc.files.csv_text import csv_text
 from catenary.solver.base.errors import InputError, RunBroken
 
 DROPPER_COLUMNS = ("dropper_span", "dropper_x", "dropper_length", "dropper_force")
-_DROPPER_HEADS = ("span", "x_m", "length_m", "force_N")
+DROPPER_WIRES = ("dropper_upper", "dropper_lower")
+_DROPPER_HEADS = ("span", "x_m", "length_m", "force_N", "from_wire", "to_wire")
 
 
 def new_file(path: Path, suffixes: tuple[str, ...], force: bool) -> None:
@@ -40,10 +41,10 @@ def write_static(path: Path, table: Mapping[str, Any]) -> None:
                 json.dump(plain, stream, indent=1)
                 stream.write("\n")
                 return
-            columns = [np.asarray(table[name]) for name in DROPPER_COLUMNS]
+            columns = [np.asarray(table[name]) for name in (*DROPPER_COLUMNS, *DROPPER_WIRES)]
             rows = (
-                (int(span) + 1, f"{x:.4f}", f"{length:.5f}", f"{force:.3f}")
-                for span, x, length, force in zip(*columns, strict=True)
+                (int(span) + 1, f"{x:.4f}", f"{length:.5f}", f"{force:.3f}", upper, lower)
+                for span, x, length, force, upper, lower in zip(*columns, strict=True)
             )
             stream.write(csv_text(_DROPPER_HEADS, rows))
     except OSError as error:

@@ -28,6 +28,7 @@ from catenary.cases.run.continuing import refuse_other_run, state_to_continue
 from catenary.cases.run.describe.arrivals import arrival_facts
 from catenary.cases.run.describe.incidents import incident_facts
 from catenary.cases.run.describe.pantographs import header_words
+from catenary.cases.run.installed import installed
 from catenary.cases.run.needs import (
     flush_cadence,
     needs_before_meshing,
@@ -144,7 +145,10 @@ def restart_case(
 
 
 def static_table(scene: Scene) -> dict[str, np.ndarray]:
-    """The line at rest, arrays named as in the result file's groups. Not collective."""
+    """The line at rest, arrays named as in the result file's groups, and what `installed` adds.
+
+    Not collective.
+    """
     problem = problem_of(scene)
     mesh = mesh_of(scene)
     rest = line_at_rest(problem, mesh)
@@ -152,6 +156,7 @@ def static_table(scene: Scene) -> dict[str, np.ndarray]:
         **line_datasets(problem.line, mesh, problem.evaluation),
         **static_datasets(problem.line, mesh, rest.form, rest.lift),
         "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
+        **installed(problem.line, mesh, rest.form.height),
     }
     return {name.split("/", 1)[1]: values for name, values in data.items()}
 

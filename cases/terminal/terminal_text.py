@@ -10,7 +10,7 @@ import numpy as np
 
 from catenary.cases.scene.input.case_files import CaseEntry
 from catenary.meshgen.line import Line
-from catenary.meshgen.wires import Role
+from catenary.meshgen.wires import Role, Wire
 from catenary.postproc.evaluate.comparing import decimals_that_tell
 from catenary.postproc.evaluate.wording import counted, fixed
 
@@ -103,31 +103,40 @@ def static_text(table: Mapping[str, Any], line: Line) -> str:
     ----------
     table : arrays in SI units named as in ``/static`` and ``/line`` of a result file:
         ``dropper_span``, ``dropper_x``, ``dropper_length``, ``dropper_force``, ``contact_x``,
-        ``contact_height``, ``elasticity_x``, ``elasticity``, ``wires/NAME``
+        ``contact_height``, ``elasticity_x``, ``elasticity``, ``wires/NAME``, and what
+        `cases.run.installed` adds
     line : for supports and contact wires
     """
     data = {name: np.asarray(value) for name, value in table.items()}
     masts = line.support_positions
-    lines = [f"{'span':>5} {'in span [m]':>12} {'length [m]':>11} {'force [N]':>10}"]
+    several = len(line.droppers) > 1
+    hung = [
+        f"  {upper} to {lower}" if several else ""
+        for upper, lower in zip(data["dropper_upper"], data["dropper_lower"], strict=True)
+    ]
+    head = f"{'span':>5} {'in span [m]':>12} {'length [m]':>11} {'force [N]':>10}"
+    lines = [head + ("  hangs from and to" if several else "")]
     spans = data["dropper_span"].astype(int)
-    shown: dict[tuple[float, ...], int] = {}
+    shown: dict[tuple[float | str, ...], int] = {}
     for span in np.unique(spans):
         chosen = spans == span
         x = data["dropper_x"][chosen] - masts[span]
         length, force = data["dropper_length"][chosen], data["dropper_force"][chosen]
         # Millimetres and newtons decide: a span that is cut like an earlier one is only named.
-        pattern = tuple(np.round(np.concatenate([x, 1e3 * length, force])).tolist())
+        names = [hung[i] for i in np.flatnonzero(chosen)]
+        rounded = np.round(np.concatenate([x, 1e3 * length, force])).tolist()
+        pattern = (*rounded, *names)
         if pattern in shown:
             lines.append(f"{span + 1:5d} as span {shown[pattern]}")
             continue
         shown[pattern] = int(span) + 1
         lines += [
-            f"{span + 1:5d} {x[i]:12.3f} {length[i]:11.4f} {fixed(force[i], 1):>10}"
+            f"{span + 1:5d} {x[i]:12.3f} {length[i]:11.4f} {fixed(force[i], 1):>10}{names[i]}"
             for i in range(x.size)
         ]
     lift, place = 1e3 * data["elasticity"], data["elasticity_x"]
     first, last = line.running_range
-    lines += [""]
+    lines += ["", *(_wire_text(wire, data.get(f"lengths/{wire.name}")) for wire in line.wires)]
     wires = [wire.name for wire in line.wires_of(Role.CONTACT)]
     ends = np.cumsum([data[f"wires/{name}"].size for name in wires])[:-1]
     chains = (np.split(data[f"contact_{own}"], ends) for own in ("x", "height"))
@@ -144,3 +153,17 @@ def static_text(table: Mapping[str, Any], line: Line) -> str:
         f"{100 * (lift.max() - lift.min()) / (lift.max() + lift.min()):.1f} %",
     ]
     return "\n".join(lines)
+
+
+def _wire_text(wire: Wire, lengths: np.ndarray | None) -> str:
+    """Tension of a wire, and what is special about its pieces; ``lengths`` of clamped ones [m]."""
+    text = f"{wire.name}: tension {wire.tension:g} N"
+    shares = sorted({less for _, _, less in wire.taken})
+    if shares:
+        left = " or ".join(f"{wire.tension - less:g}" for less in shares)
+        text += f", {left} N beside wires that are clamped to it"
+    if lengths is not None and lengths.size:
+        low, high = f"{lengths.min():.3f}", f"{lengths.max():.3f}"
+        between = low if low == high else f"{low} to {high}"
+        text += f"; {counted(lengths.size, 'piece')}, {between} m long from clamp to clamp"
+    return text

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from measuring import check
 
+from catenary.cases.run.runner import static_table
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.line import line_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.scene.load import load_scene
+from catenary.cases.terminal.terminal_text import static_text
 from catenary.meshgen.wires import Role
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 
@@ -171,3 +173,33 @@ def test_a_bridle_softens_the_support_of_a_single_wire() -> None:
     print(f"at the support {at_mast[0]:.3f} and {at_mast[1]:.3f} mm/N")
     assert at_mast[0] > 0.5 and at_mast[1] == pytest.approx(0.01, rel=0.05)  # a spring of 1e5 N/m
     assert [wire.name for wire in bridled.problem.line.wires] == ["contact_wire", "bridle_wire"]
+
+
+def test_installers_read_which_wire_hangs_on_which_and_how_long_it_is() -> None:
+    """A stitch wire of 18 m from clamp to clamp is longer along itself by its sag: it hangs on two
+    halves that fall by some f, 2 f^2 / 9 m, and not by more than bending hides."""
+    scene = load_scene(RE330, shortened=True)
+    table, line = static_table(scene), line_of(scene)
+    near = abs(table["dropper_x"][:, None] - line.support_positions[1:-1]).min(axis=1) < 9.0
+    assert (table["dropper_upper"] == np.where(near, "stitch_wire", "messenger_wire")).all()
+    assert set(table["dropper_lower"]) == {"contact_wire"}
+    lengths = table["lengths/stitch_wire"]
+    assert lengths.size == line.n_spans - 1
+    rest = rest_of(RE330, [])
+    nodes = rest.mesh.wires["stitch_wire"][: rest.mesh.breaks["stitch_wire"][0]]
+    falls = float(np.ptp(rest.form.height[nodes]))
+    print(f"{lengths[0]:.4f} m, falls by {falls:.3f} m")
+    assert 18.0 + falls**2 / 9.0 < lengths[0] < 18.0 + 4.0 * falls**2 / 9.0
+    text = static_text(table, line)
+    assert "messenger_wire: tension 21000 N, 17500 N beside wires" in text
+    assert re.search(r"stitch_wire: tension 3500 N; 13 pieces, 18\.\d+ m long", text)
+    assert "stitch_wire to contact_wire" in text
+
+
+@pytest.mark.parametrize("case", [TRAM, TWIN])
+def test_tables_of_lines_without_droppers_or_with_two_wires(case: str) -> None:
+    scene = load_scene(case, shortened=True)
+    table = static_table(scene)
+    lower = {wire.name for wire in line_of(scene).wires_of(Role.CONTACT)}
+    assert set(table["dropper_lower"]) == (lower if case == TWIN else set())
+    assert static_text(table, line_of(scene)).count("tension ") == len(line_of(scene).wires)

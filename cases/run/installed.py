@@ -1,0 +1,39 @@
+"""What an installer needs of a line at rest: which wire hangs on which, and how long it is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from catenary.meshgen.line import Line
+from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.wires import End
+
+
+def installed(line: Line, mesh: LineMesh, height: np.ndarray) -> dict[str, np.ndarray]:
+    """Names of the wires that droppers join, and lengths of wires between clamps.
+
+    Parameters
+    ----------
+    height : (n_nodes,) of the line at rest [m]
+
+    Returns
+    -------
+    ``line/dropper_upper``, ``line/dropper_lower`` : (n_droppers,) names of wires
+    ``static/lengths/NAME`` : length along each piece of a wire whose ends are clamped [m]
+    """
+    group = mesh.dropper_group
+    ends = (
+        ("upper", [own.upper for own in line.droppers]),
+        (
+            "lower",
+            [own.lower for own in line.droppers],
+        ),
+    )
+    found = {f"line/dropper_{end}": np.array(names, dtype=str)[group] for end, names in ends}
+    for wire in line.wires:
+        if all(End.CLAMPED in piece.ends for piece in wire.pieces):
+            nodes = mesh.wires[wire.name]
+            pieces = np.split(nodes, mesh.breaks.get(wire.name, np.zeros(0, dtype=int)))
+            lengths = [np.hypot(np.diff(mesh.x(own)), np.diff(height[own])).sum() for own in pieces]
+            found[f"static/lengths/{wire.name}"] = np.array(lengths)
+    return found
