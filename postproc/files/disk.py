@@ -188,7 +188,7 @@ def write_at(handle: int, offset: int, numbers: np.ndarray) -> None:
     OSError
         If not all of it could be written.
     """
-    left = numbers.data.cast("B")
+    left = numbers.reshape(-1).view(np.uint8).data  # an empty array cannot be cast
     while left.nbytes:
         written = os.pwrite(handle, left, offset)
         left, offset = left[written:], offset + written
