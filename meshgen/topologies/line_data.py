@@ -17,8 +17,8 @@ SHORTEST_GAP = 1e-3
 
 
 @dataclass(frozen=True)
-class StitchWire:
-    """A wire clamped to the messenger wire on both sides of each inner support.
+class ClampedWire:
+    """A short wire clamped to another one on both sides of each inner support.
 
     ``length`` from clamp to clamp [m]; of each clamp ``clamp_mass`` [kg], half of it on either
     wire, and ``clamp_stiffness`` [N/m].
@@ -28,6 +28,10 @@ class StitchWire:
     length: float
     clamp_mass: float
     clamp_stiffness: float
+
+
+class StitchWire(ClampedWire):
+    """A wire clamped to the messenger wire, which carries the droppers beside a support."""
 
 
 @dataclass(frozen=True)
@@ -53,18 +57,8 @@ class Twin:
     alternating: bool
 
 
-@dataclass(frozen=True)
-class Bridle:
-    """A wire over each inner support, whose ends are clamped to the contact wire.
-
-    ``length`` from clamp to clamp [m]; of each clamp ``clamp_mass`` [kg], half of it on either
-    wire, and ``clamp_stiffness`` [N/m].
-    """
-
-    conductor: Conductor
-    length: float
-    clamp_mass: float
-    clamp_stiffness: float
+class Bridle(ClampedWire):
+    """A wire over a support, whose ends are clamped to the contact wire."""
 
 
 @dataclass(frozen=True)
