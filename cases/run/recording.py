@@ -16,7 +16,7 @@ from catenary.solver.problem.problem import Problem
 from catenary.solver.time_loop import channels
 
 if TYPE_CHECKING:
-    from catenary.cases.scene.tables.run import OutputTable
+    from catenary.cases.scene.tables.run.output import OutputTable
 
 # Size up to which the line's channels are recorded at every step, and snapshots at their usual
 # cadence, unless the scene says otherwise [B].

@@ -12,22 +12,21 @@ from typing import Any
 from pydantic import Field, PrivateAttr
 
 from catenary.cases.scene.input.origin import Origin
-from catenary.cases.scene.tables.contact import ContactTable
-from catenary.cases.scene.tables.incidents import Incident
-from catenary.cases.scene.tables.line import LineTable, MeshTable
-from catenary.cases.scene.tables.mechanism import Name
-from catenary.cases.scene.tables.pantograph import PantographTable
-from catenary.cases.scene.tables.petsc import PetscTable
-from catenary.cases.scene.tables.run import (
-    CaseTable,
-    EvaluationTable,
-    NumericsTable,
-    OutputTable,
-    TrainTable,
-)
+from catenary.cases.scene.tables.line.line import LineTable
+from catenary.cases.scene.tables.line.mesh import MeshTable
+from catenary.cases.scene.tables.run.case import CaseTable
+from catenary.cases.scene.tables.run.contact import ContactTable
+from catenary.cases.scene.tables.run.evaluation import EvaluationTable
+from catenary.cases.scene.tables.run.incidents import Incident
+from catenary.cases.scene.tables.run.numerics import NumericsTable
+from catenary.cases.scene.tables.run.output import OutputTable
+from catenary.cases.scene.tables.run.petsc import PetscTable
+from catenary.cases.scene.tables.run.window import WindowTable
 from catenary.cases.scene.tables.table import Table
-from catenary.cases.scene.tables.vehicle import VehicleTable
-from catenary.cases.scene.tables.window import WindowTable
+from catenary.cases.scene.tables.train.mechanism import Name
+from catenary.cases.scene.tables.train.pantograph import PantographTable
+from catenary.cases.scene.tables.train.train import TrainTable
+from catenary.cases.scene.tables.train.vehicle import VehicleTable
 from catenary.solver.effects import all_effects as effect_registry
 from catenary.solver.effects.effect import Limit
 

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 from catenary.cases.cli.main import app
 from catenary.cases.run import scene_mesh
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.checks.mesh_size import size_of
+from catenary.cases.scene.checks.line.mesh_size import size_of
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.input.origin import Origin

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 from catenary.cases.scene.convert.mechanism import multibody_of
 from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.tables.pantograph import CorrectionTable, MultibodyTable
+from catenary.cases.scene.tables.train.pantograph import CorrectionTable, MultibodyTable
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, without_head
 from catenary.mbs.rigid.system import System
 

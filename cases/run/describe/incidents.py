@@ -6,7 +6,7 @@ from typing import Any
 
 from catenary.cases.scene.convert.incidents import at_step, dropper_place
 from catenary.cases.scene.scene import Scene
-from catenary.cases.scene.tables.incidents import DropperBreakTable, Incident, TensionLossTable
+from catenary.cases.scene.tables.run.incidents import DropperBreakTable, Incident, TensionLossTable
 from catenary.meshgen.line import Line
 from catenary.solver.problem.problem import Problem
 

@@ -13,27 +13,27 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from catenary.cases.scene.checks.contact import check_contact
-from catenary.cases.scene.checks.droppers import (
-    check_dropper_lengths,
-    check_droppers_inside_spans,
-)
 from catenary.cases.scene.checks.effects import (
     check_effect_data,
     check_effect_names,
     check_requirements_of_chosen,
     check_requirements_of_defaults,
 )
-from catenary.cases.scene.checks.ends import check_ends
-from catenary.cases.scene.checks.incidents import check_incidents
-from catenary.cases.scene.checks.mesh_size import size_faults
-from catenary.cases.scene.checks.output import check_output, check_recorded_parts
-from catenary.cases.scene.checks.pantograph import check_mechanisms, check_pantographs
-from catenary.cases.scene.checks.scheme import check_scheme
-from catenary.cases.scene.checks.topology import check_names, check_parts, check_topology
-from catenary.cases.scene.checks.usual import usual_faults
-from catenary.cases.scene.checks.vehicle import check_vehicle
-from catenary.cases.scene.checks.window import check_window
+from catenary.cases.scene.checks.line.droppers import (
+    check_dropper_lengths,
+    check_droppers_inside_spans,
+)
+from catenary.cases.scene.checks.line.ends import check_ends
+from catenary.cases.scene.checks.line.mesh_size import size_faults
+from catenary.cases.scene.checks.line.topology import check_names, check_parts, check_topology
+from catenary.cases.scene.checks.run.contact import check_contact
+from catenary.cases.scene.checks.run.incidents import check_incidents
+from catenary.cases.scene.checks.run.output import check_output, check_recorded_parts
+from catenary.cases.scene.checks.run.scheme import check_scheme
+from catenary.cases.scene.checks.run.usual import usual_faults
+from catenary.cases.scene.checks.run.window import check_window
+from catenary.cases.scene.checks.train.pantograph import check_mechanisms, check_pantographs
+from catenary.cases.scene.checks.train.vehicle import check_vehicle
 from catenary.cases.scene.convert.course import end_of, strips_ahead
 from catenary.cases.scene.convert.line import line_data_of
 from catenary.cases.scene.input.faults import Fault, SceneError

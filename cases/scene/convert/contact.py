@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from catenary.cases.scene.tables.contact import HERTZ, ContactTable
+from catenary.cases.scene.tables.run.contact import HERTZ, ContactTable
 from catenary.solver.problem.contact_laws import (
     HYSTERESIS,
     ContactLaw,

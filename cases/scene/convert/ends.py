@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from catenary.cases.scene.tables.ends import EndsTable, EndTable
+from catenary.cases.scene.tables.line.ends import EndsTable, EndTable
 from catenary.solver.problem.ends import AbsorbingLayer, EndCondition, Fixed, Periodic
 
 

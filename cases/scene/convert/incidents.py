@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from catenary.cases.scene.tables.incidents import (
+from catenary.cases.scene.tables.run.incidents import (
     DropperBreakTable,
     IncidentTable,
     LoweringTable,

@@ -8,14 +8,9 @@ from typing import TypeVar
 import numpy as np
 
 from catenary.cases.scene.scene import Scene
-from catenary.cases.scene.tables.line import (
-    BridleTable,
-    DropperTable,
-    HangingTable,
-    LineTable,
-    StitchWireTable,
-    WireTable,
-)
+from catenary.cases.scene.tables.line.droppers import DropperTable, HangingTable
+from catenary.cases.scene.tables.line.line import LineTable
+from catenary.cases.scene.tables.line.wires import BridleTable, StitchWireTable, WireTable
 from catenary.cases.scene.tables.units import length_from_mm
 from catenary.meshgen.hardware import DropperKind, SteadyArm
 from catenary.meshgen.line import Line

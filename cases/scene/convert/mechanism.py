@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from catenary.cases.scene.convert.pantograph import strips_of, wanted_force
-from catenary.cases.scene.tables import mechanism as schema
-from catenary.cases.scene.tables.pantograph import MultibodyTable
+from catenary.cases.scene.tables.train import mechanism as schema
+from catenary.cases.scene.tables.train.pantograph import MultibodyTable
 from catenary.cases.scene.tables.units import angle_from_deg, speed_from_km_h
 from catenary.mbs.mechanism.pantograph_data import AllBodies, MultibodyData
 from catenary.mbs.rigid.bodies import Body

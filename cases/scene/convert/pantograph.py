@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catenary.cases.scene.tables.head import StripsTable
-from catenary.cases.scene.tables.pantograph import MultibodyTable, PantographTable
+from catenary.cases.scene.tables.train.head import StripsTable
+from catenary.cases.scene.tables.train.pantograph import MultibodyTable, PantographTable
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.lumped_data import LumpedData
 

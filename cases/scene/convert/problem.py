@@ -15,9 +15,9 @@ from catenary.cases.scene.convert.incidents import line_incidents, lowering_of
 from catenary.cases.scene.convert.line import line_of
 from catenary.cases.scene.convert.pantograph import pantograph_of, static_force
 from catenary.cases.scene.convert.vehicle import vehicle_of
-from catenary.cases.scene.tables.line import LineTable
+from catenary.cases.scene.tables.line.line import LineTable
+from catenary.cases.scene.tables.run.window import WindowTable
 from catenary.cases.scene.tables.units import speed_from_km_h
-from catenary.cases.scene.tables.window import WindowTable
 from catenary.solver.problem.problem import Damping, Numerics, Placement, Problem, Train
 from catenary.solver.problem.window import BOUNDED, WindowChoice
 from catenary.solver.window.choice import spans_of_window

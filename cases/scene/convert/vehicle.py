@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from catenary.cases.scene.tables.train.vehicle import Course, MotionTable, VehicleTable
 from catenary.cases.scene.tables.units import angle_from_deg
-from catenary.cases.scene.tables.vehicle import Course, MotionTable, VehicleTable
 from catenary.mbs.vehicle.irregularity import Irregularity
 from catenary.mbs.vehicle.motion_sources import Harmonic, Source, Table, VehicleMotion
 

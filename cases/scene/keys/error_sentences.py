@@ -13,7 +13,7 @@ from catenary.cases.scene.input.origin import Origin, shown
 from catenary.cases.scene.input.plain_text import plain
 from catenary.cases.scene.keys.keys import is_known, known_keys, nearest, without_kinds
 from catenary.cases.scene.keys.usual_ranges import unit_guess, usual_range
-from catenary.cases.scene.tables.petsc import ELSEWHERE
+from catenary.cases.scene.tables.run.petsc import ELSEWHERE
 from catenary.cases.scene.tables.units import unit_of
 
 _LONGEST_KEY = 200  # of one in a sentence

@@ -12,8 +12,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from catenary.cases.scene.tables.head import SomeInertia, SomeMass
 from catenary.cases.scene.tables.table import Table, ascending, exactly_one
+from catenary.cases.scene.tables.train.head import SomeInertia, SomeMass
 from catenary.mbs.frame import SPACE
 
 Coordinate = Annotated[float, Field(ge=-100, le=100)]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
-from catenary.cases.scene.tables.contact import HERTZ, WITH_RESTITUTION
+from catenary.cases.scene.tables.run.contact import HERTZ, WITH_RESTITUTION
 from catenary.solver.problem.integrator_parameters import NEWMARK
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
-from catenary.cases.scene.tables.incidents import DropperBreakTable, TensionLossTable
+from catenary.cases.scene.tables.run.incidents import DropperBreakTable, TensionLossTable
 from catenary.meshgen.topologies.line_data import LineData
 
 if TYPE_CHECKING:

@@ -15,9 +15,9 @@ from pydantic import (
 )
 
 from catenary.cases.scene.input.toml_input import assign
-from catenary.cases.scene.tables.head import RollTable, SomeMass, StripsTable
-from catenary.cases.scene.tables.mechanism import BodyTable, ForceTable, JointTable, Name
 from catenary.cases.scene.tables.table import TAKE_AWAY, Table, ascending, exactly_one
+from catenary.cases.scene.tables.train.head import RollTable, SomeMass, StripsTable
+from catenary.cases.scene.tables.train.mechanism import BodyTable, ForceTable, JointTable, Name
 from catenary.solver.base.errors import InputError
 
 Mass = Annotated[float, Field(gt=0, le=1000), SomeMass]

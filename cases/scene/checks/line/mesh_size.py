@@ -11,7 +11,7 @@ import numpy as np
 from catenary.cases.scene.convert.line import line_of, span_lengths
 from catenary.cases.scene.cost_model import estimate_memory, estimate_start
 from catenary.cases.scene.input.faults import Fault, SceneError
-from catenary.cases.scene.tables.line import TransitionTable
+from catenary.cases.scene.tables.line.line import TransitionTable
 from catenary.meshgen.division import divisions_of
 from catenary.meshgen.geometry import find_cuts
 from catenary.meshgen.line import Line

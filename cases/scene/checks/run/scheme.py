@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
-from catenary.cases.scene.tables.pantograph import LumpedTable
+from catenary.cases.scene.tables.train.pantograph import LumpedTable
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene

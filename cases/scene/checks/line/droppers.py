@@ -9,7 +9,7 @@ import numpy as np
 
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
-from catenary.cases.scene.tables.line import HangingTable
+from catenary.cases.scene.tables.line.droppers import HangingTable
 from catenary.meshgen.geometry import find_cuts
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData

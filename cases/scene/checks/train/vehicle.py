@@ -13,8 +13,8 @@ from catenary.cases.scene.convert.pantograph import pantograph_of
 from catenary.cases.scene.convert.vehicle import vehicle_of
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
-from catenary.cases.scene.tables.pantograph import LumpedTable, MultibodyTable
-from catenary.cases.scene.tables.vehicle import MotionTable
+from catenary.cases.scene.tables.train.pantograph import LumpedTable, MultibodyTable
+from catenary.cases.scene.tables.train.vehicle import MotionTable
 from catenary.mbs.roll import roll_of
 from catenary.meshgen.topologies.line_data import LineData
 

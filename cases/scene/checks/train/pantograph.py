@@ -10,8 +10,8 @@ from catenary.cases.scene.convert.pantograph import wanted_force
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.input.origin import shown
 from catenary.cases.scene.keys.error_sentences import refusal
-from catenary.cases.scene.tables.mechanism import ActuatorTable
-from catenary.cases.scene.tables.pantograph import MultibodyTable
+from catenary.cases.scene.tables.train.mechanism import ActuatorTable
+from catenary.cases.scene.tables.train.pantograph import MultibodyTable
 from catenary.mbs.frame import SPACE
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.base.errors import InputError, RunBroken

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
-from catenary.cases.scene.tables.incidents import TensionLossTable
-from catenary.cases.scene.tables.line import LineTable
+from catenary.cases.scene.tables.line.line import LineTable
+from catenary.cases.scene.tables.run.incidents import TensionLossTable
 from catenary.meshgen.topologies.all_topologies import make_line, registered
 from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData
 

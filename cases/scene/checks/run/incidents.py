@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from catenary.cases.scene.checks.pantograph import reaches_below
+from catenary.cases.scene.checks.train.pantograph import reaches_below
 from catenary.cases.scene.convert.course import end_of
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
-from catenary.cases.scene.tables.incidents import (
+from catenary.cases.scene.tables.run.incidents import (
     DropperBreakTable,
     IncidentTable,
     LoweringTable,

@@ -1,0 +1,1 @@
+"""What a run must hold beyond the range of each key."""

@@ -1,0 +1,1 @@
+"""What a train must hold beyond the range of each key."""

@@ -1,0 +1,1 @@
+"""Keys of the line: wires, hardware, ends, mesh."""

@@ -1,0 +1,127 @@
+"""Scene tables of droppers: what they are, and where they hang."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from catenary.cases.scene.tables.line.spans import Span
+from catenary.cases.scene.tables.table import TAKE_AWAY, Table, ascending, exactly_one
+
+PreSag = Annotated[float, Field(ge=-1000, le=1000)]
+DropperPosition = Annotated[float, Field(gt=0, le=500)]
+
+
+class DropperPattern(Table):
+    """Where the droppers of all spans of one length hang."""
+
+    span_m: Span = Field(description="length of the spans that have this pattern")
+    positions_m: list[DropperPosition] = Field(
+        min_length=1, max_length=200, description="distances from the span's left support"
+    )
+    pre_sag_mm: list[PreSag] | None = Field(
+        None, description="how far the contact wire hangs lower, one value per dropper"
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> DropperPattern:
+        ascending(self.positions_m, "positions_m")
+        _one_pre_sag_each(self.pre_sag_mm, len(self.positions_m))
+        return self
+
+
+class HangingTable(Table):
+    """Droppers: what they are, and where they hang."""
+
+    stiffness_N_per_m: float | None = Field(
+        None, gt=0, le=1e9, description="stiffness in tension, the same for every length"
+    )
+    axial_stiffness_N: float | None = Field(
+        None, gt=0, le=1e9, description="EA; the stiffness is EA over the dropper's length"
+    )
+    mass_kg_per_m: float = Field(0.0, ge=0, le=100, description="mass per length")
+    messenger_clamp_kg: float = Field(
+        0.0, ge=0, le=100, description="clamp at the upper end, on the messenger wire or another"
+    )
+    positions_m: list[DropperPosition] | None = Field(
+        None,
+        min_length=1,
+        max_length=200,
+        description="distances from the left support, for lines whose spans all have one length",
+    )
+    count: int | None = Field(
+        None, ge=1, le=200, description="droppers per span, centred in it at spacing_m"
+    )
+    spacing_m: float | None = Field(None, gt=0, le=500, description="distance between droppers")
+    patterns: list[DropperPattern] | None = Field(
+        None, min_length=1, max_length=200, description="one entry per span length"
+    )
+
+    @model_validator(mode="after")
+    def _placed(self) -> HangingTable:
+        exactly_one(self, "stiffness_N_per_m", "axial_stiffness_N")
+        exactly_one(self, "positions_m", "count", "patterns")
+        if (self.count is None) != (self.spacing_m is None):
+            raise ValueError("needs count and spacing_m together, but only one is given")
+        if self.patterns is not None:
+            ascending([p.span_m for p in self.patterns], "patterns by span_m")
+        if self.positions_m is not None:
+            ascending(self.positions_m, "positions_m")
+        return self
+
+
+class DropperTable(HangingTable):
+    """Droppers of the contact wire, and the pre-sag that they give it."""
+
+    contact_clamp_kg: float = Field(0.0, ge=0, le=100, description="clamp on the contact wire")
+    pre_sag_mm: list[PreSag] | None = Field(
+        None, description="how far the contact wire hangs lower, one value per dropper"
+    )
+    pre_sag_mid_mm: PreSag | None = Field(
+        None, description="pre-sag at mid-span of a parabola from the first to the last dropper"
+    )
+    residual_stiffness_ratio: float = Field(
+        0.0, ge=0, lt=1, description="share of its stiffness that a compressed dropper keeps"
+    )
+    slack_damping: Literal["released", "kept"] = Field(
+        "released",
+        description="damper of a slack dropper: released with its spring, or kept in action as in "
+        "equation (2.7) of Ambrosio et al. (2012)",
+    )
+
+    @model_validator(mode="after")
+    def _pre_sag(self) -> DropperTable:
+        if self.pre_sag_mm is not None and self.pre_sag_mid_mm is not None:
+            raise ValueError(f"takes pre_sag_mm or pre_sag_mid_mm, but both are given{TAKE_AWAY}")
+        if self.patterns is not None:
+            if self.pre_sag_mm is not None:
+                raise ValueError("with patterns takes pre_sag_mm in each pattern, not here")
+            mixed = any(p.pre_sag_mm is not None for p in self.patterns)
+            if mixed and self.pre_sag_mid_mm is not None:
+                raise ValueError("takes pre_sag_mm in the patterns or pre_sag_mid_mm, not both")
+        if self.positions_m is not None:
+            _one_pre_sag_each(self.pre_sag_mm, len(self.positions_m))
+        if self.count is not None:
+            _one_pre_sag_each(self.pre_sag_mm, self.count)
+        return self
+
+
+def _one_pre_sag_each(pre_sag: list[float] | None, n_droppers: int) -> None:
+    if pre_sag is not None and len(pre_sag) != n_droppers:
+        raise ValueError(
+            f"must give one pre_sag_mm per dropper, but there are {len(pre_sag)} values "
+            f"for {n_droppers} droppers"
+        )
+
+
+class AuxiliaryDropperTable(HangingTable):
+    """Droppers from the messenger wire down to the auxiliary wire, which hangs level by them."""
+
+    auxiliary_clamp_kg: float = Field(0.0, ge=0, le=100, description="clamp on the auxiliary wire")
+
+    @model_validator(mode="after")
+    def _level(self) -> AuxiliaryDropperTable:
+        if any(pattern.pre_sag_mm is not None for pattern in self.patterns or []):
+            raise ValueError("takes no pre_sag_mm in patterns: the auxiliary wire hangs level")
+        return self

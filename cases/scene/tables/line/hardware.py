@@ -1,0 +1,29 @@
+"""Scene tables of supports and steady arms."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from catenary.cases.scene.tables.table import Table
+
+
+class SupportTable(Table):
+    """What carries the topmost wire at a mast."""
+
+    stiffness_N_per_m: float = Field(5e5, gt=0, le=1e10, description="vertical stiffness")
+
+
+class SteadyArmTable(Table):
+    """The arm that holds the contact wire sideways at a mast."""
+
+    length_m: float = Field(0.0, ge=0, le=10, description="length from hinge to clamp")
+    mass_kg_per_m: float = Field(0.0, ge=0, le=100, description="mass per length")
+    clamp_kg: float = Field(0.0, ge=0, le=100, description="clamp on the contact wire")
+    stiffness_N_per_m: float = Field(
+        0.0, ge=0, le=1e8, description="vertical stiffness at the contact wire"
+    )
+    holds_height: bool = Field(
+        False,
+        description="whether the arm holds the contact wire at its height at rest; otherwise the "
+        "wire hangs freely between the droppers next to it",
+    )

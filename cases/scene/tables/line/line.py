@@ -1,0 +1,117 @@
+"""Scene table of the line from anchor to anchor. Keys carry their unit where it is not obvious."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from catenary.cases.scene.tables.line.damping import DampingTable
+from catenary.cases.scene.tables.line.droppers import DropperTable
+from catenary.cases.scene.tables.line.ends import EndsTable
+from catenary.cases.scene.tables.line.hardware import SteadyArmTable, SupportTable
+from catenary.cases.scene.tables.line.spans import Span
+from catenary.cases.scene.tables.line.wires import (
+    AuxiliaryWireTable,
+    BridleTable,
+    StitchWireTable,
+    TwinTable,
+    WireTable,
+)
+from catenary.cases.scene.tables.table import OneOrMore, Table
+from catenary.meshgen.topologies.all_topologies import registered
+
+Stagger = Annotated[float, Field(ge=-2, le=2)]
+
+
+class TransitionTable(Table):
+    """Spans at the ends in which the contact wire rises to its tensioner."""
+
+    n_spans_start: int = Field(0, ge=0, le=100, description="transition spans at the start")
+    n_spans_end: int = Field(0, ge=0, le=100, description="transition spans at the end")
+    rise_m: float = Field(0.0, ge=0, le=5, description="height gained over all of one end's spans")
+    span_m: Span | None = Field(
+        None, description="length of the transition spans; line.span_m counts for them if absent"
+    )
+
+
+class OverlapTable(Table):
+    """Spans in which one tension section ends and the next one begins."""
+
+    first_span: int = Field(ge=2, le=20_000, description="number of its first span, from 1")
+    n_spans: int = Field(4, ge=3, le=5, description="number of its spans")
+    rise_m: float = Field(
+        gt=0,
+        le=5,
+        description="height that a contact wire gains from the middle to the end of its section",
+    )
+    distance_m: float = Field(
+        0.4, gt=0, le=2, description="distance of the wires of both sections from each other"
+    )
+
+
+class LineTable(Table):
+    """The line from anchor to anchor."""
+
+    topology: str = Field(
+        "simple",
+        min_length=1,
+        max_length=100,
+        description="which wires the line has: " + ", ".join(registered()),
+    )
+    n_spans: int = Field(ge=1, le=20_000, description="number of spans from anchor to anchor")
+    span_m: Annotated[list[Span], OneOrMore, Field(min_length=1, max_length=2000)] = Field(
+        description="span length, or a list of span lengths that is repeated"
+    )
+    contact_height_m: float = Field(
+        5.08, gt=0, le=20, description="height of the contact wire at the supports above the rail"
+    )
+    encumbrance_m: float | None = Field(
+        None,
+        gt=0,
+        le=10,
+        description="height of the messenger wire above the contact wire at supports",
+    )
+    stagger_m: Annotated[list[Stagger], OneOrMore, Field(min_length=1, max_length=2001)] = Field(
+        [0.0], description="alternating sideways offset at the supports, or one value per support"
+    )
+    contact_wire: WireTable = Field(description="contact wire")
+    messenger_wire: WireTable | None = Field(None, description="messenger wire")
+    auxiliary_wire: AuxiliaryWireTable | None = Field(
+        None, description="wire between messenger and contact wire"
+    )
+    stitch_wire: StitchWireTable | None = Field(None, description="stitch wires at the supports")
+    twin: TwinTable | None = Field(None, description="two contact wires in place of one")
+    bridle: BridleTable | None = Field(None, description="bridles of a single contact wire")
+    dropper: DropperTable | None = Field(None, description="droppers of the contact wire")
+    support: SupportTable = Field(default_factory=SupportTable, description="supports")
+    steady_arm: SteadyArmTable = Field(default_factory=SteadyArmTable, description="steady arms")
+    damping: DampingTable = Field(description="proportional damping")
+    overlap: OverlapTable | None = Field(
+        None, description="spans in which the next tension section begins"
+    )
+    transition: TransitionTable = Field(
+        default_factory=TransitionTable, description="transition spans"
+    )
+    ends: EndsTable = Field(default_factory=EndsTable, description="how the line ends")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> LineTable:
+        n_transition = self.transition.n_spans_start + self.transition.n_spans_end
+        if n_transition >= self.n_spans:
+            raise ValueError(
+                f"must have more spans (n_spans is {self.n_spans}) than transition spans "
+                f"(n_spans_start + n_spans_end is {n_transition})"
+            )
+        covered = self.n_spans - (n_transition if self.transition.span_m is not None else 0)
+        if len(self.span_m) > covered:
+            raise ValueError(
+                f"must not list more lengths in span_m ({len(self.span_m)}) than there are spans "
+                f"for them ({covered})"
+            )
+        if len(self.stagger_m) not in (1, self.n_spans + 1):
+            raise ValueError(
+                f"must give stagger_m as one number or one per support ({self.n_spans + 1}), "
+                f"but lists {len(self.stagger_m)}"
+            )
+        return self

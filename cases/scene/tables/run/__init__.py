@@ -1,0 +1,1 @@
+"""Keys of the run: contact, numerics, incidents, output, evaluation."""

@@ -1,0 +1,1 @@
+"""Keys of the train: pantographs, their mechanisms, the vehicle."""
