@@ -14,7 +14,7 @@ from catenary.solver.base.errors import InputError
 
 @app.command(
     "list",
-    help="List the shipped cases, or all keys of a scene.",
+    help="List the shipped cases, all keys of a scene, or ready pantographs.",
     epilog="Example: catenary list --keys damping",
 )
 @console.guarded
@@ -22,6 +22,10 @@ from catenary.solver.base.errors import InputError
 def list_cases(
     keys: Annotated[
         bool, typer.Option("--keys", help="Every key of a scene, its unit, default and meaning.")
+    ] = False,
+    pantographs: Annotated[
+        bool,
+        typer.Option("--pantographs", help="Ready pantographs, for pantographs.NAME.model."),
     ] = False,
     wanted: Annotated[
         str | None,
@@ -34,6 +38,8 @@ def list_cases(
     ] = None,
 ) -> None:
     """Serial."""
+    if keys and pantographs:
+        raise InputError("list takes --keys or --pantographs, but both are given")
     if keys:
         from catenary.cases.terminal.key_list import key_details, key_table
 
@@ -41,6 +47,11 @@ def list_cases(
         return
     if wanted is not None:
         raise InputError(f"{wanted} filters keys: write `catenary list --keys {wanted}`")
+    if pantographs:
+        from catenary.cases.terminal.pantograph_list import pantograph_table
+
+        console.say(pantograph_table())
+        return
     from catenary.cases.scene.input.case_files import entries
     from catenary.cases.terminal import terminal_text
 

@@ -112,6 +112,9 @@ def _second_kind(rng: random.Random, words: Words, span: float) -> None:
     first, others = placed.split(",{", 1)
     words["train.pantographs"] = f"{first},{{{others.replace('reference', 'other', 1)}"
     table = "pantographs.other"
+    if rng.random() < 0.3:
+        words[f"{table}.model"] = rng.choice(["'dsa380'", "'en50318_2002'", "'ambrosio2012'"])
+        return
     words[f"{table}.masses_kg"] = [10 ** rng.uniform(-0.3, 1.3), 10 ** rng.uniform(-0.3, 1.3)]
     words[f"{table}.stiffnesses_N_per_m"] = [10 ** rng.uniform(2.5, 4.3), rng.uniform(0.0, 500.0)]
     words[f"{table}.dampings_N_s_per_m"] = [rng.uniform(0.0, 150.0), rng.uniform(0.0, 150.0)]

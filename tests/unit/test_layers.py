@@ -37,7 +37,7 @@ ROOMS = {
         "division", "gmsh_lines", "reader", "build"),
     "mbs": (
         "frame", "interface", "rigid", "time_steps", "vehicle", "head", "mechanism", "lumped_data",
-        "response", "lumped", "lowering", "roll", "shape", "build",
+        "library", "response", "lumped", "lowering", "roll", "shape", "build",
     ),
     "solver": (
         "base", "problem", "model", "ends", "effects", "linear", "statics", "waves", "window",

@@ -9,6 +9,7 @@ import numpy as np
 from catenary.cases.scene.tables.train.head import StripsTable
 from catenary.cases.scene.tables.train.pantograph import MultibodyTable, PantographTable
 from catenary.mbs.head.strips import Strips, Suspension, Turning
+from catenary.mbs.library import READY
 from catenary.mbs.lumped_data import LumpedData
 
 if TYPE_CHECKING:
@@ -78,7 +79,8 @@ def wanted_force(table: PantographTable, speed_km_h: float) -> float | None:
     if table.static_force_N is not None:
         return table.static_force_N
     if table.static_force_by_speed is None:
-        return None
+        ready = None if isinstance(table, MultibodyTable) else table.model
+        return None if ready is None else READY[ready].force_at(speed_km_h)
     speeds, forces = np.array(table.static_force_by_speed).T
     if not speeds[0] <= speed_km_h <= speeds[-1]:
         return None

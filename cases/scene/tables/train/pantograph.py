@@ -18,11 +18,15 @@ from catenary.cases.scene.input.toml_input import assign
 from catenary.cases.scene.tables.table import TAKE_AWAY, Table, ascending, exactly_one
 from catenary.cases.scene.tables.train.head import RollTable, SomeMass, StripsTable
 from catenary.cases.scene.tables.train.mechanism import BodyTable, ForceTable, JointTable, Name
+from catenary.mbs.library import READY
 from catenary.solver.base.errors import InputError
 
 Mass = Annotated[float, Field(gt=0, le=1000), SomeMass]
 Stiffness = Annotated[float, Field(ge=0, le=1e8)]
 DampingValue = Annotated[float, Field(ge=0, le=1e6)]
+# Names of ready chains, and the lists that stand for one.
+Ready = Literal["en50318_2002", "en50318_2018", "dsa380", "ambrosio2012"]
+CHAIN = ("masses_kg", "stiffnesses_N_per_m", "dampings_N_s_per_m")
 # What acts only where all bodies are moved.
 _OF_ALL_BODIES = ("constraint_handling", "substeps")
 
@@ -69,7 +73,14 @@ class LumpedTable(_Pressing):
     """A pantograph as a chain of lumped masses, head first; the last spring stands on the base."""
 
     type: Literal["lumped"] = Field("lumped", description="model: lumped or multibody")
-    masses_kg: list[Mass] = Field(min_length=1, max_length=20, description="masses, head first")
+    model: Ready | None = Field(
+        None, description="a ready chain in place of the three lists; see `list --pantographs`"
+    )
+    masses_kg: list[Mass] = Field(
+        min_length=1,
+        max_length=20,
+        description="masses, head first; those of model, if it is given",
+    )
     stiffnesses_N_per_m: list[Stiffness] = Field(
         description="springs below each mass, the last one to the base; only that may be 0"
     )
@@ -77,6 +88,24 @@ class LumpedTable(_Pressing):
     roll: RollTable | None = Field(
         None, description="how the head rolls; acts with effects.head_roll"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _take_ready(cls, raw: Any) -> Any:
+        """The lists of a ready chain; those that stand beside its name must be the same."""
+        model = raw.get("model") if isinstance(raw, dict) else None
+        if not isinstance(model, str):
+            return raw
+        # Of an unknown name that alone is said, not that lists are missing.
+        ready = READY.get(model, next(iter(READY.values()))).chain
+        filled = dict(raw)
+        for key, values in zip(CHAIN, (ready.masses, ready.stiffnesses, ready.dampings),
+                               strict=True):  # fmt: skip
+            if filled.setdefault(key, list(values)) != list(values) and model in READY:
+                raise ValueError(
+                    f'must not have {key} beside model = "{model}", which has its own{TAKE_AWAY}'
+                )
+        return filled
 
     @model_validator(mode="after")
     def _consistent(self) -> LumpedTable:
@@ -90,7 +119,9 @@ class LumpedTable(_Pressing):
         if any(k == 0 for k in self.stiffnesses_N_per_m[:-1]):
             raise ValueError("must have springs between its masses: only the last of "
                              "stiffnesses_N_per_m may be 0")  # fmt: skip
-        exactly_one(self, "static_force_N", "static_force_by_speed")
+        own = self.static_force_N is not None or self.static_force_by_speed is not None
+        if own or self.model is None or READY[self.model].static_force is None:
+            exactly_one(self, "static_force_N", "static_force_by_speed")
         if self.strips.mass >= self.masses_kg[0]:
             raise ValueError(
                 f"must have a head heavier than its strips, but masses_kg gives it "
