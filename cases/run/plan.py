@@ -18,6 +18,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import numbering_of
+from catenary.solver.effects.effect import Effect
 from catenary.solver.problem.problem import Numerics, Problem, n_halvings
 from catenary.solver.window.choice import window_sentence
 
@@ -110,13 +111,17 @@ def effect_rows(scene: Scene, problem: Problem) -> tuple[list[EffectRow], list[E
             else:
                 reason = "asked for by the scene" if name in scene.effects else "default"
             on.append(EffectRow(name, effect.title, reason))
-        elif name in problem.effects:
-            off.append(EffectRow(name, effect.title, "nothing in the scene calls for it"))
         else:
-            said = name in scene.effects
-            reason = "left out by the scene" if said else "off unless the scene asks for it"
-            off.append(EffectRow(name, effect.title, reason))
+            off.append(EffectRow(name, effect.title, _why_off(scene, problem, effect)))
     return on, off
+
+
+def _why_off(scene: Scene, problem: Problem, effect: Effect) -> str:
+    if scene.effects.get(effect.name) is False:
+        return "left out by the scene"
+    if effect.applies(problem):
+        return "off unless the scene asks for it"
+    return "the scene has no data for it" + (f": {effect.data}" if effect.data else "")
 
 
 def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:

@@ -53,7 +53,15 @@ def _heads(a: Results, b: Results) -> list[str]:
             f"dt {run.dt:g} s, {counted(about['n_ranks'], 'rank')}, "
             f"{counted(run.n_steps, 'step')}, {run.outcome})"
         )
+    for letter, run, other in (("A", a, b), ("B", b, a)):
+        alone = _simulated(run) - _simulated(other)
+        if alone:
+            lines.append(f"only {letter} simulates {', '.join(sorted(alone))}")
     return lines
+
+
+def _simulated(run: Results) -> set[str]:
+    return {name for name, *_ in run.attributes["effects_on"]}
 
 
 def _statistics(a: Results, b: Results) -> list[str]:

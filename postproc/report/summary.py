@@ -75,6 +75,7 @@ def summarise(
         "complaints": statistics.complaints + results.damage,
         "effects_on": [name for name, _, _ in attributes["effects_on"]],
         "effects_off": [name for name, _, _ in attributes["effects_off"]],
+        "effects": _effects(attributes),
         "versions": attributes["versions"],
     }
     return dict(plain(summary))
@@ -164,6 +165,15 @@ def _elasticity_of_wires(results: Results) -> dict[str, Any]:
             for name, own in zip(names, columns, strict=True)
         }
     }
+
+
+def _effects(attributes: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What was simulated and what was left out, each with the reason."""
+    return [
+        {"name": name, "title": title, "simulated": simulated, "reason": reason}
+        for key, simulated in (("effects_on", True), ("effects_off", False))
+        for name, title, reason in attributes[key]
+    ]
 
 
 def _criterion(c: Criterion) -> dict[str, Any]:

@@ -57,6 +57,7 @@ class Effect:
     law : the record of laws with the fields that the effect sets. Effects are applied in building
         order, so that an effect may change what one that it requires has set
     lifts : limits of a scene that do not hold with the effect
+    data : what a scene has to hold for it to act on, by its keys; empty if any scene does
     """
 
     name: str
@@ -71,6 +72,7 @@ class Effect:
     build: Callable[[ModelBuilder], None] | None = None
     law: Callable[[Simulated, Problem], Simulated] | None = None
     lifts: tuple[Limit, ...] = ()
+    data: str = ""
 
     @property
     def n_laws(self) -> int:

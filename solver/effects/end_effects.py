@@ -73,6 +73,7 @@ register(
         default=True,
         applies=lambda p: _has(p, AbsorbingLayer),
         build=_layers,
+        data="line.ends with an end of kind absorbing_layer",
     )
 )
 register(
@@ -85,5 +86,6 @@ register(
         applies=lambda p: _has(p, Periodic),
         build=_lines_beyond,
         law=_going_on,
+        data="line.ends with an end of kind periodic",
     )
 )

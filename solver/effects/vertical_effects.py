@@ -116,6 +116,7 @@ register(
         requires=("gravity",),
         applies=lambda p: any(any(wanted.sag) for wanted in p.line.profiles),
         law=lambda laws, p: _shaped(laws, target_heights.pre_sag),
+        data="line.dropper.pre_sag_mm or pre_sag_mid_mm other than 0",
     )
 )
 register(
@@ -127,6 +128,7 @@ register(
         default=True,
         applies=lambda p: any(wanted.rises for wanted in p.line.profiles),
         law=lambda laws, p: _shaped(laws, target_heights.transition),
+        data="line.transition with a rise_m",
     )
 )
 register(
@@ -138,6 +140,7 @@ register(
         default=True,
         applies=lambda p: any(group.kind.mass_per_length > 0 for group in p.line.droppers),
         build=_dropper_mass,
+        data="line.dropper.mass_kg_per_m above 0",
     )
 )
 register(
@@ -155,6 +158,7 @@ register(
             )
         ),
         build=_clamp_mass,
+        data="clamps of some mass, such as line.dropper.contact_clamp_kg",
     )
 )
 register(
@@ -169,6 +173,7 @@ register(
             for group in p.line.steady_arms
         ),
         build=_arm_inertia,
+        data="line.steady_arm with a clamp_kg, or a length_m and mass_kg_per_m",
     )
 )
 register(
@@ -180,6 +185,7 @@ register(
         default=True,
         applies=lambda p: any(group.kind.stiffness > 0 for group in p.line.steady_arms),
         build=_arm_stiffness,
+        data="line.steady_arm.stiffness_N_per_m above 0",
     )
 )
 register(
@@ -195,6 +201,7 @@ register(
             or any(any(pair) for pair in p.damping.per_component.values())
         ),
         law=lambda laws, p: replace(laws, damping=p.damping),
+        data="line.damping with alpha_s or beta_per_s above 0",
     )
 )
 register(
@@ -218,6 +225,7 @@ register(
         requires=("dropper_slackening",),
         applies=lambda p: p.residual_stiffness_ratio > 0,
         law=_residual_stiffness,
+        data="line.dropper.residual_stiffness_ratio above 0",
     )
 )
 register(
@@ -229,6 +237,7 @@ register(
         default=True,
         applies=lambda p: not isinstance(p.contact, KinematicLaw),
         law=lambda laws, p: replace(laws, contact_loss=True),
+        data="contact.law other than kinematic",
     )
 )
 register(
@@ -240,6 +249,7 @@ register(
         default=False,
         applies=lambda p: p.contact.dissipates,
         law=lambda laws, p: replace(laws, contact=p.contact),
+        data="contact.damping_N_s_per_m above 0 or contact.restitution below 1",
     )
 )
 register(
@@ -251,6 +261,7 @@ register(
         default=True,
         applies=lambda p: len(p.train.placements) > 1,
         lifts=(Limit.ONE_PANTOGRAPH,),
+        data="a second entry of train.pantographs",
     )
 )
 register(
@@ -262,6 +273,7 @@ register(
         default=False,
         applies=lambda p: any(roll_of(place.data) is not None for place in p.train.placements),
         law=lambda laws, p: replace(laws, head_roll=True),
+        data="a head that can roll (pantographs.*.roll) under a wire with line.stagger_m",
     )
 )
 register(
@@ -273,6 +285,7 @@ register(
         default=False,
         applies=lambda p: p.train.vehicle is not None,
         law=lambda laws, p: replace(laws, vehicle=p.train.vehicle),
+        data="a table [vehicle]",
     )
 )
 register(
@@ -284,6 +297,7 @@ register(
         default=True,
         applies=lambda p: any(isinstance(incident, DropperBreak) for incident in p.incidents),
         law=lambda laws, p: _happening(laws, p, DropperBreak),
+        data="an entry of incidents of type dropper_break",
     )
 )
 register(
@@ -295,6 +309,7 @@ register(
         default=True,
         applies=lambda p: any(isinstance(incident, TensionLoss) for incident in p.incidents),
         law=lambda laws, p: _happening(laws, p, TensionLoss),
+        data="an entry of incidents of type tension_loss",
     )
 )
 register(
@@ -306,6 +321,7 @@ register(
         default=True,
         applies=lambda p: any(place.lowering is not None for place in p.train.placements),
         law=lambda laws, p: replace(laws, lowering=True),
+        data="an entry of incidents of type lowering",
     )
 )
 register(
@@ -317,5 +333,6 @@ register(
         default=False,
         applies=lambda p: p.train.speed >= slowest_wave_speed(p),
         lifts=(Limit.WAVE_SPEED,),
+        data="a train.speed_km_h at or above the contact wire's wave speed",
     )
 )

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
+from dataclasses import fields
 
 import pytest
 
 from catenary.cases.run.plan import effect_rows
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.keys.keys import known_keys
 from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.scene import Scene
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.effect import Effect, register, unregister
@@ -64,8 +68,29 @@ def test_the_plan_tells_why_an_effect_is_not_simulated() -> None:
     _, off = effect_rows(scene, problem_of(scene))
     reason = {row.name: row.reason for row in off}
     assert reason["arm_stiffness"] == "left out by the scene"
-    assert reason["pre_sag"] == "nothing in the scene calls for it"
-    assert reason["contact_damping"] == "off unless the scene asks for it"
+    assert reason["pre_sag"] == (
+        "the scene has no data for it: line.dropper.pre_sag_mm or pre_sag_mid_mm other than 0"
+    )
+    assert reason["supercritical_speed"].startswith("the scene has no data for it: a train.speed")
+    damped = ["contact.damping_N_s_per_m=10", "contact.law=linear"]
+    scene = load_scene("ac_simple", [*damped, "effects.contact_damping=false"])
+    _, off = effect_rows(scene, problem_of(scene))
+    assert {row.name: row.reason for row in off}["contact_damping"] == "left out by the scene"
+
+
+def test_an_effect_that_needs_data_names_keys_that_scenes_have() -> None:
+    known = {re.sub(r"\*", "X", key) for key in known_keys(Scene)}
+    any_scene = {field.name: field.default for field in fields(Effect)}["applies"]
+    for name, effect in effects.registry().items():
+        assert bool(effect.data) == (effect.applies is not any_scene), name
+        for key in re.findall(r"[a-z_]+(?:\.(?:[A-Za-z_0-9]+|\*))+", effect.data):
+            assert key.replace("*", "X") in known, f"{name}: {key}"
+
+
+def test_an_effect_that_could_be_switched_on_needs_no_data(wind: Effect) -> None:
+    scene = load_scene("ac_simple")
+    _, off = effect_rows(scene, problem_of(scene))
+    assert {r.name: r.reason for r in off}[wind.name] == "off unless the scene asks for it"
 
 
 def test_a_new_effect_becomes_a_key_without_a_change_here(wind: Effect) -> None:

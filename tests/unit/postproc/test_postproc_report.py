@@ -110,6 +110,14 @@ def test_summary_has_the_keys_that_others_rely_on(report_folder: Path) -> None:
     elasticity = summary["static"]["elasticity_mm_per_N"]
     assert (elasticity["max"], elasticity["min"]) == pytest.approx((0.45, 0.33))
     assert {"criterion", "value", "limit", "passed"} <= summary["acceptance"][0].keys()
+    told = [
+        (effect["name"], effect["simulated"], effect["reason"]) for effect in summary["effects"]
+    ]
+    assert told == [
+        ("vertical", True, "always"),
+        ("dropper_slackening", True, "default"),
+        ("lateral", False, "not asked for"),
+    ]
     assert all(c["passed"] is True for c in summary["acceptance"])
 
 
