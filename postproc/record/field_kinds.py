@@ -6,9 +6,14 @@ Scene, recorder, files and readers follow from ``FIELDS``.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
 
 from catenary.meshgen.mesh import DROPPERS
 from catenary.postproc.record.blocks import Block
+
+_Count = TypeVar("_Count", int, np.ndarray)
 
 # Unknowns of a node that fields are made of: upward and lateral displacement, slope dw/dx.
 UP, ASIDE, SLOPE = "w", "v", "theta_y"
@@ -50,8 +55,8 @@ class FieldKind:
             return block.name == DROPPERS
         return block.is_wire if self.of_wires else block.moves
 
-    def values_of(self, n_points: int) -> int:
-        """How many values a block with so many points has."""
+    def values_of(self, n_points: _Count) -> _Count:
+        """How many values blocks with so many points have."""
         return n_points // 2 if self.of_droppers else n_points
 
 

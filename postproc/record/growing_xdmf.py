@@ -10,6 +10,7 @@ can be read.
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -103,41 +104,45 @@ def grids_of(
     h5_name : file of the numbers, relative to that of the text
     offsets : name of a table of the block -> where it begins in that file [B]
     """
-    texts = []
+    # Grids differ in numbers only: one text for all, into which these are put.
     moves = bool(np.ptp(slots.first) or np.ptp(slots.count))
-    for number, time in enumerate(times):
-        first, count = int(slots.first[number]), int(slots.count[number])
-        n_cells = int(slots.cell_count[number])
-        # The XDMF reader takes a mesh for the one before if its items begin alike.
-        name = f"<!-- {number} -->{h5_name}" if moves else h5_name
-        cells = _item(name, (n_cells, 2), "<i4", offsets["cells"], int(slots.cell_first[number]))
-        places = _item(name, (count, 3), "<f8", offsets["points"], first)
-        fields = ""
-        for kind in slots.kinds:
-            n_values = kind.values_of(count)
-            shape = (n_values,) if kind.components == 1 else (n_values, kind.components)
-            at = offsets[kind.name], slots.row_at(kind, number)
-            fields += (
-                f'<Attribute Name="{kind.name}" '
-                f'AttributeType="{"Scalar" if kind.components == 1 else "Vector"}" '
-                f'Center="{"Cell" if kind.of_droppers else "Node"}">'
-                f"{_item(h5_name, shape, kind.number, *at)}</Attribute>\n"
-            )
-        texts.append(
-            f'<Grid Name="{slots.name}" GridType="Uniform"><Time Value="{time!r}"/>\n'
-            f'<Topology TopologyType="Polyline" NodesPerElement="2" NumberOfElements="{n_cells}">'
-            f"{cells}</Topology>\n"
-            f'<Geometry GeometryType="XYZ">{places}</Geometry>\n{fields}</Grid>\n'
-        )
-    return texts
-
-
-def _item(h5_name: str, shape: tuple[int, ...], number: str, offset: int, row: int) -> str:
-    """Rows of a table from number ``row`` on, which begins at ``offset`` in the file."""
-    name, size = _KINDS[number]
-    width = int(np.prod(shape[1:], dtype=int))
-    seek = offset + row * width * size
-    return (
-        f'<DataItem Dimensions="{" ".join(map(str, shape))}" NumberType="{name}" '
-        f'Precision="{size}" Format="Binary" Endian="Little" Seek="{seek}">{h5_name}</DataItem>'
+    file, block = h5_name.replace("%", "%%"), slots.name.replace("%", "%%")
+    # The XDMF reader takes a mesh for the one before if its items begin alike.
+    name, numbers = (f"<!-- %d -->{file}", (np.arange(len(times)),)) if moves else (file, ())
+    cells, of_cells = _items((2,), "<i4", offsets["cells"], slots.cell_count, slots.cell_first)
+    places, of_places = _items((3,), "<f8", offsets["points"], slots.count, slots.first)
+    text = (
+        f'<Grid Name="{block}" GridType="Uniform"><Time Value="%r"/>\n'
+        '<Topology TopologyType="Polyline" NodesPerElement="2" NumberOfElements="%d">'
+        f"{cells}{name}</DataItem></Topology>\n"
+        f'<Geometry GeometryType="XYZ">{places}{name}</DataItem></Geometry>\n'
     )
+    columns = [slots.cell_count, *of_cells, *numbers, *of_places, *numbers]
+    for kind in slots.kinds:
+        width = () if kind.components == 1 else (kind.components,)
+        n_values = kind.values_of(slots.count)
+        start = kind.values_of(slots.start[:-1])
+        values, of_values = _items(width, kind.number, offsets[kind.name], n_values, start)
+        text += (
+            f'<Attribute Name="{kind.name}" '
+            f'AttributeType="{"Scalar" if kind.components == 1 else "Vector"}" '
+            f'Center="{"Cell" if kind.of_droppers else "Node"}">'
+            f"{values}{file}</DataItem></Attribute>\n"
+        )
+        columns += of_values
+    text += "</Grid>\n"
+    rows = zip(times, *(column[: len(times)].tolist() for column in columns), strict=True)
+    return [text % row for row in rows]
+
+
+def _items(
+    width: tuple[int, ...], number: str, offset: int, count: np.ndarray, row: np.ndarray
+) -> tuple[str, list[np.ndarray]]:
+    """Text up to the file's name of items with ``count`` rows each, from number ``row`` on, of a
+    table that begins at ``offset`` in the file; and the numbers that go into it, item by item."""
+    name, size = _KINDS[number]
+    text = (
+        f'<DataItem Dimensions="{" ".join(["%d", *map(str, width)])}" NumberType="{name}" '
+        f'Precision="{size}" Format="Binary" Endian="Little" Seek="%d">'
+    )
+    return text, [count, offset + row * (math.prod(width) * size)]

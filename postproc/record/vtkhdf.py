@@ -14,6 +14,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from catenary.postproc.files.array_writes import (
+    group_in_order,
+    put_array,
+    put_attribute,
+    whole_array,
+)
 from catenary.postproc.files.checked import text_of
 from catenary.postproc.files.disk import appears_whole
 from catenary.postproc.record.field_kinds import KINDS
@@ -35,65 +41,80 @@ def write_vtkhdf(numbers: Path) -> Path:
     """
     path = numbers.with_suffix(SUFFIX)
     with h5py.File(numbers, "r") as source, appears_whole(path) as part:
-        times = source["times"][...]
+        times = whole_array(source, "times")
         times = times[np.isfinite(times)]
         # Readers go through links in the order in which they were made.
         with h5py.File(part, "w", track_order=True) as file:
-            root = file.create_group("VTKHDF", track_order=True)
+            root = group_in_order(file, "VTKHDF")
             _name_type(root, "PartitionedDataSetCollection")
-            assembly = root.create_group("Assembly", track_order=True)
+            assembly = group_in_order(root, "Assembly")
             for index, name in enumerate(json.loads(text_of(source.attrs["parts"]))):
-                block = root.create_group(name, track_order=True)
-                block.attrs["Index"] = index
+                block = group_in_order(root, name)
+                put_attribute(block, "Index", np.asarray(index))
                 _write_block(block, source[name], numbers.name, times)
-                assembly[name] = h5py.SoftLink(f"/VTKHDF/{name}")
+                assembly.id.links.create_soft(name.encode(), f"/VTKHDF/{name}".encode())
     return path
 
 
 def _name_type(group: h5py.Group, name: str) -> None:
-    group.attrs["Version"] = _VERSION
+    put_attribute(group, "Version", _VERSION)
     kind = h5py.string_dtype("ascii", len(name))
-    group.attrs.create("Type", np.array(name.encode(), dtype=kind))
+    put_attribute(group, "Type", np.array(name.encode(), dtype=kind))
 
 
 def _write_block(block: h5py.Group, source: h5py.Group, h5_name: str, times: np.ndarray) -> None:
     """A grid with links to the tables of a block."""
     n = times.size
-    first, count = source["first"][:n], source["count"][:n]
-    start = np.cumsum(source["count"][...]) - source["count"][...]
-    cells = source["cells"][...].astype(np.int64)
+    count = whole_array(source, "count")
+    first, start = whole_array(source, "first")[:n], np.cumsum(count) - count
+    cells = whole_array(source, "cells").astype(np.int64)
     # A part is a grid without its points: snapshots that are cut alike share one.
-    cut = np.column_stack([source["cell_first"][:n], source["cell_count"][:n], count])
-    parts, part_of = np.unique(cut, axis=0, return_inverse=True)
+    cut = [whole_array(source, name)[:n] for name in ("cell_first", "cell_count")]
+    parts, part_of = np.unique(np.column_stack([*cut, count[:n]]), axis=0, return_inverse=True)
     part_of = part_of.reshape(-1)
     n_cells = parts[:, 1]
     before = np.cumsum(n_cells) - n_cells
-    _name_type(block, "UnstructuredGrid")
-    block["Points"] = h5py.ExternalLink(h5_name, f"{source.name}/points")
     own = [cells[begin : begin + size] for begin, size, _ in parts.tolist()]
-    block["Connectivity"] = np.concatenate(own).ravel()
-    block["Offsets"] = np.concatenate([2 * np.arange(size + 1) for size in n_cells.tolist()])
-    block["Types"] = np.full(int(n_cells.sum()), _LINE, dtype=np.uint8)
-    block["NumberOfPoints"] = parts[:, 2]
-    block["NumberOfCells"], block["NumberOfConnectivityIds"] = n_cells, 2 * n_cells
-    steps = block.create_group("Steps", track_order=True)
-    steps.attrs["NSteps"] = n
-    steps["Values"] = times
-    steps["PartOffsets"] = part_of.astype(np.int64)
-    steps["NumberOfParts"] = np.ones(n, dtype=np.int64)
-    steps["PointOffsets"] = first
-    steps["CellOffsets"] = before[part_of].reshape(-1, 1)
-    steps["ConnectivityIdOffsets"] = 2 * before[part_of].reshape(-1, 1)
+    _name_type(block, "UnstructuredGrid")
+    _link(block, h5_name, source, "points", "Points")
+    _put_all(
+        block,
+        Connectivity=np.concatenate(own).ravel(),
+        Offsets=np.concatenate([2 * np.arange(size + 1) for size in n_cells.tolist()]),
+        Types=np.full(int(n_cells.sum()), _LINE, dtype=np.uint8),
+        NumberOfPoints=parts[:, 2],
+        NumberOfCells=n_cells,
+        NumberOfConnectivityIds=2 * n_cells,
+    )
+    steps = group_in_order(block, "Steps")
+    put_attribute(steps, "NSteps", np.asarray(n))
+    _put_all(
+        steps,
+        Values=times,
+        PartOffsets=part_of.astype(np.int64),
+        NumberOfParts=np.ones(n, dtype=np.int64),
+        PointOffsets=first,
+        CellOffsets=before[part_of].reshape(-1, 1),
+        ConnectivityIdOffsets=2 * before[part_of].reshape(-1, 1),
+    )
     groups = {
-        kind: (
-            block.create_group(f"{kind}Data", track_order=True),
-            steps.create_group(f"{kind}DataOffsets", track_order=True),
-        )
+        kind: (group_in_order(block, f"{kind}Data"), group_in_order(steps, f"{kind}DataOffsets"))
         for kind in ("Point", "Cell")
     }
     for name, kind in KINDS.items():
         if name not in source:
             continue
         values, offsets = groups["Cell" if kind.of_droppers else "Point"]
-        values[name] = h5py.ExternalLink(h5_name, f"{source.name}/{name}")
-        offsets[name] = start[:n] // 2 if kind.of_droppers else start[:n]
+        _link(values, h5_name, source, name, name)
+        put_array(offsets, name, kind.values_of(start[:n]))
+
+
+def _put_all(group: h5py.Group, **arrays: np.ndarray) -> None:
+    for name, values in arrays.items():
+        put_array(group, name, values)
+
+
+def _link(group: h5py.Group, h5_name: str, source: h5py.Group, table: str, name: str) -> None:
+    """Let ``name`` be a table of the file of the numbers."""
+    place = f"{source.name}/{table}"
+    group.id.links.create_external(name.encode(), h5_name.encode(), place.encode())
