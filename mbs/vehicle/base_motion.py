@@ -7,6 +7,7 @@ all at once. Velocities and accelerations are derivatives of the same splines an
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -14,6 +15,10 @@ from scipy.interpolate import CubicSpline
 
 from catenary.mbs.vehicle import curves
 from catenary.mbs.vehicle.motion_sources import Harmonic, Source, Table, VehicleMotion
+from catenary.mbs.vehicle.suspension import Vehicle, roof_course, transfer
+
+# A spline of the track is followed in such steps [m].
+_FINE = 0.1
 
 
 class Motion(NamedTuple):
@@ -31,8 +36,8 @@ class _Course(Protocol):
 
 
 class _Spline:
-    def __init__(self, table: Table) -> None:
-        spline = CubicSpline(table.points, table.values, bc_type="natural")
+    def __init__(self, points: Sequence[float] | np.ndarray, values: object) -> None:
+        spline = CubicSpline(points, values, bc_type="natural")
         self._breaks = spline.x
         self._coefficients = np.ascontiguousarray(spline.c.T)
 
@@ -62,8 +67,8 @@ class BaseMotion:
 
     def __init__(self, vehicle: VehicleMotion, start: float, speed: float) -> None:
         self._start, self._speed = start, speed
-        self._vertical = [_course(source, "vertical") for source in vehicle.vertical]
-        self._lateral = [_course(source, "lateral") for source in vehicle.lateral]
+        self._vertical = [_course(one, "vertical", vehicle, speed) for one in vehicle.vertical]
+        self._lateral = [_course(one, "lateral", vehicle, speed) for one in vehicle.lateral]
 
     def vertical(self, time: float) -> Motion:
         """Upward motion at ``time`` [s]."""
@@ -89,12 +94,31 @@ class BaseMotion:
         return Motion(place, velocity, acceleration)
 
 
-def _course(source: Source, direction: str) -> tuple[_Course, bool]:
+def _course(
+    source: Source, direction: str, vehicle: VehicleMotion, speed: float
+) -> tuple[_Course, bool]:
     """A source as a function, and whether it is one of the place along the track."""
-    if isinstance(source, Table):
-        return _Spline(source), source.along_track
+    suspension = vehicle.suspension
     if isinstance(source, Harmonic):
         rate = 2.0 * np.pi * source.frequency
         waves = (np.array([v]) for v in (source.amplitude, rate, source.phase))
         return _Sines(*waves), False
-    return _Sines(*source.waves(direction)), True
+    if isinstance(source, Table):
+        if suspension is None or not source.along_track:
+            return _Spline(source.points, source.values), source.along_track
+        return _Spline(*_roof_course(source, direction, suspension, speed)), True
+    amplitudes, wave_numbers, phases = source.waves(direction)
+    if suspension is not None:
+        passed = transfer(suspension, direction, wave_numbers, speed)
+        amplitudes, phases = amplitudes * np.abs(passed), phases + np.angle(passed)
+    return _Sines(amplitudes, wave_numbers, phases), True
+
+
+def _roof_course(
+    source: Table, direction: str, suspension: Vehicle, speed: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Places and heights of the roof above a track that follows a spline."""
+    spline = CubicSpline(source.points, source.values, bc_type="natural")
+    n = int(np.ceil((spline.x[-1] - spline.x[0]) / _FINE)) + 1
+    points = np.linspace(spline.x[0], spline.x[-1], max(n, 2))
+    return roof_course(suspension, direction, points, spline(points), speed)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from catenary.mbs.vehicle.irregularity import Irregularity
+from catenary.mbs.vehicle.suspension import Vehicle
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,12 @@ Source = Table | Harmonic | Irregularity
 
 @dataclass(frozen=True)
 class VehicleMotion:
-    """Sums of sources that move the bases of a train's pantographs, up and to the left."""
+    """Sums of sources that move the bases of a train's pantographs, up and to the left.
+
+    What depends on the place is the track, which reaches the bases through a ``suspension``;
+    without one they follow it as it is. What depends on time is their own motion in either case.
+    """
 
     vertical: tuple[Source, ...] = ()
     lateral: tuple[Source, ...] = ()
+    suspension: Vehicle | None = None

@@ -248,7 +248,8 @@ def _make(
     numerics, train = problem.numerics, problem.train
     start, base = train.start - placement.behind, None
     if simulated.vehicle is not None:
-        base = BaseMotion(simulated.vehicle, start, train.speed)
+        vehicle = replace(simulated.vehicle, suspension=simulated.suspension)
+        base = BaseMotion(vehicle, start, train.speed)
     operation = Operation(
         placement.static_force,
         nominal_height,

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from catenary.solver.effects import end_effects, vertical_effects  # noqa: F401  (registers)
+from catenary.solver.effects import (  # noqa: F401  (registers)
+    end_effects,
+    pantograph_effects,
+    vertical_effects,
+)
 from catenary.solver.effects.effect import Effect, NamedWire, registered
 from catenary.solver.model.unknowns import Group
 from catenary.solver.problem.problem import Problem

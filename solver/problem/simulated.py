@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.mbs.vehicle.motion_sources import VehicleMotion
+from catenary.mbs.vehicle.suspension import Vehicle
 from catenary.meshgen.wires import Profile
 from catenary.solver.problem.contact_laws import ContactLaw
 from catenary.solver.problem.incidents import LineIncident
@@ -36,6 +37,7 @@ class Simulated:
     head_roll : whether heads roll
     lowering : whether pantographs are lowered as their placements say
     vehicle : motion of the pantographs' bases, None if they move along a straight line
+    suspension : of the vehicle between the track and these bases, None if they follow the track
     incidents : of the line, in the order of ``Problem.incidents``
     goes_on : whether the line goes on beyond its start and beyond its end
     """
@@ -50,6 +52,7 @@ class Simulated:
     head_roll: bool = False
     lowering: bool = False
     vehicle: VehicleMotion | None = None
+    suspension: Vehicle | None = None
     incidents: tuple[LineIncident, ...] = ()
     goes_on: tuple[bool, bool] = (False, False)
 

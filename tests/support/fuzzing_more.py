@@ -163,10 +163,28 @@ def _vehicle(rng: random.Random, words: Words) -> None:
         words["vehicle.irregularity.spectrum"] = rng.choice(["'fra_5'", "'german_low'"])
         words["vehicle.irregularity.shortest_m"] = shortest
         words["vehicle.irregularity.seed"] = rng.randrange(1000)
+        if rng.random() < 0.5:
+            _suspension(rng, words)
         return
     words["vehicle.vertical.amplitude_m"] = rng.uniform(1e-3, 0.03)
     words["vehicle.vertical.frequency_hz"] = rng.uniform(0.3, 5.0)
     words["vehicle.vertical.phase_deg"] = rng.uniform(-180.0, 180.0)
+
+
+def _suspension(rng: random.Random, words: Words) -> None:
+    """A car body between the track and the base, with bogies of their own now and then."""
+    table = "vehicle.suspension"
+    words[f"{table}.body_mass_kg"] = rng.uniform(1e4, 6e4)
+    words[f"{table}.pitch_inertia_kg_m2"] = rng.uniform(5e5, 3e6)
+    words[f"{table}.stiffness_N_per_m"] = 10 ** rng.uniform(5.3, 6.5)
+    words[f"{table}.damping_N_s_per_m"] = 10 ** rng.uniform(3.0, 5.5)
+    words[f"{table}.bogie_distance_m"] = rng.uniform(6.0, 20.0)
+    words[f"{table}.wheelbase_m"] = rng.uniform(1.8, 3.0)
+    words[f"{table}.pantograph_ahead_m"] = rng.uniform(-10.0, 10.0)
+    if rng.random() < 0.5:
+        words[f"{table}.bogie_mass_kg"] = rng.uniform(1e3, 6e3)
+        words[f"{table}.primary_stiffness_N_per_m"] = 10 ** rng.uniform(6.0, 7.3)
+        words[f"{table}.primary_damping_N_s_per_m"] = 10 ** rng.uniform(3.0, 5.0)
 
 
 # ---- contact ------------------------------------------------------------------------------------

@@ -18,6 +18,7 @@ from catenary.cases.scene.convert.vehicle import vehicle_of
 from catenary.cases.scene.tables.line.line import LineTable
 from catenary.cases.scene.tables.run.window import WindowTable
 from catenary.cases.scene.tables.units import speed_from_km_h
+from catenary.mbs.vehicle.motion_sources import VehicleMotion
 from catenary.solver.problem.problem import Damping, Numerics, Placement, Problem, Train
 from catenary.solver.problem.window import BOUNDED, WindowChoice
 from catenary.solver.window.choice import spans_of_window
@@ -78,6 +79,14 @@ def _damping(table: LineTable) -> Damping:
     )
 
 
+def _vehicle(scene: Scene) -> VehicleMotion | None:
+    if scene.vehicle is None:
+        return None
+    vehicle = vehicle_of(scene.vehicle)
+    # A suspension passes on what the track does, and nothing else.
+    return vehicle if scene.switches()["vehicle_motion"] else replace(vehicle, suspension=None)
+
+
 def _train(scene: Scene) -> Train:
     placements = []
     for number, place in enumerate(scene.train.pantographs, start=1):
@@ -102,5 +111,5 @@ def _train(scene: Scene) -> Train:
         raise_time=scene.train.raise_time_s,
         start_below=scene.train.start_below_m,
         placements=tuple(placements),
-        vehicle=None if scene.vehicle is None else vehicle_of(scene.vehicle),
+        vehicle=_vehicle(scene),
     )

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-from catenary.cases.scene.tables.train.vehicle import Course, MotionTable, VehicleTable
+from catenary.cases.scene.tables.train.vehicle import (
+    Course,
+    MotionTable,
+    SidewaysTable,
+    SuspensionTable,
+    VehicleTable,
+)
 from catenary.cases.scene.tables.units import angle_from_deg
 from catenary.mbs.vehicle.irregularity import Irregularity
 from catenary.mbs.vehicle.motion_sources import Harmonic, Source, Table, VehicleMotion
+from catenary.mbs.vehicle.suspension import Sideways, Vehicle
 
 
 def vehicle_of(table: VehicleTable) -> VehicleMotion:
@@ -14,7 +21,36 @@ def vehicle_of(table: VehicleTable) -> VehicleMotion:
     both: tuple[Source, ...] = ()
     if track is not None:
         both = (Irregularity(track.spectrum, track.shortest_m, track.longest_m, track.seed),)
-    return VehicleMotion(_sources(table.vertical) + both, _sources(table.lateral) + both)
+    suspension = None if table.suspension is None else _suspension(table.suspension)
+    vertical, lateral = _sources(table.vertical) + both, _sources(table.lateral) + both
+    return VehicleMotion(vertical, lateral, suspension)
+
+
+def _suspension(table: SuspensionTable) -> Vehicle:
+    return Vehicle(
+        mass=table.body_mass_kg,
+        pitch_inertia=table.pitch_inertia_kg_m2,
+        stiffness=table.stiffness_N_per_m,
+        damping=table.damping_N_s_per_m,
+        bogie_distance=table.bogie_distance_m,
+        wheelbase=table.wheelbase_m,
+        bogie_mass=table.bogie_mass_kg or 0.0,
+        primary_stiffness=table.primary_stiffness_N_per_m or 0.0,
+        primary_damping=table.primary_damping_N_s_per_m or 0.0,
+        pantograph_ahead=table.pantograph_ahead_m,
+        sideways=None if table.lateral is None else _sideways(table.lateral),
+    )
+
+
+def _sideways(table: SidewaysTable) -> Sideways:
+    return Sideways(
+        table.roll_inertia_kg_m2,
+        table.stiffness_N_per_m,
+        table.damping_N_s_per_m,
+        table.spring_distance_m,
+        table.centre_above_m,
+        table.roof_above_m,
+    )
 
 
 def _sources(table: MotionTable | None) -> tuple[Source, ...]:

@@ -13,6 +13,11 @@ from catenary.cases.cli.main import app
 
 # A scene of its own, so that a shipped case may change its numbers without a change here.
 SOUND = Path(__file__).with_name("sound.toml")
+# A car of [vehicle.suspension].
+CAR = (
+    "body_mass_kg=3e4,pitch_inertia_kg_m2=2e6,stiffness_N_per_m=9e5,damping_N_s_per_m=4e4,"
+    "bogie_distance_m=19,wheelbase_m=2.5"
+)
 
 # Assignments on the sound scene, and what the sentence must hold.
 ASSIGNMENTS = {
@@ -117,6 +122,31 @@ ASSIGNMENTS = {
     "roll without its effect": (
         ["pantographs.reference.roll={inertia_kg_m2=2, spring_distance_m=0.6}"],
         "acts only with effects.head_roll = true",
+    ),
+    "suspension without a track": (
+        [
+            "effects.vehicle_motion=true",
+            "vehicle.vertical={amplitude_m=0.01,frequency_hz=1.5}",
+            f"vehicle.suspension={{{CAR}}}",
+        ],
+        "must have irregularity or a course by_place with suspension",
+    ),
+    "half a bogie": (
+        [
+            "effects.vehicle_motion=true",
+            "vehicle.irregularity.spectrum=fra_6",
+            f"vehicle.suspension={{{CAR},bogie_mass_kg=2600}}",
+        ],
+        "needs primary_stiffness_N_per_m and primary_damping_N_s_per_m together with bogie_mass_kg",
+    ),
+    "car that turns over": (
+        [
+            "effects.vehicle_motion=true",
+            "vehicle.irregularity.spectrum=fra_6",
+            f"vehicle.suspension={{{CAR},lateral={{roll_inertia_kg_m2=6e4,stiffness_N_per_m=3e5,"
+            "damping_N_s_per_m=6e4,spring_distance_m=0.5,centre_above_m=0.8,roof_above_m=1.8}}",
+        ],
+        "its weight turns it over on springs of 900000 N/m that are 0.5 m apart",
     ),
     "vehicle without its effect": (
         ["vehicle.irregularity.spectrum=fra_6"],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -181,7 +182,10 @@ def _farthest(scene: Scene, line: LineData, number: int) -> tuple[float, float]:
     if scene.switches()["vehicle_motion"] and scene.vehicle is not None:
         from catenary.mbs.vehicle.base_motion import BaseMotion
 
-        base = BaseMotion(vehicle_of(scene.vehicle), start, speed)
+        vehicle = vehicle_of(scene.vehicle)
+        if not scene.switches()["vehicle_suspension"]:
+            vehicle = replace(vehicle, suspension=None)
+        base = BaseMotion(vehicle, start, speed)
     # Extremes are at supports, unless the vehicle sways: then every 0.25 m and 20 ms are sampled.
     supports = line.support_positions
     times = np.concatenate(

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from catenary.cases.scene.tables.table import TAKE_AWAY, Table, ascending
+from catenary.mbs.vehicle.suspension import GRAVITY
 
 _PAIR = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=2, max_length=2)]
 # Farther than this no vehicle moves [m].
@@ -83,6 +84,64 @@ class IrregularityTable(Table):
         return self
 
 
+_BOGIE = ("bogie_mass_kg", "primary_stiffness_N_per_m", "primary_damping_N_s_per_m")
+
+
+class SidewaysTable(Table):
+    """How a car body sways and rolls on its secondary suspension."""
+
+    roll_inertia_kg_m2: float = Field(ge=10, le=1e7, description="of the car body")
+    stiffness_N_per_m: float = Field(gt=0, le=1e8, description="of one bogie, sideways")
+    damping_N_s_per_m: float = Field(gt=0, le=1e8, description="of one bogie, sideways")
+    spring_distance_m: float = Field(gt=0, le=4, description="between left and right springs")
+    centre_above_m: float = Field(ge=0, le=4, description="centre of mass above the springs")
+    roof_above_m: float = Field(ge=0, le=6, description="roof above the centre of mass")
+
+
+class SuspensionTable(Table):
+    """A car body on two bogies, between the track and the roof; each pantograph has a car."""
+
+    body_mass_kg: float = Field(ge=100, le=1e6, description="of the car body")
+    pitch_inertia_kg_m2: float = Field(
+        ge=100, le=1e8, description="of the car body, which yaws with the same"
+    )
+    stiffness_N_per_m: float = Field(
+        gt=0, le=1e9, description="secondary suspension of one bogie, upward"
+    )
+    damping_N_s_per_m: float = Field(gt=0, le=1e8, description="of the same")
+    bogie_distance_m: float = Field(gt=0, le=40, description="between the bogies' middles")
+    wheelbase_m: float = Field(gt=0, le=10, description="between the two wheelsets of a bogie")
+    pantograph_ahead_m: float = Field(
+        0.0, ge=-30, le=30, description="place of a pantograph ahead of the middle of its car"
+    )
+    bogie_mass_kg: float | None = Field(
+        None, ge=10, le=1e5, description="of one bogie; bogies follow the track if absent"
+    )
+    primary_stiffness_N_per_m: float | None = Field(
+        None, gt=0, le=1e9, description="primary suspension of one bogie, upward"
+    )
+    primary_damping_N_s_per_m: float | None = Field(None, gt=0, le=1e8, description="of the same")
+    lateral: SidewaysTable | None = Field(
+        None, description="sway and roll; the roof follows the track sideways if absent"
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> SuspensionTable:
+        given = [name for name in _BOGIE if getattr(self, name) is not None]
+        if given and len(given) < len(_BOGIE):
+            missing = " and ".join(name for name in _BOGIE if name not in given)
+            raise ValueError(f"needs {missing} together with {' and '.join(given)}")
+        side = self.lateral
+        if side is not None:
+            weight = self.body_mass_kg * GRAVITY * side.centre_above_m
+            if 0.5 * self.stiffness_N_per_m * side.spring_distance_m**2 <= weight:
+                raise ValueError(
+                    "must hold the car body upright, but its weight turns it over on springs of "
+                    f"{self.stiffness_N_per_m:g} N/m that are {side.spring_distance_m:g} m apart"
+                )
+        return self
+
+
 class VehicleTable(Table):
     """How the vehicle moves the bases of its pantographs; acts with effects.vehicle_motion."""
 
@@ -91,11 +150,26 @@ class VehicleTable(Table):
         None, description="motion to the left; acts with effects.head_roll"
     )
     irregularity: IrregularityTable | None = Field(
-        None, description="track irregularity, which the base follows without a suspension"
+        None, description="track irregularity, which the base follows where there is no suspension"
+    )
+    suspension: SuspensionTable | None = Field(
+        None, description="what stands between the track, as a function of place, and the base"
     )
 
     @model_validator(mode="after")
     def _moves(self) -> VehicleTable:
         if self.vertical is None and self.lateral is None and self.irregularity is None:
             raise ValueError("needs vertical, lateral or irregularity, but none is given")
+        if self.suspension is not None and not self._has_track():
+            raise ValueError(
+                "must have irregularity or a course by_place with suspension, because what depends "
+                f"on time is the base's own motion{TAKE_AWAY}"
+            )
         return self
+
+    def _has_track(self) -> bool:
+        """Whether something depends on the place along the track."""
+        courses = (self.vertical, self.lateral)
+        return self.irregularity is not None or any(
+            one is not None and one.by_place is not None for one in courses
+        )
