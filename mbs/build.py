@@ -5,6 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
+from catenary.mbs.air.air_forces import AirForces, SteadyForces
+from catenary.mbs.air.airflow import Airflow
 from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph, Lowering
@@ -14,7 +18,8 @@ from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.mechanism.head_rotation import PITCH, head_turning
 from catenary.mbs.mechanism.pantograph_data import (
     MultibodyData,
-    head_weight_under_way,
+    arm_lift,
+    head_lift,
     reduced,
     stand,
 )
@@ -32,8 +37,8 @@ class Operation(NamedTuple):
     ``static_force`` [N] on a wire at rest at ``nominal_height`` [m] of the head, raised from zero
     over ``raise_time`` [s]; ``dt`` [s], ``beta`` and ``gamma`` of the line's Newmark step.
     ``lateral`` is where the wire crosses the strips, without which the head does not roll, and
-    ``base`` how the vehicle moves, without which it does not. ``lowering`` is how the pantograph is
-    lowered on the way.
+    ``base`` how the vehicle moves, without which it does not. ``air`` is the air that it meets,
+    without which there is none. ``lowering`` is how the pantograph is lowered on the way.
     """
 
     static_force: float
@@ -44,6 +49,7 @@ class Operation(NamedTuple):
     gamma: float
     lateral: LateralPath | SeveralPaths | None = None
     base: BaseMotion | None = None
+    air: Airflow | None = None
     lowering: Lowering | None = None
 
 
@@ -59,13 +65,30 @@ def make_pantograph(data: PantographData, operation: Operation) -> Pantograph:
 def _model(
     data: PantographData, operation: Operation
 ) -> FullPantograph | RaisingPantograph | LumpedPantograph:
+    air, on_frame = None, 0.0
+    if operation.air is not None and data.meets_air:
+        air = AirForces(operation.air, data.uplift, operation.raise_time)
+        on_frame = steady_forces(data, operation.air.speed).on_frame
+    force, height = operation[:2]
+    moved = *operation[2:-2], air
     if isinstance(data, MultibodyData):
+        pressing = force + on_frame
         if data.all_bodies is not None:
             way = data.all_bodies
-            return FullPantograph(data, *operation[:-1], way.handling, way.substeps)
-        raising = raising_data(data, operation.static_force, operation.nominal_height)
-        return RaisingPantograph(raising, *operation[2:-1])
-    return LumpedPantograph(data, *operation[:-1])
+            return FullPantograph(data, pressing, height, *moved, way.handling, way.substeps)
+        return RaisingPantograph(raising_data(data, pressing, height), *moved)
+    return LumpedPantograph(data, force, height, *moved, steady_air=on_frame)
+
+
+def steady_forces(data: PantographData, speed: float) -> SteadyForces:
+    """Forces of still air on the open line at a train's speed [m/s]; those on a mechanism's bodies
+    are at its working height. Not collective."""
+    on_head = on_frame = 0.0
+    if data.uplift is not None:
+        on_head, on_frame = (float(force) for force in data.uplift.at(np.array(speed)))
+    if isinstance(data, MultibodyData):
+        on_head, on_frame = on_head + head_lift(data), on_frame + arm_lift(data)
+    return SteadyForces(on_head, on_frame)
 
 
 def has_joints(data: PantographData) -> bool:
@@ -88,27 +111,28 @@ def touching_mass(data: PantographData) -> float:
     return head / data.strips.number
 
 
-def raising_data(data: MultibodyData, static_force: float, nominal_height: float) -> RaisingData:
+def raising_data(data: MultibodyData, pressing: float, nominal_height: float) -> RaisingData:
     """Head and mechanism of a multibody pantograph on a vehicle of the right height.
 
-    Its arm is at the working height when the head, at ``nominal_height`` [m], is pressed down by
-    ``static_force`` [N].
+    Its arm is at the working height when the head, at ``nominal_height`` [m], is pressed down on
+    the arm by ``pressing`` [N]: the static force, and what the air lifts the arm with.
     """
     standing = stand(data)
     head = standing.head
     strips = data.strips
     if strips.number > 1:
         strips = replace(strips, pitch=head_turning(data, PITCH))
-    pressed = static_force / head.stiffness + strips.compression(static_force)
+    pressed = pressing / head.stiffness + strips.compression(pressing)
     arm = nominal_height + pressed - head.offset
     return RaisingData(
         frame=reduced(data),
         head_mass=head.mass,
         head_stiffness=head.stiffness,
         head_damping=head.damping,
-        head_weight=head_weight_under_way(data),
+        head_weight=head.weight,
         head_offset=head.offset,
         base_height=arm - standing.working_height,
         strips=strips,
         roll=roll_of(data),
+        blown_head=head_lift(data),
     )

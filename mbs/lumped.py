@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
+from catenary.mbs.air.air_forces import ON_FRAME, ON_HEAD, AirForces
 from catenary.mbs.head import head_kernels
-from catenary.mbs.head.head_kernels import FORCE, LinearStep
+from catenary.mbs.head.head_kernels import FORCE, HEAD_FORCE, N_DRIVE, LinearStep
 from catenary.mbs.head.head_records import LUMPED
 from catenary.mbs.head.newmark_head import Raising, SteppedHead, parts_of
 from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
@@ -39,6 +40,8 @@ class LumpedPantograph(SteppedHead):
     dt, beta, gamma : Newmark step [s] and parameters, those of the line
     lateral : where the wire crosses the strips; without it the head does not roll
     base : how the vehicle moves; without it the base stays
+    air : forces of the air on head and last mass; without it there are none
+    steady_air : force of the air on the last mass where the nominal height holds [N]
     """
 
     def __init__(
@@ -52,13 +55,15 @@ class LumpedPantograph(SteppedHead):
         gamma: float = 0.5,
         lateral: LateralPath | SeveralPaths | None = None,
         base: BaseMotion | None = None,
+        air: AirForces | None = None,
+        steady_air: float = 0.0,
     ) -> None:
         head = data.head(rolls=lateral is not None)
         n = head.n + data.n_masses - 1
         super().__init__(head, n, dt, beta, gamma, lateral)
         self._lift_full = static_force
         self._part: Callable[[float], float] = Raising(raise_time)
-        self._base = base
+        self._base, self._air = base, air
         # The lift acts on the last mass, which is the head itself if there is no other.
         self._carrier = n - 1 if data.n_masses > 1 else int(np.flatnonzero(head.level)[-1])
         self._masses = np.concatenate([head.masses, data.masses[1:]])
@@ -67,9 +72,11 @@ class LumpedPantograph(SteppedHead):
         self._stiffness, self._damping = springs[:n, :n], dampers[:n, :n]
         self._base_stiffness, self._base_damping = data.stiffnesses[-1], data.dampings[-1]
         # The base spring carries nothing when the head is at its nominal height under the static
-        # force, which compresses every spring between head and last mass.
-        compression = sum(static_force / k for k in data.stiffnesses[:-1])
-        compression += data.strips.compression(static_force)
+        # force, which compresses every spring between head and last mass. So does what the air
+        # lifts the last mass with.
+        pressing = static_force + steady_air
+        compression = sum(pressing / k for k in data.stiffnesses[:-1])
+        compression += data.strips.compression(pressing)
         self._base_height = nominal_height + compression
         # A step is linear: new state = step @ state + drive * by_drive - by_force @ force, with
         # the state (positions, velocities, accelerations).
@@ -94,9 +101,10 @@ class LumpedPantograph(SteppedHead):
         )
         unit = np.vstack([newmark.position * inverse, newmark.velocity * inverse, inverse])
         by_drive = np.ascontiguousarray(unit[:, self._carrier])
-        self._of_step = LinearStep(step, by_drive, inverse)
-        arguments = self._of_step, newmark, self._arrays
-        self._step = bound(head_kernels.linear_step, *arguments, later=(0.0,))
+        self._of_step = LinearStep(step, by_drive, unit @ self._push, inverse)
+        self._drives = np.zeros(N_DRIVE)
+        arguments = self._of_step, newmark, self._arrays, self._drives
+        self._step = bound(head_kernels.linear_step, *arguments)
 
     def lift(self, time: float) -> float:
         """Net lift on the last mass at ``time`` [N]: a half cosine up to the static force."""
@@ -109,16 +117,26 @@ class LumpedPantograph(SteppedHead):
     def predict(self, time: float) -> HeadState:
         """Strips at ``time`` [s] as affine functions of the contact forces in the coming step."""
         self._aim(time)
-        self._step(self._drive(time))
+        self._drives[FORCE] = self._drive(time)
+        if self._air is not None:
+            on_head, on_frame, _ = self._air.now(time)
+            self._drives[FORCE] += on_frame
+            self._drives[HEAD_FORCE] = on_head
+        self._step()
         return self._head
 
     def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
-        """Fill in the force on the last mass, and where the wire crosses; see `SteppedHead`."""
+        """Fill in the forces, and where the wire crosses; see `SteppedHead`."""
         if self._base is None:
             constant = self._base_stiffness * self._base_height
             drives[:, FORCE] = self._lift_full * parts_of(self._part, times) + constant
         else:
             drives[:, FORCE] = [self._drive(time) for time in times]
+        drives[:, HEAD_FORCE] = 0.0
+        if self._air is not None:
+            forces = self._air.at(times)
+            drives[:, FORCE] += forces[:, ON_FRAME]
+            drives[:, HEAD_FORCE] = forces[:, ON_HEAD]
         self._fill_lateral(times, drives)
 
     def record(self) -> dict[str, Any]:
@@ -137,7 +155,7 @@ class LumpedPantograph(SteppedHead):
         )
 
     def _drive(self, time: float) -> float:
-        """Force on the last mass that its own motion has no part in [N]."""
+        """Force on the last mass that its own motion has no part in, but the air's [N]."""
         force = self.lift(time) + self._base_stiffness * self._base_height
         if self._base is not None:
             base = self._base.vertical(time)
@@ -147,4 +165,8 @@ class LumpedPantograph(SteppedHead):
     def _acceleration(self, time: float) -> np.ndarray:
         force = -self._stiffness @ self.position - self._damping @ self.velocity
         force[self._carrier] += self._drive(time)
+        if self._air is not None:
+            on_head, on_frame, _ = self._air.now(time)
+            force[self._carrier] += on_frame
+            force += on_head * self._push
         return np.asarray(force / self._masses)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from catenary.mbs.air.uplift import Uplift
 from catenary.mbs.head.strips import ONE_STRIP, HeadParts, Strips, Turning, head_parts
 
 
@@ -15,7 +16,8 @@ class LumpedData:
 
     ``masses`` [kg], shape (n,); ``stiffnesses`` [N/m] and ``dampings`` [N s/m], shape (n,): entry
     i joins mass i to mass i + 1, the last entry joins the last mass to the base. The first mass is
-    the whole head, ``strips`` included, which may turn about the track as ``roll`` says.
+    the whole head, ``strips`` included, which may turn about the track as ``roll`` says. The air
+    lifts it by ``uplift``.
     """
 
     masses: tuple[float, ...]
@@ -23,6 +25,12 @@ class LumpedData:
     dampings: tuple[float, ...]
     strips: Strips = ONE_STRIP
     roll: Turning | None = None
+    uplift: Uplift | None = None
+
+    @property
+    def meets_air(self) -> bool:
+        """Whether the air has forces on it."""
+        return self.uplift is not None
 
     @property
     def n_masses(self) -> int:

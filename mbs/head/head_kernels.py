@@ -14,12 +14,17 @@ from catenary.solver.base.compiled import compiled, in_line
 from catenary.solver.base.inverse import invert
 
 # Columns of a row of what a head depends on in a step besides its state. A chain of lumped masses
-# has the first alone, the force on its last mass [N]; a reduced mechanism has the part of the full
-# lift, the head's weight [N], the height of its zero [m], and height [m], velocity [m/s] and
-# acceleration [m/s2] of the base on top of it.
-FORCE = 0
-LIFTED, WEIGHT, ZERO, BASE, BASE_VELOCITY, BASE_ACCELERATION = range(6)
-N_DRIVE = 6
+# has the first two alone, the forces on its last mass and on its head [N]; a reduced mechanism has
+# the part of the full lift, the head's weight [N], the height of its zero [m], height [m], velocity
+# [m/s] and acceleration [m/s2] of the base on top of it, upward forces of the air on its head and
+# on its arm [N], and what the air lifts by its bodies in parts of the table's.
+FORCE, HEAD_FORCE = range(2)
+LIFTED, WEIGHT, ZERO, BASE, BASE_VELOCITY, BASE_ACCELERATION, HEAD_AIR, ARM_AIR, BODIES_AIR = range(
+    9
+)
+N_DRIVE = 9
+# Columns of a mechanism's tables: mass, lift, damping, carried mass; of some, what the air lifts.
+N_COLUMNS, LIFTED_BY_AIR = 4, 4
 
 
 class NewmarkFactors(NamedTuple):
@@ -61,16 +66,18 @@ class HeadArrays(NamedTuple):
 
 
 class LinearStep(NamedTuple):
-    """A step of a linear system without contact: new state = matrix @ state + drive * by_drive.
+    """A step of a linear system without contact, of which forces F are on carrier and head:
+    new state = matrix @ state + F_carrier by_drive + F_head by_head.
 
     Attributes
     ----------
-    matrix, by_drive : (3 n, 3 n), (3 n,)
+    matrix, by_drive, by_head : (3 n, 3 n), (3 n,), (3 n,)
     inverse : (n, n) of the matrix that gives accelerations
     """
 
     matrix: np.ndarray
     by_drive: np.ndarray
+    by_head: np.ndarray
     inverse: np.ndarray
 
 
@@ -80,13 +87,16 @@ class RaisedHead(NamedTuple):
     Attributes
     ----------
     masses, stiffness, damping : (n,), (n, n), (n, n) of all but the mechanism itself
-    breaks, coefficients : (m,), (m - 1, 4, 4) tables of mass [kg], lift [N], damping [N s/m] and
-        carried mass [kg] over the mechanism's height [m]; see `table_at`
+    push : (n,) what an upward force on the strips' middle does to each coordinate
+    breaks, coefficients : (m,), (m - 1, k, 4) tables of mass [kg], lift [N], damping [N s/m],
+        carried mass [kg] and, where k is 5, what the air lifts [N] over the mechanism's height [m];
+        see `table_at`
     """
 
     masses: np.ndarray
     stiffness: np.ndarray
     damping: np.ndarray
+    push: np.ndarray
     breaks: np.ndarray
     coefficients: np.ndarray
 
@@ -121,10 +131,10 @@ def respond(inverse, newmark, head):
 
 @in_line
 def linear_step(linear, newmark, head, drive):
-    """Step a head without contact under ``drive``, the force on its last mass [N]."""
+    """Step a head without contact, with a row ``drive`` whose first two numbers are forces."""
     state, free = head.state, head.free
     for i in range(state.size):
-        value = drive * linear.by_drive[i]
+        value = drive[FORCE] * linear.by_drive[i] + drive[HEAD_FORCE] * linear.by_head[i]
         for k in range(state.size):
             value += linear.matrix[i, k] * state[k]
         free[i] = value
@@ -162,16 +172,17 @@ def raising_step(raised, newmark, head, drive):
         velocity[i] = state[n + i] + newmark.predict_velocity * acceleration
     height = position[last] - drive[ZERO] - drive[BASE]
     speed = velocity[last] - drive[BASE_VELOCITY]
-    values, slopes = np.empty(4), np.empty(4)
+    n_columns = raised.coefficients.shape[1]
+    values, slopes = np.empty(n_columns), np.empty(n_columns)
     table_at(raised.breaks, raised.coefficients, height, values, slopes)
-    mass, lift, slowing, carried = values
+    mass, lift, slowing, carried = values[0], values[1], values[2], values[3]
     matrix = np.empty((n, n))
     for i in range(n):
         value = 0.0
         for k in range(n):
             value -= stiffness[i, k] * position[k] + damping[i, k] * velocity[k]
             matrix[i, k] = newmark.velocity * damping[i, k] + newmark.position * stiffness[i, k]
-        force[i] = value
+        force[i] = value + drive[HEAD_AIR] * raised.push[i]
         matrix[i, i] += masses[i]
     lifted = drive[LIFTED]
     force[last] += lifted * (lift - drive[WEIGHT]) - slowing * speed - 0.5 * slopes[0] * speed**2
@@ -179,6 +190,10 @@ def raising_step(raised, newmark, head, drive):
     force[last] += (mass - carried) * drive[BASE_ACCELERATION]
     matrix[last, last] += mass + newmark.velocity * (slowing + slopes[0] * speed)
     matrix[last, last] -= newmark.position * lifted * slopes[1]
+    force[last] += drive[ARM_AIR]
+    if n_columns > N_COLUMNS:
+        force[last] += drive[BODIES_AIR] * values[LIFTED_BY_AIR]
+        matrix[last, last] -= newmark.position * drive[BODIES_AIR] * slopes[LIFTED_BY_AIR]
     invert(matrix)
     for i in range(n):
         acceleration = 0.0

@@ -13,7 +13,6 @@ import numpy as np
 
 from catenary.mbs.head import head_kernels
 from catenary.mbs.head.head_kernels import (
-    FORCE,
     N_DRIVE,
     HeadArrays,
     LinearStep,
@@ -28,8 +27,8 @@ LUMPED, REDUCED = 0, 1
 
 _ADDRESSES = (*HeadArrays._fields, *LinearStep._fields, *RaisedHead._fields)
 # A head: its model, how many coordinates and strips it has, the coordinate of its roll or -1, its
-# first contact; the heights that a reduced mechanism reaches [m], and how many breaks its tables
-# have; its factors, and the addresses of its arrays, named as in `head_kernels`.
+# first contact; the heights that a reduced mechanism reaches [m], and how many breaks and columns
+# its tables have; its factors, and the addresses of its arrays, named as in `head_kernels`.
 HEAD = np.dtype(
     [
         ("model", np.int64),
@@ -40,6 +39,7 @@ HEAD = np.dtype(
         ("lowest", np.float64),
         ("highest", np.float64),
         ("n_breaks", np.int64),
+        ("n_columns", np.int64),
         *((name, np.float64) for name in NewmarkFactors._fields),
         *((name, np.int64) for name in _ADDRESSES),
     ]
@@ -92,16 +92,18 @@ def predict(head, drive, numbers, n_contacts):
         linear = LinearStep(
             table_at_address(head.matrix, 3 * n, 3 * n),
             numbers_at(head.by_drive, 3 * n),
+            numbers_at(head.by_head, 3 * n),
             table_at_address(head.inverse, n, n),
         )
-        head_kernels.linear_step(linear, newmark, arrays, drive[FORCE])
+        head_kernels.linear_step(linear, newmark, arrays, drive[:N_DRIVE])
     else:
         raised = RaisedHead(
             numbers_at(head.masses, n),
             table_at_address(head.stiffness, n, n),
             table_at_address(head.damping, n, n),
+            numbers_at(head.push, n),
             numbers_at(head.breaks, head.n_breaks),
-            cube_at(head.coefficients, head.n_breaks - 1, 4, 4),
+            cube_at(head.coefficients, head.n_breaks - 1, head.n_columns, 4),
         )
         height = head_kernels.raising_step(raised, newmark, arrays, drive[:N_DRIVE])
         # What is not a number is left to those who couple.

@@ -45,6 +45,9 @@ class SteppedHead(ABC):
         self._level[: head.n] = head.level
         self._touch = np.zeros((2, s, n))
         self._touch[0, :, : head.n] = head.touch
+        # What a force on the middle of the strips does to each coordinate.
+        self._push = np.zeros(n)
+        self._push[: head.n] = head.touch.mean(axis=0)
         self._newmark = NewmarkFactors(
             dt, dt**2 * (0.5 - beta), dt * (1.0 - gamma), beta * dt**2, gamma * dt
         )

@@ -13,13 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from catenary.mbs.air.air_forces import ON_FRAME, ON_HEAD, SQUARE, AirForces
 from catenary.mbs.head.newmark_head import Raising
 from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
 from catenary.mbs.interface import HeadState
-from catenary.mbs.mechanism.pantograph_data import MultibodyData, head_weight_under_way, stand
+from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand
 from catenary.mbs.rigid import kernels
 from catenary.mbs.rigid.bodies import SPACE, Motion
-from catenary.mbs.rigid.forces import Gravity
+from catenary.mbs.rigid.forces import Force, Gravity, PointForce
 from catenary.mbs.rigid.joints import ORIGIN, PrescribedPoint, constant, steady
 from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.spin_locks import without_spins
@@ -77,6 +78,37 @@ class _Carried:
         return 0.0
 
 
+@dataclass(frozen=True)
+class _Blown:
+    """A ``force`` of the air as it acts at a time: times ``column`` of the numbers of ``air``."""
+
+    name: str
+    force: Force
+    air: AirForces
+    column: int
+
+    def generalised(self, motion: Motion, time: float) -> np.ndarray:
+        """Generalised forces (6 n,)."""
+        return float(self.air.now(time)[self.column]) * self.force.generalised(motion, time)
+
+    def energy(self, motion: Motion) -> float:
+        """Counts as work from outside."""
+        return 0.0
+
+
+def _blown(data: MultibodyData, air: AirForces | None) -> tuple[_Blown, ...]:
+    """All forces of the air on bodies."""
+    if air is None:
+        return ()
+    forces = [_Blown(force.name, force, air, SQUARE) for force in data.wind]
+    if data.uplift is not None:
+        for body, column in ((data.head, ON_HEAD), (data.arm, ON_FRAME)):
+            name = f"uplift of {body}"
+            lift = PointForce(name, body, (0.0, 0.0, 1.0))
+            forces.append(_Blown(name, lift, air, column))
+    return tuple(forces)
+
+
 class FullPantograph:
     """All bodies of a multibody pantograph, implicit in the contact forces.
 
@@ -85,11 +117,13 @@ class FullPantograph:
     Parameters
     ----------
     data : MultibodyData
-    static_force : force on a wire at rest [N] that holds the head at ``nominal_height`` [m]
+    pressing : force [N] of the head on its arm, whose working height is that of a head at
+        ``nominal_height`` [m]: the static force, and what the air lifts the arm with
     raise_time : time over which the static force grows from zero [s]
     dt, beta, gamma : Newmark step [s] and parameters, those of the line
     lateral : where the wire crosses the strips; without it, in their middle
     base : how the vehicle moves; without it the base stays
+    air : forces of the air; without it there are none
     handling : way of keeping constraints, or its name in `step_solvers.METHODS`
     substeps : into how many a step is cut
 
@@ -102,7 +136,7 @@ class FullPantograph:
     def __init__(
         self,
         data: MultibodyData,
-        static_force: float,
+        pressing: float,
         nominal_height: float,
         raise_time: float,
         dt: float,
@@ -110,6 +144,7 @@ class FullPantograph:
         gamma: float = 0.5,
         lateral: LateralPath | SeveralPaths | None = None,
         base: BaseMotion | None = None,
+        air: AirForces | None = None,
         handling: StepSolver | str = "coordinate_partitioning",
         substeps: int = 1,
     ) -> None:
@@ -124,13 +159,14 @@ class FullPantograph:
         part = Raising(raise_time)
         self._hold_down = _HoldDown("held down until raised", data.arm, part)
         system = without_spins(standing.system, standing.motion)
-        system = system.with_forces(*data.wind, self._hold_down)
+        system = system.with_forces(*_blown(data, air), self._hold_down)
         if base is not None:
             masses = tuple(body.mass for body in system.bodies)
             system = system.with_forces(_Carried("carried by the base", masses, base))
         self._rest = standing.motion
-        self._zero = nominal_height - self._head_under(static_force)
-        self._still = without_spins(standing.system, standing.motion).with_forces(*data.wind)
+        self._zero = nominal_height - self._head_under(pressing)
+        still = without_spins(standing.system, standing.motion)
+        self._still = still.with_forces(*_blown(data, air))
         s, space = len(data.strips.contact_offsets), self._rest.numbers[SPACE]
         self._touched = np.tile([space, space, self._rest.numbers[data.head]], (s, 1))
         self._between = np.ones(s, dtype=bool)
@@ -295,12 +331,10 @@ class FullPantograph:
             f"{head_height:.4g} m: {head_height - self._zero:.4g} m above its base."
         )
 
-    def _head_under(self, static_force: float) -> float:
-        """Height of the head above the base, arm at its working height, wire on the head [m]."""
-        standing = stand(self._data)
-        lifted = standing.head.weight - head_weight_under_way(self._data)
+    def _head_under(self, pressing: float) -> float:
+        """Height of the head above the base, arm at its working height, pressed on it [m]."""
         height = float(self._rest.position[self._rest.numbers[self._data.head], 2])
-        return height + (lifted - static_force) / standing.head.stiffness
+        return height - pressing / stand(self._data).head.stiffness
 
     def _aim(self, time: float) -> None:
         """Let the strips touch where the wire is at ``time`` [s]."""

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.mbs.air.uplift import Uplift
 from catenary.mbs.head.strips import ONE_STRIP, Strips
 from catenary.mbs.mechanism.reduction import ReducedMechanism, reduce_mechanism
 from catenary.mbs.rigid.bodies import Motion
@@ -57,8 +58,9 @@ class MultibodyData:
     ``name`` for messages; ``system`` with joints that ``assembly_tolerance`` [m] lets miss in the
     given positions; ``head``, ``arm`` names of bodies; ``working_height`` [m] of the arm's centre
     of mass, None for where the joints close; ``actuator`` is the force to be calibrated to
-    ``static_force`` [N], both None if forces hold as they are; ``wind`` are forces that act under
-    way, not at standstill, where the static force is measured; ``strips`` are parts of the head.
+    ``static_force`` [N], both None if forces hold as they are; ``wind`` are forces of the air at
+    the train's speed and ``uplift`` lifts head and arm, both not at standstill, where the static
+    force is measured; ``strips`` are parts of the head.
     ``all_bodies`` has all bodies in the time loop; with None the mechanism is reduced to tables.
     """
 
@@ -73,6 +75,12 @@ class MultibodyData:
     wind: tuple[PointForce, ...] = ()
     strips: Strips = ONE_STRIP
     all_bodies: AllBodies | None = None
+    uplift: Uplift | None = None
+
+    @property
+    def meets_air(self) -> bool:
+        """Whether the air has forces on it."""
+        return self.uplift is not None or bool(self.wind)
 
     @property
     def strip_offsets(self) -> tuple[float, ...]:
@@ -178,7 +186,6 @@ def reduced(data: MultibodyData) -> ReducedMechanism:
     frame = without_head(data, standing.system)
     heights = standing.working_height + np.arange(-REACH, REACH + 0.5 * SPACING, SPACING)
     start = _part(standing.motion, frame)
-    frame = frame.with_forces(*(f for f in data.wind if f.body != data.head))
     return reduce_mechanism(
         frame,
         data.arm,
@@ -187,15 +194,40 @@ def reduced(data: MultibodyData) -> ReducedMechanism:
         as_far_as_it_goes=True,
         tolerance=LIFT_TOLERANCE,
         name=data.name,
+        blowing=_on_frame(data, standing.motion),
     )
 
 
-def head_weight_under_way(data: MultibodyData) -> float:
-    """The head's weight less what the wind lifts it by [N]."""
-    start = data.system.start()
-    up = 6 * start.numbers[data.head] + 2
-    lifts = [f.generalised(start, 0.0)[up] for f in data.wind if f.body == data.head]
-    return stand(data).head.weight - float(np.sum(lifts))
+def head_lift(data: MultibodyData) -> float:
+    """What ``wind`` lifts the head by [N]."""
+    return float(sum(_vector(force)[2] for force in data.wind if force.body == data.head))
+
+
+def arm_lift(data: MultibodyData) -> float:
+    """What ``wind`` on the mechanism lifts its arm by, at the working height [N]."""
+    return reduced(data).blown_at(stand(data).working_height) if data.wind else 0.0
+
+
+def _on_frame(data: MultibodyData, motion: Motion) -> tuple[PointForce, ...]:
+    """Forces of ``wind`` on the mechanism without its head, which slides on the arm: the arm holds
+    the head against what blows it along and across the track."""
+    head, arm = motion.numbers[data.head], motion.numbers[data.arm]
+    forces = []
+    for force in data.wind:
+        along, across, _ = _vector(force)
+        if force.body != data.head:
+            forces.append(force)
+        elif along or across:
+            place = motion.position[head] + motion.rotation[head] @ np.asarray(force.at)
+            at = motion.rotation[arm].T @ (place - motion.position[arm])
+            forces.append(PointForce(force.name, data.arm, (along, across, 0.0), tuple(at)))
+    return tuple(forces)
+
+
+def _vector(force: PointForce) -> np.ndarray:
+    """A force of ``wind`` (3,) [N]."""
+    assert not callable(force.force)
+    return np.asarray(force.force, dtype=float)
 
 
 def describe(data: MultibodyData) -> str:

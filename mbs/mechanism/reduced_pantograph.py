@@ -9,7 +9,8 @@ h the arm's height above the base, S the static force at that height: the mechan
 head's weight; r grows from 0 to 1 while the pantograph is raised. b is the height of a base that
 moves (Lagrange's equation with the kinetic energy 1/2 m h'^2 + s h' b'), s the mass that the base
 carries along with the arm. The head may stand on several strips, roll and pitch (`strips`); it is
-not carried along the track, and links between two balls do not spin.
+not carried along the track, and links between two balls do not spin. The air adds forces on the
+head, on the arm, and on bodies of the mechanism, whose lift is a column of the tables.
 """
 
 from __future__ import annotations
@@ -20,8 +21,19 @@ from typing import Any
 
 import numpy as np
 
+from catenary.mbs.air.air_forces import SQUARE, AirForces
 from catenary.mbs.head import head_kernels
-from catenary.mbs.head.head_kernels import BASE, LIFTED, N_DRIVE, WEIGHT, ZERO, RaisedHead
+from catenary.mbs.head.head_kernels import (
+    ARM_AIR,
+    BASE,
+    BODIES_AIR,
+    HEAD_AIR,
+    LIFTED,
+    N_DRIVE,
+    WEIGHT,
+    ZERO,
+    RaisedHead,
+)
 from catenary.mbs.head.head_records import REDUCED
 from catenary.mbs.head.newmark_head import Raising, SteppedHead, parts_of
 from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning, head_parts
@@ -41,7 +53,8 @@ class RaisingData:
     ``head_stiffness`` [N/m] and ``head_damping`` [N s/m] between head and arm; ``head_weight`` [N];
     ``head_offset`` [m], height of the head above the arm at rest without contact; ``base_height``
     [m] of the base, in the line's heights. ``strips`` are part of the head, which may turn about
-    the track as ``roll`` says.
+    the track as ``roll`` says. ``blown_head`` [N] is what the air on bodies lifts the head by,
+    where it meets them as the frame's tables have it.
     """
 
     frame: ReducedMechanism
@@ -53,6 +66,7 @@ class RaisingData:
     base_height: float = 0.0
     strips: Strips = ONE_STRIP
     roll: Turning | None = None
+    blown_head: float = 0.0
 
 
 class RaisingPantograph(SteppedHead):
@@ -68,6 +82,7 @@ class RaisingPantograph(SteppedHead):
     dt, beta, gamma : Newmark step [s] and parameters, those of the line
     lateral : where the wire crosses the strips; without it the head does not roll
     base : how the vehicle moves; without it the base stays
+    air : forces of the air; without it there are none
     """
 
     def __init__(
@@ -79,20 +94,26 @@ class RaisingPantograph(SteppedHead):
         gamma: float = 0.5,
         lateral: LateralPath | SeveralPaths | None = None,
         base: BaseMotion | None = None,
+        air: AirForces | None = None,
     ) -> None:
         values = data.head_mass, data.head_stiffness, data.head_damping
         head = head_parts(*values, data.strips, data.roll if lateral is not None else None)
         super().__init__(head, head.n + 1, dt, beta, gamma, lateral)
         self._data = data
         self._part: Callable[[float], float] = Raising(raise_time)
-        self._base = base
+        self._base, self._air = base, air
         self._zero = data.head_offset + data.base_height
         self._masses = np.append(head.masses, 0.0)
         self._stiffness, self._damping = head.stiffness, head.damping
         self._breaks, self._coefficients = data.frame.coefficients(carried=base is not None)
         self._lowest, self._highest = float(self._breaks[0]), float(self._breaks[-1])
         self._raised = RaisedHead(
-            self._masses, self._stiffness, self._damping, self._breaks, self._coefficients
+            self._masses,
+            self._stiffness,
+            self._damping,
+            self._push,
+            self._breaks,
+            self._coefficients,
         )
         self._drive = np.zeros(N_DRIVE)
         self._drive[WEIGHT], self._drive[ZERO] = data.head_weight, self._zero
@@ -120,7 +141,9 @@ class RaisingPantograph(SteppedHead):
         drives[:, :N_DRIVE] = self._drive
         drives[:, LIFTED] = parts_of(self._part, times)
         if self._base is not None:
-            drives[:, BASE:N_DRIVE] = [self._base.vertical(time) for time in times]
+            drives[:, BASE:HEAD_AIR] = [self._base.vertical(time) for time in times]
+        if self._air is not None:
+            drives[:, HEAD_AIR:N_DRIVE] = self._blowing(self._air.at(times))
         self._fill_lateral(times, drives)
 
     def record(self) -> dict[str, Any]:
@@ -131,6 +154,7 @@ class RaisingPantograph(SteppedHead):
             "lowest": self._lowest,
             "highest": self._highest,
             "n_breaks": self._breaks.size,
+            "n_columns": self._coefficients.shape[1],
             **self._raised._asdict(),
         }
 
@@ -142,10 +166,10 @@ class RaisingPantograph(SteppedHead):
         stretch = self.position - self.position[-1] * self._level
         return float(0.5 * masses @ self.velocity**2 + 0.5 * stretch @ self._stiffness @ stretch)
 
-    def static_force(self, head_height: float) -> float:
+    def static_force(self, head_height: float, time: float = np.inf) -> float:
         """Force on a wire that holds the strips at this height at rest, fully raised [N].
 
-        The head's springs give way under it.
+        The head's springs give way under it. The air acts as it does at a ``time`` [s].
 
         Raises
         ------
@@ -153,11 +177,16 @@ class RaisingPantograph(SteppedHead):
             There is none: they give way faster than the lift falls.
         """
         data, force = self._data, 0.0
+        on_head, on_arm, on_bodies = np.zeros(3)
+        if self._air is not None:
+            on_head, on_arm, on_bodies = self._blowing(self._air.now(time))
         for _ in range(50):
-            previous = force
-            pressed = force / data.head_stiffness + data.strips.compression(force)
-            (_, lift, _), _ = self._frame_at(head_height + pressed)
-            force = float(lift) - data.head_weight
+            previous, below = force, force - on_head
+            pressed = below / data.head_stiffness + data.strips.compression(below)
+            height = head_height + pressed
+            (_, lift, _), _ = self._frame_at(height)
+            force = float(lift) - data.head_weight + on_head + on_arm
+            force += on_bodies * data.frame.blown_at(height - self._zero)
             if abs(force - previous) <= 1e-10 * abs(force):
                 return force
         raise RunBroken(
@@ -182,18 +211,28 @@ class RaisingPantograph(SteppedHead):
         """Put lift and base to ``time`` [s]."""
         self._drive[LIFTED] = self._part(time)
         if self._base is not None:
-            self._drive[BASE:] = self._base.vertical(time)
+            self._drive[BASE:HEAD_AIR] = self._base.vertical(time)
+        if self._air is not None:
+            self._drive[HEAD_AIR:] = self._blowing(self._air.now(time))
+
+    def _blowing(self, forces: np.ndarray) -> np.ndarray:
+        """The last columns of a drive, from those of ``AirForces``, shape as these."""
+        blown = forces.copy()
+        blown[..., 0] += self._data.blown_head * forces[..., SQUARE]
+        return blown
 
     def _acceleration(self, time: float) -> np.ndarray:
         self._move_base(time)
-        part, weight, zero, place, velocity, acceleration = self._drive
-        (mass, lift, slowing, carried), (mass_slope, *_) = self._columns_at(
+        part, weight, zero, place, velocity, acceleration = self._drive[:HEAD_AIR]
+        (mass, lift, slowing, carried, *blown), (mass_slope, *_) = self._columns_at(
             self.position[-1] - zero - place
         )
         speed = self.velocity[-1] - velocity
         force = -self._stiffness @ self.position - self._damping @ self.velocity
         force[-1] += part * (lift - weight) - slowing * speed - 0.5 * mass_slope * speed**2
         force[-1] += (mass - carried) * acceleration
+        force += self._drive[HEAD_AIR] * self._push
+        force[-1] += self._drive[ARM_AIR] + self._drive[BODIES_AIR] * sum(blown)
         masses = self._masses.copy()
         masses[-1] = mass
         return np.asarray(force / masses)
@@ -202,6 +241,6 @@ class RaisingPantograph(SteppedHead):
         """All columns of the mechanism's tables and their slopes at a height above the base [m]."""
         if not self._lowest <= height <= self._highest:
             raise self._data.frame.left(height)
-        values, slopes = np.empty(4), np.empty(4)
+        values, slopes = np.empty((2, self._coefficients.shape[1]))
         head_kernels.table_at(self._breaks, self._coefficients, height, values, slopes)
         return values, slopes

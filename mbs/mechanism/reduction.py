@@ -7,6 +7,7 @@ of m, F and c over h hold all of it, so that a step costs a few interpolations.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple
@@ -15,6 +16,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from catenary.mbs.rigid.bodies import Motion, Vector
+from catenary.mbs.rigid.forces import Force
 from catenary.mbs.rigid.joints import ORIGIN, PrescribedPoint
 from catenary.mbs.rigid.kinematics import Law, point
 from catenary.mbs.rigid.least_squares import least_squares
@@ -36,7 +38,8 @@ class ReducedMechanism:
     ``heights`` [m], growing; ``masses`` [kg], equivalent mass at the point; ``lifts`` [N], upward
     force on the point at rest; ``dampings`` [N s/m]; all of shape (n,), n >= 4. ``name`` is the
     pantograph's, for messages. ``carried`` [kg], shape (n,): the sum of m dz/dh, force on the point
-    per upward acceleration of the base; None if the base is at rest.
+    per upward acceleration of the base; None if the base is at rest. ``blown`` [N], shape (n,):
+    upward force on the point by the air on the bodies; None if it has none.
     """
 
     heights: np.ndarray
@@ -45,6 +48,7 @@ class ReducedMechanism:
     dampings: np.ndarray
     name: str = ""
     carried: np.ndarray | None = None
+    blown: np.ndarray | None = None
     _table: CubicSpline = field(init=False, repr=False, compare=False)
     _slopes: CubicSpline = field(init=False, repr=False, compare=False)
 
@@ -66,19 +70,25 @@ class ReducedMechanism:
         return self._table(height), self._slopes(height)
 
     def coefficients(self, carried: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Heights (n,) and, from each to the next, coefficients of the splines (n - 1, 4, 4).
+        """Heights (n,) and, from each to the next, coefficients of the splines (n - 1, k, 4).
 
-        The second index stands for mass, lift, damping and carried mass (zero without ``carried``),
-        the third for powers, the highest first.
+        The second index stands for mass, lift, damping, carried mass (zero without ``carried``)
+        and, of a mechanism that meets the air, what that lifts; the third for powers, the highest
+        first.
         """
         last = np.zeros_like(self.masses)
         if carried:
             if self.carried is None:
                 raise ValueError("nothing is known of what a moving base carries along")
             last = self.carried
-        columns = np.stack([self.masses, self.lifts, self.dampings, last], axis=1)
+        listed = [self.masses, self.lifts, self.dampings, last]
+        columns = np.stack(listed if self.blown is None else [*listed, self.blown], axis=1)
         spline = CubicSpline(self.heights, columns)
         return spline.x, np.ascontiguousarray(spline.c.transpose(1, 2, 0))
+
+    def blown_at(self, height: float) -> float:
+        """Upward force on the point by the air on the bodies at a height [m], 0 without air."""
+        return 0.0 if self.blown is None else float(CubicSpline(self.heights, self.blown)(height))
 
     def left(self, height: float, time: float | None = None) -> RunBroken:
         """The error of a mechanism that has left its tables at a height [m] and a time [s]."""
@@ -110,6 +120,7 @@ def reduce_mechanism(
     as_far_as_it_goes: bool = False,
     tolerance: float | None = None,
     name: str = "",
+    blowing: Sequence[Force] = (),
 ) -> ReducedMechanism:
     """Tables of a mechanism for heights of the point ``at`` of a body.
 
@@ -125,6 +136,7 @@ def reduce_mechanism(
     tolerance : of the lift between heights [N]; where it is missed further ones are put in, down
         to half a millimetre; None for the given heights alone
     name : of the pantograph, for messages
+    blowing : forces of the air, of which the tables have a column of their own
 
     Raises
     ------
@@ -137,7 +149,7 @@ def reduce_mechanism(
     # Heights are visited from the one that is nearest to the start, each from its neighbour.
     motion = system.assemble(system.start() if start is None else start).motion
     first = int(np.argmin(np.abs(table - point(motion, body, at).value[2])))
-    raised = _Raised(system, body, at)
+    raised = _Raised(system, body, at, blowing)
     places = [raised.to(table[first], motion)]
     for way in (table[first + 1 :], table[:first][::-1]):
         there = places[0]
@@ -160,12 +172,13 @@ def reduce_mechanism(
     if tolerance is not None:
         places = _refined(raised, places, tolerance)
     reached = np.array([place.height for place in places])
-    masses, lifts, dampings, carried = np.array([place.columns for place in places]).T
-    return ReducedMechanism(reached, masses, lifts, dampings, name, carried)
+    masses, lifts, dampings, carried, blown = np.array([place.columns for place in places]).T
+    own = blown if blowing else None
+    return ReducedMechanism(reached, masses, lifts, dampings, name, carried, own)
 
 
 class _Place(NamedTuple):
-    """A mechanism at rest at a ``height``: ``columns`` (4,) of its tables there, and its ``way``
+    """A mechanism at rest at a ``height``: ``columns`` (5,) of its tables there, and its ``way``
     (6 n,), the displacement per metre of height."""
 
     height: float
@@ -177,8 +190,10 @@ class _Place(NamedTuple):
 class _Raised:
     """A system with the point ``at`` of a body held at heights that follow one another."""
 
-    def __init__(self, system: System, body: str, at: Vector) -> None:
-        self._system, self._height = system, 0.0
+    def __init__(
+        self, system: System, body: str, at: Vector, blowing: Sequence[Force] = ()
+    ) -> None:
+        self._system, self._height, self._blowing = system, 0.0, tuple(blowing)
         # Its law reads the height of the moment, so that the system is made once.
         self._holder = PrescribedPoint("height", body, self._law, at)
         self._held = system.with_joints(self._holder)
@@ -207,7 +222,8 @@ class _Raised:
         damping = lift - way @ system.generalised_forces(motion.with_velocities(way), 0.0)
         # Where the third of the six numbers of a body is its velocity upward.
         carried = system.mass[2::6] @ way[2::6]
-        columns = np.array([system.mass @ way**2, lift, damping, carried])
+        blown = sum(float(way @ force.generalised(motion, 0.0)) for force in self._blowing)
+        columns = np.array([system.mass @ way**2, lift, damping, carried, blown])
         return _Place(float(height), motion, columns, way)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy import integrate
 
-from catenary.mbs.build import Operation, has_joints, make_pantograph
+from catenary.mbs.build import Operation, has_joints, make_pantograph, steady_forces
 from catenary.mbs.head.head_records import HEAD, fill_head
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
@@ -23,6 +23,7 @@ from catenary.meshgen.wires import Role
 from catenary.solver.base.bound import bound
 from catenary.solver.base.parallel import on_root
 from catenary.solver.contact import contact_kernels
+from catenary.solver.contact.air_around import airflow
 from catenary.solver.contact.contact_kernels import Ends
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
 from catenary.solver.contact.head_states import Heads
@@ -259,6 +260,7 @@ def _make(
         numerics.gamma,
         _lateral_path(problem, placement, base) if simulated.head_roll else None,
         base,
+        airflow(problem, simulated, placement),
         placement.lowering if simulated.lowering else None,
     )
     data = placement.data
@@ -287,13 +289,13 @@ def _lateral_path(
 
 
 def nominal_height_rule(
-    wires: ContactWires, elasticity: Elasticity
+    wires: ContactWires, elasticity: Elasticity, air_speed: float | None = None
 ) -> Callable[[Placement], float]:
     """Head height at which the static force is defined.
 
-    That of the placement, or else the mean height of a head that lifts the contact wires with the
-    static force in the stretch of ``elasticity``, so that the base spring neither adds to the mean
-    force nor takes from it.
+    That of the placement, or else the mean height of a head that lifts the contact wires in the
+    stretch of ``elasticity`` with the static force and that of still air at ``air_speed`` [m/s], so
+    that the base spring neither adds to the mean force nor takes from it.
     """
     x = elasticity.x
     at_rest = np.stack([wires.rest_height_of(wire, x) for wire in range(wires.n_wires)], axis=1)
@@ -301,7 +303,10 @@ def nominal_height_rule(
     def height(placement: Placement) -> float:
         if placement.nominal_height is not None:
             return placement.nominal_height
-        lifted = elasticity.pressed(at_rest, placement.static_force)
+        force = placement.static_force
+        if air_speed is not None and placement.data.meets_air:
+            force += steady_forces(placement.data, air_speed).whole
+        lifted = elasticity.pressed(at_rest, force)
         return float(integrate.trapezoid(lifted, x) / (x[-1] - x[0]))
 
     return height

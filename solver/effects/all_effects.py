@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from catenary.solver.effects import (  # noqa: F401  (registers)
+    air_effects,
     end_effects,
     pantograph_effects,
     vertical_effects,

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from catenary.mbs.air.airflow import Tunnel
 from catenary.mbs.vehicle.motion_sources import VehicleMotion
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role
@@ -113,7 +114,7 @@ class Problem:
     ``residual_stiffness_ratio`` is the share of its stiffness that a compressed dropper keeps;
     ``slack_dampers_act`` whether the damper of a dropper goes on acting when its spring is slack;
     ``incidents`` are what happens to the line on the way; ``ends`` how it begins and ends;
-    ``window`` which part of it steps take on.
+    ``window`` which part of it steps take on; ``tunnels`` on the way.
     """
 
     line: Line
@@ -129,6 +130,7 @@ class Problem:
     slack_dampers_act: bool = False
     ends: tuple[EndCondition, EndCondition] = (Fixed(), Fixed())
     window: WindowChoice = WindowChoice()
+    tunnels: tuple[Tunnel, ...] = ()
 
 
 def steps_of(problem: Problem) -> int:

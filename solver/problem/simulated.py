@@ -35,6 +35,7 @@ class Simulated:
     kept_ratio : share of its stiffness that a pushed dropper keeps; 1 if droppers do not slacken
     contact_loss : whether heads leave the wire; without it the contact force may pull
     head_roll : whether heads roll
+    meets_air : whether the air has forces on pantographs
     lowering : whether pantographs are lowered as their placements say
     vehicle : motion of the pantographs' bases, None if they move along a straight line
     suspension : of the vehicle between the track and these bases, None if they follow the track
@@ -50,6 +51,7 @@ class Simulated:
     kept_ratio: float = 1.0
     contact_loss: bool = False
     head_roll: bool = False
+    meets_air: bool = False
     lowering: bool = False
     vehicle: VehicleMotion | None = None
     suspension: Vehicle | None = None

@@ -16,8 +16,11 @@ from collections.abc import Callable
 import numpy as np
 from scipy import sparse
 
+from catenary.mbs.air.air_forces import AirForces
+from catenary.mbs.build import steady_forces
 from catenary.mbs.head.newmark_head import raised
 from catenary.mbs.lumped_data import LumpedData
+from catenary.solver.contact.air_around import airflow
 from catenary.solver.integrators.line_loads import LineLoads
 from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model
@@ -71,6 +74,16 @@ class WholeSystem:
         self._behind = np.array([placement.behind for placement in train.placements])
         self._static = np.array([placement.static_force for placement in train.placements])
         self.level = nominal_height(train.placements[0])
+        flows = [airflow(problem, model.simulated, place) for place in train.placements]
+        self._air = [
+            (p, AirForces(flow, kind.uplift, train.raise_time))
+            for p, (flow, kind) in enumerate(zip(flows, data, strict=True))
+            if flow is not None
+        ]
+        on_frame = [
+            0.0 if flow is None else steady_forces(kind, flow.speed).on_frame
+            for flow, kind in zip(flows, data, strict=True)
+        ]
         # What the base spring pushes where masses are at that level: it carries nothing when the
         # head presses with the static force at its nominal height.
         self._base = np.array(
@@ -79,9 +92,9 @@ class WholeSystem:
                 * (
                     nominal_height(place)
                     - self.level
-                    + sum(place.static_force / k for k in kind.stiffnesses[:-1])
+                    + sum((place.static_force + lifted) / k for k in kind.stiffnesses[:-1])
                 )
-                for place, kind in zip(train.placements, data, strict=True)
+                for place, kind, lifted in zip(train.placements, data, on_frame, strict=True)
             ]
         )
         nodes = model.contact_nodes
@@ -182,6 +195,10 @@ class WholeSystem:
         result = self._mass @ a + self._damping @ v + self._stiffness @ u
         grown = raised(time, self._train.raise_time)
         result[self._carriers] -= grown * self._static + self._base
+        for p, air in self._air:
+            on_head, on_frame, _ = air.now(time)
+            result[self.heads[p]] -= on_head
+            result[self._carriers[p]] -= on_frame
         if self._loads is not None:
             self._loads.at(time)
             result[: self.n_line] -= self._loads.values

@@ -119,7 +119,8 @@ class March:
         self._form = form
         self.ownership = distribute(model, comm.size, comm.rank)
         self._wire = ContactWires(model, form, self.ownership)
-        self._nominal_height = nominal_height_rule(self._wire, elasticity)
+        air_speed = problem.train.speed if model.simulated.meets_air else None
+        self._nominal_height = nominal_height_rule(self._wire, elasticity, air_speed)
         self._pantographs = Pantographs(
             comm, problem, model.simulated, self._wire, self._nominal_height
         )

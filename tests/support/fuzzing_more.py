@@ -33,6 +33,8 @@ def put_more(rng: random.Random, words: Words, span: float, room: float, n_steps
         _strips(rng, words)
     if rng.random() < _NOW_AND_THEN:
         _vehicle(rng, words)
+    if rng.random() < _NOW_AND_THEN:
+        _air(rng, words)
     # Droppers must be able to slacken if they are to keep a share of their stiffness then.
     if words["effects.dropper_slackening"] == "true" and rng.random() < _NOW_AND_THEN:
         words["line.dropper.residual_stiffness_ratio"] = rng.uniform(1e-3, 0.5)
@@ -185,6 +187,22 @@ def _suspension(rng: random.Random, words: Words) -> None:
         words[f"{table}.bogie_mass_kg"] = rng.uniform(1e3, 6e3)
         words[f"{table}.primary_stiffness_N_per_m"] = 10 ** rng.uniform(6.0, 7.3)
         words[f"{table}.primary_damping_N_s_per_m"] = 10 ** rng.uniform(3.0, 5.0)
+
+
+def _air(rng: random.Random, words: Words) -> None:
+    """Uplift by a polynomial or a table, now and then in a tunnel."""
+    table = "pantographs.reference.aerodynamics"
+    if rng.random() < 0.5:
+        words[f"{table}.uplift_polynomial"] = [0.0, rng.uniform(0.0, 0.01), rng.uniform(0.0, 2e-3)]
+    else:
+        words[f"{table}.uplift_by_speed"] = [[50.0, rng.uniform(0, 9)], [300.0, rng.uniform(9, 90)]]
+    words[f"{table}.head_share"] = rng.uniform(0.0, 1.0)
+    if rng.random() < 0.5:
+        start, factor = float(str(words["train.start_m"])), rng.uniform(0.8, 2.0)
+        words["line.tunnels"] = (
+            f"[{{from_m={start + 1.0!r},to_m={start + 500.0!r},force_factor={factor!r},"
+            f"portal_m={rng.choice([0.0, 20.0])!r}}}]"
+        )
 
 
 # ---- contact ------------------------------------------------------------------------------------

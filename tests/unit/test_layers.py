@@ -36,8 +36,8 @@ ROOMS = {
     "meshgen": ("spans", "wires", "hardware", "line", "mesh", "topologies", "geometry", "chains",
         "division", "gmsh_lines", "reader", "build"),
     "mbs": (
-        "frame", "interface", "rigid", "time_steps", "vehicle", "head", "mechanism", "lumped_data",
-        "library", "response", "lumped", "lowering", "roll", "shape", "build",
+        "frame", "interface", "rigid", "time_steps", "vehicle", "head", "air", "mechanism",
+        "lumped_data", "library", "response", "lumped", "lowering", "roll", "shape", "build",
     ),
     "solver": (
         "base", "problem", "model", "ends", "effects", "linear", "statics", "waves", "window",

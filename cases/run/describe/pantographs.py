@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.head.strips import Strips
 from catenary.mbs.lumped_data import LumpedData
-from catenary.solver.problem.problem import Problem
+from catenary.solver.effects.all_effects import simulated
+from catenary.solver.problem.problem import Placement, Problem
 
 if TYPE_CHECKING:
     from catenary.mbs.build import PantographData
@@ -41,13 +42,24 @@ def _strips_of(strips: Strips) -> str:
     return f"{text} of {own.mass:g} kg on {own.stiffness:g} N/m"
 
 
+def _description(placement: Placement, problem: Problem) -> str:
+    """A line about a pantograph under way."""
+    text = description_of(placement.data, placement.static_force)
+    if not (simulated(problem).meets_air and placement.data.meets_air):
+        return text
+    from catenary.mbs.build import steady_forces
+
+    lifted = steady_forces(placement.data, problem.train.speed).whole
+    return f"{text}; {lifted:+.1f} N by the air at {3.6 * problem.train.speed:.4g} km/h"
+
+
 def header_words(scene: Scene, problem: Problem) -> list[dict[str, str]]:
     """Facts on each pantograph for a result file, in running order. Not collective."""
     return [
         {
             "kind": place.name,
             "model": model_of(placement.data),
-            "description": description_of(placement.data, placement.static_force),
+            "description": _description(placement, problem),
         }
         for place, placement in zip(scene.train.pantographs, problem.train.placements, strict=True)
     ]
@@ -57,7 +69,7 @@ def kind_lines(scene: Scene, problem: Problem) -> dict[str, list[str]]:
     """Lines about each kind of pantograph on the train, by its name. Not collective."""
     lines: dict[str, list[str]] = {}
     for place, placement in zip(scene.train.pantographs, problem.train.placements, strict=True):
-        lines[place.name] = [description_of(placement.data, placement.static_force)]
+        lines[place.name] = [_description(placement, problem)]
         if not isinstance(placement.data, LumpedData):
             from catenary.mbs.mechanism.pantograph_data import describe_assembly, stand
 

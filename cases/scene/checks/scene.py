@@ -32,6 +32,11 @@ from catenary.cases.scene.checks.run.output import check_output, check_recorded_
 from catenary.cases.scene.checks.run.scheme import check_scheme
 from catenary.cases.scene.checks.run.usual import usual_faults
 from catenary.cases.scene.checks.run.window import check_window
+from catenary.cases.scene.checks.train.aerodynamics import (
+    check_tunnels,
+    check_uplift,
+    has_front,
+)
 from catenary.cases.scene.checks.train.pantograph import check_mechanisms, check_pantographs
 from catenary.cases.scene.checks.train.vehicle import check_vehicle
 from catenary.cases.scene.convert.course import end_of, strips_ahead
@@ -78,7 +83,7 @@ def faults_of(scene: Scene) -> list[Fault]:
         return found.faults
     if not found.nothing_by(check_names, scene, line):
         return found.faults
-    for of_line in (check_dropper_lengths, check_recorded_parts, _speed):
+    for of_line in (check_dropper_lengths, check_recorded_parts, check_tunnels, _speed):
         found.nothing_by(of_line, scene, line)
     if found.nothing_by(_running, scene, line) and found.nothing_by(_evaluation, scene):
         found.nothing_by(_raising, scene)
@@ -87,6 +92,7 @@ def faults_of(scene: Scene) -> list[Fault]:
         return found.faults
     # What may need multibody systems stands last: other faults are reported at once.
     if found.nothing_by(check_mechanisms, scene, line):
+        found.nothing_by(check_uplift, scene)
         found.nothing_by(check_requirements_of_defaults, scene)
         found.nothing_by(check_vehicle, scene, line)
         if found.nothing_by(check_incidents, scene, line):
@@ -145,10 +151,13 @@ def _pantograph_names(scene: Scene) -> Iterator[Fault]:
                 else f"it must be one of {', '.join(scene.pantographs)}"
             )
             yield _refusal(scene, f"train.pantographs.{i}.name", place.name, hint)
-        elif place.reversed and scene.pantographs[place.name].type == "lumped":
-            key = f"train.pantographs.{i}.reversed"
+        elif place.reversed and not has_front(scene.pantographs[place.name]):
             yield _refusal(
-                scene, key, True, f"{place.name} is a chain of lumped masses, with no front"
+                scene,
+                f"train.pantographs.{i}.reversed",
+                True,
+                f"{place.name} is a chain of lumped masses, with no front but what "
+                f"pantographs.{place.name}.aerodynamics.reversed gives it",
             )
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from catenary.cases.scene.convert.aerodynamics import uplift_of
 from catenary.cases.scene.tables.train.head import StripsTable
 from catenary.cases.scene.tables.train.pantograph import MultibodyTable, PantographTable
 from catenary.mbs.head.strips import Strips, Suspension, Turning
@@ -29,7 +31,9 @@ def pantograph_of(
     if isinstance(table, MultibodyTable):
         from catenary.cases.scene.convert.mechanism import multibody_of, turned
 
-        data = multibody_of(name, table, speed_km_h)
+        data = replace(
+            multibody_of(name, table, speed_km_h), uplift=uplift_of(table.aerodynamics, reversed)
+        )
         return turned(data) if reversed else data
     spring, damper = table.stiffnesses_N_per_m[0], table.dampings_N_s_per_m[0]
     roll = table.roll
@@ -41,6 +45,7 @@ def pantograph_of(
         None
         if roll is None
         else _turning(roll.inertia_kg_m2, roll.spring_distance_m, spring, damper),
+        uplift_of(table.aerodynamics, reversed),
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from catenary.cases.scene.convert.aerodynamics import tunnels_of
 from catenary.cases.scene.convert.contact import contact_law_of
 from catenary.cases.scene.convert.course import end_of
 from catenary.cases.scene.convert.ends import ends_of
@@ -58,6 +59,7 @@ def problem_of(scene: Scene) -> Problem:
         incidents=line_incidents(scene.incidents, line, numerics.dt_s),
         slack_dampers_act=hung is not None and hung.slack_damping == "kept",
         ends=ends_of(scene.line.ends),
+        tunnels=tunnels_of(scene.line.tunnels),
     )
     return replace(problem, window=_window(scene.window, problem))
 

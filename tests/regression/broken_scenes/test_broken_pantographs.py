@@ -52,6 +52,53 @@ ASSIGNMENTS = {
     "unknown body of a force": ([f"{KIND}.forces.brake.j=nothing"], "one of mast, head, space"),
     "head is arm": ([f"{KIND}.head=mast"], "as the arm is"),
     "joint of one body": ([f"{KIND}.joints.slide.i=head"], 'has "head" on both sides'),
+    "uplift twice": (
+        [f"{KIND}.aerodynamics={{uplift_polynomial=[1], uplift_by_speed=[[0, 0], [300, 80]]}}"],
+        "needs exactly one of uplift_polynomial, uplift_by_speed",
+    ),
+    "no uplift": ([f"{KIND}.aerodynamics.head_share=0.5"], "but none is given"),
+    "uplift in no order": (
+        [f"{KIND}.aerodynamics.uplift_by_speed=[[300, 80], [200, 40]]"],
+        "in ascending order, but 200 follows 300",
+    ),
+    "uplift of a plane": (
+        [f"{KIND}.aerodynamics.uplift_by_speed=[[0, 0], [300, 8000]]"],
+        "within 2000 N in uplift_by_speed, but one is 8000",
+    ),
+    "air at the speed of sound": (
+        [f"{KIND}.aerodynamics.uplift_by_speed=[[0, 0], [3000, 80]]"],
+        "between 0 and 1500 km/h in uplift_by_speed, but one is 3000",
+    ),
+    "more than all on the head": (
+        [f"{KIND}.aerodynamics={{uplift_polynomial=[1], head_share=1.5}}"],
+        f"{KIND}.aerodynamics.head_share is 1.5",
+    ),
+    "pressed down": (
+        [f"{KIND}.aerodynamics.uplift_polynomial=[-500]"],
+        "presses the head down by 500 N at 250 km/h",
+    ),
+    "tunnel without length": (
+        ["line.tunnels=[{from_m=300, to_m=200}]"],
+        "must end behind its start, but to_m is 200 and from_m 300",
+    ),
+    "tunnel in a tunnel": (
+        [
+            "line.tunnels=[{from_m=100, to_m=300}, {from_m=200, to_m=400}]",
+            f"{KIND}.aerodynamics.uplift_polynomial=[5]",
+        ],
+        "line.tunnels.1.from_m is 200 m on the command line (--set); it must be 300 at least",
+    ),
+    "tunnel beyond the line": (
+        [
+            "line.tunnels=[{from_m=90000, to_m=90001}]",
+            f"{KIND}.aerodynamics.uplift_polynomial=[5]",
+        ],
+        "the line ends at",
+    ),
+    "tunnel that nothing notices": (
+        ["line.tunnels=[{from_m=100, to_m=300}]"],
+        "changes nothing: no pantograph of the train has aerodynamics",
+    ),
     "no static force": ([f"{KIND}.static_force_N="], "exactly one of static_force_N"),
     "static force twice": (
         [f"{KIND}.static_force_by_speed=[[100, 90], [300, 120]]"],

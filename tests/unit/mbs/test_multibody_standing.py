@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from measuring import check
 
+from catenary.mbs.air.airflow import Airflow
 from catenary.mbs.build import Operation, make_pantograph, raising_data
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, describe, reduced, stand
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
@@ -108,7 +109,11 @@ def test_wind_adds_to_the_force_under_way_and_not_to_the_static_one() -> None:
     )
     data = replace(DATA, wind=wind)
     assert stand(data).actuator_force == pytest.approx(stand(DATA).actuator_force, rel=1e-12)
-    running = make_pantograph(data, Operation(FORCE, 5.0, 0.0, 1e-3, 0.25, 0.5))
+    operation = Operation(FORCE, 5.0, 0.0, 1e-3, 0.25, 0.5)
+    running = make_pantograph(data, operation)
+    assert isinstance(running, RaisingPantograph)
+    check("without the effect [N]", running.static_force(5.0), FORCE, within=1e-6)
+    running = make_pantograph(data, operation._replace(air=Airflow(70.0)))
     assert isinstance(running, RaisingPantograph)
     check("under way [N]", running.static_force(5.0), FORCE + 20.0, within=1e-6)
 

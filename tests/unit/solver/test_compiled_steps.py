@@ -13,8 +13,11 @@ import pytest
 from measuring import registered, start_march
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 
+from catenary.mbs.air.airflow import Tunnel
+from catenary.mbs.air.uplift import Polynomial, Uplift
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.vehicle.irregularity import Irregularity
 from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
@@ -44,6 +47,8 @@ TWO = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0))
 PAIR = Strips(2, 0.56, 1.6, Suspension(1.0, 8000.0, 10.0))
 ROLLING = replace(TWO, strips=PAIR, roll=Turning(2.0, 600.0, 4.0))
 TRACK = (Irregularity("fra_6", 3.0, 100.0, 1), Harmonic(0.01, 1.3))
+UPLIFT = Uplift(Polynomial((0.0, 0.0, 0.01)), 0.7)
+DRAG = (PointForce("drag", "lower_arm", (-80.0, 0.0, 0.0), (-0.82, 0.0, 0.0)),)
 # What runs alternately by the loop and from Python: pantographs, contact, effects.
 LINEAR = LinearLaw(5e4, 100.0)
 SCENES: dict[str, tuple[tuple[Any, ...], Any, set[str]]] = {
@@ -57,6 +62,11 @@ SCENES: dict[str, tuple[tuple[Any, ...], Any, set[str]]] = {
         {"contact_damping", "head_roll", "vehicle_motion"},
     ),
     "kinematic": ((TWO,), KinematicLaw(), set()),
+    "in the air of a tunnel": (
+        (replace(TWO, uplift=UPLIFT), replace(paper.data(), wind=DRAG, uplift=UPLIFT)),
+        LINEAR,
+        {"contact_damping", "pantograph_aerodynamics"},
+    ),
 }  # fmt: skip
 
 
@@ -74,7 +84,13 @@ def problem(scene: str, n_steps: int = 200, raise_time: float = 0.15) -> Problem
     usual = train(speed, start, start + n_steps * dt * speed, raise_time=raise_time)
     usual = replace(usual, placements=placements, vehicle=VehicleMotion(TRACK, TRACK))
     return problem_of(
-        LINE, WHOLE | effects, contact=law, train=usual, numerics=numerics(dt), evaluation=(95, 100)
+        LINE,
+        WHOLE | effects,
+        contact=law,
+        train=usual,
+        numerics=numerics(dt),
+        evaluation=(95, 100),
+        tunnels=(Tunnel(60.0, 100.0, 1.5, 5.0),),
     )
 
 

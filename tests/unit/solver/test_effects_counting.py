@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from small_lines import BARE, EN_PANTOGRAPH, ac_simple_line, mesh_of, problem_of, train
 
+from catenary.mbs.air.uplift import Polynomial, Uplift
 from catenary.mbs.build import Operation, make_pantograph
 from catenary.mbs.head.strips import Turning
 from catenary.mbs.head.wire_crossing import LateralPath
@@ -47,7 +48,8 @@ def full_line() -> LineData:
 
 def full_problem(names: frozenset[str]) -> Problem:
     line = full_line()
-    rolling = replace(EN_PANTOGRAPH, roll=Turning(2.0, 470.0, 1.0))
+    uplift = Uplift(Polynomial((0.0, 0.0, 0.01)))
+    rolling = replace(EN_PANTOGRAPH, roll=Turning(2.0, 470.0, 1.0), uplift=uplift)
     speed = 1.1 * line.contact_wire.wave_speed
     ours = train(speed, 60.0, 160.0, data=rolling, behind=(0.0, 31.0))
     lowered = replace(ours.placements[0], lowering=Lowering(0.5, -50.0, 0.2, 0.4))
@@ -138,6 +140,7 @@ BLOCKS = {
     "dropper_break": ({}, 1),
     "tension_loss": ({}, 1),
     "lowering": ({}, 1),
+    "pantograph_aerodynamics": ({}, 1),
     "supercritical_speed": ({}, 1),
 }
 # The fields of `Simulated` that each effect sets.
@@ -155,6 +158,7 @@ LAWS = {
     "dropper_break": "incidents",
     "tension_loss": "incidents",
     "lowering": "lowering",
+    "pantograph_aerodynamics": "meets_air",
 }
 LIFTED = {
     "several_pantographs": (Limit.ONE_PANTOGRAPH,),
@@ -187,7 +191,7 @@ def test_no_effect_is_found_by_its_name() -> None:
     """What an effect contributes is read from `Simulated` and the model, in all of the solver."""
     names = set(effects.registry()) - {"vertical", "gravity", "pre_sag"}
     for path in (Path(__file__).parents[3] / "solver").rglob("*.py"):
-        if path.name in ("vertical_effects.py", "end_effects.py", "pantograph_effects.py"):
+        if path.parent.name == "effects" and path.name.endswith("_effects.py"):
             continue
         texts = (node for node in ast.walk(ast.parse(path.read_text("utf-8"))))
         strings = {n.value for n in texts if isinstance(n, ast.Constant)}
@@ -257,6 +261,7 @@ def test_a_scene_without_an_effect_has_no_trace_of_it(name: str, mesh: LineMesh)
         ),
         ("head_roll", lambda p: replace(p, train=train(70.0, 60.0, 160.0))),
         ("vehicle_motion", lambda p: replace(p, train=replace(p.train, vehicle=None))),
+        ("pantograph_aerodynamics", lambda p: replace(p, train=train(70.0, 60.0, 160.0))),
         ("supercritical_speed", lambda p: replace(p, train=replace(p.train, speed=70.0))),
     ],
 )

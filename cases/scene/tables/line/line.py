@@ -11,6 +11,7 @@ from catenary.cases.scene.tables.line.droppers import DropperTable
 from catenary.cases.scene.tables.line.ends import EndsTable
 from catenary.cases.scene.tables.line.hardware import SteadyArmTable, SupportTable
 from catenary.cases.scene.tables.line.spans import Span
+from catenary.cases.scene.tables.line.tunnels import TunnelTable
 from catenary.cases.scene.tables.line.wires import (
     AuxiliaryWireTable,
     BridleTable,
@@ -94,6 +95,9 @@ class LineTable(Table):
         default_factory=TransitionTable, description="transition spans"
     )
     ends: EndsTable = Field(default_factory=EndsTable, description="how the line ends")
+    tunnels: list[TunnelTable] = Field(
+        default_factory=list, max_length=1000, description="tunnels on the way, in ascending order"
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> LineTable:

@@ -16,6 +16,7 @@ from pydantic import (
 
 from catenary.cases.scene.input.toml_input import assign
 from catenary.cases.scene.tables.table import TAKE_AWAY, Table, ascending, exactly_one
+from catenary.cases.scene.tables.train.aerodynamics import AerodynamicsTable
 from catenary.cases.scene.tables.train.head import RollTable, SomeMass, StripsTable
 from catenary.cases.scene.tables.train.mechanism import BodyTable, ForceTable, JointTable, Name
 from catenary.mbs.library import READY
@@ -49,6 +50,9 @@ class _Pressing(Table):
         None, gt=0, le=20, description="head height at which the static force holds"
     )
     strips: StripsTable = Field(default_factory=StripsTable, description="collector strips")
+    aerodynamics: AerodynamicsTable | None = Field(
+        None, description="uplift by the air under way, on top of the static force"
+    )
 
     @model_validator(mode="after")
     def _forces_by_speed(self) -> _Pressing:

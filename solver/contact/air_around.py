@@ -1,0 +1,15 @@
+"""The air around the train's pantographs."""
+
+from __future__ import annotations
+
+from catenary.mbs.air.airflow import Airflow
+from catenary.solver.problem.problem import Placement, Problem
+from catenary.solver.problem.simulated import Simulated
+
+
+def airflow(problem: Problem, simulated: Simulated, placement: Placement) -> Airflow | None:
+    """The air that a pantograph meets on its way, None if it has no forces. Not collective."""
+    if not (simulated.meets_air and placement.data.meets_air):
+        return None
+    train = problem.train
+    return Airflow(train.speed, train.start - placement.behind, problem.tunnels)
