@@ -5,7 +5,7 @@ SI units. Axes: x along the track from the first anchor, y lateral, z up from th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
@@ -30,13 +30,23 @@ class End(str, Enum):
     CLAMPED = "clamped"
 
 
+# Thermal expansion of copper and its alloys (TB/T 2810, 2821) [1/K].
+EXPANSION_OF_COPPER = 1.7e-5
+
+
 @dataclass(frozen=True)
 class Conductor:
-    """A tensioned conductor: tension [N], mass per length [kg/m], bending stiffness EI [N m2]."""
+    """A tensioned conductor: tension [N], mass per length [kg/m], bending stiffness EI [N m2].
+
+    ``axial_stiffness`` EA [N] is that of a bar, None where nothing says it; ``expansion`` is by
+    temperature [1/K].
+    """
 
     tension: float
     mass_per_length: float
     bending_stiffness: float
+    axial_stiffness: float | None = field(default=None, kw_only=True)
+    expansion: float = field(default=EXPANSION_OF_COPPER, kw_only=True)
 
     @property
     def wave_speed(self) -> float:
@@ -152,6 +162,8 @@ class Wire(Conductor):
             pieces,
             profile,
             taken,
+            axial_stiffness=conductor.axial_stiffness,
+            expansion=conductor.expansion,
         )
 
     def tension_at(self, x: np.ndarray | float) -> np.ndarray:
@@ -162,6 +174,27 @@ class Wire(Conductor):
             which = np.clip(np.searchsorted(start, x, side="right") - 1, 0, None)
             tension -= np.where((x >= start[which]) & (x < end[which]), less[which], 0.0)
         return tension
+
+    def radial_force(self, x: np.ndarray) -> np.ndarray:
+        """Lateral force that holds the wire where its course in plan has a kink, > 0 to the left.
+
+        Parameters
+        ----------
+        x : (n,) places along the track [m]
+
+        Returns
+        -------
+        ndarray, shape (n,) [N]
+            Zero where the course is straight, or no piece passes.
+        """
+        force = np.zeros(x.shape)
+        for piece in self.pieces:
+            at, course = np.array(piece.x), np.array(piece.y)
+            kink = np.diff(np.diff(course) / np.diff(at))
+            for place, change in zip(at[1:-1], kink, strict=True):
+                here = np.abs(x - place) < _SAME_PLACE
+                force[here] = -self.tension_at(x[here]) * change
+        return force
 
     @property
     def length(self) -> float:

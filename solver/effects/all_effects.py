@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from catenary.solver.effects import (  # noqa: F401  (registers)
     air_effects,
+    axial_effects,
     end_effects,
     pantograph_effects,
     vertical_effects,
@@ -24,6 +25,11 @@ def registry() -> dict[str, Effect]:
 def active(problem: Problem) -> list[Effect]:
     """The effects of ``problem`` that have something to act on, in building order."""
     return [e for e in registry().values() if e.name in problem.effects and e.applies(problem)]
+
+
+def needs_form(problem: Problem) -> bool:
+    """Whether matrices of any active effect depend on the shape at rest."""
+    return any(effect.of_form for effect in active(problem))
 
 
 def simulated(problem: Problem) -> Simulated:

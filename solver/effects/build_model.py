@@ -8,6 +8,7 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.model import Model
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.stations import along_the_track
 from catenary.solver.model.unknowns import Unknowns, number_unknowns
 from catenary.solver.problem.problem import Problem
@@ -18,10 +19,12 @@ def build(
     mesh: LineMesh,
     dropper_lengths: np.ndarray,
     broken: np.ndarray | None = None,
+    form: Equilibrium | None = None,
 ) -> Model:
     """The model of a problem on a mesh, for given dropper lengths [m]. Not collective.
 
-    ``broken`` (n_droppers,) bool, droppers that carry nothing; none if not given.
+    ``broken`` (n_droppers,) bool, droppers that carry nothing; none if not given. ``form`` is the
+    shape at rest, where it is known: before it is found wires are straight and droppers upright.
     """
     active = effects.active(problem)
     row_of_node = np.empty(mesh.n_nodes, dtype=np.int64)
@@ -36,6 +39,7 @@ def build(
         dropper_lengths,
     )
     model.broken = np.zeros(mesh.droppers.shape[0], dtype=bool) if broken is None else broken
+    model.form = form
     model.terms_of = {effect.name: 0 for effect in active}
     builder = ModelBuilder(model)
     for effect in active:

@@ -56,6 +56,7 @@ class Effect:
     build : adds matrices, weights, held unknowns and loads in time to the model
     law : the record of laws with the fields that the effect sets. Effects are applied in building
         order, so that an effect may change what one that it requires has set
+    of_form : whether ``build`` reads the shape at rest, ``Model.form``
     lifts : limits of a scene that do not hold with the effect
     data : what a scene has to hold for it to act on, by its keys; empty if any scene does
     """
@@ -73,6 +74,7 @@ class Effect:
     law: Callable[[Simulated, Problem], Simulated] | None = None
     lifts: tuple[Limit, ...] = ()
     data: str = ""
+    of_form: bool = False
 
     @property
     def n_laws(self) -> int:

@@ -6,7 +6,8 @@ import numpy as np
 
 from catenary.meshgen.mesh import DROPPERS
 from catenary.solver.model import elements
-from catenary.solver.model.links import BOTH, PULLS, Direction, Links, between_nodes, law
+from catenary.solver.model.leaning_droppers import dropper_directions
+from catenary.solver.model.links import BOTH, PULLS, Direction, Links, law
 from catenary.solver.model.loads import Load
 from catenary.solver.model.model import Block, Model, wire_elements
 from catenary.solver.model.stations import SAME_STATION
@@ -28,7 +29,7 @@ class ModelBuilder:
         """Bending and tension of a wire in the plane of two unknowns; its mass and weight."""
         dofs, length = wire_elements(self.model, wire, unknowns)
         data = self.problem.line.wire(wire)
-        tension = data.tension_at(self.mesh.x(self.mesh.elements(wire)).mean(axis=1))
+        tension = self.model.tension_of(wire)
         # Length and tension as one number, of which NumPy finds those that are alike.
         alike, kind = np.unique(length + 1j * tension, return_inverse=True)
         self._add_block(
@@ -59,10 +60,18 @@ class ModelBuilder:
         hanging_mass: float | np.ndarray | None = None,
         unknown: str = "w",
     ) -> None:
-        """Point masses [kg]; ``hanging_mass`` is what the node carries if it is not the same."""
+        """Point masses [kg]; ``hanging_mass`` is what the node carries if it is not the same.
+
+        Those of heights move along the track as well, where nodes do.
+        """
         values = np.broadcast_to(np.asarray(mass, dtype=float), nodes.shape)
         dofs = self.model.dofs(nodes, unknown)
         self._add_block(component, dofs[:, None], values[:, None, None].copy(), None)
+        along = nodes[self.model.numbering.has(nodes, "u")] if unknown == "w" else nodes[:0]
+        if along.size:
+            moved = values[self.model.numbering.has(nodes, "u")]
+            own = self.model.dofs(along, "u")[:, None]
+            self._add_block(component, own, moved[:, None, None].copy(), None)
         if unknown == "w":
             hanging = values if hanging_mass is None else hanging_mass
             self._hanging.append((dofs, np.broadcast_to(np.asarray(hanging), nodes.shape)))
@@ -90,7 +99,7 @@ class ModelBuilder:
         """The droppers of the mesh; those of each group are a component of their own."""
         model, mesh = self.model, self.mesh
         laws = law(mesh.x(mesh.droppers[:, 1]), model.dropper_stiffness, acts=PULLS)
-        model.droppers = Links(DROPPERS, between_nodes(model, mesh.droppers), laws)
+        model.droppers = Links(DROPPERS, dropper_directions(model), laws)
         model.links.append(model.droppers)
         matrices = model.droppers.stiffness_matrices
         for number, group in enumerate(self.problem.line.droppers):

@@ -14,6 +14,7 @@ import numpy as np
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
 from catenary.solver.model.links import Links
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.unknowns import Unknowns
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
@@ -61,6 +62,7 @@ class Model:
     loads : beside those of contacts and links, from the start of the march on
     links : droppers, and whatever else was added as links
     droppers : those of the mesh, in its order; they only pull where they may slacken
+    form : the shape at rest that matrices are made about, None before it is found
     terms_of : effect name -> number of terms, laws and lifted limits that it contributes
     """
 
@@ -79,6 +81,7 @@ class Model:
     loads: list[Load] = field(default_factory=list)
     terms_of: dict[str, int] = field(default_factory=dict)
     broken: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    form: Equilibrium | None = None
 
     @property
     def unknowns(self) -> tuple[str, ...]:
@@ -128,6 +131,13 @@ class Model:
         if any(block.damping is not None for block in self.blocks):
             return False
         return len({self.damping_of(block.component) for block in self.blocks}) <= 1
+
+    def tension_of(self, wire: str) -> np.ndarray:
+        """Tension of the elements of a wire at rest, (n_elements,) [N]."""
+        pairs = self.mesh.elements(wire)
+        tension = self.problem.line.wire(wire).tension_at(self.mesh.x(pairs).mean(axis=1))
+        gained = {} if self.form is None else self.form.gained_tension
+        return tension + gained[wire] if wire in gained else tension
 
     def wire_elements(self, wire: str) -> tuple[np.ndarray, np.ndarray]:
         """Element unknowns (n, 4) in the vertical plane and lengths (n,) [m] of a wire."""

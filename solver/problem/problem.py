@@ -11,6 +11,7 @@ from catenary.mbs.air.airflow import Tunnel
 from catenary.mbs.vehicle.motion_sources import VehicleMotion
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role
+from catenary.solver.problem.along_track import AlongTrack
 from catenary.solver.problem.contact_laws import ContactLaw
 from catenary.solver.problem.ends import EndCondition, Fixed
 from catenary.solver.problem.incidents import LineIncident, TensionLoss
@@ -114,7 +115,8 @@ class Problem:
     ``residual_stiffness_ratio`` is the share of its stiffness that a compressed dropper keeps;
     ``slack_dampers_act`` whether the damper of a dropper goes on acting when its spring is slack;
     ``incidents`` are what happens to the line on the way; ``ends`` how it begins and ends;
-    ``window`` which part of it steps take on; ``tunnels`` on the way.
+    ``window`` which part of it steps take on; ``tunnels`` on the way; ``along`` what holds
+    wires along the track.
     """
 
     line: Line
@@ -131,6 +133,7 @@ class Problem:
     ends: tuple[EndCondition, EndCondition] = (Fixed(), Fixed())
     window: WindowChoice = WindowChoice()
     tunnels: tuple[Tunnel, ...] = ()
+    along: AlongTrack = AlongTrack()
 
 
 def steps_of(problem: Problem) -> int:

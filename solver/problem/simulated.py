@@ -10,6 +10,7 @@ import numpy as np
 from catenary.mbs.vehicle.motion_sources import VehicleMotion
 from catenary.mbs.vehicle.suspension import Vehicle
 from catenary.meshgen.wires import Profile
+from catenary.solver.problem.along_track import Tensioner
 from catenary.solver.problem.contact_laws import ContactLaw
 from catenary.solver.problem.incidents import LineIncident
 from catenary.solver.problem.problem import Damping
@@ -40,6 +41,8 @@ class Simulated:
     vehicle : motion of the pantographs' bases, None if they move along a straight line
     suspension : of the vehicle between the track and these bases, None if they follow the track
     incidents : of the line, in the order of ``Problem.incidents``
+    tensioner : at the ends of wires that have one, None if all are held along the track
+    warmer : temperature less that of the installation [K]
     goes_on : whether the line goes on beyond its start and beyond its end
     """
 
@@ -56,6 +59,8 @@ class Simulated:
     vehicle: VehicleMotion | None = None
     suspension: Vehicle | None = None
     incidents: tuple[LineIncident, ...] = ()
+    tensioner: Tensioner | None = None
+    warmer: float = 0.0
     goes_on: tuple[bool, bool] = (False, False)
 
     def target_height(self, wanted: Profile, x: np.ndarray) -> np.ndarray:

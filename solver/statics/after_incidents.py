@@ -74,7 +74,7 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
         else:
             shares[incident.wire] = incident.share
     after = replace(problem, line=problem.line.with_shares(shares))
-    model = build(after, mesh, first.dropper_lengths, broken)
+    model = build(after, mesh, first.dropper_lengths, broken, form)
     load, energy = np.zeros(model.n_dofs), 0.0
     for wire, now in zip(problem.line.wires, after.line.wires, strict=True):
         pairs = mesh.elements(wire.name)

@@ -8,7 +8,6 @@ a height that is given has its force as unknown. Any number of wires may hang be
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
@@ -19,33 +18,17 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Wire
 from catenary.solver.base.errors import InputError
+from catenary.solver.effects.all_effects import needs_form
 from catenary.solver.effects.build_model import build
 from catenary.solver.model import elements
 from catenary.solver.model.model import Model
+from catenary.solver.model.rest_shape import Equilibrium as Equilibrium
 from catenary.solver.problem.problem import Problem
 
 # Lengths are printed to the millimetre; the iteration contracts by the ratio of dropper weight
 # to tension sag, about 1e-3, so that this costs one more pass and leaves no trace in the forces.
 _LENGTH_TOLERANCE = 1e-10
 _MAX_PASSES = 30
-
-
-@dataclass(frozen=True)
-class Equilibrium:
-    """The line at rest.
-
-    Attributes
-    ----------
-    height : (n_nodes,) of every mesh node [m]
-    slope : (n_nodes,) dw/dx of the wires at every mesh node [-]
-    dropper_force : (n_droppers,) tension [N]
-    dropper_length : (n_droppers,) unstretched length, by which the dropper is cut [m]
-    """
-
-    height: np.ndarray
-    slope: np.ndarray
-    dropper_force: np.ndarray
-    dropper_length: np.ndarray
 
 
 def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
@@ -67,12 +50,19 @@ def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
         change = np.abs(geometric - length).max(initial=0.0)
         length = geometric
         if change < _LENGTH_TOLERANCE:
-            return model, form
+            return about(model, form), form
     raise InputError(
         f"the lengths of the droppers do not settle: they still change by {1e3 * change:.2g} mm "
         f"after {_MAX_PASSES} passes, as each stretches the line by its own weight; make "
         "line.dropper.mass_kg_per_m smaller, or the tensions greater"
     )
+
+
+def about(model: Model, form: Equilibrium) -> Model:
+    """The model with matrices about its shape at rest, if any effect's are. Not collective."""
+    if not needs_form(model.problem):
+        return model
+    return build(model.problem, model.mesh, model.dropper_lengths, form=form)
 
 
 class _HangingWires:

@@ -77,4 +77,4 @@ def line_at_rest_on_all(
         return rest.model.dropper_lengths, rest.form, rest.lift
 
     lengths, form, lift = on_root(comm, alone(work), takes_long=True)
-    return LineAtRest(problem, build(problem, mesh, lengths), form, lift)
+    return LineAtRest(problem, build(problem, mesh, lengths, form=form), form, lift)

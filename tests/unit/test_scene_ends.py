@@ -36,7 +36,7 @@ def test_a_line_may_go_on_where_no_dropper_breaks() -> None:
     ("assignments", "sentence"),
     [
         ([f"{END}.kind=dashpot"], "it must not be dashpot: matched dashpots sqrt.* 0.26 to 0.84"),
-        ([f"{END}.kind=tensioner"], "fixed is the end of a wire at its tensioner"),
+        ([f"{END}.kind=tensioner"], "kind says what becomes of vertical waves"),
         ([f"{END}.kind=free"], "it must be fixed, absorbing_layer or periodic"),
         ([f"{END}.kind=3"], "line.ends.end.kind"),
         ([f"{END}.spans=4"], "takes spans with kind absorbing_layer, not with fixed"),

@@ -19,6 +19,7 @@ from catenary.cases.scene.checks.effects import (
     check_requirements_of_chosen,
     check_requirements_of_defaults,
 )
+from catenary.cases.scene.checks.line.along import check_along
 from catenary.cases.scene.checks.line.droppers import (
     check_dropper_lengths,
     check_droppers_inside_spans,
@@ -88,6 +89,7 @@ def faults_of(scene: Scene) -> list[Fault]:
     if found.nothing_by(_running, scene, line) and found.nothing_by(_evaluation, scene):
         found.nothing_by(_raising, scene)
         found.nothing_by(check_ends, scene, line)
+        found.nothing_by(check_along, scene, line)
     if found.faults:
         return found.faults
     # What may need multibody systems stands last: other faults are reported at once.

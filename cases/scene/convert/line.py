@@ -184,4 +184,10 @@ def _stagger(table: LineTable) -> tuple[float, ...]:
 
 
 def _conductor(table: WireTable) -> Conductor:
-    return Conductor(table.tension_N, table.mass_kg_per_m, table.bending_stiffness_N_m2)
+    return Conductor(
+        table.tension_N,
+        table.mass_kg_per_m,
+        table.bending_stiffness_N_m2,
+        axial_stiffness=table.stiffness_along(),
+        expansion=table.expansion_per_K,
+    )

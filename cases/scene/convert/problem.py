@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from catenary.cases.scene.convert.aerodynamics import tunnels_of
+from catenary.cases.scene.convert.along import along_of
 from catenary.cases.scene.convert.contact import contact_law_of
 from catenary.cases.scene.convert.course import end_of
 from catenary.cases.scene.convert.ends import ends_of
@@ -60,6 +61,7 @@ def problem_of(scene: Scene) -> Problem:
         slack_dampers_act=hung is not None and hung.slack_damping == "kept",
         ends=ends_of(scene.line.ends),
         tunnels=tunnels_of(scene.line.tunnels),
+        along=along_of(scene.line),
     )
     return replace(problem, window=_window(scene.window, problem))
 

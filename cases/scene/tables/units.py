@@ -18,11 +18,15 @@ SUFFIXES: dict[str, str] = {
     "_km_h": "km/h",
     "_hz": "Hz",
     "_per_s": "1/s",
+    "_per_K": "1/K",
+    "_GPa": "GPa",
+    "_mm2": "mm2",
     "_mm": "mm",
     "_kg": "kg",
     "_m": "m",
     "_N": "N",
     "_s": "s",
+    "_K": "K",
 }
 
 
@@ -45,3 +49,13 @@ def angle_from_deg(angle: float) -> float:
 def length_from_mm(length: float) -> float:
     """Length [m] from ``length`` [mm]."""
     return length / 1000.0
+
+
+def area_from_mm2(area: float) -> float:
+    """Area [m2] from ``area`` [mm2]."""
+    return area * 1e-6
+
+
+def pressure_from_GPa(pressure: float) -> float:
+    """Pressure [N/m2] from ``pressure`` [GPa]."""
+    return pressure * 1e9

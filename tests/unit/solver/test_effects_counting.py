@@ -200,8 +200,9 @@ def test_no_effect_is_found_by_its_name() -> None:
 
 def test_the_table_names_every_shipped_effect() -> None:
     """A new effect must be counted here as well; what depends on the matrices of others stands in
-    `test_absorbing_layers.py` and `test_periodic_ends.py`."""
-    assert set(effects.registry()) == {"vertical", "absorbing_layers", "periodic_ends", *BLOCKS}
+    `test_absorbing_layers.py`, `test_periodic_ends.py` and `test_axial_counting.py`."""
+    elsewhere = {"absorbing_layers", "periodic_ends", "axial_motion", "tensioners"}
+    assert set(effects.registry()) == {"vertical", *elsewhere, *BLOCKS}
 
 
 @pytest.mark.parametrize("name", BLOCKS)

@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from catenary.cases.scene.tables.line.along import Along
 from catenary.cases.scene.tables.table import Table
 
 # Spans and largest damping of a layer: on the line of EN 50318 less damping lets waves through, and
@@ -15,8 +16,8 @@ USUAL_LAYER = {"spans": 20, "damping_per_s": 1.5}
 _NO_KIND = {
     "dashpot": "must not be dashpot: matched dashpots sqrt(T m) send back 0.26 to 0.84 of a wave "
     "where droppers join two wires; periodic and absorbing_layer take waves up",
-    "tensioner": "must not be tensioner: its weights move along the wire, of which the vertical "
-    "motion does not depend; fixed is the end of a wire at its tensioner",
+    "tensioner": "must not be tensioner: kind says what becomes of vertical waves; a wire that its "
+    'tensioner lets move has along = "tensioner" beside it',
 }
 
 
@@ -27,6 +28,11 @@ class EndTable(Table):
         "fixed",
         description="wires held in height; the same after spans whose damping grows towards the "
         "end and takes waves up; or a line that goes on for ever with spans like the last one",
+    )
+    along: Along = Field(
+        "fixed",
+        description="wires held along the track, or by a tensioner each; acts with "
+        "effects.axial_motion",
     )
     spans: int | None = Field(
         None, ge=1, le=1000, description="spans of an absorbing layer, 20 if not given"

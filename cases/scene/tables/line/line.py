@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
+from catenary.cases.scene.tables.line.along import Along, TensionerTable
 from catenary.cases.scene.tables.line.damping import DampingTable
 from catenary.cases.scene.tables.line.droppers import DropperTable
 from catenary.cases.scene.tables.line.ends import EndsTable
@@ -22,6 +23,7 @@ from catenary.cases.scene.tables.line.wires import (
 from catenary.cases.scene.tables.table import OneOrMore, Table
 from catenary.meshgen.topologies.all_topologies import registered
 
+MidPoint = Annotated[float, Field(gt=0, le=2e6)]
 Stagger = Annotated[float, Field(ge=-2, le=2)]
 
 
@@ -48,6 +50,10 @@ class OverlapTable(Table):
     )
     distance_m: float = Field(
         0.4, gt=0, le=2, description="distance of the wires of both sections from each other"
+    )
+    along: Along = Field(
+        "tensioner",
+        description="what wires end at inside the overlap; acts with effects.axial_motion",
     )
 
 
@@ -97,6 +103,14 @@ class LineTable(Table):
     ends: EndsTable = Field(default_factory=EndsTable, description="how the line ends")
     tunnels: list[TunnelTable] = Field(
         default_factory=list, max_length=1000, description="tunnels on the way, in ascending order"
+    )
+    tensioner: TensionerTable = Field(
+        default_factory=TensionerTable, description="tensioners at the ends of wires"
+    )
+    mid_points_m: list[MidPoint] = Field(
+        default_factory=list,
+        max_length=1000,
+        description="places of masts at which wires are held along the track",
     )
 
     @model_validator(mode="after")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from catenary.cases.scene.tables.line.droppers import AuxiliaryDropperTable
-from catenary.cases.scene.tables.table import Table
+from catenary.cases.scene.tables.table import TAKE_AWAY, Table
+from catenary.cases.scene.tables.units import area_from_mm2, pressure_from_GPa
+from catenary.meshgen.wires import EXPANSION_OF_COPPER
 
 
 class WireTable(Table):
@@ -16,6 +18,39 @@ class WireTable(Table):
     tension_N: float = Field(gt=0, le=1e6, description="tension")
     mass_kg_per_m: float = Field(gt=0, le=100, description="mass per length")
     bending_stiffness_N_m2: float = Field(ge=0, le=1e6, description="bending stiffness EI")
+    axial_stiffness_N: float | None = Field(
+        None, gt=0, le=1e10, description="axial stiffness EA; acts with effects.axial_motion"
+    )
+    section_mm2: float | None = Field(
+        None, gt=0, le=1e4, description="cross-section, in place of axial_stiffness_N"
+    )
+    youngs_modulus_GPa: float | None = Field(
+        None, gt=0, le=1000, description="Young's modulus, with section_mm2"
+    )
+    expansion_per_K: float = Field(
+        EXPANSION_OF_COPPER,
+        ge=0,
+        le=1e-3,
+        description="thermal expansion; acts with effects.temperature",
+    )
+
+    @model_validator(mode="after")
+    def _one_stiffness(self) -> Self:
+        if (self.section_mm2 is None) != (self.youngs_modulus_GPa is None):
+            raise ValueError(
+                "needs section_mm2 and youngs_modulus_GPa together, but only one is given"
+            )
+        if self.axial_stiffness_N is not None and self.section_mm2 is not None:
+            raise ValueError(
+                f"takes axial_stiffness_N or section_mm2, but both are given{TAKE_AWAY}"
+            )
+        return self
+
+    def stiffness_along(self) -> float | None:
+        """Axial stiffness EA [N], None where nothing says it."""
+        if self.section_mm2 is None or self.youngs_modulus_GPa is None:
+            return self.axial_stiffness_N
+        return area_from_mm2(self.section_mm2) * pressure_from_GPa(self.youngs_modulus_GPa)
 
 
 class AuxiliaryWireTable(WireTable):

@@ -1,0 +1,158 @@
+"""Whether a scene has what motion along the track needs, and wires are held somewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from catenary.cases.scene.convert.along import TENSIONER, along_of
+from catenary.cases.scene.input.faults import Fault
+from catenary.cases.scene.keys.error_sentences import refusal
+from catenary.cases.scene.tables.line.line import LineTable
+from catenary.cases.scene.tables.line.wires import WireTable
+from catenary.meshgen.topologies.all_topologies import make_line
+from catenary.meshgen.topologies.line_data import LineData
+
+if TYPE_CHECKING:
+    from catenary.cases.scene.scene import Scene
+
+_EFFECT = "axial_motion"
+_GRAVITY = 9.81
+# A place is at a mast if it is nearer than this [m].
+_AT_MAST = 1e-3
+# Weights fit a tension if they differ by a smaller share.
+_FITS = 1e-6
+
+
+def check_along(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Data that motion along the track lacks, and data that only it has a use for."""
+    on = scene.switches()[_EFFECT]
+    if not on and _EFFECT not in scene.effects:
+        for key, value in _data_of_effect(scene.line).items():
+            why = (
+                f"it acts only with effects.{_EFFECT} = true; write that, or false to leave it out"
+            )
+            yield refusal(scene.origin, key, value, why)
+    yield from _mid_points(scene, line)
+    yield from _weights(scene, line)
+    if on:
+        yield from _wires(scene)
+        yield from _arms(scene, line)
+        yield from _held(scene, line)
+        yield from _elsewhere(scene)
+
+
+def _data_of_effect(table: LineTable) -> dict[str, object]:
+    """Keys and values of a line that nothing but motion along the track reads."""
+    found: dict[str, object] = {}
+    for side, end in (("start", table.ends.start), ("end", table.ends.end)):
+        if end.along == TENSIONER:
+            found[f"line.ends.{side}.along"] = end.along
+    if table.mid_points_m:
+        found["line.mid_points_m"] = table.mid_points_m
+    return found
+
+
+def _wires(scene: Scene) -> Iterator[Fault]:
+    for name, field in LineTable.model_fields.items():
+        wire = getattr(scene.line, name)
+        if isinstance(wire, WireTable) and wire.stiffness_along() is None:
+            key = f"line.{name}"
+            yield Fault(
+                f"{key}.axial_stiffness_N",
+                f"effects.{_EFFECT} is on, but {key} ({field.description}) {scene.origin.of(key)} "
+                "has no axial stiffness; give it axial_stiffness_N, or section_mm2 and "
+                "youngs_modulus_GPa",
+            )
+
+
+def _arms(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Arms without a length, along which nothing could swing."""
+    if scene.line.steady_arm.length_m > 0:
+        return
+    made = make_line(line)
+    if any(made.wire(arms.wire).radial_force(np.array(arms.x)).any() for arms in made.steady_arms):
+        yield refusal(
+            scene.origin,
+            "line.steady_arm.length_m",
+            0.0,
+            f"effects.{_EFFECT} is on, and an arm that carries the radial force of "
+            "line.stagger_m swings about its hinge: it must be greater than 0",
+        )
+
+
+def _held(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Sections with a tensioner at both ends and nothing in between that holds their wires."""
+    along, masts, overlap = along_of(scene.line), line.support_positions, line.overlap
+    sections = [(0.0, float(masts[-1]), along.start, along.end, "line.ends.end.along")]
+    if overlap is not None:
+        first = float(masts[overlap.first])
+        last = float(masts[overlap.first + overlap.n_spans])
+        sections = [
+            (0.0, last, along.start, along.overlap, "line.overlap.along"),
+            (first, float(masts[-1]), along.overlap, along.end, "line.ends.end.along"),
+        ]
+    for start, end, *tensioned, key in sections:
+        if all(tensioned) and not any(start < x < end for x in along.mid_points):
+            yield refusal(
+                scene.origin,
+                str(key),
+                TENSIONER,
+                f"the wires from {start:g} to {end:g} m would have tensioners at both ends and "
+                "nothing to hold them in between: name a mast there in line.mid_points_m, or hold "
+                "one end (fixed)",
+            )
+
+
+def _mid_points(scene: Scene, line: LineData) -> Iterator[Fault]:
+    masts = line.support_positions[1:-1]
+    for i, x in enumerate(scene.line.mid_points_m):
+        if masts.size == 0 or np.abs(masts - x).min() > _AT_MAST:
+            near = f", such as {masts[np.abs(masts - x).argmin()]:g} m" if masts.size else ""
+            why = f"a mid-point anchor stands at a mast between two spans{near}"
+            yield refusal(scene.origin, f"line.mid_points_m.{i}", x, why)
+
+
+def _weights(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Weights of wires that are none, or whose wheel would turn at rest."""
+    tensioner = along_of(scene.line).tensioner
+    wires = {wire.name: wire for wire in make_line(line).wires}
+    for name, mass in tensioner.weights.items():
+        key = f"line.tensioner.weights_kg.{name}"
+        if name not in wires:
+            yield refusal(scene.origin, key, mass, f"the line has {', '.join(wires)}")
+            continue
+        tension = wires[name].tension
+        low, high = tensioner.band(name, wires[name], _GRAVITY)
+        if not low * (1 - _FITS) <= tension <= high * (1 + _FITS):
+            fits = tension / (tensioner.ratio * _GRAVITY)
+            yield refusal(
+                scene.origin,
+                key,
+                mass,
+                f"it would hold {low:g} to {high:g} N by line.tensioner.ratio and efficiency, but "
+                f"the wire has {tension:g} N, which {fits:.6g} kg hold",
+            )
+
+
+def _elsewhere(scene: Scene) -> Iterator[Fault]:
+    """What the motion along the track does not go with."""
+    for side, end in (("start", scene.line.ends.start), ("end", scene.line.ends.end)):
+        if end.kind == "periodic":
+            yield refusal(
+                scene.origin,
+                f"line.ends.{side}.kind",
+                "periodic",
+                f"with effects.{_EFFECT} a line ends fixed or in an absorbing_layer: waves along "
+                "the track would go on beyond the end for ever",
+            )
+    if scene.window.mode == "bounded" and scene.window.tolerance is None:
+        yield refusal(
+            scene.origin,
+            "window.mode",
+            "bounded",
+            f"with effects.{_EFFECT} waves along the track run far ahead of a window of some "
+            "spans; take exact, or off",
+        )

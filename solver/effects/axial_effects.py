@@ -1,0 +1,144 @@
+"""Effects along the track: stretch of wires, tensioners, temperature."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from catenary.meshgen.wires import End
+from catenary.solver.effects import vertical_effects  # noqa: F401  (built before)
+from catenary.solver.effects.effect import Effect, register
+from catenary.solver.model import axial_elements, wire_ends
+from catenary.solver.model.leaning_droppers import across_droppers
+from catenary.solver.model.links import PULLS, PUSHES, Direction, between_nodes, law
+from catenary.solver.model.model import Block
+from catenary.solver.model.stations import SAME_STATION
+from catenary.solver.problem.problem import Problem
+from catenary.solver.problem.simulated import Simulated
+
+if TYPE_CHECKING:
+    from catenary.solver.model.builder import ModelBuilder
+
+AXIAL = "axial_motion"
+# Components: tensioners in the damping, and their stops, of weights at their lowest and highest.
+TENSIONERS = "tensioners"
+_LOWEST, _HIGHEST = "tensioner_stops_down", "tensioner_stops_up"
+
+
+def _axial(builder: ModelBuilder) -> None:
+    for wire in builder.problem.line.wires:
+        _add_bars(builder, wire.name)
+    _add_pendulums(builder)
+    model, mesh = builder.model, builder.mesh
+    for number, clamps in enumerate(builder.problem.line.clamps):
+        pairs = mesh.clamps[builder.problem.line.clamp_group == number]
+        laws = law(mesh.x(pairs[:, 1]), clamps.stiffness)
+        builder.add_links(clamps.name, between_nodes(model, pairs, "u"), laws)
+    builder.hold(wire_ends.held_along(model), "u")
+
+
+def _add_bars(builder: ModelBuilder, name: str) -> None:
+    """Stiffness and mass of a wire along the track."""
+    model, data = builder.model, builder.problem.line.wire(name)
+    if data.axial_stiffness is None:
+        raise ValueError(f"{name} has no axial stiffness")
+    unknowns = axial_elements.unknowns_along(model, name)
+    rows = axial_elements.strain_rows(model, name)
+    alike, kind = np.unique(rows, axis=0, return_inverse=True)
+    length = 1.0 / alike[:, 1]
+    stiffness = (data.axial_stiffness * length)[:, None, None] * (
+        alike[:, :, None] * alike[:, None, :]
+    )
+    mass = np.zeros_like(stiffness)
+    mass[:, :2, :2] = axial_elements.bar_mass(length, data.mass_per_length)
+    builder.add_block(Block(name, unknowns, kind.ravel(), mass, stiffness))
+
+
+def _add_pendulums(builder: ModelBuilder) -> None:
+    """What hangs swings along the track: droppers by their force, arms by their radial force."""
+    model, mesh, line = builder.model, builder.mesh, builder.problem.line
+    unknowns, matrices = across_droppers(model)
+    for number, droppers in enumerate(line.droppers):
+        mine = mesh.dropper_group == number
+        kind = np.arange(np.count_nonzero(mine))
+        builder.add_block(Block(droppers.name, unknowns[mine], kind, None, matrices[mine]))
+    for number, arms in enumerate(line.steady_arms):
+        nodes = mesh.steady_arms[mesh.arm_group == number]
+        radial = np.abs(line.wire(arms.wire).radial_force(np.array(arms.x)))
+        if radial.any():
+            builder.add_springs(arms.name, nodes, "u", radial / arms.kind.length)
+
+
+def _tensioners(builder: ModelBuilder) -> None:
+    """Inertia of the weights and end stops, of those that turn."""
+    model, problem = builder.model, builder.problem
+    tensioner = model.simulated.tensioner
+    assert tensioner is not None
+    ends = wire_ends.tensioned_ends(model)
+    if not (tensioner.turns and ends):
+        return
+    nodes = np.array([end.node for end in ends])
+    inertia = [
+        tensioner.inertia(end.wire, problem.line.wire(end.wire), problem.gravity) for end in ends
+    ]
+    builder.add_masses(TENSIONERS, nodes, np.array(inertia), unknown="u")
+    if tensioner.travel is None:
+        return
+    # Stretch is how far an end is outwards: from there on weights sink no further.
+    sign = np.array([float(end.outwards) for end in ends])
+    moved = np.zeros(len(ends))
+    if model.form is not None and model.form.along.size:
+        moved = sign * model.form.along[nodes]
+    direction = Direction(model.dofs(nodes, "u")[:, None], sign[:, None])
+    for stop, acts, way in ((_LOWEST, PULLS, -moved), (_HIGHEST, PUSHES, moved)):
+        gap = np.maximum(tensioner.travel + way, 0.0)
+        laws = law(builder.mesh.x(nodes), tensioner.stop_stiffness, acts=acts, gap=gap)
+        builder.add_links(stop, direction, laws)
+
+
+def _with_tensioner(laws: Simulated, problem: Problem) -> Simulated:
+    return replace(laws, tensioner=problem.along.tensioner)
+
+
+def _has_tensioner(problem: Problem) -> bool:
+    along, masts = problem.along, problem.line.support_positions[[0, -1]]
+    inner = any(
+        abs(piece.x[end] - masts[end]) > SAME_STATION
+        for wire in problem.line.wires
+        for piece in wire.pieces
+        for end in (0, -1)
+        if piece.ends[end] is not End.CLAMPED
+    )
+    has_one = along.start or along.end or (along.overlap and inner)
+    return AXIAL in problem.effects and has_one
+
+
+register(
+    Effect(
+        AXIAL,
+        "motion of the wires along the track",
+        "places along the track, stretch of wires, droppers and arms that swing along the track",
+        "mean strain of a bar about its shape at rest (Washizu 1982)",
+        default=False,
+        unknowns_of_wire=lambda wire: ("u",),
+        applies=lambda p: all(wire.axial_stiffness is not None for wire in p.line.wires),
+        data="axial_stiffness_N, or section_mm2 and youngs_modulus_GPa, of every wire",
+        build=_axial,
+        of_form=True,
+    )
+)
+register(
+    Effect(
+        "tensioners",
+        "tensioners at the ends of wires",
+        "inertia of weights and stops at their ends of travel; line.tensioner",
+        "weights on a wheel with friction",
+        default=True,
+        applies=_has_tensioner,
+        data="line.ends or line.overlap with along = tensioner, and effects.axial_motion",
+        build=_tensioners,
+        law=_with_tensioner,
+    )
+)
