@@ -62,13 +62,14 @@ class LineBlock(NamedTuple):
     ----------
     time : (rows,) [s]
     position : (rows, n_pantographs) along the track [m], where the window is
-    values : name -> (rows, recorded columns)
+    values : name -> the first of the recorded columns that are given, and these (rows, columns);
+        all of them if there is no window
     extremes : name -> (2, all columns), smallest and largest of every step up to this flush
     """
 
     time: np.ndarray
     position: np.ndarray
-    values: Mapping[str, np.ndarray]
+    values: Mapping[str, tuple[int, np.ndarray]]
     extremes: Mapping[str, np.ndarray]
 
 
@@ -213,10 +214,10 @@ class ResultFile:
         for name, values in line.values.items():
             dataset = self._growing[f"line_channels/{name}"]
             if edges is None:
-                append_rows(dataset, start, values)
+                append_rows(dataset, start, values[1])
                 continue
             grow([dataset], start + line.time.size)
-            if values.size:
+            if values[1].size:
                 write_window(dataset, start, values, self._x[name], edges)
         append_rows(self._growing[LINE_TIME], start, line.time)
 

@@ -9,7 +9,7 @@ import numpy as np
 def write_window(
     dataset: h5py.Dataset,
     start: int,
-    values: np.ndarray,
+    values: tuple[int, np.ndarray],
     x: np.ndarray,
     edges: tuple[np.ndarray, np.ndarray],
 ) -> None:
@@ -19,13 +19,15 @@ def write_window(
 
     Parameters
     ----------
-    values : (rows, columns)
+    values : the first of the columns that are given, and these (rows, columns); they reach over
+        the window of each row
     x : (columns,) where the columns are [m]
     edges : from and to of the window at each row, (rows,) each [m]
     """
     rows, columns = dataset.chunks
     low, high = edges
-    end = start + values.shape[0]
+    given, numbers = values
+    end = start + numbers.shape[0]
     for first in range(start - start % rows, end, rows):
         part = slice(max(first, start), min(first + rows, end))
         own = slice(part.start - start, part.stop - start)
@@ -35,4 +37,8 @@ def write_window(
             at = x[across]
             inside = (at >= low[own, None]) & (at <= high[own, None])
             if inside.any():
-                dataset[part, across] = np.where(inside, values[own, across], np.nan)
+                kept = slice(max(across.start, given), min(across.stop, given + numbers.shape[1]))
+                shown = np.full(inside.shape, np.nan)
+                there = slice(kept.start - across.start, kept.stop - across.start)
+                shown[:, there] = numbers[own, kept.start - given : kept.stop - given]
+                dataset[part, across] = np.where(inside, shown, np.nan)

@@ -31,11 +31,15 @@ class Extremes:
         """Continue from what ``whole`` gave, (2, n_columns), on any ranks. Not collective."""
         self._kept[:] = whole[:, self._owned]
 
-    def take(self, rows: np.ndarray) -> None:
-        """Take in rows of the owned columns, (rows, n_owned). Not collective."""
+    def take(self, rows: np.ndarray, columns: slice) -> None:
+        """Take in rows of the owned columns, (rows, n_owned), as far as these have changed.
+
+        Not collective.
+        """
         if rows.shape[0]:
-            np.minimum(self._kept[0], rows.min(axis=0), out=self._kept[0])
-            np.maximum(self._kept[1], rows.max(axis=0), out=self._kept[1])
+            shown, kept = rows[:, columns], self._kept[:, columns]
+            np.minimum(kept[0], shown.min(axis=0), out=kept[0])
+            np.maximum(kept[1], shown.max(axis=0), out=kept[1])
 
     def whole(self) -> np.ndarray:
         """Smallest and largest value of all columns, (2, n_columns), on rank 0. Collective."""

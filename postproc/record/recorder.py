@@ -25,6 +25,8 @@ from catenary.solver.time_loop import channels
 from catenary.solver.time_loop.observers import Stage, StepView
 
 _NEVER = 2**62
+# Single steps of which the line's channels are taken in together.
+_WAITING = 16
 # What a run leaves that breaks before its first step.
 _NOTHING = "nothing was written, and results of an earlier run are as they were"
 
@@ -77,6 +79,10 @@ class Recorder:
         self._kept: dict[str, tuple[slice, np.ndarray]] = {}
         self._flushed_once = False
         self._extremes: dict[str, np.ndarray] = {}
+        # Where channels stand in a row, and rows that the line's channels wait in.
+        self._parts: dict[str, slice] = {}
+        self._waiting = np.zeros((0, 0))
+        self._n_waiting = self._n_taken = 0
         self._rows = 0
         self._first_step = 0
         self._energies: list[tuple[float, ...]] = []
@@ -95,7 +101,7 @@ class Recorder:
             On all ranks, if the file cannot be written.
         """
         rows = self._flush_every
-        self._last_time = stage.start_time
+        self._last_time, self._moving = stage.start_time, stage.moving
         self._line = LineGather(self._comm, stage, self._record, rows)
         self._time = np.zeros(rows)
         self._names = [channel.name for channel in channels.train_channels(stage.train)]
@@ -115,6 +121,7 @@ class Recorder:
         for part, kept in self._kept.values():
             kept[row] = view.row[part]
         self._rows = row + 1
+        self._take_line(view)
         self._view = view
         self._last_time = view.time
         if self._energy_every and view.step % self._energy_every == 0:
@@ -151,6 +158,8 @@ class Recorder:
         self._time[begin:end] = times
         for part, kept in self._kept.values():
             kept[begin:end] = rows[:, part]
+        self._take_waiting()
+        self._take(first_step, rows, all_move=False)
         self._last_time = float(times[-1])
 
     def finish(self, outcome: str) -> None:
@@ -177,20 +186,47 @@ class Recorder:
 
     def _flush(self, view: StepView | None) -> None:
         """Gather the buffers, append them, and store the state of ``view``. Collective."""
-        line = self._line(self._first_step, self._columns)
+        self._take_waiting()
+        line = self._line()
         state = view.checkpoint() if view is not None else None
         self._guarded(lambda: self._append(self._blocks(), self._block(line), state))
-        self._rows = 0
+        self._rows = self._n_taken = 0
         self._energies.clear()
         self._flushed_once = True
 
     def _make_room(self, columns: Mapping[str, slice]) -> None:
-        """Make a buffer for each channel, so that a flush copies nothing."""
-        for name, part in columns.items():
+        """Make a buffer for each channel of the train, so that a flush copies nothing."""
+        self._parts = dict(columns)
+        for name in self._names:
+            part = columns[name]
             self._kept[name] = part, np.empty((self._flush_every, part.stop - part.start))
+        width = max((part.stop for part in columns.values()), default=0)
+        self._waiting = np.empty((_WAITING, width))
+
+    def _take_line(self, view: StepView) -> None:
+        """Take in the line's channels of one step, a few together if all of the line moves."""
+        if not self._moving.are_all:
+            self._take_waiting()
+            self._take(view.step, view.row[None], all_move=False)
+            return
+        self._waiting[self._n_waiting] = view.row
+        self._n_waiting += 1
+        if self._n_waiting == _WAITING:
+            self._take_waiting()
+
+    def _take_waiting(self) -> None:
+        """Take in those that wait, which are the latest rows."""
+        n, self._n_waiting = self._n_waiting, 0
+        if n:
+            self._take(self._first_step + self._n_taken, self._waiting[:n], all_move=True)
+
+    def _take(self, first_step: int, rows: np.ndarray, *, all_move: bool) -> None:
+        by_name = {name: rows[:, part] for name, part in self._parts.items()}
+        self._line.take(first_step, by_name, all_move=all_move)
+        self._n_taken += len(rows)
 
     def _columns(self, name: str) -> np.ndarray:
-        """What is kept of a channel here, shape (rows, columns); the buffer itself."""
+        """What is kept of a channel of the train, shape (rows, columns); the buffer itself."""
         return self._kept[name][1][: self._rows]
 
     # ---- rank 0 ------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from catenary.solver.base.bound import bound
 from catenary.solver.contact.contact_kernels import Followed
 from catenary.solver.contact.line_response import Coupled
 from catenary.solver.integrators import state_kernels
@@ -41,6 +42,9 @@ class FollowedLinks:
         self.reserve = np.zeros(self.numbers.size)
         self.moving = np.array([0, self.numbers.size], dtype=np.int64)
         self._line = line
+        self._energy = bound(
+            state_kernels.energy_of_switching, later=(np.zeros(0), self.links, 0, 0)
+        )
         line.track_links(self.links, self.reserve)
 
     @property
@@ -65,13 +69,13 @@ class FollowedLinks:
         released = self.links.law["released"]
         return np.asarray(released * np.maximum(0.0, -self.find_reserve()))
 
-    def energy_of_switching(self, displacement: np.ndarray) -> float:
+    def energy_of_switching(self, displacement: np.ndarray, begin: int, end: int) -> float:
         """What elastic energy of the line lacks where owned links have switched, were they springs:
         slack droppers hold less than K makes of them, and closed stops more than nothing [J].
 
-        ``displacement`` (n_local,) of the line [m].
+        ``displacement`` (n_local,) of the line [m]; of the links from ``begin`` to ``end``.
         """
-        return float(state_kernels.energy_of_switching(displacement, self.links))
+        return float(self._energy(displacement, self.links, begin, end))
 
     def loads(self, compensation: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Local unknowns and forces of compensations (n,) [N] of all of them."""

@@ -119,11 +119,21 @@ def reserves(motion, links, result):
 
 
 @compiled
-def energy_of_switching(displacement, links):
-    """What elastic energy lacks where ``links`` have switched [J], were they springs."""
+def motion_within(motion, begin, end, displacement, velocity):
+    """Fill in displacements and velocities of the unknowns from ``begin`` to ``end``; ``motion`` as
+    ``LineState.read``."""
+    for i in range(begin, end):
+        displacement[i] = displacement_at(i, motion)
+        velocity[i] = velocity_at(i, motion)
+
+
+@compiled
+def energy_of_switching(displacement, links, begin, end):
+    """What elastic energy lacks where links from ``begin`` to ``end`` have switched [J], were they
+    springs."""
     energy = 0.0
     unknowns, weights, laws = links
-    for link in range(laws.size):
+    for link in range(begin, end):
         law, stretch = laws[link], 0.0
         for k in range(unknowns.shape[1]):
             stretch += weights[link, k] * displacement[unknowns[link, k]]

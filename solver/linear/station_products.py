@@ -160,14 +160,20 @@ class StationProduct:
     ) -> None:
         self.layout, self.places, self.kinds = layout, places, kinds
         self.blocks, self.first, self.n_kinds = blocks, first, n_kinds
-        vectors = np.zeros(0), np.zeros(0), np.zeros(0)
-        self._multiply = bound(multiply, layout, places, kinds, blocks, first, later=vectors)
+        later = 0, 0, np.zeros(0), np.zeros(0), np.zeros(0)
+        self._multiply = bound(multiply, layout, places, kinds, blocks, first, later=later)
 
     def multiply(
         self, factor: np.ndarray, result: np.ndarray, velocity: np.ndarray | None = None
     ) -> None:
         """Make ``result`` K ``factor``, less C ``velocity`` if the layout is damped."""
-        self._multiply(factor, factor if velocity is None else velocity, result)
+        velocity = factor if velocity is None else velocity
+        self._multiply(0, self.kinds.size, factor, velocity, result)
+
+    def multiply_rows(self, begin: int, end: int, factor: np.ndarray, result: np.ndarray) -> None:
+        """The rows from ``begin`` to ``end`` of that, where the layout is not damped; of others
+        ``result`` stays as it is."""
+        self._multiply(begin, end, factor, factor, result)
 
 
 def station_product(
@@ -257,12 +263,13 @@ put_row = by_make_up(_put_row)
 
 
 @compiled
-def multiply(layout, places, kinds, blocks, first, factor, velocity, result):
-    """``result`` = K ``factor``, less C ``velocity``; see ``StationProduct``."""
+def multiply(layout, places, kinds, blocks, first, begin, end, factor, velocity, result):
+    """Rows from ``begin`` to ``end`` of ``result`` = K ``factor``, less C ``velocity``; see
+    ``StationProduct``."""
     multiplied = borrowed((layout, places, kinds, blocks, first, factor, velocity))
     result = borrowed(result)
-    before, here = read_station(multiplied, -1), read_station(multiplied, 0)
-    for i in range(kinds.size):
+    before, here = read_station(multiplied, begin - 1), read_station(multiplied, begin)
+    for i in range(begin, end):
         after = read_station(multiplied, i + 1)
         positions, velocities = (before[0], here[0], after[0]), (before[1], here[1], after[1])
         make_up = make_up_of(layout, multiplied[1], first + i)

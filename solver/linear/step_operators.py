@@ -222,6 +222,15 @@ class LineOperators:
         self._products.multiply(name, self._loaded.array, self._loaded_here)
         return float(self._loaded.array[self.domain.owned] @ self.factor)
 
+    def by_rows(self) -> tuple[StationProduct, StationProduct, int] | None:
+        """Products with M and K by stations, of this rank alone, and how much longer than the
+        rank's unknowns what they read is at either end; None on several ranks, or if there are
+        none. Not collective."""
+        mass, stiffness = (self._products.by_stations(name) for name in ("mass", "stiffness"))
+        if self._comm.size > 1 or mass is None or stiffness is None:
+            return None
+        return mass, stiffness, self._pad
+
     def residual(self) -> float:
         """Relative residual of a solve with a load on every unknown. Collective.
 

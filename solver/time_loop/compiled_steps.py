@@ -22,7 +22,15 @@ from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.time_loop import step_kernels
 from catenary.solver.time_loop.observers import StepView
-from catenary.solver.time_loop.step_kernels import N_COUNTS, REPEATED, ROUNDS, SLACK, Steps
+from catenary.solver.time_loop.step_kernels import (
+    FULL,
+    N_COUNTS,
+    REPEATED,
+    ROUNDS,
+    SLACK,
+    KeptMotions,
+    Steps,
+)
 from catenary.solver.time_loop.step_views import Showing
 from catenary.solver.window.moving_columns import MovedStations
 
@@ -43,8 +51,8 @@ class CompiledSteps:
     most : steps of the largest block
     times : (most,) of the steps of the latest block [s]
     rows : (most, width) what each of them shows; empty if nobody looks
-    taken : steps of the latest block that were taken, fewer than asked for if one broke, or if
-        loads were not known for all of them
+    taken : steps of the latest block that were taken, fewer than asked for if one broke, if there
+        was no room for its motion, or if loads were not known for all of them
     most_motions : steps of a block of which the motion can be kept
 
     Parameters
@@ -62,18 +70,26 @@ class CompiledSteps:
         self.times = np.zeros(self.most)
         self._moved = MovedStations(len(self.rows), showing.shown.columns)
         self.taken = 0
-        n = scheme.interaction.line.ownership.n_local
-        self.most_motions = min(_MOST_MOTIONS, _MOTION_BYTES // (16 * n)) if shows else 0
-        self._motions = np.zeros((self.most_motions, 2, n))
+        n_numbers = 2 * scheme.interaction.line.ownership.n_local
+        most = _MOST_MOTIONS
+        if scheme.interaction.line.window is None:
+            most = min(most, _MOTION_BYTES // (8 * n_numbers))
+        self.most_motions = most if shows else 0
         # Where masses of the pantographs are, which is kept with a motion.
         self._place_arrays = scheme.pantographs.places()
-        addresses = [
+        taps = [
             address_of(array) + 8 * at for array in self._place_arrays for at in range(array.size)
         ]
-        self._place_taps = np.array(addresses, dtype=np.int64)
-        self._places = np.zeros((self.most_motions, len(addresses)))
-        # Of each step the number of the motion that keeps it, -1 if none does.
-        self._kept = np.full(self.most, -1)
+        room = min(n_numbers * self.most_motions, _MOTION_BYTES // 8)
+        self._kept = KeptMotions(
+            motion_of=np.full(self.most, -1),
+            numbers=np.zeros(room),
+            stations=np.zeros((self.most_motions, 3), dtype=np.int64),
+            used=np.zeros(1, dtype=np.int64),
+            moved=showing.motion.moved,
+            taps=np.array(taps, dtype=np.int64),
+            tapped=np.zeros((self.most_motions, len(taps))),
+        )
         pantographs, interaction = scheme.pantographs, scheme.interaction
         n = pantographs.n_contacts
         records, passes = pantographs.records(), interaction.line.passes
@@ -112,20 +128,28 @@ class CompiledSteps:
             n_steps = self._loads.cover(times)
             times = times[:n_steps]
         self._moved.begin(step)
-        self._kept[:n_steps] = -1
+        self._kept.motion_of[:n_steps] = -1
+        self._kept.used[0] = 0
         for number, at in enumerate(kept):
-            self._kept[at] = number
+            # The last step is shown as it is.
+            if at < n_steps - 1:
+                self._kept.motion_of[at] = number
         scheme.pantographs.fill_drives(times.tolist(), self._drives[:n_steps])
+        is_full = False
         while self.taken < n_steps:
             if self._take_on(n_steps):
                 time = float(times[self.taken])
                 scheme.finish(time, stop=False)
                 if self._shows:
                     number = step + self.taken + 1
-                    self.rows[self.taken] = self._showing.view(number, time).row
-                    self._keep_motion(int(self._kept[self.taken]))
+                    view = self._showing.view(number, time, followed=True)
+                    self.rows[self.taken] = view.row
+                    is_full = not self._keep_motion(int(self._kept.motion_of[self.taken]))
                 self.taken += 1
+            if is_full or self._counts[FULL]:
+                n_steps = self.taken
         self._moved.end(step + n_steps, n_steps)
+        self._showing.follow(self._moved.now)
 
     def last_view(self, step: int) -> StepView:
         """The state after the latest block, ``step`` being the number of its last step."""
@@ -141,15 +165,30 @@ class CompiledSteps:
         at : its index in the block
         number : of the kept motion
         """
-        motion = self._motions[number, 0], self._motions[number, 1]
-        places = self._places[number]
-        return self._showing.view_of(step, float(self.times[at]), self.rows[at], motion, places)
+        kept = self._kept
+        begin, end, first = kept.stations[number].tolist()
+        starts = self._showing.shown.columns.starts
+        last = first + 2 * int(starts[end] - starts[begin])
+        motion = (begin, end), kept.numbers[first:last]
+        time, row = float(self.times[at]), self.rows[at]
+        return self._showing.view_of_kept(step, time, row, motion, kept.tapped[number])
 
-    def _keep_motion(self, number: int) -> None:
-        if number >= 0:
-            line = self._scheme.interaction.line
-            self._motions[number] = line.displacement, line.velocity
-            self._places[number] = np.concatenate(self._place_arrays)
+    def _keep_motion(self, number: int) -> bool:
+        """Keep the motion of a step as that of a number, none if below 0; whether there is room."""
+        kept, motion = self._kept, self._showing.motion
+        if number < 0:
+            return True
+        columns, line = self._showing.shown.columns, self._scheme.interaction.line
+        own, first = slice(*columns.starts[kept.moved].tolist()), int(kept.used[0])
+        last = first + 2 * (own.stop - own.start)
+        if last > kept.numbers.size:
+            return False
+        kept.numbers[first:last] = np.append(line.displacement[own], line.velocity[own])
+        kept.stations[number] = *motion.moved, first
+        kept.used[0] = last
+        motion.moved[:] = columns.ends[:2]
+        kept.tapped[number] = np.concatenate(self._place_arrays)
+        return True
 
     def _take_on(self, n_steps: int) -> bool:
         """Go on with a block as far as the loop can; whether the scheme has to finish a step."""
@@ -203,9 +242,8 @@ class CompiledSteps:
             shown=self._showing.shown,
             taps=self._showing.layout.taps,
         )
-        kept = self._kept, self._motions, self._place_taps, self._places
         rows = self.rows, (self._moved.now, self._moved.behind)
-        return steps, self.times, self._drives, *rows, kept, self._counts, self._shows
+        return steps, self.times, self._drives, *rows, self._kept, self._counts, self._shows
 
 
 def compiled_steps(

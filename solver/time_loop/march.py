@@ -56,6 +56,7 @@ from catenary.solver.time_loop.observers import Observer
 from catenary.solver.time_loop.single_steps import single_steps_of
 from catenary.solver.time_loop.step_views import Showing
 from catenary.solver.time_loop.ts_stepper import Stepper
+from catenary.solver.window.moving_columns import MovingColumns
 
 
 @dataclass
@@ -120,10 +121,10 @@ class March:
         self.ownership = distribute(model, comm.size, comm.rank)
         self._wire = ContactWires(model, form, self.ownership)
         air_speed = problem.train.speed if model.simulated.meets_air else None
-        self._nominal_height = nominal_height_rule(self._wire, elasticity, air_speed)
-        self._pantographs = Pantographs(
-            comm, problem, model.simulated, self._wire, self._nominal_height
-        )
+        height = nominal_height_rule(self._wire, elasticity, air_speed)
+        self._nominal_height, effects = height, model.simulated
+        self._pantographs = Pantographs(comm, problem, effects, self._wire, height)
+        self._moving = MovingColumns()
         self._set_ups = SchemeFactory(comm, form, self.ownership, self._nominal_height)
         self._set_up(unchanged(model))
         self._set_off(model)
@@ -147,6 +148,7 @@ class March:
             parts.interaction,
             self._pantographs,
             self._scheme,
+            self._moving,
         )
 
     def _set_off(self, model: Model) -> None:

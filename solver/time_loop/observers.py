@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from catenary.solver.time_loop.channels import Train
+from catenary.solver.window.moving_columns import MovingColumns
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,7 @@ class Stage:
     node_points : (n_nodes, 3) static equilibrium shape of the line [m], z up
     owned_nodes : node numbers of what ``StepView.node_motion`` returns, one owner each
     unknowns : names of the unknowns that nodes have
+    moving : which columns of arms and droppers have changed since the rows that were shown before
     n_places : how many numbers say where each pantograph's masses or bodies are; on rank 0
     """
 
@@ -48,6 +50,7 @@ class Stage:
     n_places: tuple[int, ...] = ()
     joints_in_loop: bool = False
     n_wires: int = 1
+    moving: MovingColumns = field(default_factory=MovingColumns)
 
     @property
     def train(self) -> Train:

@@ -22,9 +22,35 @@ from catenary.solver.window.window_kernels import take_in
 
 # Numbers of ``counts``, named as in `schemes.Counters`.
 ROUNDS, SLACK, REPEATED = 0, 1, 2
-N_COUNTS = 3
+# Beside these whether the loop has ended as there is no room for a motion.
+FULL = 3
+N_COUNTS = 4
 # In place of a number of compensations: forces are left to others, or bounds were too small.
 LEFT, TOO_SMALL = -1, -2
+
+
+class KeptMotions(NamedTuple):
+    """What is kept of steps that the line goes on from, see ``ShownMotion``.
+
+    Attributes
+    ----------
+    motion_of : (n,) number of the motion that keeps a step, -1 if none does
+    numbers : (m,) room for displacements and velocities, one motion after another
+    stations : (k, 3) of each motion the stations that are kept, first and one after the last, and
+        where its numbers begin
+    used : (1,) how much of the room is
+    moved : ``ShownMotion.moved``
+    taps : (l,) addresses of numbers that are kept with a motion
+    tapped : (k, l) room for these
+    """
+
+    motion_of: np.ndarray
+    numbers: np.ndarray
+    stations: np.ndarray
+    used: np.ndarray
+    moved: np.ndarray
+    taps: np.ndarray
+    tapped: np.ndarray
 
 
 class Steps(NamedTuple):
@@ -123,21 +149,39 @@ def widen(bounds):
         bounds.force[i] *= 2.0
 
 
+@in_line
+def keep(kept, number, motion, columns):
+    """Keep the motion of a step as that of a number; whether there is room for it."""
+    begin, end = columns.starts[kept.moved[0]], columns.starts[kept.moved[1]]
+    size, at = end - begin, kept.used[0]
+    if at + 2 * size > kept.numbers.size:
+        return False
+    for i in range(size):
+        kept.numbers[at + i] = state_kernels.displacement_at(begin + i, motion)
+        kept.numbers[at + size + i] = state_kernels.velocity_at(begin + i, motion)
+    stations = kept.stations[number]
+    stations[0], stations[1], stations[2] = kept.moved[0], kept.moved[1], at
+    kept.used[0] = at + 2 * size
+    kept.moved[0], kept.moved[1] = columns.ends[0], columns.ends[1]
+    for j in range(kept.taps.size):
+        kept.tapped[number, j] = numbers_at(kept.taps[j], 1)[0]
+    return True
+
+
 @compiled
 def take(steps, times, drives, rows, moved, kept_motions, counts, shows, first, n_steps):
     """Take the steps from ``first`` on of ``n_steps`` to ``times`` [s], with ``drives`` of heads.
 
     If ``shows``, ``rows`` take what each shows; ``moved`` are ``now`` and ``behind`` of
-    ``MovedStations``, beside which a row is up to date. ``kept_motions`` holds of each the number
-    of the motion that keeps it, -1 if none does, and the motions (m, 2, n_local); then addresses
-    (k,) of numbers that are kept with a motion, and room for them (m, k).
+    ``MovedStations``, beside which a row is up to date. ``kept_motions`` are ``KeptMotions``; where
+    there is no room for one, its step is the last.
 
     Returns how many were taken, and whether the next one is begun: up to its free step, as its
     forces are left to others.
     """
     steps, times, drives, rows, kept_motions = borrowed((steps, times, drives, rows, kept_motions))
     now, behind = borrowed(moved)
-    motion_of, motions, kept_taps, kept_numbers = kept_motions
+    kept = kept_motions
     (start, places), speed, loading = steps.moving, steps.speed, steps.loading
     records, heads, taps, shown = steps.records, steps.heads, steps.taps, steps.shown
     problem, law, switched, outputs = steps.problem, steps.law, steps.switched, steps.outputs
@@ -159,6 +203,7 @@ def take(steps, times, drives, rows, moved, kept_motions, counts, shows, first, 
             call_held(loading)
         call_held(free)
         take_in(now, shown.columns.ends)
+        take_in(kept.moved, shown.columns.ends)
         within = True
         for h in range(records.size):
             within &= head_records.predict(records[h], drives[i, h], heads, n)
@@ -187,10 +232,7 @@ def take(steps, times, drives, rows, moved, kept_motions, counts, shows, first, 
             state_kernels.show(shown, uplift, tension, begin, end)
             for j in range(taps.size):
                 row[n_shown + j] = numbers_at(taps[j], 1)[0]
-            number = motion_of[i]
-            if number >= 0:
-                state_kernels.displacements(motion, motions[number, 0])
-                state_kernels.velocities(motion, motions[number, 1])
-                for j in range(kept_taps.size):
-                    kept_numbers[number, j] = numbers_at(kept_taps[j], 1)[0]
+            if kept.motion_of[i] >= 0 and not keep(kept, kept.motion_of[i], motion, shown.columns):
+                counts[FULL] = 1
+                return i + 1 - first, False
     return n_steps - first, False

@@ -21,13 +21,17 @@ from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.after_incidents import ChangedLine
 from catenary.solver.statics.equilibrium import Equilibrium
 from catenary.solver.time_loop.channels import Energies, Sources, energies_of
+from catenary.solver.time_loop.line_energy import LineEnergy
 from catenary.solver.time_loop.observers import Stage, StepView
 from catenary.solver.time_loop.row_layout import RowLayout
-from catenary.solver.window.moving_columns import columns_of
+from catenary.solver.time_loop.shown_motion import ShownMotion
+from catenary.solver.window.moving_columns import MovingColumns, columns_of
 
 # What every state of a line has, and what is kept of the pantographs beside their own states.
 _MOTION = ("displacement", "velocity", "acceleration")
 _OF_PANTOGRAPHS = ("contact_force", "head_height", "wire_height", "strip_force")
+# Channels of the first tables of ``Shown.columns``.
+_OF_COLUMNS = ("arm_uplift", "dropper_force")
 _ON_WIRES = "contact_wire_force"
 
 
@@ -38,11 +42,13 @@ class Showing:
     ----------
     comm : mpi4py communicator
     line, form : the line as it is now, and its first rest, from which displacements count
+    moving : kept up to date for those who watch
 
     Attributes
     ----------
     shown : first argument of ``state_kernels.show``
     layout : of a row of a view
+    motion : ShownMotion
     """
 
     def __init__(
@@ -53,8 +59,9 @@ class Showing:
         interaction: ForcesOnLine,
         pantographs: Pantographs,
         scheme: Scheme,
+        moving: MovingColumns,
     ) -> None:
-        self._comm = comm
+        self._comm, self._moving = comm, moving
         model = line.model
         self._model = model
         self._changed = line
@@ -78,14 +85,15 @@ class Showing:
         others, other_force, by_name = _further_links(interaction.links)
         self._sources = Sources(pantographs, interaction, scheme, uplift, tension, by_name)
         self.layout = RowLayout(self._sources, self._shown)
-        self._kept_motion: tuple[np.ndarray, np.ndarray] | None = None
+        self._is_kept = False
+        self._rows_of_unknown: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self._kept_places = np.zeros(0)
         self._view = StepView(
             step=0,
             time=0.0,
             row=np.zeros(self.layout.width),
             columns=self.layout.columns,
-            node_uplift=lambda: self._displacement()[self._node_rows],
+            node_uplift=lambda: self.motion.displacement[self._node_rows],
             node_motion=self._node_motion,
             wire_tension=lambda: self._tension,
             pantograph_places=self._pantograph_places,
@@ -106,7 +114,12 @@ class Showing:
                 None if self._line.window is None else self._line.window.stations,
             ),
         )
-        n = self.shown.columns.n_stations
+        stepped = slice(self._line.ownership.first, self._line.ownership.last)
+        load = line.load[stepped] if self._unbalanced else np.zeros(0)
+        columns = self.shown.columns
+        self._energy = LineEnergy(self._line, interaction.links, load, columns)
+        self.motion = ShownMotion(self._line, columns, self._energy.pad)
+        n = columns.n_stations
         self._show = bound(state_kernels.show, self.shown, uplift, tension, 0, n)
 
     def stage(self, dt: float, start_time: float, n_steps: int) -> Stage:
@@ -130,11 +143,18 @@ class Showing:
             n_places=tuple(places.size for places in self._pantographs.places()),
             joints_in_loop=self._pantographs.joints_in_loop,
             n_wires=self._pantographs.n_wires,
+            moving=self._moving,
         )
 
-    def view(self, step: int, time: float) -> StepView:
-        """The state after a step; the same object each time."""
-        view, outputs, self._kept_motion = self._view, self._pantographs.outputs, None
+    def view(self, step: int, time: float, *, followed: bool = False) -> StepView:
+        """The state after a step; the same object each time.
+
+        ``followed`` says whether a compiled loop has noted which stations moved up to it.
+        """
+        view, outputs, self._is_kept = self._view, self._pantographs.outputs, False
+        self.motion.late(followed=followed)
+        if not followed:
+            self._moving.all_move()
         view.step, view.time = step, time
         self._shown[: outputs.size] = outputs
         self._show()
@@ -142,21 +162,33 @@ class Showing:
         self.layout.fill(view.row)
         return view
 
-    def view_of(
+    def follow(self, stations: np.ndarray) -> None:
+        """Say that only ``stations`` (2,), from and to, have moved since the latest rows."""
+        if self._line.window is not None:
+            self._moving.follow(self.shown.columns, _OF_COLUMNS, stations)
+
+    def view_of(self, step: int, time: float, row: np.ndarray) -> StepView:
+        """The state after a step that a compiled loop has shown as ``row`` of a view, its latest
+        one."""
+        self.motion.late(followed=True)
+        return self._viewed(step, time, row, is_kept=False)
+
+    def view_of_kept(
         self,
         step: int,
         time: float,
         row: np.ndarray,
-        motion: tuple[np.ndarray, np.ndarray] | None = None,
-        places: np.ndarray | None = None,
+        motion: tuple[tuple[int, int], np.ndarray],
+        places: np.ndarray,
     ) -> StepView:
-        """The state after a step that a compiled loop has shown as ``row`` of a view.
+        """The same of a step before it, with what is left of its ``motion``, see
+        ``ShownMotion.show``, and with ``places`` of the pantographs."""
+        self.motion.show(*motion)
+        self._kept_places = places
+        return self._viewed(step, time, row, is_kept=True)
 
-        If it was not the latest one, ``motion`` is what is left of it: displacement and velocity,
-        and ``places`` those of the pantographs.
-        """
-        view, self._kept_motion = self._view, motion
-        self._kept_places = np.zeros(0) if places is None else places
+    def _viewed(self, step: int, time: float, row: np.ndarray, *, is_kept: bool) -> StepView:
+        view, self._is_kept = self._view, is_kept
         view.step, view.time = step, time
         view.row[:] = row
         self._shown[:] = row[: self._shown.size]
@@ -216,24 +248,24 @@ class Showing:
         for i, pantograph in enumerate(self._pantographs.models):
             _like(checkpoint, f"pantograph_{i}", pantograph.state())
 
-    def _displacement(self) -> np.ndarray:
-        """That of the rank's unknowns after the step that is shown."""
-        kept = self._kept_motion
-        return self._line.displacement if kept is None else kept[0]
-
     def _node_motion(self, name: str, rate: bool) -> np.ndarray:
         """One unknown of the rank's nodes, or its rate, zero for nodes without it."""
-        kept, line = self._kept_motion, self._line
-        if kept is None:
-            kept = line.displacement, line.velocity
-        numbering = self._model.numbering
-        numbers = numbering.numbers[self._owned_nodes, numbering.names.index(name)]
-        own = numbers - line.ownership.first
-        return np.where(numbers >= 0, kept[rate][own], 0.0)
+        if name not in self._rows_of_unknown:
+            numbering = self._model.numbering
+            numbers = numbering.numbers[self._owned_nodes, numbering.names.index(name)]
+            there = np.flatnonzero(numbers >= 0)
+            self._rows_of_unknown[name] = there, numbers[there] - self._line.ownership.first
+        there, own = self._rows_of_unknown[name]
+        motion = self.motion.velocity if rate else self.motion.displacement
+        if there.size == self._owned_nodes.size:
+            return np.take(motion, own)
+        result = np.zeros(self._owned_nodes.size)
+        result[there] = motion[own]
+        return result
 
     def _pantograph_places(self) -> np.ndarray:
         """Heights of the bases, then places of masses and bodies, on rank 0."""
-        now = self._pantographs.places() if self._kept_motion is None else [self._kept_places]
+        now = [self._kept_places] if self._is_kept else self._pantographs.places()
         return np.concatenate([self._pantographs.bases(self._view.time), *now])
 
     @cached_property
@@ -250,7 +282,7 @@ class Showing:
         return self._line.state()
 
     def _refuse_kept_motion(self) -> None:
-        if self._kept_motion is not None:
+        if self._is_kept:
             raise RuntimeError("of this step only the motion was kept, see `MotionObserver`")
 
     def _energies(self) -> tuple[float, ...]:
@@ -262,13 +294,7 @@ class Showing:
 
         Collective. After an incident it is that of what is left of the line; see `after_incidents`.
         """
-        displacement, kept = self._displacement(), self._kept_motion
-        velocity = self._line.velocity if kept is None else kept[1]
-        parts = self._line.energy_parts(displacement, velocity)
-        if self._unbalanced:
-            load = self._changed.load[self._line.ownership.first : self._line.ownership.last]
-            parts[1] -= load @ displacement
-        parts[1] += self._interaction.links.energy_of_switching(displacement)
+        parts = self._energy.parts(self.motion)
         kinetic, elastic = total(self._comm, parts).tolist()
         return kinetic, elastic + self._changed.energy if self._unbalanced else elastic
 

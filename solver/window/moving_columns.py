@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+_ALL = slice(None)
+
 
 class Columns(NamedTuple):
     """Columns of several tables by the stations that they follow from, as kernels take them.
@@ -50,6 +52,47 @@ def columns_of(
     first = np.minimum.accumulate(first[::-1], axis=0)[::-1]
     last = np.maximum.accumulate(last, axis=0)
     return Columns(ends, starts.astype(np.int64), np.ascontiguousarray(first), last)
+
+
+def widen(stations: np.ndarray, begin: int, end: int) -> None:
+    """Let a range (2,) of stations take in those from ``begin`` to ``end``."""
+    stations[0] = min(int(stations[0]), begin)
+    stations[1] = max(int(stations[1]), end)
+
+
+class MovingColumns:
+    """Which columns of what steps show have changed since the rows shown before them.
+
+    Those who step the line keep it up to date. Not collective.
+    """
+
+    def __init__(self) -> None:
+        self._columns: dict[str, slice] = {}
+
+    def all_move(self) -> None:
+        """Say that any column may have changed."""
+        self._columns.clear()
+
+    def follow(self, columns: Columns, names: Sequence[str], stations: np.ndarray) -> None:
+        """Say that only ``stations`` (2,), from and to, have moved.
+
+        Parameters
+        ----------
+        names : of the first tables of ``columns``
+        """
+        begin, end = stations.tolist()
+        firsts, lasts = columns.first[begin].tolist(), columns.last[end].tolist()
+        for name, first, last in zip(names, firsts, lasts, strict=False):
+            self._columns[name] = slice(first, max(first, last))
+
+    def columns(self, name: str) -> slice:
+        """Columns of a channel that may have changed."""
+        return self._columns.get(name, _ALL)
+
+    @property
+    def are_all(self) -> bool:
+        """Whether any may have."""
+        return not self._columns
 
 
 class MovedStations:

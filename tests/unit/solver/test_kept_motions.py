@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,11 @@ from catenary.meshgen.mesh import MESSENGER_WIRE
 from catenary.solver.contact_problem import complementarity
 from catenary.solver.problem.incidents import TensionLoss
 from catenary.solver.problem.problem import Problem
-from catenary.solver.time_loop import compiled_steps
+from catenary.solver.problem.window import BOUNDED, EXACT, WindowChoice
+from catenary.solver.time_loop import compiled_steps, line_energy, step_views
 from catenary.solver.time_loop import march as time_loop
 from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.shown_motion import ShownMotion
 
 N_STEPS, EVERY = 250, 7
 
@@ -72,9 +75,9 @@ def problem(effects: frozenset[str] = frozenset(), **changes: Any) -> Problem:
     )
 
 
-def watched(scene: Problem, *others: Any) -> Looking:
+def watched(scene: Problem, *others: Any, elements: int = 3) -> Looking:
     looking = Looking()
-    march, _ = start_march(scene, mesh_of(scene.line, 3))
+    march, _ = start_march(scene, mesh_of(scene.line, elements))
     with march:
         march.run([looking, *others])
     assert len(looking.rows) == N_STEPS + 1
@@ -110,6 +113,42 @@ def test_kept_motions_are_those_of_single_steps(
     assert np.array_equal(found.places, expected.places)
     assert (np.ptp(found.places, axis=0)[1:] > 1e-4).all(), "all masses move"
     assert np.ptp([kinetic for kinetic, _ in found.energies]) > 0.0
+
+
+@pytest.mark.parametrize(
+    "window",
+    [WindowChoice(BOUNDED, None, 2.0, 2.0), WindowChoice(EXACT, None)],
+    ids=["spans", "exact"],
+)
+@pytest.mark.parametrize("way", ["loop", "left to the scheme", "no room", "one at a time"])
+def test_motions_of_a_window_are_those_of_the_whole_line(
+    window: WindowChoice, way: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Single steps look at all stations. Energies are summed in parts of a few stations."""
+    run = train(75.0, 330.0, 330.0 + N_STEPS * 0.075, raise_time=0.0)
+    scene = replace(problem_of(ac_simple_line(12), WHOLE, train=run), window=window)
+    monkeypatch.setattr(line_energy, "_STATIONS", 16)
+    monkeypatch.setattr(line_energy, "_LINKS", 4)
+    with monkeypatch.context() as patch:
+        patch.setattr(time_loop, "compiled_steps", lambda *arguments: None)
+        patch.setattr(step_views.ShownMotion, "take_changes", whole_line)
+        expected = watched(scene, elements=2)
+    if way == "left to the scheme":
+        monkeypatch.setattr(complementarity, "_MAX_ROUNDS", 0)
+    elif way == "no room":
+        monkeypatch.setattr(compiled_steps, "_MOTION_BYTES", 30_000)
+    elif way == "one at a time":
+        monkeypatch.setattr(compiled_steps, "_MOST_MOTIONS", 1)
+    found = watched(scene, elements=2)
+    assert np.array_equal(found.rows, expected.rows, equal_nan=True)
+    assert np.array_equal(found.motion, expected.motion)
+    np.testing.assert_allclose(found.energies, expected.energies, rtol=1e-12, atol=1e-12)
+    assert np.ptp([kinetic for kinetic, _ in found.energies]) > 0.0
+
+
+def whole_line(motion: ShownMotion) -> tuple[int, int]:
+    """In place of ``ShownMotion.take_changes``: all of it."""
+    return 0, motion._columns.n_stations  # noqa: SLF001
 
 
 def test_those_who_need_rows_alone_get_each_once() -> None:
