@@ -1,4 +1,4 @@
-"""The verbs ``plan``, ``check``, ``mesh`` and ``static``: a scene's line, before any run."""
+"""The verbs ``check``, ``mesh`` and ``static``: a scene's line, before any run."""
 
 from __future__ import annotations
 
@@ -10,26 +10,6 @@ import typer
 from catenary.cases.cli.app import Assignments, Case, Force, MoreAssignments, Shortened, app, load
 from catenary.cases.terminal import console
 from catenary.postproc.evaluate.wording import counted
-
-
-@app.command(
-    "plan",
-    help="Print what a case simulates and what not, and what it will cost.",
-    epilog="Example: catenary plan ac_simple --set train.speed_km_h=320",
-)
-@console.guarded
-@console.serial
-def plan(
-    case: Case,
-    extras: MoreAssignments = None,
-    assignments: Assignments = None,
-    shortened: Shortened = False,
-) -> None:
-    """Serial."""
-    scene = load(case, assignments, extras, shortened)
-    from catenary.cases.run.plan import make_plan, plan_text
-
-    console.say(plan_text(make_plan(scene)))
 
 
 @app.command(

@@ -12,7 +12,7 @@ import typer
 
 # Each of these files adds its verbs to the application, in this order of --help.
 # isort: off
-from catenary.cases.cli import run, line, results  # noqa: F401
+from catenary.cases.cli import run, plan, line, results  # noqa: F401
 from catenary.cases.cli import sweep, accuracy, hard, pantograph, stability, waves, lists  # noqa: F401
 
 # isort: on

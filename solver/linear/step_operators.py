@@ -138,6 +138,15 @@ class LineOperators:
         rates = self._rate_padded if damped else read
         return ByStations(product, solver.factors, read, rates, self._solution.array)
 
+    @property
+    def station_widths(self) -> tuple[int, ...]:
+        """Unknowns of a whole cross-section in each plane that no matrix joins to others.
+
+        Of all in one where stations have no kernels of their own.
+        """
+        layout = self._products.layout
+        return (self._model.numbering.width,) if layout is None else layout.widths
+
     def why_not_by_stations(self) -> str:
         """Why ``by_stations`` is None on some rank, the same on all. Collective."""
         reasons = {

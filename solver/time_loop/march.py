@@ -36,7 +36,7 @@ from catenary.solver.linear.petsc_solvers import (
 )
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
-from catenary.solver.problem.incidents import Happened, in_steps
+from catenary.solver.problem.incidents import Happened, LineIncident, in_steps
 from catenary.solver.problem.problem import Problem, steps_of
 from catenary.solver.schemes.adaptive_steps import StepLevels
 from catenary.solver.schemes.make_scheme import Parts, SchemeFactory
@@ -130,6 +130,7 @@ class March:
         self._set_off(model)
         give_back()
         self._first_step = 0
+        self._happened: tuple[LineIncident, ...] = ()
         self._ahead = self._happening()
         if self.detour is not None and comm.rank == 0:
             tell(self.detour)
@@ -206,6 +207,12 @@ class March:
         finally:
             scheme.destroy()
             line.destroy()
+        self._happened = happened.incidents
+
+    @property
+    def station_widths(self) -> tuple[int, ...]:
+        """Unknowns of a whole cross-section in each plane, planes that no matrix joins apart."""
+        return self._line.operators.station_widths
 
     @property
     def detour(self) -> Detour | None:
@@ -222,7 +229,7 @@ class March:
     def restore(self, checkpoint: dict[str, Any]) -> None:
         """Continue from what ``StepView.checkpoint`` gave, on any number of ranks.
 
-        Collective; every rank passes the same checkpoint.
+        Collective; every rank passes the same checkpoint. A march may go back to an earlier one.
 
         Raises
         ------
@@ -235,11 +242,14 @@ class March:
                 f"the state to continue from is of step {self._first_step}, and the run has "
                 f"{self.n_steps}; start the run anew"
             )
-        past = [happened for happened in self._ahead if happened.step < self._first_step]
-        if past:
+        happening = self._happening()
+        past = [happened for happened in happening if happened.step < self._first_step]
+        incidents = past[-1].incidents if past else ()
+        if incidents != self._happened:
             self.destroy()
-            self._set_up(changed_line(self._first, self._form, past[-1].incidents))
-            self._ahead = self._ahead[len(past) :]
+            changed = changed_line(self._first, self._form, incidents)
+            self._set_up(changed if incidents else unchanged(self._first))
+        self._happened, self._ahead = incidents, happening[len(past) :]
         self._pantographs.move_to(self._first_step * self._problem.numerics.dt)
         self._showing.restore(checkpoint)
 

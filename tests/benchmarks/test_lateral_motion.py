@@ -16,14 +16,13 @@ from step_cost import room
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
+from catenary.cases.studies.choice.turns import RepeatedMarch, in_turns
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.links import Direction, law
 from catenary.solver.model.loads import FieldLoad, FunctionLoad, ShapeLoad, along, harmonics
 from catenary.solver.statics.line_at_rest import line_at_rest
-from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
 
 PLANE = ("v", "theta_z")
 WIND = 8.0  # [N/m]
@@ -83,52 +82,23 @@ def couple(builder: ModelBuilder) -> None:
     builder.add_links("inclined", Direction(unknowns, weights), laws)
 
 
-class Timed:
-    """A march that starts again and again from its first state."""
-
-    def __init__(self, n_spans: int, name: str) -> None:
-        scene = load_scene("ambrosio2012", [f"line.n_spans={n_spans}", *room(n_spans)])
-        problem = problem_of(scene)
-        train = problem.train
-        way = (LINES[n_spans][0] + 0.5) * problem.numerics.dt * train.speed
-        effects = problem.effects if name == "vertical" else problem.effects | {"lateral"}
-        problem = replace(problem, effects=effects, train=replace(train, end=train.start + way))
-        effect = Effect(
-            "lateral", name, "unknowns and wires", "benchmark", False,
-            unknowns_of_wire=lambda wire: PLANE, build=build_of(name),
-        )  # fmt: skip
-        with registered(effect):
-            self._march = March(MPI.COMM_SELF, *line_at_rest(problem, mesh_of(scene)))
-        self._march.run([self])
-
-    def start(self, stage: Stage) -> None:
-        """An observer of the first run, for the state that it starts from."""
-
-    def observe(self, view: StepView) -> None:
-        if view.step == 0:
-            self._first = view.checkpoint()
-
-    def finish(self, outcome: str) -> None:
-        assert outcome == "done"
-
-    def step_cost(self) -> float:
-        """Time of a step of one more march [us]."""
-        assert self._first is not None
-        self._march.restore(self._first)
-        outcome = self._march.run([])
-        return 1e6 * outcome.wall / outcome.n_steps
-
-    def destroy(self) -> None:
-        self._march.destroy()
+def march_of(n_spans: int, name: str) -> RepeatedMarch:
+    scene = load_scene("ambrosio2012", [f"line.n_spans={n_spans}", *room(n_spans)])
+    problem = problem_of(scene)
+    effects = problem.effects if name == "vertical" else problem.effects | {"lateral"}
+    effect = Effect(
+        "lateral", name, "unknowns and wires", "benchmark", False,
+        unknowns_of_wire=lambda wire: PLANE, build=build_of(name),
+    )  # fmt: skip
+    with registered(effect):
+        at_rest = line_at_rest(replace(problem, effects=effects), mesh_of(scene))
+        return RepeatedMarch(MPI.COMM_SELF, at_rest, n_steps=LINES[n_spans][0])
 
 
 @pytest.mark.parametrize("n_spans", LINES)
 def test_lateral_motion_costs_what_its_unknowns_cost(n_spans: int) -> None:
-    marches = {name: Timed(n_spans, name) for name in ("vertical", *BUILDS)}
-    least = dict.fromkeys(marches, np.inf)
-    for _ in range(LINES[n_spans][1]):
-        for name, march in marches.items():
-            least[name] = min(least[name], march.step_cost())
+    marches = {name: march_of(n_spans, name) for name in ("vertical", *BUILDS)}
+    least = in_turns(marches, LINES[n_spans][1])
     print(f"\n{n_spans} spans{'':22}{'us a step':>10}{'x vertical':>12}{'at most':>9}")
     for name, value in least.items():
         at_most = f"{MOST[name]:9.2f}" if name in MOST else ""

@@ -51,7 +51,8 @@ ROOMS = {
         "scene.cost_model", "scene.checks", "scene.load", "terminal", "process",
         "result_folder", "run",
         "studies.sweep", "studies.pantograph", "studies.accuracy", "studies.hard",
-        "studies.stability", "studies.waves", "studies.case_study", "ambrosio2012", "cli",
+        "studies.stability", "studies.choice", "studies.waves", "studies.case_study",
+        "ambrosio2012", "cli",
     ),
 }  # fmt: skip
 FILES = sorted(path for part in PARTS for path in (ROOT / part).rglob("*.py"))

@@ -284,7 +284,7 @@ def advice(
     )
 
 
-def parse_target(text: str) -> float:
+def parse_target(text: str, option: str = "--target") -> float:
     """Percent of ``1%`` or ``1``.
 
     Raises
@@ -297,5 +297,5 @@ def parse_target(text: str) -> float:
     except ValueError:
         value = math.nan
     if not 0.0 < value <= 100.0:
-        raise InputError(f"--target {text} must be a percentage above 0 and up to 100, e.g. 1%")
+        raise InputError(f"{option} {text} must be a percentage above 0 and up to 100, e.g. 1%")
     return value

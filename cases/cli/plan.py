@@ -1,0 +1,176 @@
+"""The verb ``plan``: what a scene simulates, what that costs, and what each effect is worth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from catenary.cases.cli.app import (
+    Assignments,
+    Case,
+    Force,
+    MoreAssignments,
+    Shortened,
+    app,
+    folder_option,
+    load,
+)
+from catenary.cases.terminal import console
+from catenary.solver.base.errors import InputError
+
+if TYPE_CHECKING:
+    from catenary.cases.studies.choice.study import Costs, Wish
+
+_RUNS = "runs"
+_MOST_ROUNDS = 1000
+
+
+@app.command(
+    "plan",
+    help="Print what a case simulates and what not, and what it will cost. With --cost, run it "
+    "with each effect the other way, and print what a step then takes and what changes.",
+    epilog="Example: catenary plan ac_simple --set train.speed_km_h=320; "
+    "catenary plan ambrosio2012 --cost --stretch-m 100 -o results/cost",
+)
+@console.guarded
+@console.serial
+def plan(
+    case: Case,
+    extras: MoreAssignments = None,
+    assignments: Assignments = None,
+    shortened: Shortened = False,
+    cost: Annotated[
+        bool,
+        typer.Option(
+            "--cost", help="Measure what each effect costs and changes, on one rank; a minute."
+        ),
+    ] = False,
+    only: Annotated[
+        str | None,
+        typer.Option("--only", metavar="EFFECT,...", help="With --cost: these effects alone."),
+    ] = None,
+    stretch: Annotated[
+        float | None,
+        typer.Option("--stretch-m", help="With --cost: length to evaluate at most; 200 if absent."),
+    ] = None,
+    rounds: Annotated[
+        int | None,
+        typer.Option("--rounds", help="With --cost: how often steps are timed; 10 if absent."),
+    ] = None,
+    tolerance: Annotated[
+        str | None,
+        typer.Option(
+            "--tolerance",
+            metavar="PERCENT",
+            help="With --cost: changes below are not worth an effect; 1% if absent.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        folder_option("With --cost: for table, CSV, JSON, and runs, which are then not run again."),
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="With --cost: print JSON in place of the table.")
+    ] = False,
+    force: Force = False,
+) -> int:
+    """Serial."""
+    given = [*(assignments or []), *(extras or [])]
+    if cost:
+        from catenary.cases.studies.accuracy.analysis import parse_target
+        from catenary.cases.studies.choice.study import Wish
+
+        wanted = 0.01 if tolerance is None else parse_target(tolerance, "--tolerance") / 100
+        wish = Wish(
+            case,
+            given,
+            shortened,
+            200.0 if stretch is None else _within("--stretch-m", stretch, 1.0, 1e7),
+            10 if rounds is None else int(_within("--rounds", rounds, 1, _MOST_ROUNDS)),
+            wanted,
+            [] if only is None else [name.strip() for name in only.split(",")],
+        )
+        return _cost(wish, out, as_json, force)
+    belonging = {
+        "--only": only, "--stretch-m": stretch, "--rounds": rounds, "--tolerance": tolerance,
+        "-o": out, "--json": as_json or None, "--force": force or None,
+    }  # fmt: skip
+    for option, value in belonging.items():
+        if value is not None:
+            raise InputError(f"{option} belongs to plan --cost; give both")
+    scene = load(case, assignments, extras, shortened)
+    from catenary.cases.run.plan import make_plan, plan_text
+
+    console.say(plan_text(make_plan(scene)))
+    return console.DONE
+
+
+def _within(option: str, value: float, low: float, high: float) -> float:
+    if not low <= value <= high:
+        raise InputError(f"{option} {value:g} must be between {low:g} and {high:g}")
+    return value
+
+
+def _cost(wish: Wish, out: Path | None, as_json: bool, force: bool) -> int:
+    """What --cost does; returns the exit code."""
+    import tempfile
+
+    from mpi4py import MPI
+
+    from catenary.cases.process.petsc_options import as_arguments, start_petsc
+    from catenary.cases.result_folder.folder_lock import held
+    from catenary.cases.result_folder.output_folder import refuse_impossible
+    from catenary.cases.scene.load import load_scene
+    from catenary.solver.base.parallel import launched_by_mpirun
+
+    if launched_by_mpirun() and console.world().size > 1:
+        raise InputError(
+            f"plan --cost times steps on one rank, not on {console.world().size}: start it without "
+            "mpirun"
+        )
+    if out is not None:
+        refuse_impossible(out)
+    scene = load_scene(wish.case, wish.overrides, wish.shortened)
+    start_petsc(as_arguments(scene.petsc.given(), []))
+    from catenary.cases.studies.choice import output, study
+
+    def say(line: str) -> None:
+        if not as_json:
+            console.say(line)
+
+    if out is None:
+        with tempfile.TemporaryDirectory(prefix="catenary_cost_") as folder:
+            found = study.measure(wish, Path(folder), say)
+        files: list[Path] = []
+    else:
+        with held(out, MPI.COMM_SELF, f"catenary plan {wish.case} --cost"):
+            _refuse_other(out, output.RECORD, force)
+            found = study.measure(wish, out / _RUNS, say, force)
+            files = [] if found is None else output.write(found, out)
+    if found is None:
+        again = "" if out is None else "; the same command continues it"
+        console.complain(f"interrupted before all effects were run{again}")
+        return console.BROKEN
+    _print(found, files, as_json)
+    return console.DONE
+
+
+def _refuse_other(out: Path, name: str, force: bool) -> None:
+    """Refuse to write over costs that were found before."""
+    if (out / name).exists() and not force:
+        raise InputError(
+            f"{out / name} is there already; name another folder with -o, or give --force"
+        )
+
+
+def _print(found: Costs, files: list[Path], as_json: bool) -> None:
+    from catenary.cases.studies.choice import output
+
+    if as_json:
+        console.say(output.as_json(found).rstrip())
+        return
+    console.say("\n" + output.as_text(found))
+    if files:
+        console.say("\n" + "\n".join(map(str, files)))

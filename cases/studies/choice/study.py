@@ -1,0 +1,269 @@
+"""What each effect of a scene costs and changes: runs beside the scene as it is, and their steps.
+
+Figures are those of whole runs over a stretch, costs those of steps in turns on the same stretch.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+from catenary.cases.process.interrupts import Phase
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.convert.course import end_of
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.input.toml_input import Assigned
+from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.choice.switches import Choice, Switch, choice_of
+from catenary.cases.studies.choice.turns import RepeatedMarch, beside, in_turns
+from catenary.cases.studies.sweep.jobs import Job, RunOptions, interrupted
+from catenary.cases.studies.sweep.run_jobs import run_jobs
+from catenary.cases.studies.sweep.variants import Variant
+from catenary.solver.base.errors import InputError, RunBroken
+from catenary.solver.problem.problem import Problem, steps_of
+from catenary.solver.statics.line_at_rest import line_at_rest
+
+# The scene as it is, among the names of runs: no effect has a hyphen in its name.
+AS_IT_IS = "as-it-is"
+# Steps of a round at least, some milliseconds, and at most; a span between them.
+_FEWEST, _MOST = 200, 4000
+# What one figure is called, and where a pantograph's and the line's stand in a summary.
+FIGURES = ("mean_N", "std_N", "max_N", "min_N")
+UPLIFT = "max_uplift_mm"
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What is measured, and how long.
+
+    Attributes
+    ----------
+    case, overrides, shortened : as ``load_scene`` takes them
+    stretch : length that is evaluated at most [m]
+    rounds : how often steps are timed
+    tolerance : share below which a change is none to speak of
+    only : names of the effects, all if empty
+    """
+
+    case: str
+    overrides: Sequence[str] = ()
+    shortened: bool = False
+    stretch: float = 200.0
+    rounds: int = 10
+    tolerance: float = 0.01
+    only: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Size:
+    """Unknowns of a line, of its stations (fewest, most), and of a cross-section by planes."""
+
+    n_unknowns: int
+    of_a_station: tuple[int, int]
+    planes: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A scene with one effect switched, beside the scene as it is.
+
+    Attributes
+    ----------
+    switch : what is switched
+    outcome : "done", or the sentence of what is not possible or broke
+    size : of the line
+    ratio : time of a step over that of the scene as it is
+    figures : of each pantograph, ``FIGURES`` by name; and ``UPLIFT`` of the line under that name
+    """
+
+    switch: Switch
+    outcome: str
+    size: Size | None = None
+    ratio: float = math.nan
+    figures: list[dict[str, float | None]] = field(default_factory=list)
+
+    @property
+    def done(self) -> bool:
+        """Whether the run came to its end and its steps were timed."""
+        return self.outcome == "done"
+
+    @property
+    def cost(self) -> float:
+        """How many times as long a step takes with the effect as without."""
+        return 1.0 / self.ratio if self.switch.on else self.ratio
+
+
+@dataclass(frozen=True)
+class Costs:
+    """What was found.
+
+    Attributes
+    ----------
+    wish, choice : what was asked for, and what the scene leaves to choose
+    stretch : evaluated, from and to [m]
+    n_steps : of a timed round
+    size, figures : of the scene as it is, as in ``Measured``
+    step : least time of a step of it [us]
+    names : of the pantographs
+    rows : one of each switch
+    """
+
+    wish: Wish
+    choice: Choice
+    stretch: tuple[float, float]
+    n_steps: int
+    size: Size
+    step: float
+    figures: list[dict[str, float | None]]
+    names: list[str]
+    rows: list[Measured]
+
+
+def jobs_of(wish: Wish) -> tuple[Choice, list[Job], dict[str, str]]:
+    """What can be chosen, the runs to be made, and why others cannot. Not collective.
+
+    The first run is of the scene as it is; those of switches have the names of their effects.
+
+    Raises
+    ------
+    InputError
+        If the scene is wrong, or has no such effect to switch.
+    """
+    whole = load_scene(wish.case, wish.overrides, wish.shortened)
+    shorter = _shortened(whole, wish.stretch)
+    scene = _scene(wish, shorter)
+    choice = choice_of(scene)
+    if wish.only:
+        choice = Choice(_named(choice, wish.only), choice.always, choice.lacking)
+    jobs, refused = [_job(AS_IT_IS, scene)], {}
+    for switch in choice.switches:
+        try:
+            jobs.append(_job(switch.name, _scene(wish, [*shorter, *switch.assignments])))
+        except InputError as error:
+            refused[switch.name] = str(error)
+    return choice, jobs, refused
+
+
+def _named(choice: Choice, names: Sequence[str]) -> list[Switch]:
+    known = {switch.name: switch for switch in choice.switches}
+    for name in names:
+        if name in choice.lacking:
+            raise InputError(f"--only {name}: the scene has no data for it: {choice.lacking[name]}")
+        if name in choice.always:
+            raise InputError(f"--only {name}: it is part of every scene and cannot be left out")
+        if name not in known:
+            raise InputError(f"--only {name} is no effect; there are {', '.join(known)}")
+    return [known[name] for name in dict.fromkeys(names)]
+
+
+def _shortened(scene: Scene, stretch: float) -> list[str]:
+    """Keys that end a run behind the first ``stretch`` [m] that is evaluated, if it is longer."""
+    start, end = scene.evaluation.from_m, scene.evaluation.to_m
+    if end - start <= stretch:
+        return []
+    behind = max(place.behind_m for place in scene.train.pantographs)
+    stop = min(start + stretch + behind, end_of(scene))
+    dt, speed = scene.numerics.dt_s, scene.train.speed_km_h / 3.6
+    last = scene.train.start_m + speed * max((one.at_s for one in scene.incidents), default=0.0)
+    stop = max(stop, min(end_of(scene), last + 2 * dt * speed))  # incidents stay inside the run
+    return [f"evaluation.to_m={start + stretch!r}", f"train.end_m={stop!r}"]
+
+
+def _scene(wish: Wish, further: Sequence[str]) -> Scene:
+    varied = [Assigned(text, "--cost", "by plan --cost") for text in further]
+    return load_scene(wish.case, wish.overrides, wish.shortened, varied)
+
+
+def _job(name: str, scene: Scene) -> Job:
+    return Job(Variant(name, ()), scene, keep_results=False)
+
+
+def measure(
+    wish: Wish, folder: Path, say: Callable[[str], None], force: bool = False
+) -> Costs | None:
+    """Run the scene with each effect switched and time its steps; None if a signal ended that.
+
+    Not collective: on this rank alone.
+
+    Parameters
+    ----------
+    folder : for the runs; what is done there already is not run again
+    say : called with lines on the progress
+    force : whether other runs there may be replaced
+
+    Raises
+    ------
+    InputError, RunBroken
+        If the scene is wrong; if it breaks as it is, or a signal comes while steps are timed.
+    """
+    choice, jobs, refused = jobs_of(wish)
+    comm = MPI.COMM_SELF
+    ended = run_jobs(jobs, folder, comm, RunOptions(force, (), say))
+    if interrupted(ended):
+        return None
+    whole, *others = ended
+    if not whole.done:
+        raise RunBroken(f"the scene as it is breaks: {whole.outcome}")
+    scene = jobs[0].scene
+    problem = problem_of(scene)
+    first, n_steps = _round_of(problem)
+    runs = {one.variant.name: (job, one) for job, one in zip(jobs[1:], others, strict=True)}
+    rows = []
+    with (
+        Phase(comm, "steps were timed", "runs are kept where -o names a folder") as phase,
+        RepeatedMarch(comm, _at_rest(scene), first, n_steps) as as_it_is,
+    ):
+        step = in_turns({AS_IT_IS: as_it_is}, wish.rounds)[AS_IT_IS]
+        for number, switch in enumerate(choice.switches, start=1):
+            phase.next(f"steps without or with {switch.name} were timed")
+            say(f"[{number}/{len(choice.switches)}] steps: {switch.name}")
+            if switch.name in refused:
+                rows.append(Measured(switch, refused[switch.name]))
+                continue
+            job, one = runs[switch.name]
+            if not one.done:
+                rows.append(Measured(switch, one.outcome))
+                continue
+            with RepeatedMarch(comm, _at_rest(job.scene), first, n_steps) as march:
+                timed, own = beside(march, as_it_is, wish.rounds), size_of(march)
+            rows.append(Measured(switch, "done", own, timed.ratio, figures_of(one.summary)))
+            step = min(step, timed.least_of_other)
+        size = size_of(as_it_is)
+    names = [one["name"] for one in whole.summary["pantographs"]]
+    start, end = scene.evaluation.from_m, scene.evaluation.to_m
+    figures = figures_of(whole.summary)
+    return Costs(wish, choice, (start, end), n_steps, size, step, figures, names, rows)
+
+
+def _round_of(problem: Problem) -> tuple[int, int]:
+    """Step at which rounds begin, where the evaluation does, and the steps of one: some span's."""
+    train, dt = problem.train, problem.numerics.dt
+    line = problem.line
+    span = (line.support_positions[-1] - line.support_positions[0]) / line.n_spans
+    n_steps = min(max(round(span / train.speed / dt), _FEWEST), _MOST)
+    begin = round((problem.evaluation[0] - train.start) / train.speed / dt)
+    first = max(0, min(begin, steps_of(problem) - n_steps))
+    return first, min(n_steps, steps_of(problem) - first)
+
+
+def _at_rest(scene: Scene) -> Any:
+    return line_at_rest(problem_of(scene), mesh_of(scene))
+
+
+def size_of(march: RepeatedMarch) -> Size:
+    """The size of a line that is marched. Not collective."""
+    return Size(march.n_unknowns, march.unknowns_of_a_station, march.widths)
+
+
+def figures_of(summary: dict[str, Any]) -> list[dict[str, float | None]]:
+    """The figures of each pantograph in a summary, the line's uplift with each."""
+    uplift = summary["supports"][UPLIFT]
+    return [
+        {**{name: one[name] for name in FIGURES}, UPLIFT: uplift} for one in summary["pantographs"]
+    ]
