@@ -112,3 +112,21 @@ class Supports:
     wire: str
     x: tuple[float, ...]
     holds: str = ""
+
+
+@dataclass(frozen=True)
+class Fittings:
+    """Fittings of one kind on one wire, such as section insulators: lumped masses.
+
+    Attributes
+    ----------
+    kind : what they are
+    wire : its name
+    x : their places, ascending [m]
+    mass : of each [kg]
+    """
+
+    kind: str
+    wire: str
+    x: tuple[float, ...]
+    mass: tuple[float, ...]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from catenary.meshgen.hardware import Clamps, Droppers, SteadyArms, Supports
+from catenary.meshgen.hardware import Clamps, Droppers, Fittings, SteadyArms, Supports
 from catenary.meshgen.spans import Spans
 from catenary.meshgen.wires import End, Profile, Role, Wire
 
@@ -25,6 +25,7 @@ class Line(Spans):
     topology : name of what made it
     wires : from the contact wires upwards
     droppers, steady_arms, supports, clamps : groups
+    fittings : insulators and the like on wires, which no mesh file has
 
     Raises ValueError if names occur twice, a group names no wire, or droppers hang a wire without
     wanted heights: a topology that makes such a line is wrong.
@@ -36,6 +37,7 @@ class Line(Spans):
     steady_arms: tuple[SteadyArms, ...]
     supports: tuple[Supports, ...]
     clamps: tuple[Clamps, ...] = ()
+    fittings: tuple[Fittings, ...] = ()
 
     def __post_init__(self) -> None:
         wires = {wire.name for wire in self.wires}

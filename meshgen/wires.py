@@ -134,6 +134,8 @@ class Wire(Conductor):
     profile : heights wanted at its droppers' lower ends; None if none hangs it
     taken : stretches (from, to, tension) over which wires that are clamped to it carry that much of
         its tension, in ascending order [m], [m], [N]
+    worn : stretches (from, to, share) over which it has lost a share of its section, from below
+        [m], [m], [-]
     """
 
     name: str
@@ -141,6 +143,7 @@ class Wire(Conductor):
     pieces: tuple[Piece, ...]
     profile: Profile | None = None
     taken: tuple[tuple[float, float, float], ...] = ()
+    worn: tuple[tuple[float, float, float], ...] = ()
 
     @classmethod
     def of(
@@ -196,6 +199,19 @@ class Wire(Conductor):
                 force[here] = -self.tension_at(x[here]) * change
         return force
 
+    def left_of(self, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Shares left of section and bending stiffness between ``ends`` (n, 2) [m], (n,) each.
+
+        What is worn in part has the mean of both.
+        """
+        section, bending = np.ones(len(ends)), np.ones(len(ends))
+        for start, end, lost in self.worn:
+            inside = np.minimum(ends[:, 1], end) - np.maximum(ends[:, 0], start)
+            share = np.clip(inside / (ends[:, 1] - ends[:, 0]), 0.0, 1.0)
+            section -= share * lost
+            bending -= share * (1.0 - worn_bending(lost))
+        return section, bending
+
     @property
     def length(self) -> float:
         """Length of all pieces along the track [m]."""
@@ -225,3 +241,23 @@ class Wire(Conductor):
         if self.profile is not None:
             points[:, 2] = self.profile.level(x) - self.profile.pre_sag(x)
         return points
+
+
+def worn_bending(lost: float) -> float:
+    """Share left of the bending stiffness in the vertical plane of a round wire worn from below.
+
+    With the half angle a of the flat, seen from the axis, the segment lost has the area
+    R^2 (a - sin a cos a), and about the axis of the circle the first moment 2/3 R^3 sin^3 a and the
+    second one R^4/4 (a - sin a cos a (1 - 2 sin^2 a)); what is left bends about its own centroid.
+
+    ``lost`` is the share of the section, 0 <= lost < 1.
+    """
+    low, high = 0.0, np.pi
+    for _ in range(60):  # halvings, down to round-off
+        a = 0.5 * (low + high)
+        low, high = (a, high) if a - np.sin(a) * np.cos(a) < np.pi * lost else (low, a)
+    segment = a - np.sin(a) * np.cos(a)
+    second = 0.25 * (a - np.sin(a) * np.cos(a) * (1.0 - 2.0 * np.sin(a) ** 2))
+    first = 2.0 / 3.0 * np.sin(a) ** 3
+    left = np.pi / 4 - second - first**2 / (np.pi - segment)
+    return float(left / (np.pi / 4))

@@ -123,10 +123,13 @@ def static(
     if out is not None:
         new_file(out, (".csv", ".json"), force)
     scene = load(case, assignments, extras)
+    from catenary.cases.run.describe.defects import defect_facts
     from catenary.cases.run.runner import static_table
-    from catenary.cases.scene.convert.line import line_of
+    from catenary.cases.scene.convert.problem import problem_of
 
-    table = static_table(scene)
+    table, problem = static_table(scene), problem_of(scene)
     if out is not None:
         write_static(out, table)
-    console.say(terminal_text.static_text(table, line_of(scene)))
+    for fact in defect_facts(scene, problem):
+        console.say(fact["says"])
+    console.say(terminal_text.static_text(table, problem.line))

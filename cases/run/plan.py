@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.cases.result_folder.output_folder import volume
 from catenary.cases.run.describe.arrivals import arrival_facts
+from catenary.cases.run.describe.defects import defect_facts
 from catenary.cases.run.describe.ends import end_sentences
 from catenary.cases.run.describe.incidents import incident_facts
 from catenary.cases.run.describe.pantographs import kind_lines
@@ -50,6 +51,7 @@ class Plan:
     static_forces : of the pantographs [N]
     kinds : name and description of each kind of pantograph on the train
     start, end, evaluation : stretch that the leading pantograph runs, and that is judged [m]
+    defects : sentence of each irregularity, fitting and defect
     incidents : time [s] and sentence of each, in order of time
     ends : how the line begins and ends, in words
     arrivals : sentences about run-in and waves from the ends of the line
@@ -83,6 +85,7 @@ class Plan:
     start: float
     end: float
     evaluation: tuple[float, float]
+    defects: tuple[str, ...]
     incidents: tuple[tuple[float, str], ...]
     ends: tuple[str, str]
     arrivals: tuple[str, ...]
@@ -161,6 +164,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
         start=train.start,
         end=train.end,
         evaluation=problem.evaluation,
+        defects=tuple(fact["says"] for fact in defect_facts(scene, problem)),
         incidents=tuple((fact["time_s"], fact["says"]) for fact in incident_facts(scene, problem)),
         ends=end_sentences(problem),
         arrivals=tuple(fact["says"] for fact in waves["pantographs"]),
@@ -218,6 +222,7 @@ def plan_text(plan: Plan) -> str:
         ),
         ("runs", f"from {plan.start:g} to {plan.end:g} m (leading pantograph)"),
         ("evaluated", f"from {plan.evaluation[0]:g} to {plan.evaluation[1]:g} m"),
+        *(("defect", says) for says in plan.defects),
         *(("incident", f"at {time:.4g} s: {says}") for time, says in plan.incidents),
         ("ends", "; ".join(plan.ends)),
         *(("waves", says) for says in plan.arrivals),

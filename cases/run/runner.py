@@ -26,6 +26,7 @@ from catenary.cases.result_folder.output_folder import (
 )
 from catenary.cases.run.continuing import refuse_other_run, state_to_continue
 from catenary.cases.run.describe.arrivals import arrival_facts
+from catenary.cases.run.describe.defects import defect_facts
 from catenary.cases.run.describe.incidents import incident_facts
 from catenary.cases.run.describe.pantographs import header_words
 from catenary.cases.run.installed import installed
@@ -353,6 +354,7 @@ def _header(order: _Order, problem: Problem, at_rest: LineAtRest) -> Header:
             "system": scene.evaluation.system,
             "edition": scene.evaluation.edition,
             "pantographs": header_words(scene, problem),
+            "defects": defect_facts(scene, problem),
             "incidents": incident_facts(scene, problem),
             "arrivals": arrival_facts(scene, problem),
             "window": window_sentence(problem),

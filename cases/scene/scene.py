@@ -12,6 +12,8 @@ from typing import Any
 from pydantic import Field, PrivateAttr
 
 from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.tables.line.defects import Defect
+from catenary.cases.scene.tables.line.irregularities import IrregularitiesTable
 from catenary.cases.scene.tables.line.line import LineTable
 from catenary.cases.scene.tables.line.mesh import MeshTable
 from catenary.cases.scene.tables.run.case import CaseTable
@@ -36,6 +38,12 @@ class Scene(Table):
 
     case: CaseTable = Field(default_factory=CaseTable, description="what the case is")
     line: LineTable = Field(description="the line from anchor to anchor")
+    irregularities: IrregularitiesTable = Field(
+        default_factory=IrregularitiesTable, description="what is irregular about the line"
+    )
+    defects: list[Defect] = Field(
+        default_factory=list, max_length=10_000, description="what is wrong with the line"
+    )
     mesh: MeshTable = Field(default_factory=MeshTable, description="the finite-element mesh")
     pantographs: dict[Name, PantographTable] = Field(
         min_length=1, max_length=100, description="the kinds of pantograph, by name"

@@ -135,6 +135,12 @@ def _effects(value: Any) -> bool:
     )
 
 
+def _defects(value: Any) -> bool:
+    return isinstance(value, list) and all(
+        isinstance(fact, dict) and isinstance(fact.get("says"), str) for fact in value
+    )
+
+
 def _incidents(value: Any) -> bool:
     return isinstance(value, list) and all(
         isinstance(fact, dict)
@@ -189,6 +195,7 @@ ATTRIBUTES: dict[str, Attribute] = {
     "effects_on": Attribute("a list of names with titles and reasons", _effects, True),
     "effects_off": Attribute("a list of names with titles and reasons", _effects, True),
     "pantographs": Attribute("a list of tables of facts", _pantographs, True, []),
+    "defects": Attribute("a list of sentences", _defects, True, []),
     "incidents": Attribute("a list of times with sentences", _incidents, True, []),
     "arrivals": Attribute("facts of waves from the ends, with sentences", _arrivals, True, {}),
     "wires": Attribute("a table of roles", _wires, True, SIMPLE_CATENARY),

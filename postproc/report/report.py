@@ -293,6 +293,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
         ("ranks", f"{about['n_ranks']}"),
         *([("speed of steps", about["detour"])] if about.get("detour") else []),
         *([("window", about["window"])] if about.get("window") else []),
+        *(("defect", fact["says"]) for fact in about.get("defects", [])),
         *(
             (f"incident at {fact['time_s']:.4g} s", fact["says"])
             for fact in about.get("incidents", [])

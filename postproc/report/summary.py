@@ -61,6 +61,7 @@ def summarise(
             )
         ],
         "supports": _supports(statistics),
+        "defects": attributes.get("defects", []),
         "incidents": attributes.get("incidents", []),
         "arrivals": attributes.get("arrivals", {}),
         "droppers": {

@@ -40,13 +40,18 @@ NODE = np.dtype(
     ]
 )
 
+# A sample of the running surface of a contact wire: where along the track [m], its height above the
+# wire's axis [m] and its slope [-].
+SAMPLE = np.dtype([("x", np.float64), ("height", np.float64), ("slope", np.float64)])
+
 # A place of a strip on a contact wire, which is a candidate for a contact: the wire's first node
 # and the one after its last; the strip's half length [m]; 1 if the wire is there on the strip, else
 # 0, and so are then all functions; where it is along the track [m], and the number of the first
 # node of its element; of the element's four unknowns the numbers on this rank, 0 where another rank
 # owns them, the Hermite functions N and dN/dx, 0 where not owned here and without regard to that,
-# and what they are at rest [m], [-]; the first and one after the last of the local unknowns that
-# answer to a force here.
+# and what they are at rest [m], [-]; of the samples of the wire's running surface the first, the
+# one after the last and the one before the place; height [m] and slope [-] of that surface here;
+# the first and one after the last of the local unknowns that answer to a force here.
 TOUCH = np.dtype(
     [
         ("first", np.int64),
@@ -61,9 +66,20 @@ TOUCH = np.dtype(
         ("whole_value", np.float64, (4,)),
         ("whole_slope", np.float64, (4,)),
         ("rest", np.float64, (4,)),
+        ("samples", np.int64, (2,)),
+        ("sample", np.int64),
+        ("surface", np.float64, (2,)),
         ("filled", np.int64, (2,)),
     ]
 )
+
+
+class WireShapes(NamedTuple):
+    """What there is of contact wires: ``nodes`` (n,) of ``NODE`` wire by wire, and samples of their
+    running ``surface`` (m,) of ``SAMPLE``, ascending in each wire, none of a wire that has none."""
+
+    nodes: np.ndarray
+    surface: np.ndarray
 
 
 class Answers(NamedTuple):
@@ -107,11 +123,36 @@ class Followed(NamedTuple):
 
 
 @in_line
-def locate(x, nodes, touches):
-    """Make ``touches`` those at places ``x`` (n,) [m], each on its own wire.
+def look_at_surface(place, surface, touch):
+    """Height and slope of the running surface at a place, cubic between samples, zero beyond."""
+    first, last = touch.samples[0], touch.samples[1] - 1
+    touch.surface[0], touch.surface[1] = 0.0, 0.0
+    if not (last > first and surface[first].x <= place <= surface[last].x):
+        return
+    # Mostly the interval of the step before, or one of the next.
+    s = touch.sample
+    while s < last - 1 and surface[s + 1].x < place:
+        s += 1
+    while s > first and surface[s].x >= place:
+        s -= 1
+    touch.sample = s
+    before, after = surface[s], surface[s + 1]
+    length = after.x - before.x
+    xi = (place - before.x) / length
+    values, slopes = shape_values(xi, length), shape_slopes(xi, length)
+    touch.surface[0] = values[0] * before.height + values[1] * before.slope
+    touch.surface[0] += values[2] * after.height + values[3] * after.slope
+    touch.surface[1] = slopes[0] * before.height + slopes[1] * before.slope
+    touch.surface[1] += slopes[2] * after.height + slopes[3] * after.slope
+
+
+@in_line
+def locate(x, wires, touches):
+    """Make ``touches`` those at places ``x`` (n,) [m], each on its own of the ``WireShapes``.
 
     A node belongs to the element that it ends.
     """
+    nodes, surface = wires
     for i in range(x.size):
         touch = touches[i]
         place, first, last = x[i], touch.first, touch.end - 1
@@ -140,6 +181,8 @@ def locate(x, nodes, touches):
             touch.whole_value[k], touch.whole_slope[k] = values[k], slopes[k]
             touch.value[k] = values[k] * node.owned[unknown]
             touch.slope[k] = slopes[k] * node.owned[unknown]
+        if surface.size:
+            look_at_surface(place, surface, touch)
 
 
 @in_line
@@ -158,18 +201,19 @@ def clear(answer, low, high):
 
 
 @in_line
-def place(x, nodes, data, touches, answers):
+def place(x, wires, data, touches, answers):
     """Make ``touches`` those at places ``x`` (n,) [m], and ``answers`` those to forces there.
 
     ``data`` holds the columns of the nodes.
     """
+    nodes = wires.nodes
     by_force, slope = answers
     for i in range(x.size):
         low, high = touches[i].filled
         clear(by_force[i], low, high)
         if slope.shape[1] > 0:
             clear(slope[i], low, high)
-    locate(x, nodes, touches)
+    locate(x, wires, touches)
     for i in range(x.size):
         touch = touches[i]
         low, high = by_force.shape[1], 0
@@ -200,8 +244,10 @@ def heights(motion, touches, train_speed, height, rate):
                 rising += touch.value[k] * velocity_at(touch.local[k], motion)
             w += touch.value[k] * total
             steep += touch.slope[k] * total
-        height[i] = w
-        rate[i] = rising + train_speed * steep
+        # Of the running surface the same share: functions of heights add up to one.
+        share = touch.value[0] + touch.value[2]
+        height[i] = w + share * touch.surface[0]
+        rate[i] = rising + train_speed * (steep + share * touch.surface[1])
 
 
 @in_line

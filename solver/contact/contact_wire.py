@@ -8,7 +8,8 @@ import numpy as np
 
 from catenary.meshgen.wires import Role
 from catenary.solver.contact import contact_kernels
-from catenary.solver.contact.contact_kernels import NODE, SLIP, TOUCH
+from catenary.solver.contact.contact_kernels import NODE, SLIP, TOUCH, WireShapes
+from catenary.solver.contact.running_surface import surface_samples
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.statics.equilibrium import Equilibrium
@@ -38,6 +39,7 @@ class ContactWires:
     ranges : (n_wires, 2) first node of each wire, and the one after its last
     dofs : (n_nodes, 2) unknowns (w, theta_y) of its nodes
     nodes : (n_nodes,) records of ``NODE``, of no columns until a ``ForcesOnLine`` has some
+    shapes : WireShapes, these nodes and the wires' running surfaces
     """
 
     def __init__(self, model: Model, form: Equilibrium, ownership: Ownership) -> None:
@@ -59,6 +61,8 @@ class ContactWires:
         self.nodes["local"] = np.where(mine, self.dofs - ownership.first, 0)
         self.nodes["owned"] = mine
         self.nodes["rest"] = np.stack([form.height[nodes], form.slope[nodes]], axis=1)
+        surface, self._samples = surface_samples(model)
+        self.shapes = WireShapes(self.nodes, surface)
 
     @property
     def n_wires(self) -> int:
@@ -70,13 +74,15 @@ class ContactWires:
         touches = np.zeros(wire.size, dtype=TOUCH)
         touches["first"], touches["end"] = self.ranges[wire].T
         touches["element"], touches["half_length"] = touches["first"], half_length
+        touches["samples"] = self._samples[wire]
+        touches["sample"] = touches["samples"][:, 0]
         return touches
 
     def touches(self, x: np.ndarray, wire: int | np.ndarray = 0) -> np.ndarray:
         """Places on a wire, or on wires (n,), at positions ``x`` (n,) [m], records of ``TOUCH``
         (n,)."""
         touches = self.on_wires(np.broadcast_to(wire, x.shape))
-        contact_kernels.locate(x, self.nodes, touches)
+        contact_kernels.locate(x, self.shapes, touches)
         return touches
 
     def rest_height(self, x: np.ndarray) -> np.ndarray:
@@ -87,7 +93,7 @@ class ContactWires:
     def rest_height_of(self, wire: int, x: np.ndarray) -> np.ndarray:
         """Height of a wire at rest at positions ``x`` (n,) [m], (n,); NaN where it is not."""
         touches = self.touches(x, wire)
-        own = (touches["whole_value"] * touches["rest"]).sum(axis=1)
+        own = _height_of(touches)
         return np.where(touches["present"] > 0.0, own, np.nan)
 
     def rest_slope(self, x: np.ndarray) -> np.ndarray:
@@ -98,10 +104,11 @@ class ContactWires:
         height, slope = np.full(x.shape, np.inf), np.zeros(x.shape)
         for wire in range(self.n_wires):
             touches = self.touches(x, wire)
-            own = (touches["whole_value"] * touches["rest"]).sum(axis=1)
+            own = _height_of(touches)
             lower = (touches["present"] > 0.0) & (own < height)
             height[lower] = own[lower]
-            slope[lower] = (touches["whole_slope"] * touches["rest"]).sum(axis=1)[lower]
+            steep = (touches["whole_slope"] * touches["rest"]).sum(axis=1)
+            slope[lower] = (steep + touches["surface"][:, 1])[lower]
         return height, slope
 
     def nodes_between(self, low: float, high: float, wire: int = 0) -> tuple[int, int]:
@@ -112,3 +119,9 @@ class ContactWires:
         begin = int(np.searchsorted(own, low - SLIP, side="right")) - 1
         last = int(np.searchsorted(own, high + SLIP)) + 1
         return int(first) + max(begin, 0), int(first) + min(last, own.size)
+
+
+def _height_of(touches: np.ndarray) -> np.ndarray:
+    """Height of the wires at rest where they are touched, their running surface included [m]."""
+    axis = (touches["whole_value"] * touches["rest"]).sum(axis=1)
+    return np.asarray(axis + touches["surface"][:, 0])

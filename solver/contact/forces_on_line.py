@@ -74,7 +74,7 @@ class ForcesOnLine:
         self.reach = reach
         self._gains = Gains(train_speed, line.position_factor, line.velocity_factor, reach)
         touched = self._touches, self._answers
-        self.placing = candidates.place, self.wires.nodes, node_columns, *touched
+        self.placing = candidates.place, self.wires.shapes, node_columns, *touched
         self._place = bound(contact_kernels.place, *self.placing)
         motion = line.motion.read, line.motion.gains
         self._force = np.zeros(n)
@@ -89,7 +89,7 @@ class ForcesOnLine:
 
     def locate(self) -> None:
         """Look where the contacts are now, for heights and loads only."""
-        contact_kernels.locate(self._contact_place, self.wires.nodes, self._touches)
+        contact_kernels.locate(self._contact_place, self.wires.shapes, self._touches)
 
     def present(self) -> np.ndarray:
         """Whether the wire of each contact is on its strip, (n,) bool, where they were located."""

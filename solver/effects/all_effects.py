@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
+from dataclasses import replace
 
 from catenary.solver.effects import (  # noqa: F401  (registers)
     air_effects,
     axial_effects,
+    defect_effects,
     end_effects,
     pantograph_effects,
     vertical_effects,
@@ -30,6 +32,26 @@ def active(problem: Problem) -> list[Effect]:
 def needs_form(problem: Problem) -> bool:
     """Whether matrices of any active effect depend on the shape at rest."""
     return any(effect.of_form for effect in active(problem))
+
+
+def after_cutting(problem: Problem) -> list[Effect]:
+    """The active effects that befall the line once its droppers are cut, in building order."""
+    return [effect for effect in active(problem) if effect.after_cutting]
+
+
+def as_cut(problem: Problem, but: Set[str] = frozenset()) -> Problem:
+    """A problem whose line is the sound one, for which droppers are cut, with effects ``but``
+    others."""
+    befallen = {effect.name for effect in after_cutting(problem)} - but
+    return replace(problem, effects=problem.effects - befallen) if befallen else problem
+
+
+def as_hung(problem: Problem) -> Problem:
+    """A problem whose wires are those that hang, after what befell them."""
+    for effect in after_cutting(problem):
+        if effect.hangs is not None:
+            problem = replace(problem, line=effect.hangs(problem.line, problem))
+    return problem
 
 
 def simulated(problem: Problem) -> Simulated:

@@ -46,13 +46,15 @@ def _add_bars(builder: ModelBuilder, name: str) -> None:
         raise ValueError(f"{name} has no axial stiffness")
     unknowns = axial_elements.unknowns_along(model, name)
     rows = axial_elements.strain_rows(model, name)
-    alike, kind = np.unique(rows, axis=0, return_inverse=True)
+    left, _ = data.left_of(model.mesh.x(model.mesh.elements(name)))
+    alike, kind = np.unique(np.column_stack([rows, left]), axis=0, return_inverse=True)
+    alike, left = alike[:, :6], alike[:, 6]
     length = 1.0 / alike[:, 1]
-    stiffness = (data.axial_stiffness * length)[:, None, None] * (
+    stiffness = (data.axial_stiffness * left * length)[:, None, None] * (
         alike[:, :, None] * alike[:, None, :]
     )
     mass = np.zeros_like(stiffness)
-    mass[:, :2, :2] = axial_elements.bar_mass(length, data.mass_per_length)
+    mass[:, :2, :2] = axial_elements.bar_mass(left * length, data.mass_per_length)
     builder.add_block(Block(name, unknowns, kind.ravel(), mass, stiffness))
 
 

@@ -20,11 +20,14 @@ def build(
     dropper_lengths: np.ndarray,
     broken: np.ndarray | None = None,
     form: Equilibrium | None = None,
+    gap: np.ndarray | None = None,
 ) -> Model:
     """The model of a problem on a mesh, for given dropper lengths [m]. Not collective.
 
-    ``broken`` (n_droppers,) bool, droppers that carry nothing; none if not given. ``form`` is the
-    shape at rest, where it is known: before it is found wires are straight and droppers upright.
+    ``broken`` (n_droppers,) bool, droppers that carry nothing beside those that the problem has;
+    ``gap`` (n_droppers,) what droppers that are slack at rest lack to be taut [m]; none if not
+    given. ``form`` is the shape at rest, where it is known: before it is found wires are straight
+    and droppers upright.
     """
     active = effects.active(problem)
     row_of_node = np.empty(mesh.n_nodes, dtype=np.int64)
@@ -38,8 +41,12 @@ def build(
         row_of_node,
         dropper_lengths,
     )
-    model.broken = np.zeros(mesh.droppers.shape[0], dtype=bool) if broken is None else broken
     model.form = form
+    model.missing = model.droppers_at(model.simulated.missing)
+    model.broken = model.missing | model.droppers_at(model.simulated.loose)
+    if broken is not None:
+        model.broken |= broken
+    model.dropper_gap = np.zeros(mesh.droppers.shape[0]) if gap is None else gap
     model.terms_of = {effect.name: 0 for effect in active}
     builder = ModelBuilder(model)
     for effect in active:

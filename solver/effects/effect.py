@@ -14,6 +14,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
+    from catenary.meshgen.line import Line
     from catenary.meshgen.wires import Role
     from catenary.solver.model.builder import ModelBuilder
     from catenary.solver.problem.problem import Problem
@@ -59,6 +60,9 @@ class Effect:
     of_form : whether ``build`` reads the shape at rest, ``Model.form``
     lifts : limits of a scene that do not hold with the effect
     data : what a scene has to hold for it to act on, by its keys; empty if any scene does
+    after_cutting : True for what befalls a line whose droppers are cut: form finding leaves it out,
+        and the line then hangs with it (`statics.as_hung`)
+    hangs : of an effect after cutting, what the line's wires become with it
     """
 
     name: str
@@ -75,11 +79,14 @@ class Effect:
     lifts: tuple[Limit, ...] = ()
     data: str = ""
     of_form: bool = False
+    after_cutting: bool = False
+    cut_for: bool = False
+    hangs: Callable[[Line, Problem], Line] | None = None
 
     @property
     def n_laws(self) -> int:
-        """Contributions that are no terms of the model: a law, limits lifted."""
-        return int(self.law is not None) + len(self.lifts)
+        """Contributions that are no terms of the model: a law, wires that change, limits lifted."""
+        return int(self.law is not None) + int(self.hangs is not None) + len(self.lifts)
 
 
 _REGISTRY: dict[str, Effect] = {}

@@ -38,6 +38,7 @@ def _dropper_mass(builder: ModelBuilder) -> None:
     for number, droppers in enumerate(builder.problem.line.droppers):
         mine = mesh.dropper_group == number
         half = 0.5 * droppers.kind.mass_per_length * builder.model.dropper_lengths[mine]
+        half[builder.model.missing[mine]] = 0.0
         for side in (0, 1):
             builder.add_masses(droppers.name, mesh.droppers[mine, side], half)
 
@@ -45,9 +46,11 @@ def _dropper_mass(builder: ModelBuilder) -> None:
 def _clamp_mass(builder: ModelBuilder) -> None:
     mesh = builder.mesh
     for number, droppers in enumerate(builder.problem.line.droppers):
-        upper, lower = mesh.droppers[mesh.dropper_group == number].T
-        builder.add_masses(droppers.upper, upper, droppers.kind.upper_clamp_mass)
-        builder.add_masses(droppers.lower, lower, droppers.kind.lower_clamp_mass)
+        mine = mesh.dropper_group == number
+        upper, lower = mesh.droppers[mine].T
+        there = 1.0 - builder.model.missing[mine]
+        builder.add_masses(droppers.upper, upper, droppers.kind.upper_clamp_mass * there)
+        builder.add_masses(droppers.lower, lower, droppers.kind.lower_clamp_mass * there)
     for number, clamps in enumerate(builder.problem.line.clamps):
         pairs = mesh.clamps[builder.problem.line.clamp_group == number]
         for name, side in ((clamps.upper, 0), (clamps.lower, 1)):

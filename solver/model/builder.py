@@ -32,15 +32,22 @@ class ModelBuilder:
         tension = self.model.tension_of(wire)
         # Length and tension as one number, of which NumPy finds those that are alike.
         alike, kind = np.unique(length + 1j * tension, return_inverse=True)
-        self._add_block(
-            wire,
-            dofs,
-            elements.mass(alike.real, data.mass_per_length),
-            elements.stiffness(alike.real, data.bending_stiffness, alike.imag),
-            kind,
-        )
+        mass = elements.mass(alike.real, data.mass_per_length)
+        stiffness = elements.stiffness(alike.real, data.bending_stiffness, alike.imag)
+        load = data.mass_per_length * elements.uniform_load(length)
+        if data.worn:
+            section, bending = data.left_of(self.mesh.x(self.mesh.elements(wire)))
+            worn = section < 1.0
+            # Each worn element is a kind of its own, after those that are alike.
+            kind[worn] = alike.size + np.arange(np.count_nonzero(worn))
+            own, left = length[worn], section[worn, None, None]
+            bent = elements.stiffness(own, data.bending_stiffness, 0.0)
+            pulled = elements.stiffness(own, 0.0, tension[worn])
+            mass = np.concatenate([mass, left * elements.mass(own, data.mass_per_length)])
+            stiffness = np.concatenate([stiffness, bending[worn, None, None] * bent + pulled])
+            load *= section[:, None]
+        self._add_block(wire, dofs, mass, stiffness, kind)
         if unknowns[0] == "w":
-            load = data.mass_per_length * elements.uniform_load(length)
             self._hanging.append((dofs.ravel(), load.ravel()))
 
     def add_springs(
@@ -76,6 +83,13 @@ class ModelBuilder:
             hanging = values if hanging_mass is None else hanging_mass
             self._hanging.append((dofs, np.broadcast_to(np.asarray(hanging), nodes.shape)))
 
+    def add_masses_at(self, component: str, places: Direction, mass: np.ndarray) -> None:
+        """Point masses (n,) [kg] at places of wires in the vertical plane, which they weigh on."""
+        unknowns, weights = places
+        matrices = mass[:, None, None] * weights[:, :, None] * weights[:, None, :]
+        self._add_block(component, unknowns, matrices, None)
+        self._hanging.append((unknowns.ravel(), (mass[:, None] * weights).ravel()))
+
     def add_links(self, component: str, direction: Direction, law: np.ndarray) -> Links:
         """Links with directions and laws as `model.links` makes them.
 
@@ -102,10 +116,25 @@ class ModelBuilder:
         model.droppers = Links(DROPPERS, dropper_directions(model), laws)
         model.links.append(model.droppers)
         matrices = model.droppers.stiffness_matrices
+        # Of what is slack at rest K holds only what it keeps of its stiffness.
+        slack = model.dropper_gap > 0.0
+        matrices[slack] *= model.simulated.kept_ratio
         for number, group in enumerate(self.problem.line.droppers):
             mine = mesh.dropper_group == number
             unknowns = model.droppers.direction.unknowns[mine]
             self._add_block(group.name, unknowns, None, matrices[mine])
+            if self.problem.slack_dampers_act and slack[mine].any():
+                self._add_dampers(group.name, mine & slack)
+
+    def _add_dampers(self, component: str, which: np.ndarray) -> None:
+        """Dampers of droppers that are slack at rest and whose dampers act nevertheless."""
+        model = self.model
+        assert model.droppers is not None
+        unknowns, weights = (part[which] for part in model.droppers.direction)
+        lacking = (1.0 - model.simulated.kept_ratio) * model.dropper_damping[which]
+        damping = lacking[:, None, None] * weights[:, :, None] * weights[:, None, :]
+        kind = np.arange(unknowns.shape[0])
+        self.add_block(Block(component, unknowns, kind, None, None, damping))
 
     def add_load(self, load: Load) -> None:
         """A load in time, of one of the kinds in ``model/loads.py``."""

@@ -59,6 +59,8 @@ class Model:
     dropper_stiffness, dropper_damping : (n_droppers,) [N/m], [N s/m], of the taut dropper
     released_damping : (n_droppers,) the part of ``dropper_damping`` that goes slack with the spring
     broken : (n_droppers,) droppers that carry nothing; what they weigh stays on their clamps
+    missing : (n_droppers,) those of them that are not there at all
+    dropper_gap : (n_droppers,) stretch that a dropper slack at rest lacks to be taut, else 0 [m]
     loads : beside those of contacts and links, from the start of the march on
     links : droppers, and whatever else was added as links
     droppers : those of the mesh, in its order; they only pull where they may slacken
@@ -82,6 +84,8 @@ class Model:
     terms_of: dict[str, int] = field(default_factory=dict)
     broken: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
     form: Equilibrium | None = None
+    missing: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    dropper_gap: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def unknowns(self) -> tuple[str, ...]:
@@ -109,6 +113,14 @@ class Model:
             mine = self.mesh.dropper_group == number
             stiffness[mine] = group.kind.stiffness_at(self.dropper_lengths[mine])
         return np.where(self.broken, 0.0, stiffness)
+
+    def droppers_at(self, places: tuple[float, ...]) -> np.ndarray:
+        """Which droppers stand nearest to places [m], (n_droppers,) bool."""
+        x = self.mesh.x(self.mesh.droppers[:, 1])
+        found = np.zeros(x.size, dtype=bool)
+        for place in places:
+            found[int(np.argmin(np.abs(x - place)))] = True
+        return found
 
     @property
     def dropper_damping(self) -> np.ndarray:

@@ -126,11 +126,17 @@ def switching_links(model: Model, dropper_force: np.ndarray) -> LinkTable:
 
 
 def _droppers(model: Model, links: Links, force: np.ndarray) -> LinkArrays:
-    law = np.zeros(links.law.size, dtype=RESERVE)
+    law, kept = np.zeros(links.law.size, dtype=RESERVE), model.simulated.kept_ratio
     law["rest"] = np.where(model.broken, 0.0, force)
     law["stiffness"], law["damping"] = links.law["stiffness"], model.released_damping
     law["place"], law["carried"] = links.law["place"], 1.0
-    law["released"] = 1.0 - model.simulated.kept_ratio
+    law["released"] = 1.0 - kept
+    # One that is slack at rest stands open: its reserve is what it lacks to be taut.
+    slack = (model.dropper_gap > 0.0) & ~model.broken
+    law["rest"][slack] = (model.dropper_gap * law["stiffness"])[slack]
+    law["stiffness"][slack] *= -1.0
+    law["damping"][slack] *= -1.0
+    law["carried"][slack] = -kept
     return LinkArrays(*links.direction, law)
 
 

@@ -13,8 +13,10 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role
 from catenary.solver.problem.along_track import AlongTrack
 from catenary.solver.problem.contact_laws import ContactLaw
+from catenary.solver.problem.defects import Defect, WrongTension
 from catenary.solver.problem.ends import EndCondition, Fixed
 from catenary.solver.problem.incidents import LineIncident, TensionLoss
+from catenary.solver.problem.irregularities import Irregularities
 from catenary.solver.problem.window import WindowChoice
 
 if TYPE_CHECKING:
@@ -114,6 +116,7 @@ class Problem:
     ``evaluation`` (from, to) [m] is the stretch whose statistics are judged;
     ``residual_stiffness_ratio`` is the share of its stiffness that a compressed dropper keeps;
     ``slack_dampers_act`` whether the damper of a dropper goes on acting when its spring is slack;
+    ``irregularities`` and ``defects`` are what is wrong with the line from the start;
     ``incidents`` are what happens to the line on the way; ``ends`` how it begins and ends;
     ``window`` which part of it steps take on; ``tunnels`` on the way; ``along`` what holds
     wires along the track.
@@ -134,6 +137,8 @@ class Problem:
     window: WindowChoice = WindowChoice()
     tunnels: tuple[Tunnel, ...] = ()
     along: AlongTrack = AlongTrack()
+    irregularities: Irregularities = Irregularities()
+    defects: tuple[Defect, ...] = ()
 
 
 def steps_of(problem: Problem) -> int:
@@ -150,10 +155,15 @@ def n_halvings(dt: float, smallest: float | None) -> int:
 
 
 def slowest_wave_speed(problem: Problem) -> float:
-    """Least wave speed of the contact wires in a run, losses of tension included [m/s]."""
+    """Least wave speed of the contact wires in a run, wrong and lost tensions included [m/s].
+
+    ``problem`` is as a scene has it: its wires are those for which droppers are cut.
+    """
     losses = [loss for loss in problem.incidents if isinstance(loss, TensionLoss)]
+    wrong = [defect for defect in problem.defects if isinstance(defect, WrongTension)]
     return min(
         min((loss.share for loss in losses if loss.wire == wire.name), default=1.0) ** 0.5
+        * min((defect.factor for defect in wrong if defect.wire == wire.name), default=1.0) ** 0.5
         * wire.wave_speed
         for wire in problem.line.wires_of(Role.CONTACT)
     )

@@ -9,10 +9,11 @@ import numpy as np
 
 from catenary.mbs.vehicle.motion_sources import VehicleMotion
 from catenary.mbs.vehicle.suspension import Vehicle
-from catenary.meshgen.wires import Profile
+from catenary.meshgen.wires import Profile, Role, Wire
 from catenary.solver.problem.along_track import Tensioner
 from catenary.solver.problem.contact_laws import ContactLaw
 from catenary.solver.problem.incidents import LineIncident
+from catenary.solver.problem.irregularities import Heights, LengthErrors, Surface
 from catenary.solver.problem.problem import Damping
 
 # Height [m] above ``Profile.height`` that a wire with a profile is to have at positions x [m].
@@ -44,6 +45,10 @@ class Simulated:
     tensioner : at the ends of wires that have one, None if all are held along the track
     warmer : temperature less that of the installation [K]
     goes_on : whether the line goes on beyond its start and beyond its end
+    irregular_heights : what contact wires are to be higher at rest where they are held
+    length_errors : of the droppers, None if all are cut to length
+    missing, loose : places of droppers that are not there, and of those that carry nothing [m]
+    surface : what strips run on, above the axes of the contact wires, each adding to the others
     """
 
     contact: ContactLaw
@@ -62,10 +67,22 @@ class Simulated:
     tensioner: Tensioner | None = None
     warmer: float = 0.0
     goes_on: tuple[bool, bool] = (False, False)
+    irregular_heights: Heights | None = None
+    length_errors: LengthErrors | None = None
+    missing: tuple[float, ...] = ()
+    loose: tuple[float, ...] = ()
+    surface: tuple[Surface, ...] = ()
 
-    def target_height(self, wanted: Profile, x: np.ndarray) -> np.ndarray:
-        """Height that a wire is to have at rest at positions ``x``, shape as x [m]."""
-        height = np.full_like(x, wanted.height, dtype=float)
+    def target_height(self, wire: Wire, x: np.ndarray) -> np.ndarray:
+        """Height that a wire with a profile is to have at rest at positions ``x``, shape as x [m].
+
+        ValueError if it has none.
+        """
+        if wire.profile is None:
+            raise ValueError(f"nothing says at what height {wire.name} is to be held")
+        height = np.full_like(x, wire.profile.height, dtype=float)
         for above in self.target_heights:
-            height += above(wanted, x)
+            height += above(wire.profile, x)
+        if self.irregular_heights is not None and wire.role is Role.CONTACT:
+            height += self.irregular_heights.at(wire.name, x)[0]
         return height

@@ -74,7 +74,7 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
         else:
             shares[incident.wire] = incident.share
     after = replace(problem, line=problem.line.with_shares(shares))
-    model = build(after, mesh, first.dropper_lengths, broken, form)
+    model = build(after, mesh, first.dropper_lengths, broken, form, first.dropper_gap)
     load, energy = np.zeros(model.n_dofs), 0.0
     for wire, now in zip(problem.line.wires, after.line.wires, strict=True):
         pairs = mesh.elements(wire.name)
@@ -90,7 +90,11 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
     rest = form.dropper_force[broken]
     unknowns, weights = _droppers(model, broken)
     np.add.at(load, unknowns, rest[:, None] * weights)
-    energy -= float((rest**2 / (2.0 * first.dropper_stiffness[broken])).sum())
+    stiffness = first.dropper_stiffness[broken]
+    # One that was slack at rest held the energy of what it keeps of its stiffness.
+    stiffness[first.dropper_gap[broken] > 0.0] *= first.simulated.kept_ratio
+    carried = rest != 0.0
+    energy -= float((rest[carried] ** 2 / (2.0 * stiffness[carried])).sum())
     load[model.constrained] = 0.0
     unbalanced = np.flatnonzero(load)
     if unbalanced.size:
@@ -136,8 +140,12 @@ def acceleration_jump(
     stretch, rate = (
         (weights * values[unknowns]).sum(axis=1) for values in (displacement, velocity)
     )
-    tension = form.dropper_force[new] + before.model.dropper_stiffness[new] * stretch
+    rest = np.where(before.model.dropper_gap[new] > 0.0, 0.0, form.dropper_force[new])
+    tension = rest + before.model.dropper_stiffness[new] * stretch
     tension += before.model.released_damping[new] * rate
+    # One that was slack at rest is no part of K: what it pulls is all compensation.
+    gap = before.model.dropper_gap[new]
+    tension = np.where(gap > 0.0, before.model.dropper_stiffness[new] * gap - tension, tension)
     compensation = (1.0 - pushed_share) * np.maximum(0.0, -tension)
     mine = ownership.owned(unknowns[:, 0])
     np.add.at(force, unknowns[mine] - first, compensation[mine, None] * weights[mine])

@@ -18,12 +18,13 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Wire
 from catenary.solver.base.errors import InputError
-from catenary.solver.effects.all_effects import needs_form
+from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
 from catenary.solver.model import elements
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium as Equilibrium
 from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.as_hung import hang
 
 # Lengths are printed to the millimetre; the iteration contracts by the ratio of dropper weight
 # to tension sag, about 1e-3, so that this costs one more pass and leaves no trace in the forces.
@@ -34,18 +35,35 @@ _MAX_PASSES = 30
 def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
     """The model of a line and its equilibrium under its own weight. Not collective.
 
+    Droppers are cut for the sound line, or for irregular heights of the contact wire; with all that
+    is wrong besides the line then hangs on them. ``problem`` of the model has the wires that hang.
+
     Raises
     ------
     InputError
-        If a dropper would be slack at rest or would have no length, or if lengths do not settle.
+        If a dropper of the sound line would be slack at rest or would have no length, or if lengths
+        do not settle.
     """
+    befallen = effects.after_cutting(problem)
+    if not befallen:
+        return _cut(problem, mesh)
+    cut_for = {effect.name for effect in befallen if effect.cut_for}
+    sound = _cut(effects.as_cut(problem), mesh)
+    if cut_for:
+        irregular = effects.as_cut(problem, but=cut_for)
+        sound = _cut(irregular, mesh, pushing=True)
+    return hang(effects.as_hung(problem), *sound)
+
+
+def _cut(problem: Problem, mesh: LineMesh, pushing: bool = False) -> tuple[Model, Equilibrium]:
+    """The line for which droppers are cut; they may push where ``pushing`` says so."""
     length = mesh.points[mesh.droppers[:, 0], 2] - mesh.points[mesh.droppers[:, 1], 2]
     hanging: _HangingWires | None = None
     for _ in range(_MAX_PASSES):
         model = build(problem, mesh, length)
         hanging = hanging or _HangingWires(model)
         form = hanging.at_rest(model)
-        _check(problem.line, mesh, form)
+        _check(problem.line, mesh, form, pushing)
         geometric = form.height[mesh.droppers[:, 0]] - form.height[mesh.droppers[:, 1]]
         change = np.abs(geometric - length).max(initial=0.0)
         length = geometric
@@ -60,7 +78,7 @@ def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
 
 def about(model: Model, form: Equilibrium) -> Model:
     """The model with matrices about its shape at rest, if any effect's are. Not collective."""
-    if not needs_form(model.problem):
+    if not effects.needs_form(model.problem):
         return model
     return build(model.problem, model.mesh, model.dropper_lengths, form=form)
 
@@ -177,15 +195,13 @@ def _given_heights(model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _wanted(model: Model, wire: Wire, nodes: np.ndarray) -> np.ndarray:
     """Heights that nodes of a wire are to have, (n,) [m]."""
-    if wire.profile is None:
-        raise ValueError(f"nothing says at what height {wire.name} is to be held")
-    return model.simulated.target_height(wire.profile, model.mesh.x(nodes))
+    return model.simulated.target_height(wire, model.mesh.x(nodes))
 
 
-def _check(line: Line, mesh: LineMesh, form: Equilibrium) -> None:
+def _check(line: Line, mesh: LineMesh, form: Equilibrium, pushing: bool) -> None:
     length = form.height[mesh.droppers[:, 0]] - form.height[mesh.droppers[:, 1]]
     _refuse(line, mesh, length <= 0, lambda i: f"would have a length of {length[i]:.3f} m")
-    weighted = form.dropper_force.any()
+    weighted = form.dropper_force.any() and not pushing
     slack = (form.dropper_force <= 0) & weighted
     _refuse(
         line, mesh, slack, lambda i: f"would be slack at rest (force {form.dropper_force[i]:.1f} N)"

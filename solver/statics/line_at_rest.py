@@ -10,6 +10,7 @@ import numpy as np
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.base.freed_memory import give_back
 from catenary.solver.base.parallel import on_root
+from catenary.solver.effects.all_effects import as_hung
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Problem
@@ -22,7 +23,7 @@ class LineAtRest(NamedTuple):
 
     Attributes
     ----------
-    problem : everything that the run is made of, in SI units
+    problem : everything that the run is made of, in SI units, with the wires that hang
     model : the discrete line, with the lengths of its droppers
     form : its shape at rest
     lift : elasticity of the running span in the middle of the line
@@ -49,7 +50,7 @@ def line_at_rest(problem: Problem, mesh: LineMesh) -> LineAtRest:
     """
     model, form = find_form(problem, mesh)
     give_back()
-    return LineAtRest(problem, model, form, elasticity(model, *middle_span(problem.line)))
+    return LineAtRest(model.problem, model, form, elasticity(model, *middle_span(problem.line)))
 
 
 def line_at_rest_on_all(
@@ -72,9 +73,10 @@ def line_at_rest_on_all(
         On all ranks, if there is no equilibrium with all droppers taut.
     """
 
-    def work() -> tuple[np.ndarray, Equilibrium, Elasticity]:
+    def work() -> tuple[np.ndarray, np.ndarray, Equilibrium, Elasticity]:
         rest = line_at_rest(problem, mesh)
-        return rest.model.dropper_lengths, rest.form, rest.lift
+        return rest.model.dropper_lengths, rest.model.dropper_gap, rest.form, rest.lift
 
-    lengths, form, lift = on_root(comm, alone(work), takes_long=True)
-    return LineAtRest(problem, build(problem, mesh, lengths, form=form), form, lift)
+    lengths, gap, form, lift = on_root(comm, alone(work), takes_long=True)
+    hung = as_hung(problem)
+    return LineAtRest(hung, build(hung, mesh, lengths, form=form, gap=gap), form, lift)

@@ -20,6 +20,7 @@ from catenary.cases.scene.checks.effects import (
     check_requirements_of_defaults,
 )
 from catenary.cases.scene.checks.line.along import check_along
+from catenary.cases.scene.checks.line.defects import check_defects
 from catenary.cases.scene.checks.line.droppers import (
     check_dropper_lengths,
     check_droppers_inside_spans,
@@ -84,7 +85,8 @@ def faults_of(scene: Scene) -> list[Fault]:
         return found.faults
     if not found.nothing_by(check_names, scene, line):
         return found.faults
-    for of_line in (check_dropper_lengths, check_recorded_parts, check_tunnels, _speed):
+    of_lines = check_dropper_lengths, check_recorded_parts, check_tunnels, _speed, check_defects
+    for of_line in of_lines:
         found.nothing_by(of_line, scene, line)
     if found.nothing_by(_running, scene, line) and found.nothing_by(_evaluation, scene):
         found.nothing_by(_raising, scene)

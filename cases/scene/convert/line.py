@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -12,7 +13,7 @@ from catenary.cases.scene.tables.line.droppers import DropperTable, HangingTable
 from catenary.cases.scene.tables.line.line import LineTable
 from catenary.cases.scene.tables.line.wires import BridleTable, StitchWireTable, WireTable
 from catenary.cases.scene.tables.units import length_from_mm
-from catenary.meshgen.hardware import DropperKind, SteadyArm
+from catenary.meshgen.hardware import DropperKind, Fittings, SteadyArm
 from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import (
@@ -38,7 +39,20 @@ def line_of(scene: Scene) -> Line:
     InputError
         If the droppers are not declared for one of the span lengths, or do not fit into one.
     """
-    return make_line(line_data_of(scene))
+    return replace(make_line(line_data_of(scene)), fittings=_fittings(scene.line))
+
+
+def _fittings(table: LineTable) -> tuple[Fittings, ...]:
+    """Fittings by kind and wire; what has a length is two masses."""
+    found: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    for one in table.fittings:
+        ends = (one.at_m, one.at_m + one.length_m) if one.length_m else (one.at_m,)
+        group = found.setdefault((one.kind, one.wire), [])
+        group += [(x, one.mass_kg / len(ends)) for x in ends]
+    return tuple(
+        Fittings(kind, wire, *zip(*sorted(group), strict=True))
+        for (kind, wire), group in found.items()
+    )
 
 
 def line_data_of(scene: Scene) -> LineData:

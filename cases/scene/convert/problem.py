@@ -12,6 +12,7 @@ from catenary.cases.scene.convert.aerodynamics import tunnels_of
 from catenary.cases.scene.convert.along import along_of
 from catenary.cases.scene.convert.contact import contact_law_of
 from catenary.cases.scene.convert.course import end_of
+from catenary.cases.scene.convert.defects import defects_of, irregularities_of
 from catenary.cases.scene.convert.ends import ends_of
 from catenary.cases.scene.convert.incidents import line_incidents, lowering_of
 from catenary.cases.scene.convert.line import line_of
@@ -62,6 +63,8 @@ def problem_of(scene: Scene) -> Problem:
         ends=ends_of(scene.line.ends),
         tunnels=tunnels_of(scene.line.tunnels),
         along=along_of(scene.line),
+        irregularities=irregularities_of(scene.irregularities, line),
+        defects=defects_of(scene.defects, line),
     )
     return replace(problem, window=_window(scene.window, problem))
 

@@ -19,7 +19,8 @@ from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lowering import Lowering
 from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
 from catenary.mbs.vehicle.suspension import Vehicle
-from catenary.meshgen.mesh import MESSENGER_WIRE, LineMesh
+from catenary.meshgen.hardware import Fittings
+from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.effects import all_effects as effects
@@ -27,12 +28,30 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.effects.effect import Limit
 from catenary.solver.model.model import Model
 from catenary.solver.problem.contact_laws import LinearLaw
+from catenary.solver.problem.defects import (
+    HardSpot,
+    Kink,
+    LooseClamp,
+    MissingDropper,
+    WornWire,
+    WrongTension,
+)
 from catenary.solver.problem.incidents import DropperBreak, TensionLoss
+from catenary.solver.problem.irregularities import Heights, Irregularities, LengthErrors
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.statics.equilibrium import find_form
 
 N_SPANS = 4
 CAR = Vehicle(3e4, 2e6, 9e5, 4e4, 19.0, 2.5)
+INSULATORS = Fittings("section_insulator", CONTACT_WIRE, (100.3, 101.7), (5.0, 5.0))
+DEFECTS = (
+    MissingDropper(88.25),
+    LooseClamp(137.5),
+    WornWire(CONTACT_WIRE, 60.0, 80.0, 0.2),
+    WrongTension(CONTACT_WIRE, 1.05),
+    HardSpot(CONTACT_WIRE, 120.2, 5.0, 300.0),
+    Kink(CONTACT_WIRE, 130.0, 0.01),
+)
 
 
 def full_line() -> LineData:
@@ -53,8 +72,9 @@ def full_problem(names: frozenset[str]) -> Problem:
     speed = 1.1 * line.contact_wire.wave_speed
     ours = train(speed, 60.0, 160.0, data=rolling, behind=(0.0, 31.0))
     lowered = replace(ours.placements[0], lowering=Lowering(0.5, -50.0, 0.2, 0.4))
+    heights = Heights((0.0, 220.0), None, ((90.0, 0.0), (100.0, 0.005), (110.0, 0.0)))
     return problem_of(
-        line,
+        replace(make_line(line), fittings=(INSULATORS,)),
         names,
         damping=Damping(1e-4, 0.0125),
         contact=LinearLaw(5e4, 50.0),
@@ -65,6 +85,8 @@ def full_problem(names: frozenset[str]) -> Problem:
         ),
         residual_stiffness_ratio=0.01,
         incidents=(DropperBreak(0.5, 80.0), TensionLoss(0.6, MESSENGER_WIRE, 0.9)),
+        irregularities=Irregularities(heights, heights, LengthErrors(0.001, 2.0, 1)),
+        defects=DEFECTS,
     )
 
 
@@ -92,6 +114,8 @@ def counts(mesh: LineMesh) -> dict[str, int]:
         "droppers": mesh.droppers.shape[0],
         "arms": mesh.steady_arms.size,
         "supports": mesh.supports.size,
+        "fittings": 2,
+        "spots": 1,
     }
 
 
@@ -142,6 +166,22 @@ BLOCKS = {
     "lowering": ({}, 1),
     "pantograph_aerodynamics": ({}, 1),
     "supercritical_speed": ({}, 1),
+    "fittings": ({("contact_wire", "fittings", True, False): 1}, ("fittings", 1)),
+    "contact_wire_height": ({}, 1),
+    "dropper_lengths": ({}, 1),
+    "running_surface": ({}, 1),
+    "missing_dropper": ({}, 1),
+    "loose_clamp": ({}, 1),
+    "worn_wire": ({}, 1),
+    "wrong_tension": ({}, 1),
+    "hard_spot": (
+        {
+            ("contact_wire", "spots", True, False): 1,
+            ("contact_wire", "spots", False, True): 1,
+        },
+        2,
+    ),
+    "kink": ({}, 1),
 }
 # The fields of `Simulated` that each effect sets.
 LAWS = {
@@ -159,6 +199,12 @@ LAWS = {
     "tension_loss": "incidents",
     "lowering": "lowering",
     "pantograph_aerodynamics": "meets_air",
+    "contact_wire_height": "irregular_heights",
+    "dropper_lengths": "length_errors",
+    "running_surface": "surface",
+    "missing_dropper": "missing",
+    "loose_clamp": "loose",
+    "kink": "surface",
 }
 LIFTED = {
     "several_pantographs": (Limit.ONE_PANTOGRAPH,),
@@ -220,8 +266,14 @@ def test_an_effect_alone_adds_what_it_declares_and_nothing_else(name: str, mesh:
     assert np.array_equal(model.constrained, bare.constrained)
     assert model.weight.any() == (name == "gravity")
     assert model.dropper_damping.any() == (name == "structural_damping")
-    # What was there before is the same to the bit.
+    # What was there before is the same to the bit; a dropper that carries nothing has no stiffness.
     for old, new in zip(bare.blocks, model.blocks, strict=False):
+        if name in ("missing_dropper", "loose_clamp") and old.component == "droppers":
+            assert old.stiffness is not None and new.stiffness is not None
+            changed = (old.stiffness != new.stiffness).any(axis=(1, 2))
+            assert np.flatnonzero(changed) == np.flatnonzero(model.broken)
+            assert not new.stiffness[changed].any()
+            continue
         assert np.array_equal(old.dofs, new.dofs) and np.array_equal(old.kind, new.kind)
         for ours, theirs in ((old.mass, new.mass), (old.stiffness, new.stiffness)):
             assert (ours is None and theirs is None) or np.array_equal(ours, theirs)
@@ -264,6 +316,22 @@ def test_a_scene_without_an_effect_has_no_trace_of_it(name: str, mesh: LineMesh)
         ("vehicle_motion", lambda p: replace(p, train=replace(p.train, vehicle=None))),
         ("pantograph_aerodynamics", lambda p: replace(p, train=train(70.0, 60.0, 160.0))),
         ("supercritical_speed", lambda p: replace(p, train=replace(p.train, speed=70.0))),
+        ("fittings", lambda p: replace(p, line=replace(p.line, fittings=()))),
+        *(
+            (name, lambda p: replace(p, irregularities=Irregularities()))
+            for name in ("contact_wire_height", "running_surface", "dropper_lengths")
+        ),
+        *(
+            (name, lambda p: replace(p, defects=()))
+            for name in (
+                "missing_dropper",
+                "loose_clamp",
+                "worn_wire",
+                "wrong_tension",
+                "hard_spot",
+                "kink",
+            )
+        ),
     ],
 )
 def test_an_effect_with_nothing_to_act_on_does_not_exist(
@@ -334,7 +402,8 @@ def test_point_masses_are_those_of_the_parts(mesh: LineMesh) -> None:
     line, n = full_line(), counts(mesh)
     kind, arm = line.dropper, line.steady_arm
     lengths = np.linspace(0.8, 1.2, n["droppers"])
-    whole = build(full_problem(BARE | frozenset(BLOCKS)), mesh, lengths)
+    sound = frozenset(BLOCKS) - {"fittings", "missing_dropper", "hard_spot"}
+    whole = build(full_problem(BARE | sound), mesh, lengths)
     bare = build(full_problem(BARE), mesh, lengths)
     dofs = whole.dofs(np.arange(mesh.n_nodes))
 

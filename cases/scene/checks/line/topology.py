@@ -69,6 +69,11 @@ def check_names(scene: Scene, line: LineData) -> Iterator[Fault]:
     for i, table in enumerate(scene.incidents):
         if isinstance(table, TensionLossTable):
             yield from _known(scene, f"incidents.{i}.wire", table.wire, wires)
+    for where, entries in (("defects", scene.defects), ("line.fittings", scene.line.fittings)):
+        for i, entry in enumerate(entries):
+            wire = getattr(entry, "wire", None)
+            if wire is not None:
+                yield from _known(scene, f"{where}.{i}.wire", wire, wires)
 
 
 def _known(scene: Scene, key: str, name: str, known: tuple[str, ...]) -> Iterator[Fault]:

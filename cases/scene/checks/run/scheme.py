@@ -28,6 +28,12 @@ def check_scheme(scene: Scene) -> Iterator[Fault]:
         if switches[incident.type]:
             why = f"{knows} lines and pantographs that stay what they are"
             yield refusal(scene.origin, f"incidents.{i}.type", incident.type, why)
+    for i, defect in enumerate(scene.defects):
+        if defect.type == "kink" and switches["kink"]:
+            yield refusal(scene.origin, f"defects.{i}.type", defect.type, f"{knows} smooth wires")
+    if scene.irregularities.running_surface is not None and switches["running_surface"]:
+        key = "effects.running_surface"
+        yield refusal(scene.origin, key, True, f"{knows} smooth wires: switch it off")
     for name in ("head_roll", "vehicle_motion"):
         if switches[name]:
             yield refusal(

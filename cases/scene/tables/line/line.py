@@ -10,6 +10,7 @@ from catenary.cases.scene.tables.line.along import Along, TensionerTable
 from catenary.cases.scene.tables.line.damping import DampingTable
 from catenary.cases.scene.tables.line.droppers import DropperTable
 from catenary.cases.scene.tables.line.ends import EndsTable
+from catenary.cases.scene.tables.line.fittings import FittingTable
 from catenary.cases.scene.tables.line.hardware import SteadyArmTable, SupportTable
 from catenary.cases.scene.tables.line.spans import Span
 from catenary.cases.scene.tables.line.tunnels import TunnelTable
@@ -93,6 +94,9 @@ class LineTable(Table):
     dropper: DropperTable | None = Field(None, description="droppers of the contact wire")
     support: SupportTable = Field(default_factory=SupportTable, description="supports")
     steady_arm: SteadyArmTable = Field(default_factory=SteadyArmTable, description="steady arms")
+    fittings: list[FittingTable] = Field(
+        default_factory=list, max_length=10_000, description="insulators and the like on wires"
+    )
     damping: DampingTable = Field(description="proportional damping")
     overlap: OverlapTable | None = Field(
         None, description="spans in which the next tension section begins"

@@ -1,0 +1,110 @@
+"""Sentences on irregularities and defects for plan, result file, summary and report."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from catenary.cases.scene.convert.defects import place_of, stretch_of
+from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.tables.line.defects import (
+    Defect,
+    HardSpotTable,
+    KinkTable,
+    LooseClampTable,
+    MissingDropperTable,
+    WornWireTable,
+    WrongTensionTable,
+)
+from catenary.cases.scene.tables.line.irregularities import HeightTable, LengthsTable
+from catenary.meshgen.line import Line
+from catenary.postproc.evaluate.wording import counted
+from catenary.solver.problem.problem import Problem
+
+
+def defect_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
+    """Type, place [m] if it has one, and a sentence of each irregularity, fitting and defect.
+
+    Those that are simulated, in the order of irregularities, fittings, defects. Not collective.
+    """
+    line, found = problem.line, []
+    for name in scene.irregularities.given:
+        if name in problem.effects:
+            table = getattr(scene.irregularities, name)
+            says = _lengths(table) if isinstance(table, LengthsTable) else _heights(table, line)
+            found.append({"type": name, "says": f"{_WHAT[name]}: {says}"})
+    for fitting in scene.line.fittings if "fittings" in problem.effects else []:
+        over = f" over {fitting.length_m:g} m" if fitting.length_m else ""
+        says = f"{fitting.kind.replace('_', ' ')} of {fitting.mass_kg:g} kg{over} on the "
+        says += f"{_named(fitting.wire)} at {fitting.at_m:g} m"
+        found.append({"type": fitting.kind, "at_m": fitting.at_m, "says": says})
+    for defect in scene.defects:
+        if defect.type in problem.effects:
+            found.append({"type": defect.type, **_defect(defect, line)})
+    return found
+
+
+_WHAT = {
+    "contact_wire_height": "droppers are cut for irregular heights of the contact wire",
+    "running_surface": "running surface of the contact wire",
+    "dropper_lengths": "errors of the droppers' lengths",
+}
+
+
+def _named(wire: str) -> str:
+    return wire.replace("_", " ")
+
+
+def _heights(table: HeightTable, line: Line) -> str:
+    said = []
+    if table.standard_deviation_mm is not None:
+        start, end = stretch_of(table, line)
+        said.append(
+            f"standard deviation {table.standard_deviation_mm:g} mm, waves of {table.shortest_m:g} "
+            f"to {table.longest_m:g} m, spectrum falling with the power {table.exponent:g} of the "
+            f"wave number, from {start:g} to {end:g} m, seed {table.seed}"
+        )
+    if table.by_place is not None:
+        heights = [1e3 * height for _, height in table.by_place]
+        at = counted(len(heights), "place")
+        said.append(f"{min(heights):g} to {max(heights):g} mm at {at} of a table")
+    return "; ".join(said)
+
+
+def _lengths(table: LengthsTable) -> str:
+    said = []
+    if table.standard_deviation_mm:
+        said.append(
+            f"standard deviation {table.standard_deviation_mm:g} mm, cut off at {table.cut_off:g} "
+            f"times that, seed {table.seed}"
+        )
+    if table.by_dropper is not None:
+        said.append(f"given for {counted(len(table.by_dropper), 'dropper')}")
+    return "; ".join(said)
+
+
+def _defect(table: Defect, line: Line) -> dict[str, Any]:
+    match table:
+        case MissingDropperTable() | LooseClampTable():
+            x = place_of(line, table.span, table.dropper)
+            which = f"dropper {table.dropper} of span {table.span}, at {x:g} m"
+            missing = isinstance(table, MissingDropperTable)
+            what = "is missing" if missing else "has a loose clamp and carries nothing"
+            return {"at_m": x, "says": f"{which}, {what}"}
+        case WornWireTable():
+            lost = f"has lost {100 * table.lost_share:g} % of its section"
+            where = f"from {table.from_m:g} to {table.to_m:g} m"
+            return {"at_m": table.from_m, "says": f"the {_named(table.wire)} {lost} {where}"}
+        case WrongTensionTable():
+            tension = table.factor * line.wire(table.wire).tension / 1e3
+            hangs = (
+                f"hangs with {tension:.4g} kN, {table.factor:g} of what its droppers are cut for"
+            )
+            return {"says": f"the {_named(table.wire)} {hangs}"}
+        case HardSpotTable():
+            parts = [f"{table.mass_kg:g} kg"] * bool(table.mass_kg)
+            parts += [f"{table.stiffness_N_per_m:g} N/m"] * bool(table.stiffness_N_per_m)
+            where = f"on the {_named(table.wire)} at {table.at_m:g} m"
+            return {"at_m": table.at_m, "says": f"hard spot of {' and '.join(parts)} {where}"}
+        case KinkTable():
+            where = f"of the {_named(table.wire)} at {table.at_m:g} m"
+            return {"at_m": table.at_m, "says": f"kink of {table.angle_deg:g} degrees {where}"}

@@ -1,0 +1,71 @@
+"""Defects of a line: what befalls it once its droppers have been cut.
+
+Data only. The line hangs with the droppers that were cut for the sound one (`statics.as_hung`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class MissingDropper:
+    """The dropper at ``x`` [m] is not there, nor are its clamps."""
+
+    x: float
+
+
+@dataclass(frozen=True)
+class LooseClamp:
+    """A clamp of the dropper at ``x`` [m] slips: it carries nothing; all masses stay."""
+
+    x: float
+
+
+@dataclass(frozen=True)
+class WornWire:
+    """A ``wire`` that has lost the share ``lost`` of its section from ``start`` to ``end`` [m].
+
+    It is worn flat from below, and keeps its tension.
+    """
+
+    wire: str
+    start: float
+    end: float
+    lost: float
+
+
+@dataclass(frozen=True)
+class WrongTension:
+    """A ``wire`` that hangs with ``factor`` times the tension that its droppers were cut for."""
+
+    wire: str
+    factor: float
+
+
+@dataclass(frozen=True)
+class HardSpot:
+    """A lumped ``mass`` [kg] on a ``wire`` at ``x`` [m], and a spring there to the ground.
+
+    ``stiffness`` [N/m] of the spring, which carries nothing at rest.
+    """
+
+    wire: str
+    x: float
+    mass: float
+    stiffness: float
+
+
+@dataclass(frozen=True)
+class Kink:
+    """A ``wire`` that is bent for good at ``x`` [m] by ``angle`` [rad].
+
+    A positive angle raises the slope dz/dx along the track: the bend points down.
+    """
+
+    wire: str
+    x: float
+    angle: float
+
+
+Defect = MissingDropper | LooseClamp | WornWire | WrongTension | HardSpot | Kink
