@@ -26,7 +26,6 @@ from catenary.solver.base.errors import InputError
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.effects.build_model import build
 from catenary.solver.model import axial_elements, elements
-from catenary.solver.model.matrices import stiffness_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.problem import Problem
@@ -139,6 +138,9 @@ def _by_wires(cut: Model, model: Model, form: Equilibrium) -> np.ndarray:
 def _at_rest(model: Model, load: np.ndarray, pull: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Displacement under a load (n_dofs,) [N], [N m], and what droppers would carry there that
     could push, of ``pull`` (n_droppers,) without it [N]."""
+    # PETSc is not loaded by a check of a sound line.
+    from catenary.solver.model.matrices import stiffness_matrix
+
     n, k = model.n_dofs, model.dropper_stiffness
     assert model.droppers is not None
     unknowns, weights = model.droppers.direction

@@ -26,7 +26,8 @@ def defect_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
 
     Those that are simulated, in the order of irregularities, fittings, defects. Not collective.
     """
-    line, found = problem.line, []
+    line = problem.line
+    found: list[dict[str, Any]] = []
     for name in scene.irregularities.given:
         if name in problem.effects:
             table = getattr(scene.irregularities, name)

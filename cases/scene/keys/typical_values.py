@@ -45,6 +45,9 @@ TYPICAL: dict[str, str] = {
     "line.dropper.spacing_m": "4 to 10",
     "line.dropper.pre_sag_mid_mm": "0 to 1/1000 of the span, 55 for 55 m",
     "line.steady_arm.length_m": "1 to 1.3",
+    "line.fittings.*.kind": "section_insulator",
+    "line.fittings.*.at_m": "in the middle of a span, between droppers",
+    "line.fittings.*.mass_kg": "section insulators 6 to 20, splices 0.5 to 1.5",
     "line.damping.alpha_s": (
         "0.0001 (en50318_2002, ac_simple); 0.0275 and 0.00275 (Ambrosio et al., 2012)"
     ),
