@@ -78,7 +78,7 @@ def _tensioners(builder: ModelBuilder) -> None:
     model, problem = builder.model, builder.problem
     tensioner = model.simulated.tensioner
     assert tensioner is not None
-    ends = wire_ends.tensioned_ends(model)
+    ends = [end for end in wire_ends.tensioned_ends(model) if not wire_ends.at_stop(model, end)]
     if not (tensioner.turns and ends):
         return
     nodes = np.array([end.node for end in ends])
@@ -142,5 +142,18 @@ register(
         data="line.ends or line.overlap with along = tensioner, and effects.axial_motion",
         build=_tensioners,
         law=_with_tensioner,
+    )
+)
+register(
+    Effect(
+        "temperature",
+        "another temperature than that of the installation",
+        "growth of the wires, droppers that lean and arms that swing at rest; line.temperature",
+        "potential energy of wires and droppers of given lengths",
+        default=True,
+        applies=lambda p: AXIAL in p.effects and p.along.warmer != 0.0,
+        data="line.temperature.difference_K other than 0, and effects.axial_motion",
+        law=lambda laws, p: replace(laws, warmer=p.along.warmer),
+        of_form=True,
     )
 )

@@ -10,6 +10,9 @@ from catenary.meshgen.wires import End
 from catenary.solver.model.model import Model
 from catenary.solver.model.stations import SAME_STATION
 
+# An end is at its stop if it is nearer than this [m].
+_AT_STOP = 1e-9
+
 
 class WireEnd(NamedTuple):
     """The end of a wire that no clamp carries: its node, the wire's name, whether there is a
@@ -46,8 +49,19 @@ def held_along(model: Model) -> np.ndarray:
     """Nodes that do not move along the track: ends without a tensioner that turns, mid-points."""
     tensioner = model.simulated.tensioner
     turns = tensioner is not None and tensioner.turns
-    held = [end.node for end in ends_of(model) if not (end.tensioned and turns)]
+    held = [
+        end.node for end in ends_of(model) if not (end.tensioned and turns) or at_stop(model, end)
+    ]
     return np.unique(np.concatenate([np.array(held, dtype=np.int64), mid_points(model)]))
+
+
+def at_stop(model: Model, end: WireEnd) -> bool:
+    """Whether a stop holds a tensioned end at rest."""
+    tensioner = model.simulated.tensioner
+    if tensioner is None or tensioner.travel is None or model.form is None:
+        return False
+    moved = model.form.along[end.node] if model.form.along.size else 0.0
+    return bool(abs(moved) > tensioner.travel - _AT_STOP)
 
 
 def mid_points(model: Model) -> np.ndarray:

@@ -25,6 +25,7 @@ from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium as Equilibrium
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.as_hung import hang
+from catenary.solver.statics.at_temperature import at_temperature
 
 # Lengths are printed to the millimetre; the iteration contracts by the ratio of dropper weight
 # to tension sag, about 1e-3, so that this costs one more pass and leaves no trace in the forces.
@@ -68,7 +69,7 @@ def _cut(problem: Problem, mesh: LineMesh, pushing: bool = False) -> tuple[Model
         change = np.abs(geometric - length).max(initial=0.0)
         length = geometric
         if change < _LENGTH_TOLERANCE:
-            return about(model, form), form
+            return about(model, form)
     raise InputError(
         f"the lengths of the droppers do not settle: they still change by {1e3 * change:.2g} mm "
         f"after {_MAX_PASSES} passes, as each stretches the line by its own weight; make "
@@ -76,11 +77,16 @@ def _cut(problem: Problem, mesh: LineMesh, pushing: bool = False) -> tuple[Model
     )
 
 
-def about(model: Model, form: Equilibrium) -> Model:
-    """The model with matrices about its shape at rest, if any effect's are. Not collective."""
+def about(model: Model, form: Equilibrium) -> tuple[Model, Equilibrium]:
+    """The model with matrices about its shape at rest, if any effect's are, and that shape, which
+    another temperature changes. Not collective."""
     if not effects.needs_form(model.problem):
-        return model
-    return build(model.problem, model.mesh, model.dropper_lengths, form=form)
+        return model, form
+    made = build(model.problem, model.mesh, model.dropper_lengths, form=form)
+    if not model.simulated.warmer:
+        return made, form
+    form = at_temperature(made, form)
+    return build(model.problem, model.mesh, model.dropper_lengths, form=form), form
 
 
 class _HangingWires:

@@ -103,3 +103,37 @@ def _square_of_curvature(h: np.ndarray, z: np.ndarray, slope: np.ndarray) -> np.
         bend = bend + ((6 * s - 4) * slope[:, 0] + (6 * s - 2) * slope[:, 1]) / h
         total = total + weight * bend**2
     return total
+
+
+def gradient_of(potential: PotentialOfLine, at: np.ndarray) -> np.ndarray:
+    """First derivatives of the energy by heights, slopes and places, by complex steps."""
+    slopes = np.empty(at.size)
+    for i in range(at.size):
+        moved = at.astype(complex)
+        moved[i] += 1e-30j
+        slopes[i] = potential(*np.split(moved, 3)).imag / 1e-30
+    return slopes
+
+
+def hessian_of(potential: PotentialOfLine, at: np.ndarray, delta: float = 1e-6) -> np.ndarray:
+    """Second derivatives, by central differences of the first ones."""
+    columns = []
+    for i in range(at.size):
+        ahead, behind = at.copy(), at.copy()
+        ahead[i] += delta
+        behind[i] -= delta
+        change = gradient_of(potential, ahead) - gradient_of(potential, behind)
+        columns.append(change / (2 * delta))
+    return np.array(columns)
+
+
+def line_of_few_droppers() -> LineData:
+    """Two spans of one dropper, no arms."""
+    line = elastic_line(2)
+    return replace(
+        line,
+        dropper_positions=((25.0,),) * 2,
+        pre_sag=((0.05,),) * 2,
+        stagger=(0.0,) * 3,
+        steady_arm=replace(line.steady_arm, stiffness=0.0),
+    )

@@ -56,6 +56,9 @@ def test_a_tensioner_has_all_that_the_scene_gives() -> None:
         ),
         (["line.ends.start.along=tensioner"], "acts only with effects.axial_motion = true"),
         (["line.mid_points_m=[660]"], "acts only with effects.axial_motion = true"),
+        (["line.temperature.difference_K=20"], "acts only with effects.axial_motion = true"),
+        ([*WHOLE, "line.temperature.difference_K=200"], "it must be at most 150"),
+        ([*WHOLE, f"{CONTACT}.expansion_per_K=-1"], "it must be at least 0"),
         (["line.ends.start.along=free"], "it must be fixed or tensioner"),
         (
             [*TENSIONED, "line.ends.start.along=tensioner"],

@@ -23,4 +23,5 @@ def along_of(table: LineTable) -> AlongTrack:
         end=table.ends.end.along == TENSIONER,
         overlap=table.overlap is None or table.overlap.along == TENSIONER,
         mid_points=tuple(table.mid_points_m),
+        warmer=table.temperature.difference_K,
     )

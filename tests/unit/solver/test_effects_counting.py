@@ -247,7 +247,7 @@ def test_no_effect_is_found_by_its_name() -> None:
 def test_the_table_names_every_shipped_effect() -> None:
     """A new effect must be counted here as well; what depends on the matrices of others stands in
     `test_absorbing_layers.py`, `test_periodic_ends.py` and `test_axial_counting.py`."""
-    elsewhere = {"absorbing_layers", "periodic_ends", "axial_motion", "tensioners"}
+    elsewhere = {"absorbing_layers", "periodic_ends", "axial_motion", "tensioners", "temperature"}
     assert set(effects.registry()) == {"vertical", *elsewhere, *BLOCKS}
 
 

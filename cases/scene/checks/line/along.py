@@ -50,6 +50,8 @@ def _data_of_effect(table: LineTable) -> dict[str, object]:
     for side, end in (("start", table.ends.start), ("end", table.ends.end)):
         if end.along == TENSIONER:
             found[f"line.ends.{side}.along"] = end.along
+    if table.temperature.difference_K:
+        found["line.temperature.difference_K"] = table.temperature.difference_K
     if table.mid_points_m:
         found["line.mid_points_m"] = table.mid_points_m
     return found

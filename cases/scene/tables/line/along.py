@@ -37,3 +37,14 @@ class TensionerTable(Table):
         default_factory=dict,
         description="mass of the weights by name of the wire; those of others fit their tensions",
     )
+
+
+class TemperatureTable(Table):
+    """How warm the line is."""
+
+    difference_K: float = Field(
+        0.0,
+        ge=-100,
+        le=150,
+        description="temperature less that of the installation; acts with effects.axial_motion",
+    )

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from catenary.cases.scene.tables.line.along import Along, TensionerTable
+from catenary.cases.scene.tables.line.along import Along, TemperatureTable, TensionerTable
 from catenary.cases.scene.tables.line.damping import DampingTable
 from catenary.cases.scene.tables.line.droppers import DropperTable
 from catenary.cases.scene.tables.line.ends import EndsTable
@@ -110,6 +110,9 @@ class LineTable(Table):
     )
     tensioner: TensionerTable = Field(
         default_factory=TensionerTable, description="tensioners at the ends of wires"
+    )
+    temperature: TemperatureTable = Field(
+        default_factory=TemperatureTable, description="how warm the line is"
     )
     mid_points_m: list[MidPoint] = Field(
         default_factory=list,
