@@ -9,6 +9,7 @@ import numpy as np
 
 from catenary.mbs.air.air_forces import AirForces, SteadyForces
 from catenary.mbs.air.airflow import Airflow
+from catenary.mbs.control.regulation import Regulator
 from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph, Lowering
@@ -26,6 +27,7 @@ from catenary.mbs.mechanism.pantograph_data import (
 from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
 from catenary.mbs.roll import roll_of
 from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.solver.base.errors import InputError
 
 # What a pantograph can be described by.
 PantographData = LumpedData | MultibodyData
@@ -38,7 +40,8 @@ class Operation(NamedTuple):
     over ``raise_time`` [s]; ``dt`` [s], ``beta`` and ``gamma`` of the line's Newmark step.
     ``lateral`` is where the wire crosses the strips, without which the head does not roll, and
     ``base`` how the vehicle moves, without which it does not. ``air`` is the air that it meets,
-    without which there is none. ``lowering`` is how the pantograph is lowered on the way.
+    without which there is none. ``lowering`` is how the pantograph is lowered on the way,
+    ``regulator`` what regulates its lift.
     """
 
     static_force: float
@@ -51,11 +54,25 @@ class Operation(NamedTuple):
     base: BaseMotion | None = None
     air: Airflow | None = None
     lowering: Lowering | None = None
+    regulator: Regulator | None = None
 
 
 def make_pantograph(data: PantographData, operation: Operation) -> Pantograph:
-    """The model that ``data`` describes. Not collective."""
+    """The model that ``data`` describes. Not collective.
+
+    Raises
+    ------
+    InputError
+        A pantograph with all its bodies in the loop has laws, or a regulated lift.
+    """
     model = _model(data, operation)
+    if not isinstance(model, FullPantograph):
+        model.regulate(operation.regulator)
+    elif operation.regulator is not None or data.laws:
+        raise InputError(
+            "Laws and regulated lifts act on lumped pantographs and on mechanisms that are reduced "
+            "to tables, not on one with all its bodies in the loop."
+        )
     if operation.lowering is None:
         return model
     model.follow(operation.lowering.course(operation.static_force, operation.raise_time))
@@ -70,7 +87,7 @@ def _model(
         air = AirForces(operation.air, data.uplift, operation.raise_time)
         on_frame = steady_forces(data, operation.air.speed).on_frame
     force, height = operation[:2]
-    moved = *operation[2:-2], air
+    moved = *operation[2:-3], air
     if isinstance(data, MultibodyData):
         pressing = force + on_frame
         if data.all_bodies is not None:
@@ -135,4 +152,6 @@ def raising_data(data: MultibodyData, pressing: float, nominal_height: float) ->
         strips=strips,
         roll=roll_of(data),
         blown_head=head_lift(data),
+        laws=data.laws,
+        rest=(nominal_height + strips.compression(pressing), nominal_height + pressed),
     )

@@ -13,8 +13,18 @@ from scipy import linalg
 
 from catenary.mbs.air.air_forces import ON_FRAME, ON_HEAD, AirForces
 from catenary.mbs.head import head_kernels
-from catenary.mbs.head.head_kernels import FORCE, HEAD_FORCE, N_DRIVE, LinearStep
-from catenary.mbs.head.head_records import LUMPED
+from catenary.mbs.head.head_kernels import (
+    BASE,
+    BASE_VELOCITY,
+    FORCE,
+    HEAD_FORCE,
+    N_DRIVE,
+    PART,
+    Chain,
+    LinearStep,
+)
+from catenary.mbs.head.head_records import LAWFUL, LUMPED
+from catenary.mbs.head.laws import LawsInPlace, in_place
 from catenary.mbs.head.newmark_head import Raising, SteppedHead, parts_of
 from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
 from catenary.mbs.interface import HeadState
@@ -69,7 +79,8 @@ class LumpedPantograph(SteppedHead):
         self._masses = np.concatenate([head.masses, data.masses[1:]])
         springs = chain_matrix(head.stiffness, data.stiffnesses[1:])
         dampers = chain_matrix(head.damping, data.dampings[1:])
-        self._stiffness, self._damping = springs[:n, :n], dampers[:n, :n]
+        self._stiffness = np.ascontiguousarray(springs[:n, :n])
+        self._damping = np.ascontiguousarray(dampers[:n, :n])
         self._base_stiffness, self._base_damping = data.stiffnesses[-1], data.dampings[-1]
         # The base spring carries nothing when the head is at its nominal height under the static
         # force, which compresses every spring between head and last mass. So does what the air
@@ -78,6 +89,9 @@ class LumpedPantograph(SteppedHead):
         compression = sum(pressing / k for k in data.stiffnesses[:-1])
         compression += data.strips.compression(pressing)
         self._base_height = nominal_height + compression
+        carried = np.zeros(n)
+        carried[self._carrier] = 1.0
+        self._chain = Chain(self._masses, self._stiffness, self._damping, self._push, carried)
         # A step is linear: new state = step @ state + drive * by_drive - by_force @ force, with
         # the state (positions, velocities, accelerations).
         one, none = np.eye(n), np.zeros((n, n))
@@ -103,8 +117,13 @@ class LumpedPantograph(SteppedHead):
         by_drive = np.ascontiguousarray(unit[:, self._carrier])
         self._of_step = LinearStep(step, by_drive, unit @ self._push, inverse)
         self._drives = np.zeros(N_DRIVE)
-        arguments = self._of_step, newmark, self._arrays, self._drives
-        self._step = bound(head_kernels.linear_step, *arguments)
+        common = newmark, self._arrays, self._drives
+        if data.laws:
+            self._put_laws(self._in_place(data, pressing, nominal_height))
+            arguments = self._chain, self._law_arrays, *common
+            self._step = bound(head_kernels.chain_step, *arguments, later=(0.0,))
+        else:
+            self._step = bound(head_kernels.linear_step, self._of_step, *common, later=(0.0,))
 
     def lift(self, time: float) -> float:
         """Net lift on the last mass at ``time`` [N]: a half cosine up to the static force."""
@@ -122,7 +141,12 @@ class LumpedPantograph(SteppedHead):
             on_head, on_frame, _ = self._air.now(time)
             self._drives[FORCE] += on_frame
             self._drives[HEAD_FORCE] = on_head
-        self._step()
+        added = self.added_force
+        if added:
+            self._drives[PART] = max(self._part(time), 0.0)
+        if self._laws.laws:
+            self._drives[BASE], self._drives[BASE_VELOCITY] = self._base_motion(time)
+        self._step(added)
         return self._head
 
     def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
@@ -137,22 +161,45 @@ class LumpedPantograph(SteppedHead):
             forces = self._air.at(times)
             drives[:, FORCE] += forces[:, ON_FRAME]
             drives[:, HEAD_FORCE] = forces[:, ON_HEAD]
+        if self._laws.laws and self._base is not None:
+            drives[:, BASE : BASE_VELOCITY + 1] = [self._base_motion(time) for time in times]
+        if self._control is not None:
+            drives[:, PART] = np.maximum(parts_of(self._part, times), 0.0)
         self._fill_lateral(times, drives)
 
     def record(self) -> dict[str, Any]:
         """The pantograph as `head_records.fill_head` takes it."""
-        return {**super().record(), **self._of_step._asdict(), "model": LUMPED}
+        kind = {"model": LAWFUL if self._laws.laws else LUMPED}
+        return {**super().record(), **self._of_step._asdict(), **self._chain._asdict(), **kind}
 
     def base(self, time: float) -> float:
         """How far the vehicle has lifted the base [m]."""
         return 0.0 if self._base is None else float(self._base.vertical(time).place)
 
     def energy(self) -> float:
-        """Kinetic energy, and elastic energy of all springs, the base spring included [J]."""
+        """Kinetic energy, and elastic energy of all springs, the base spring included [J].
+
+        The base counts as at rest.
+        """
         stretch = self.position - self._base_height * self._level
-        return float(
-            0.5 * self._masses @ self.velocity**2 + 0.5 * stretch @ self._stiffness @ stretch
-        )
+        own = 0.5 * self._masses @ self.velocity**2 + 0.5 * stretch @ self._stiffness @ stretch
+        return float(own) + self._laws.energy(self.position, 0.0)
+
+    def _in_place(self, data: LumpedData, static_force: float, nominal: float) -> LawsInPlace:
+        """The laws of a chain whose head is at its nominal height under the static force."""
+        head = int(np.flatnonzero(self._level[: self._n - data.n_masses + 1])[-1])
+        numbers = [head, *range(self._n - data.n_masses + 1, self._n)]
+        rest = [nominal + data.strips.compression(static_force)]
+        for stiffness in data.stiffnesses[:-1]:
+            rest.append(rest[-1] + static_force / stiffness)
+        return in_place(data.laws, numbers, self._n, rest)
+
+    def _base_motion(self, time: float) -> tuple[float, float]:
+        """How far and how fast the vehicle has lifted the base [m], [m/s]."""
+        if self._base is None:
+            return 0.0, 0.0
+        moved = self._base.vertical(time)
+        return float(moved.place), float(moved.velocity)
 
     def _drive(self, time: float) -> float:
         """Force on the last mass that its own motion has no part in, but the air's [N]."""
@@ -169,4 +216,6 @@ class LumpedPantograph(SteppedHead):
             on_head, on_frame, _ = self._air.now(time)
             force[self._carrier] += on_frame
             force += on_head * self._push
+        if self._laws.laws:
+            force += self._laws.pull(self.position, self.velocity, self._base_motion(time))
         return np.asarray(force / self._masses)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.mbs.air.uplift import Uplift
+from catenary.mbs.head.laws import Law
 from catenary.mbs.head.strips import ONE_STRIP, HeadParts, Strips, Turning, head_parts
 
 
@@ -17,7 +18,7 @@ class LumpedData:
     ``masses`` [kg], shape (n,); ``stiffnesses`` [N/m] and ``dampings`` [N s/m], shape (n,): entry
     i joins mass i to mass i + 1, the last entry joins the last mass to the base. The first mass is
     the whole head, ``strips`` included, which may turn about the track as ``roll`` says. The air
-    lifts it by ``uplift``.
+    lifts it by ``uplift``. ``laws`` that are not linear act besides.
     """
 
     masses: tuple[float, ...]
@@ -26,6 +27,7 @@ class LumpedData:
     strips: Strips = ONE_STRIP
     roll: Turning | None = None
     uplift: Uplift | None = None
+    laws: tuple[Law, ...] = ()
 
     @property
     def meets_air(self) -> bool:

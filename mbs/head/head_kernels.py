@@ -10,15 +10,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.mbs.head.law_kernels import settle
 from catenary.solver.base.compiled import compiled, in_line
 from catenary.solver.base.inverse import invert
 
 # Columns of a row of what a head depends on in a step besides its state. A chain of lumped masses
-# has the first two alone, the forces on its last mass and on its head [N]; a reduced mechanism has
-# the part of the full lift, the head's weight [N], the height of its zero [m], height [m], velocity
-# [m/s] and acceleration [m/s2] of the base on top of it, upward forces of the air on its head and
-# on its arm [N], and what the air lifts by its bodies in parts of the table's.
-FORCE, HEAD_FORCE = range(2)
+# has the first three alone, the forces on its last mass and on its head [N] and, of a regulated
+# lift, the part that acts, and with laws those of the base; a reduced mechanism has the part of the
+# full lift, the head's weight [N], the height of its zero [m], height [m], velocity [m/s] and
+# acceleration [m/s2] of the base on top of it, upward forces of the air on its head and on its arm
+# [N], and what the air lifts by its bodies in parts of the table's.
+FORCE, HEAD_FORCE, PART = range(3)
 LIFTED, WEIGHT, ZERO, BASE, BASE_VELOCITY, BASE_ACCELERATION, HEAD_AIR, ARM_AIR, BODIES_AIR = range(
     9
 )
@@ -101,6 +103,18 @@ class RaisedHead(NamedTuple):
     coefficients: np.ndarray
 
 
+class Chain(NamedTuple):
+    """A lumped chain with laws: ``masses`` (n,), ``stiffness`` and ``damping`` (n, n); ``push``
+    (n,) what an upward force on the strips' middle does to each coordinate; ``carrier`` (n,) is 1
+    for the coordinate that is driven."""
+
+    masses: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    push: np.ndarray
+    carrier: np.ndarray
+
+
 @in_line
 def respond(inverse, newmark, head):
     """Fill ``head.by_force`` and ``head.out`` for accelerations by ``inverse`` (n, n)."""
@@ -130,11 +144,17 @@ def respond(inverse, newmark, head):
 
 
 @in_line
-def linear_step(linear, newmark, head, drive):
-    """Step a head without contact, with a row ``drive`` whose first two numbers are forces."""
+def linear_step(linear, newmark, head, drive, added):
+    """Step a head without contact, with a row ``drive`` whose first two numbers are forces.
+
+    ``added`` [N] is what a controller adds to the static force.
+    """
     state, free = head.state, head.free
+    lift = drive[FORCE]
+    if added != 0.0:
+        lift += drive[PART] * added
     for i in range(state.size):
-        value = drive[FORCE] * linear.by_drive[i] + drive[HEAD_FORCE] * linear.by_head[i]
+        value = lift * linear.by_drive[i] + drive[HEAD_FORCE] * linear.by_head[i]
         for k in range(state.size):
             value += linear.matrix[i, k] * state[k]
         free[i] = value
@@ -156,8 +176,11 @@ def table_at(breaks, coefficients, x, values, slopes):
 
 
 @compiled
-def raising_step(raised, newmark, head, drive):
+def raising_step(raised, laws, newmark, head, drive, added):
     """Step a head over a mechanism without contact, with a row ``drive`` (N_DRIVE,).
+
+    ``laws`` are `law_kernels.LawArrays`, of none or some; ``added`` [N] is what a controller adds
+    to the static force.
 
     Returns the height of the mechanism at which its tables were taken [m].
     """
@@ -185,7 +208,9 @@ def raising_step(raised, newmark, head, drive):
         force[i] = value + drive[HEAD_AIR] * raised.push[i]
         matrix[i, i] += masses[i]
     lifted = drive[LIFTED]
-    force[last] += lifted * (lift - drive[WEIGHT]) - slowing * speed - 0.5 * slopes[0] * speed**2
+    force[last] += (
+        lifted * (lift - drive[WEIGHT] + added) - slowing * speed - 0.5 * slopes[0] * speed**2
+    )
     # The base carries the mechanism along, but less of it than what is raised if parts stay low.
     force[last] += (mass - carried) * drive[BASE_ACCELERATION]
     matrix[last, last] += mass + newmark.velocity * (slowing + slopes[0] * speed)
@@ -194,7 +219,11 @@ def raising_step(raised, newmark, head, drive):
     if n_columns > N_COLUMNS:
         force[last] += drive[BODIES_AIR] * values[LIFTED_BY_AIR]
         matrix[last, last] -= newmark.position * drive[BODIES_AIR] * slopes[LIFTED_BY_AIR]
-    invert(matrix)
+    if laws.zero.size:
+        base = drive[BASE], drive[BASE_VELOCITY]
+        settle(laws, newmark, head, position, velocity, base, force, matrix)
+    else:
+        invert(matrix)
     for i in range(n):
         acceleration = 0.0
         for k in range(n):
@@ -204,6 +233,44 @@ def raising_step(raised, newmark, head, drive):
         free[2 * n + i] = acceleration
     respond(matrix, newmark, head)
     return height
+
+
+@compiled
+def chain_step(chain, laws, newmark, head, drive, added):
+    """Step a chain with laws without contact, with a row ``drive`` (N_DRIVE,).
+
+    ``added`` [N] is what a controller adds to the static force.
+    """
+    state, free = head.state, head.free
+    n = chain.masses.size
+    lift = drive[FORCE]
+    if added != 0.0:
+        lift += drive[PART] * added
+    position, velocity, force = np.empty(n), np.empty(n), np.empty(n)
+    for i in range(n):
+        acceleration = state[2 * n + i]
+        position[i] = state[i] + newmark.dt * state[n + i] + newmark.predict_position * acceleration
+        velocity[i] = state[n + i] + newmark.predict_velocity * acceleration
+    matrix = np.empty((n, n))
+    for i in range(n):
+        value = lift * chain.carrier[i] + drive[HEAD_FORCE] * chain.push[i]
+        for k in range(n):
+            value -= chain.stiffness[i, k] * position[k] + chain.damping[i, k] * velocity[k]
+            matrix[i, k] = (
+                newmark.velocity * chain.damping[i, k] + newmark.position * chain.stiffness[i, k]
+            )
+        force[i] = value
+        matrix[i, i] += chain.masses[i]
+    base = drive[BASE], drive[BASE_VELOCITY]
+    settle(laws, newmark, head, position, velocity, base, force, matrix)
+    for i in range(n):
+        acceleration = 0.0
+        for k in range(n):
+            acceleration += matrix[i, k] * force[k]
+        free[i] = position[i] + newmark.position * acceleration
+        free[n + i] = velocity[i] + newmark.velocity * acceleration
+        free[2 * n + i] = acceleration
+    respond(matrix, newmark, head)
 
 
 @in_line

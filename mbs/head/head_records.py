@@ -11,24 +11,30 @@ from typing import Any
 
 import numpy as np
 
+from catenary.mbs.control import control_kernels
+from catenary.mbs.control.control_kernels import ACTING, N_SETTINGS, ControlArrays
 from catenary.mbs.head import head_kernels
 from catenary.mbs.head.head_kernels import (
     N_DRIVE,
+    Chain,
     HeadArrays,
     LinearStep,
     NewmarkFactors,
     RaisedHead,
 )
+from catenary.mbs.head.law_kernels import LawArrays
 from catenary.solver.base.compiled import in_line
 from catenary.solver.base.pointers import address_of, cube_at, numbers_at, table_at_address
 
 # Models, as `head_kernels` steps them.
-LUMPED, REDUCED = 0, 1
+LUMPED, REDUCED, LAWFUL = 0, 1, 2
 
-_ADDRESSES = (*HeadArrays._fields, *LinearStep._fields, *RaisedHead._fields)
+_KINDS = (HeadArrays, LinearStep, RaisedHead, Chain, LawArrays, ControlArrays)
+_ADDRESSES = tuple(dict.fromkeys(name for kind in _KINDS for name in kind._fields))
 # A head: its model, how many coordinates and strips it has, the coordinate of its roll or -1, its
 # first contact; the heights that a reduced mechanism reaches [m], and how many breaks and columns
-# its tables have; its factors, and the addresses of its arrays, named as in `head_kernels`.
+# its tables have; how many laws and points of these it has, rows of gains and numbers that a
+# controller remembers; its factors, and the addresses of its arrays, named as in `head_kernels`.
 HEAD = np.dtype(
     [
         ("model", np.int64),
@@ -40,6 +46,10 @@ HEAD = np.dtype(
         ("highest", np.float64),
         ("n_breaks", np.int64),
         ("n_columns", np.int64),
+        ("n_laws", np.int64),
+        ("n_points", np.int64),
+        ("n_gains", np.int64),
+        ("n_memory", np.int64),
         *((name, np.float64) for name in NewmarkFactors._fields),
         *((name, np.int64) for name in _ADDRESSES),
     ]
@@ -71,6 +81,32 @@ def arrays_of(head):
 
 
 @in_line
+def laws_of(head):
+    """The laws at the addresses of a record, which may be none."""
+    m, k = head.n_laws, head.n_points
+    return LawArrays(
+        table_at_address(head.ways, m, head.n),
+        numbers_at(head.of_rate, m),
+        numbers_at(head.by_base, m),
+        numbers_at(head.zero, m),
+        numbers_at(head.first_point, m + 1),
+        numbers_at(head.points, k),
+        numbers_at(head.forces, k),
+        numbers_at(head.pressed, head.s),
+    )
+
+
+@in_line
+def control_of(head):
+    """The controller at the addresses of a record that has one."""
+    return ControlArrays(
+        numbers_at(head.settings, N_SETTINGS),
+        table_at_address(head.gains, head.n_gains, 4),
+        numbers_at(head.memory, head.n_memory),
+    )
+
+
+@in_line
 def predict(head, drive, numbers, n_contacts):
     """Predict a head from a row ``drive`` of numbers: its strips' part of ``numbers``.
 
@@ -87,7 +123,9 @@ def predict(head, drive, numbers, n_contacts):
         for j in range(s):
             touch[0, j, head.roll] = drive[N_DRIVE + j]
             touch[1, j, head.roll] = drive[N_DRIVE + s + j]
-    within = True
+    within, added = True, 0.0
+    if head.n_gains > 0:
+        added = numbers_at(head.memory, head.n_memory)[ACTING]
     if head.model == LUMPED:
         linear = LinearStep(
             table_at_address(head.matrix, 3 * n, 3 * n),
@@ -95,7 +133,17 @@ def predict(head, drive, numbers, n_contacts):
             numbers_at(head.by_head, 3 * n),
             table_at_address(head.inverse, n, n),
         )
-        head_kernels.linear_step(linear, newmark, arrays, drive[:N_DRIVE])
+        head_kernels.linear_step(linear, newmark, arrays, drive[:N_DRIVE], added)
+    elif head.model == LAWFUL:
+        chain = Chain(
+            numbers_at(head.masses, n),
+            table_at_address(head.stiffness, n, n),
+            table_at_address(head.damping, n, n),
+            numbers_at(head.push, n),
+            numbers_at(head.carrier, n),
+        )
+        laws = laws_of(head)
+        head_kernels.chain_step(chain, laws, newmark, arrays, drive[:N_DRIVE], added)
     else:
         raised = RaisedHead(
             numbers_at(head.masses, n),
@@ -105,7 +153,8 @@ def predict(head, drive, numbers, n_contacts):
             numbers_at(head.breaks, head.n_breaks),
             cube_at(head.coefficients, head.n_breaks - 1, head.n_columns, 4),
         )
-        height = head_kernels.raising_step(raised, newmark, arrays, drive[:N_DRIVE])
+        laws = laws_of(head)
+        height = head_kernels.raising_step(raised, laws, newmark, arrays, drive[:N_DRIVE], added)
         # What is not a number is left to those who couple.
         within = not (height < head.lowest or height > head.highest)
     begin = head.first
@@ -121,4 +170,11 @@ def predict(head, drive, numbers, n_contacts):
 @in_line
 def move(head, force):
     """Move a head on under the forces (n,) at all contacts, after ``predict``."""
-    head_kernels.take(arrays_of(head), force[head.first : head.first + head.s])
+    arrays, contact_force = arrays_of(head), force[head.first : head.first + head.s]
+    head_kernels.take(arrays, contact_force)
+    if head.n_laws > 0:
+        pressed = numbers_at(head.pressed, head.s)
+        for j in range(head.s):
+            pressed[j] = contact_force[j]
+    if head.n_gains > 0:
+        control_kernels.watch(control_of(head), arrays, contact_force)

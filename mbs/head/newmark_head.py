@@ -9,8 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from catenary.mbs.control import control_kernels
+from catenary.mbs.control.control_kernels import ACTING, ControlArrays
+from catenary.mbs.control.regulation import Controller, Regulation, Regulator
 from catenary.mbs.head import head_kernels
 from catenary.mbs.head.head_kernels import N_DRIVE, HeadArrays, NewmarkFactors
+from catenary.mbs.head.laws import LawsInPlace, in_place
 from catenary.mbs.head.strips import HeadParts
 from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
 from catenary.mbs.interface import HeadState
@@ -62,6 +66,35 @@ class SteppedHead(ABC):
             head_kernels.extrapolate, self._newmark, self._arrays, self._early
         )
         self._take = bound(head_kernels.take, self._arrays, later=(np.zeros(s),))
+        self._laws: LawsInPlace = in_place((), (), n, ())
+        self._law_arrays = self._laws.arrays(s)
+        self._control: ControlArrays | None = None
+        self._controller: Controller | None = None
+        self._added, self._time = 0.0, 0.0
+
+    @property
+    def by_hand(self) -> bool:
+        """Whether a controller of one's own regulates it, which no compiled loop calls."""
+        return self._controller is not None
+
+    def regulate(self, regulator: Regulator | None) -> None:
+        """Let the lift be regulated from the start on; None leaves it as it is."""
+        if isinstance(regulator, Regulation):
+            self._control = regulator.arrays(self._newmark.dt)
+            arguments = self._control, self._arrays
+            example = (np.zeros(len(self.strip_offsets)),)
+            self._watch = bound(control_kernels.watch, *arguments, later=example)
+        elif regulator is not None:
+            self._controller = regulator()
+
+    @property
+    def added_force(self) -> float:
+        """What regulates the lift adds to the static force now [N]."""
+        return self._added if self._control is None else float(self._control.memory[ACTING])
+
+    def _put_laws(self, laws: LawsInPlace) -> None:
+        """Let laws act that are not linear, on the coordinates of the head and what is below."""
+        self._laws, self._law_arrays = laws, laws.arrays(len(self.strip_offsets))
 
     @property
     def position(self) -> np.ndarray:
@@ -102,7 +135,15 @@ class SteppedHead(ABC):
 
     def record(self) -> dict[str, Any]:
         """The head as `head_records.fill_head` takes it; arrays are the head's own."""
+        control = self._control
+        watched = {} if control is None else control._asdict()
         return {
+            **watched,
+            **self._law_arrays._asdict(),
+            "n_laws": self._law_arrays.zero.size,
+            "n_points": self._law_arrays.points.size,
+            "n_gains": 0 if control is None else len(control.gains),
+            "n_memory": 0 if control is None else control.memory.size,
             "n": self._n,
             "s": len(self.strip_offsets),
             "roll": -1 if self._lateral is None else self._roll,
@@ -129,17 +170,45 @@ class SteppedHead(ABC):
     def advance(self, contact_force: np.ndarray) -> None:
         """Take the step predicted last with these contact forces (s,) [N]."""
         self._take(contact_force)
+        if self._law_arrays.zero.size:
+            self._law_arrays.pressed[:] = contact_force
+        if self._control is not None:
+            self._watch(contact_force)
+        elif self._controller is not None:
+            height = float((self._touch[0] @ self.position).mean())
+            total = float(contact_force.sum())
+            self._added = float(self._controller.added_force(self._time, total, height))
 
     def state(self) -> np.ndarray:
-        """Positions, velocities and accelerations, shape (3 n,)."""
-        return self._state.copy()
+        """Positions, velocities and accelerations (3 n,); behind them the latest contact forces of
+        a head with laws, and what regulates the lift remembers."""
+        parts = [self._state]
+        if self._law_arrays.zero.size:
+            parts.append(self._law_arrays.pressed)
+        if self._control is not None:
+            parts.append(self._control.memory)
+        elif self._controller is not None:
+            own = np.asarray(self._controller.state(), dtype=float).ravel()
+            parts += [np.array([self._added]), own]
+        return np.concatenate(parts)
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
-        self._state[:] = state
+        begin = self._state.size
+        self._state[:] = state[:begin]
+        if self._law_arrays.zero.size:
+            pressed = self._law_arrays.pressed
+            pressed[:] = state[begin : begin + pressed.size]
+            begin += pressed.size
+        if self._control is not None:
+            self._control.memory[:] = state[begin:]
+        elif self._controller is not None:
+            self._added = float(state[begin])
+            self._controller.restore(np.array(state[begin + 1 :]))
 
     def _aim(self, time: float) -> None:
         """Let the strips touch where the wire is at ``time`` [s]."""
+        self._time = time
         if self._lateral is None:
             return
         self._lateral.move_to(time)

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.mbs.air.uplift import Uplift
+from catenary.mbs.head.laws import Law
 from catenary.mbs.head.strips import ONE_STRIP, Strips
 from catenary.mbs.mechanism.reduction import ReducedMechanism, reduce_mechanism
 from catenary.mbs.rigid.bodies import Motion
@@ -62,6 +63,7 @@ class MultibodyData:
     the train's speed and ``uplift`` lifts head and arm, both not at standstill, where the static
     force is measured; ``strips`` are parts of the head.
     ``all_bodies`` has all bodies in the time loop; with None the mechanism is reduced to tables.
+    ``laws`` that are not linear act on head (0) and arm (1) besides.
     """
 
     name: str
@@ -76,6 +78,7 @@ class MultibodyData:
     strips: Strips = ONE_STRIP
     all_bodies: AllBodies | None = None
     uplift: Uplift | None = None
+    laws: tuple[Law, ...] = ()
 
     @property
     def meets_air(self) -> bool:

@@ -35,6 +35,7 @@ from catenary.mbs.head.head_kernels import (
     RaisedHead,
 )
 from catenary.mbs.head.head_records import REDUCED
+from catenary.mbs.head.laws import Law, in_place
 from catenary.mbs.head.newmark_head import Raising, SteppedHead, parts_of
 from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning, head_parts
 from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
@@ -54,7 +55,8 @@ class RaisingData:
     ``head_offset`` [m], height of the head above the arm at rest without contact; ``base_height``
     [m] of the base, in the line's heights. ``strips`` are part of the head, which may turn about
     the track as ``roll`` says. ``blown_head`` [N] is what the air on bodies lifts the head by,
-    where it meets them as the frame's tables have it.
+    where it meets them as the frame's tables have it. ``laws`` that are not linear act on head and
+    arm besides; both are at the heights ``rest`` [m] where the static force holds.
     """
 
     frame: ReducedMechanism
@@ -67,6 +69,8 @@ class RaisingData:
     strips: Strips = ONE_STRIP
     roll: Turning | None = None
     blown_head: float = 0.0
+    laws: tuple[Law, ...] = ()
+    rest: tuple[float, float] = (0.0, 0.0)
 
 
 class RaisingPantograph(SteppedHead):
@@ -117,8 +121,10 @@ class RaisingPantograph(SteppedHead):
         )
         self._drive = np.zeros(N_DRIVE)
         self._drive[WEIGHT], self._drive[ZERO] = data.head_weight, self._zero
-        arguments = self._raised, self._newmark, self._arrays, self._drive
-        self._step = bound(head_kernels.raising_step, *arguments)
+        head_number = int(np.flatnonzero(head.level)[-1])
+        self._put_laws(in_place(data.laws, (head_number, head.n), self._n, data.rest))
+        arguments = self._raised, self._law_arrays, self._newmark, self._arrays, self._drive
+        self._step = bound(head_kernels.raising_step, *arguments, later=(0.0,))
 
     def predict(self, time: float) -> HeadState:
         """Strips at ``time`` [s] as affine functions of the contact forces in the coming step.
@@ -130,7 +136,7 @@ class RaisingPantograph(SteppedHead):
         """
         self._aim(time)
         self._move_base(time)
-        height = self._step()
+        height = self._step(self.added_force if self._drive[LIFTED] > 0.0 else 0.0)
         # What is not a number is left to those who couple.
         if height < self._lowest or height > self._highest:
             raise self._data.frame.left(height, time)
@@ -164,7 +170,8 @@ class RaisingPantograph(SteppedHead):
         masses = self._masses.copy()
         masses[-1] = self._frame_at(self.position[-1])[0][0]
         stretch = self.position - self.position[-1] * self._level
-        return float(0.5 * masses @ self.velocity**2 + 0.5 * stretch @ self._stiffness @ stretch)
+        own = 0.5 * masses @ self.velocity**2 + 0.5 * stretch @ self._stiffness @ stretch
+        return float(own) + self._laws.energy(self.position, 0.0)
 
     def static_force(self, head_height: float, time: float = np.inf) -> float:
         """Force on a wire that holds the strips at this height at rest, fully raised [N].
@@ -233,6 +240,8 @@ class RaisingPantograph(SteppedHead):
         force[-1] += (mass - carried) * acceleration
         force += self._drive[HEAD_AIR] * self._push
         force[-1] += self._drive[ARM_AIR] + self._drive[BODIES_AIR] * sum(blown)
+        if self._laws.laws:
+            force += self._laws.pull(self.position, self.velocity, (place, velocity))
         masses = self._masses.copy()
         masses[-1] = mass
         return np.asarray(force / masses)

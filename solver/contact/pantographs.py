@@ -187,7 +187,7 @@ class Pantographs:
         """The heads as a compiled loop steps them, None if it cannot step one of them."""
         records = np.zeros(self.n, dtype=HEAD)
         for record, model, strips in zip(records, self.models, self._contacts, strict=True):
-            if not isinstance(model, SteppedHead):
+            if not isinstance(model, SteppedHead) or model.by_hand:
                 return None
             fill_head(record, {**model.record(), "first": strips.start})
         return records
@@ -262,9 +262,12 @@ def _make(
         base,
         airflow(problem, simulated, placement),
         placement.lowering if simulated.lowering else None,
+        placement.regulator if simulated.regulated_lift else None,
     )
     data = placement.data
-    return make_pantograph(replace(data, strips=replace(data.strips, wires=n_wires)), operation)
+    laws = data.laws if simulated.pantograph_laws else ()
+    data = replace(data, strips=replace(data.strips, wires=n_wires), laws=laws)
+    return make_pantograph(data, operation)
 
 
 def _lateral_path(

@@ -18,6 +18,30 @@ def _suspended(laws: Simulated, problem: Problem) -> Simulated:
 
 register(
     Effect(
+        "pantograph_laws",
+        "laws of pantographs that are not linear",
+        "limiters, dampers, springs and friction as tables of force over extension or its rate",
+        "piecewise linear tables, implicit in each step",
+        default=True,
+        applies=lambda p: any(place.data.laws for place in p.train.placements),
+        law=lambda laws, p: replace(laws, pantograph_laws=True),
+        data="[[pantographs.NAME.laws]]",
+    )
+)
+register(
+    Effect(
+        "regulated_lift",
+        "pantographs whose static force is regulated",
+        "a force on the lift, by a sampled controller of the contact force or the head's height",
+        "PID controller with filter, scheduled gains, limits and delay",
+        default=True,
+        applies=lambda p: any(place.regulator is not None for place in p.train.placements),
+        law=lambda laws, p: replace(laws, regulated_lift=True),
+        data="a table [pantographs.NAME.regulation]",
+    )
+)
+register(
+    Effect(
         "vehicle_suspension",
         "suspension of the vehicle between the track and its pantographs",
         "the roof's answer to the track: bounce and pitch, sway and roll of a car body on bogies",

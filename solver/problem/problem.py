@@ -21,6 +21,7 @@ from catenary.solver.problem.window import WindowChoice
 
 if TYPE_CHECKING:
     from catenary.mbs.build import PantographData
+    from catenary.mbs.control.regulation import Regulator
     from catenary.mbs.lowering import Lowering
 
 # Halvings of a step where the scene names no smallest one.
@@ -48,7 +49,8 @@ class Placement:
     ``behind`` [m] is its distance behind the train's reference point (0 for the leading one),
     ``static_force`` [N] the force on the wire at rest at ``nominal_height`` [m] of the head;
     None stands for the mean height of the wire under the static force. ``lowering`` is how it is
-    lowered on the way, with the effect of that name.
+    lowered on the way, with the effect of that name; ``regulator`` what regulates its lift, with
+    the effect ``regulated_lift``: data, or what makes a controller of one's own.
     """
 
     data: PantographData
@@ -56,6 +58,7 @@ class Placement:
     behind: float
     nominal_height: float | None = None
     lowering: Lowering | None = None
+    regulator: Regulator | None = None
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,8 @@ class Simulated:
     contact_loss : whether heads leave the wire; without it the contact force may pull
     head_roll : whether heads roll
     meets_air : whether the air has forces on pantographs
+    pantograph_laws : whether laws of pantographs act that are not linear
+    regulated_lift : whether lifts are regulated as their placements say
     lowering : whether pantographs are lowered as their placements say
     vehicle : motion of the pantographs' bases, None if they move along a straight line
     suspension : of the vehicle between the track and these bases, None if they follow the track
@@ -60,6 +62,8 @@ class Simulated:
     contact_loss: bool = False
     head_roll: bool = False
     meets_air: bool = False
+    pantograph_laws: bool = False
+    regulated_lift: bool = False
     lowering: bool = False
     vehicle: VehicleMotion | None = None
     suspension: Vehicle | None = None

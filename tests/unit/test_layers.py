@@ -36,7 +36,8 @@ ROOMS = {
     "meshgen": ("spans", "wires", "hardware", "line", "mesh", "topologies", "geometry", "chains",
         "division", "gmsh_lines", "reader", "build"),
     "mbs": (
-        "frame", "interface", "rigid", "time_steps", "vehicle", "head", "air", "mechanism",
+        "frame", "interface", "rigid", "time_steps", "vehicle", "control", "head", "air",
+        "mechanism",
         "lumped_data", "library", "response", "lumped", "lowering", "roll", "shape", "build",
     ),
     "solver": (

@@ -15,6 +15,8 @@ from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, tr
 
 from catenary.mbs.air.airflow import Tunnel
 from catenary.mbs.air.uplift import Polynomial, Uplift
+from catenary.mbs.control.regulation import Regulation
+from catenary.mbs.head.laws import Law
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.rigid.forces import PointForce
@@ -46,6 +48,12 @@ LINE = replace(ac_simple_line(4), stagger=(0.2, -0.2, 0.2, -0.2, 0.2))
 TWO = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0))
 PAIR = Strips(2, 0.56, 1.6, Suspension(1.0, 8000.0, 10.0))
 ROLLING = replace(TWO, strips=PAIR, roll=Turning(2.0, 600.0, 4.0))
+# A limiter, a pneumatic damper and a spring that stiffens, on head and frame.
+LAWS = (
+    Law(1, 2, False, (-1.0, 0.0, 1.0), (0.0, 0.0, 2e4), from_rest=True),
+    Law(1, 2, True, (-1.0, 0.0, 1.0), (-30.0, 0.0, 200.0)),
+    Law(0, 1, False, (-0.05, -0.02, 0.0, 1.0), (-600.0, -60.0, 0.0, 0.0)),
+)
 TRACK = (Irregularity("fra_6", 3.0, 100.0, 1), Harmonic(0.01, 1.3))
 UPLIFT = Uplift(Polynomial((0.0, 0.0, 0.01)), 0.7)
 DRAG = (PointForce("drag", "lower_arm", (-80.0, 0.0, 0.0), (-0.82, 0.0, 0.0)),)
@@ -67,7 +75,20 @@ SCENES: dict[str, tuple[tuple[Any, ...], Any, set[str]]] = {
         LINEAR,
         {"contact_damping", "pantograph_aerodynamics"},
     ),
+    "laws and controllers": (
+        (replace(ROLLING, laws=LAWS), replace(paper.data(), laws=LAWS), TWO),
+        LINEAR,
+        {"contact_damping", "head_roll", "vehicle_motion", "pantograph_laws", "regulated_lift"},
+    ),
 }  # fmt: skip
+# Of the pantographs of a scene, in their order.
+REGULATORS = {
+    "laws and controllers": (
+        Regulation(False, 170.0, ((0.0, 0.2, 3.0, 0.0),), -50.0, 50.0, 5e-3, 0.05, 0.02),
+        Regulation(True, 5.02, ((4.0, 0.0, 1e3, 1.0), (6.0, 0.0, 2e3, 1.0)), -50.0, 50.0, 1e-3),
+        Regulation(False, 150.0, ((0.0, 0.1, 2.0, 0.0),), -30.0, 30.0, 0.01),
+    ),
+}
 
 
 @pytest.fixture(scope="module")
@@ -78,8 +99,10 @@ def mesh() -> LineMesh:
 def problem(scene: str, n_steps: int = 200, raise_time: float = 0.15) -> Problem:
     pantographs, law, effects = SCENES[scene]
     start, speed, dt = 90.0, 75.0, 1e-3
+    regulators = REGULATORS.get(scene, (None,) * len(pantographs))
     placements = tuple(
-        Placement(data, 160.0, 40.0 * number, 5.0) for number, data in enumerate(pantographs)
+        Placement(data, 160.0, 40.0 * number, 5.0, regulator=regulator)
+        for number, (data, regulator) in enumerate(zip(pantographs, regulators, strict=True))
     )
     usual = train(speed, start, start + n_steps * dt * speed, raise_time=raise_time)
     usual = replace(usual, placements=placements, vehicle=VehicleMotion(TRACK, TRACK))

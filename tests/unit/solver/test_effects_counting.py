@@ -14,6 +14,8 @@ from small_lines import BARE, EN_PANTOGRAPH, ac_simple_line, mesh_of, problem_of
 
 from catenary.mbs.air.uplift import Polynomial, Uplift
 from catenary.mbs.build import Operation, make_pantograph
+from catenary.mbs.control.regulation import Regulation
+from catenary.mbs.head.laws import Law
 from catenary.mbs.head.strips import Turning
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lowering import Lowering
@@ -68,10 +70,15 @@ def full_line() -> LineData:
 def full_problem(names: frozenset[str]) -> Problem:
     line = full_line()
     uplift = Uplift(Polynomial((0.0, 0.0, 0.01)))
-    rolling = replace(EN_PANTOGRAPH, roll=Turning(2.0, 470.0, 1.0), uplift=uplift)
+    limiter = Law(1, 2, False, (-1.0, 0.1, 1.0), (0.0, 0.0, 9e3), from_rest=True)
+    rolling = replace(EN_PANTOGRAPH, roll=Turning(2.0, 470.0, 1.0), uplift=uplift, laws=(limiter,))
     speed = 1.1 * line.contact_wire.wave_speed
     ours = train(speed, 60.0, 160.0, data=rolling, behind=(0.0, 31.0))
-    lowered = replace(ours.placements[0], lowering=Lowering(0.5, -50.0, 0.2, 0.4))
+    lowered = replace(
+        ours.placements[0],
+        lowering=Lowering(0.5, -50.0, 0.2, 0.4),
+        regulator=Regulation(False, 120.0, ((0.0, 0.1, 1.0, 0.0),), -50.0, 50.0, 0.01),
+    )
     heights = Heights((0.0, 220.0), None, ((90.0, 0.0), (100.0, 0.005), (110.0, 0.0)))
     return problem_of(
         replace(make_line(line), fittings=(INSULATORS,)),
@@ -160,6 +167,8 @@ BLOCKS = {
     "several_pantographs": ({}, 1),
     "head_roll": ({}, 1),
     "vehicle_motion": ({}, 1),
+    "pantograph_laws": ({}, 1),
+    "regulated_lift": ({}, 1),
     "vehicle_suspension": ({}, 1),
     "dropper_break": ({}, 1),
     "tension_loss": ({}, 1),
@@ -194,6 +203,8 @@ LAWS = {
     "contact_damping": "contact",
     "head_roll": "head_roll",
     "vehicle_motion": "vehicle",
+    "pantograph_laws": "pantograph_laws",
+    "regulated_lift": "regulated_lift",
     "vehicle_suspension": "suspension",
     "dropper_break": "incidents",
     "tension_loss": "incidents",

@@ -1,0 +1,1 @@
+"""Regulated lifts: controllers that change a pantograph's static force under way."""

@@ -1,0 +1,142 @@
+"""Laws of a pantograph that are not linear: forces over heights or velocities, as tables.
+
+A law acts between a mass and what is below it, or between a mass and the base. It pulls the mass
+down, and what is below it up, by a force over the extension between the two, or over its rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from catenary.mbs.head.law_kernels import LawArrays
+
+
+@dataclass(frozen=True)
+class Law:
+    """A force over an extension, straight between its points and beyond its ends.
+
+    Attributes
+    ----------
+    mass : which mass it holds, the head being 0
+    below : which one it holds it to; the number of masses stands for the base
+    of_rate : whether its points are rates
+    points : extensions [m] or their rates [m/s], which grow
+    forces : [N] at these, which never fall
+    from_rest : whether extensions count from where the mass stands with the head at its nominal
+        height under the static force; else from where all springs are relaxed
+    """
+
+    mass: int
+    below: int
+    of_rate: bool
+    points: tuple[float, ...]
+    forces: tuple[float, ...]
+    from_rest: bool = False
+
+    def force(self, x: float) -> float:
+        """At an extension [m] or a rate [m/s]."""
+        i = self._segment(x)
+        slope = (self.forces[i + 1] - self.forces[i]) / (self.points[i + 1] - self.points[i])
+        return self.forces[i] + slope * (x - self.points[i])
+
+    def work(self, x: float) -> float:
+        """What a spring stores from an extension of zero to one of ``x`` [J]."""
+        inner = [p for p in self.points if min(0.0, x) < p < max(0.0, x)]
+        ends = np.array(sorted([0.0, x, *inner]))
+        forces = np.array([self.force(float(end)) for end in ends])
+        return float(np.sign(x) * np.sum(0.5 * (forces[1:] + forces[:-1]) * np.diff(ends)))
+
+    def _segment(self, x: float) -> int:
+        i = int(np.searchsorted(self.points, x, side="right")) - 1
+        return min(max(i, 0), len(self.points) - 2)
+
+
+@dataclass(frozen=True)
+class LawsInPlace:
+    """Laws on the coordinates of a pantograph that stands.
+
+    Attributes
+    ----------
+    laws : tuple of Law
+    ways : (m, n) the extension of each by each coordinate
+    by_base : (m,) by the height of the base
+    zero : (m,) the extension where each counts from [m]
+    """
+
+    laws: tuple[Law, ...]
+    ways: np.ndarray
+    by_base: np.ndarray
+    zero: np.ndarray
+
+    def arrays(self, n_contacts: int) -> LawArrays:
+        """As compiled loops take them, with room for the forces of so many contacts."""
+        counts = [len(law.points) for law in self.laws]
+        return LawArrays(
+            self.ways,
+            np.array([float(law.of_rate) for law in self.laws]),
+            self.by_base,
+            self.zero,
+            np.concatenate([[0.0], np.cumsum(counts, dtype=float)]),
+            np.array([x for law in self.laws for x in law.points], dtype=float),
+            np.array([force for law in self.laws for force in law.forces], dtype=float),
+            np.zeros(n_contacts),
+        )
+
+    def pull(
+        self, position: np.ndarray, velocity: np.ndarray, base: tuple[float, float]
+    ) -> np.ndarray:
+        """Forces on the coordinates (n,), upward, in a motion over a base with height and speed."""
+        total = np.zeros(self.ways.shape[1])
+        for law, way, part, zero in self._each:
+            x = way @ velocity + part * base[1] if law.of_rate else _extension(
+                way, position, part, base[0], zero
+            )  # fmt: skip
+            total -= law.force(float(x)) * way
+        return total
+
+    def energy(self, position: np.ndarray, base: float) -> float:
+        """What the laws over extensions store [J]."""
+        return sum(
+            law.work(_extension(way, position, part, base, zero))
+            for law, way, part, zero in self._each
+            if not law.of_rate
+        )
+
+    @property
+    def _each(self) -> Any:
+        return zip(self.laws, self.ways, self.by_base, self.zero, strict=True)
+
+
+def in_place(
+    laws: Sequence[Law], numbers: Sequence[int], n: int, rest: Sequence[float]
+) -> LawsInPlace:
+    """Laws on n coordinates.
+
+    Parameters
+    ----------
+    laws : of the pantograph
+    numbers : coordinates of its masses
+    n : number of all coordinates
+    rest : heights of the masses at rest under the static force, at the nominal height [m]
+    """
+    ways, by_base, zero = np.zeros((len(laws), n)), np.zeros(len(laws)), np.zeros(len(laws))
+    heights = [*rest, 0.0]
+    for j, law in enumerate(laws):
+        ways[j, numbers[law.mass]] = 1.0
+        if law.below < len(numbers):
+            ways[j, numbers[law.below]] = -1.0
+        else:
+            by_base[j] = -1.0
+        if law.from_rest:
+            zero[j] = heights[law.mass] - heights[law.below]
+    return LawsInPlace(tuple(laws), ways, by_base, zero)
+
+
+def _extension(
+    way: np.ndarray, position: np.ndarray, part: float, base: float, zero: float
+) -> float:
+    return float(way @ position + part * base - zero)
