@@ -69,8 +69,9 @@ def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
     """
     new_file(path, DRAWN, force)
     # Matplotlib takes long to import.
+    from catenary.cases.run.describe.defects import defect_facts
     from catenary.cases.scene.convert.problem import problem_of
-    from catenary.postproc.report.line_drawing import draw_line
+    from catenary.postproc.report.line_drawing import Mark, draw_line
     from catenary.solver.statics.equilibrium import find_form
 
     problem, mesh = problem_of(scene), mesh_of(scene)
@@ -86,5 +87,10 @@ def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
     stretch = float(masts[spans[0]]), float(masts[spans[1]])
     lengths = [scene.pantographs[place.name].strips.length_m for place in scene.train.pantographs]
     known = [0.5 * length for length in lengths if length is not None]
-    draw_line(line, mesh, form, path, stretch, min(known, default=None))
+    marks = [
+        Mark(fact["at_m"], fact["wire"], fact["says"])
+        for fact in defect_facts(scene, problem)
+        if "at_m" in fact
+    ]
+    draw_line(line, mesh, form, path, stretch, min(known, default=None), marks)
     return stretch

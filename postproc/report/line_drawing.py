@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -28,6 +30,16 @@ _WIDTH, _HEIGHT = 12.0, 8.1
 _LEFT, _LONG, _CROSS = 0.75, 7.7, 2.7
 _SIDE, _PLAN, _LOW, _GAP = 3.9, 1.75, 0.6, 0.8
 _MARGIN = 0.08  # of a range, on both sides
+_MOST_NAMED = 12  # marks that have a number and a line below
+_LINE = 0.22  # of text [inch]
+
+
+class Mark(NamedTuple):
+    """What is marked on a ``wire`` at ``x`` [m], and what a line below ``says`` of it."""
+
+    x: float
+    wire: str
+    says: str
 
 
 def draw_line(
@@ -37,6 +49,7 @@ def draw_line(
     path: Path,
     stretch: tuple[float, float],
     half_head: float | None = None,
+    marks: Sequence[Mark] = (),
 ) -> None:
     """Write a drawing of a line at rest, as PNG or SVG by the file's suffix. Not collective.
 
@@ -44,13 +57,18 @@ def draw_line(
     ----------
     stretch : from and to of side view and plan view [m]
     half_head : half of the working length of the pan head, None if it is not known [m]
+    marks : what is to be seen besides, such as defects
     """
-    figure = Figure(figsize=(_WIDTH, _HEIGHT), dpi=130)
+    marks = sorted(mark for mark in marks if stretch[0] <= mark.x <= stretch[1])
+    below = _LINE * len(marks[:_MOST_NAMED])
+    figure = Figure(figsize=(_WIDTH, _HEIGHT + below), dpi=130)
     FigureCanvasAgg(figure)
 
     def panel(left: float, low: float, width: float, height: float) -> Axes:
+        whole = _HEIGHT + below
         return figure.add_axes(
-            (left / _WIDTH, low / _HEIGHT, width / _WIDTH, height / _HEIGHT), facecolor="none"
+            (left / _WIDTH, (low + below) / whole, width / _WIDTH, height / whole),
+            facecolor="none",
         )
 
     side = panel(_LEFT, _LOW + _PLAN + _GAP, _LONG, _SIDE)
@@ -58,7 +76,11 @@ def draw_line(
     cross = panel(_LEFT + _LONG + _GAP, _LOW, _CROSS, _PLAN + _GAP + _SIDE)
     points = mesh.points.copy()
     points[:, 2] = form.height
-    _side_view(side, line, mesh, points, stretch)
+    _side_view(side, line, mesh, points, form, stretch)
+    _marks(side, mesh, points, marks)
+    for number, mark in enumerate(marks[:_MOST_NAMED]):
+        high = (below - _LINE * (number + 0.5)) / (_HEIGHT + below)
+        figure.text(_LEFT / _WIDTH, high, f"{number + 1}  {mark.says}", fontsize=9)
     _plan_view(plan, line, mesh, points, stretch, half_head)
     _cross_section(cross, line, mesh, points, stretch, half_head)
     names = {wire.role: wire.name.replace("_", " ") for wire in reversed(line.wires)}
@@ -68,10 +90,17 @@ def draw_line(
 
 
 def _side_view(
-    axes: Axes, line: Line, mesh: LineMesh, points: np.ndarray, stretch: tuple[float, float]
+    axes: Axes,
+    line: Line,
+    mesh: LineMesh,
+    points: np.ndarray,
+    form: Equilibrium,
+    stretch: tuple[float, float],
 ) -> None:
-    for upper, lower in mesh.droppers:
-        axes.plot(points[[upper, lower], 0], points[[upper, lower], 2], color=GREY, lw=0.7)
+    """From the side; droppers that carry nothing are dotted."""
+    for (upper, lower), carries in zip(mesh.droppers, form.dropper_force > 0.0, strict=True):
+        style = "-" if carries else ":"
+        axes.plot(points[[upper, lower], 0], points[[upper, lower], 2], style, color=GREY, lw=0.7)
     for upper, lower in mesh.clamps:
         axes.plot(points[[upper, lower], 0], points[[upper, lower], 2], color=GREY, lw=1.5)
     _wires(axes, line, mesh, points, 2)
@@ -151,6 +180,17 @@ def _wires(axes: Axes, line: Line, mesh: LineMesh, points: np.ndarray, axis: int
     for wire in reversed(line.wires):
         for nodes in mesh.pieces(wire.name):
             axes.plot(points[nodes, 0], points[nodes, axis], color=_COLOUR[wire.role], lw=1.3)
+
+
+def _marks(axes: Axes, mesh: LineMesh, points: np.ndarray, marks: Sequence[Mark]) -> None:
+    """Numbers, or crosses where there are many, below the wire at their places."""
+    for number, mark in enumerate(marks, start=1):
+        own = points[mesh.wires[mark.wire]]
+        z = float(np.interp(mark.x, own[:, 0], own[:, 2]))
+        axes.plot(mark.x, z, "x", color="black", ms=5, mew=1.3, zorder=5)
+        if number <= _MOST_NAMED:
+            below = {"xytext": (0, -13), "textcoords": "offset points", "ha": "center"}
+            axes.annotate(str(number), (mark.x, z), fontsize=9, **below)
 
 
 def _masts(axes: Axes, line: Line) -> None:

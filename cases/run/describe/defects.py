@@ -17,14 +17,15 @@ from catenary.cases.scene.tables.line.defects import (
 )
 from catenary.cases.scene.tables.line.irregularities import HeightTable, LengthsTable
 from catenary.meshgen.line import Line
+from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.problem.problem import Problem
 
 
 def defect_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
-    """Type, place [m] if it has one, and a sentence of each irregularity, fitting and defect.
+    """Type, place [m] and wire if it has one, and a sentence of each irregularity and so on.
 
-    Those that are simulated, in the order of irregularities, fittings, defects. Not collective.
+    Of all that is simulated, in the order of irregularities, fittings, defects. Not collective.
     """
     line = problem.line
     found: list[dict[str, Any]] = []
@@ -37,7 +38,8 @@ def defect_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
         over = f" over {fitting.length_m:g} m" if fitting.length_m else ""
         says = f"{fitting.kind.replace('_', ' ')} of {fitting.mass_kg:g} kg{over} on the "
         says += f"{_named(fitting.wire)} at {fitting.at_m:g} m"
-        found.append({"type": fitting.kind, "at_m": fitting.at_m, "says": says})
+        place = {"at_m": fitting.at_m, "wire": fitting.wire}
+        found.append({"type": fitting.kind, **place, "says": says})
     for defect in scene.defects:
         if defect.type in problem.effects:
             found.append({"type": defect.type, **_defect(defect, line)})
@@ -90,11 +92,13 @@ def _defect(table: Defect, line: Line) -> dict[str, Any]:
             which = f"dropper {table.dropper} of span {table.span}, at {x:g} m"
             missing = isinstance(table, MissingDropperTable)
             what = "is missing" if missing else "has a loose clamp and carries nothing"
-            return {"at_m": x, "says": f"{which}, {what}"}
+            wire = line.wires_of(Role.CONTACT)[0].name
+            return {"at_m": x, "wire": wire, "says": f"{which}, {what}"}
         case WornWireTable():
             lost = f"has lost {100 * table.lost_share:g} % of its section"
             where = f"from {table.from_m:g} to {table.to_m:g} m"
-            return {"at_m": table.from_m, "says": f"the {_named(table.wire)} {lost} {where}"}
+            place = {"at_m": table.from_m, "wire": table.wire}
+            return {**place, "says": f"the {_named(table.wire)} {lost} {where}"}
         case WrongTensionTable():
             tension = table.factor * line.wire(table.wire).tension / 1e3
             hangs = (
@@ -105,7 +109,9 @@ def _defect(table: Defect, line: Line) -> dict[str, Any]:
             parts = [f"{table.mass_kg:g} kg"] * bool(table.mass_kg)
             parts += [f"{table.stiffness_N_per_m:g} N/m"] * bool(table.stiffness_N_per_m)
             where = f"on the {_named(table.wire)} at {table.at_m:g} m"
-            return {"at_m": table.at_m, "says": f"hard spot of {' and '.join(parts)} {where}"}
+            place = {"at_m": table.at_m, "wire": table.wire}
+            return {**place, "says": f"hard spot of {' and '.join(parts)} {where}"}
         case KinkTable():
             where = f"of the {_named(table.wire)} at {table.at_m:g} m"
-            return {"at_m": table.at_m, "says": f"kink of {table.angle_deg:g} degrees {where}"}
+            place = {"at_m": table.at_m, "wire": table.wire}
+            return {**place, "says": f"kink of {table.angle_deg:g} degrees {where}"}
