@@ -189,8 +189,14 @@ def _marks(axes: Axes, mesh: LineMesh, points: np.ndarray, marks: Sequence[Mark]
         z = float(np.interp(mark.x, own[:, 0], own[:, 2]))
         axes.plot(mark.x, z, "x", color="black", ms=5, mew=1.3, zorder=5)
         if number <= _MOST_NAMED:
-            below = {"xytext": (0, -13), "textcoords": "offset points", "ha": "center"}
-            axes.annotate(str(number), (mark.x, z), fontsize=9, **below)
+            axes.annotate(
+                str(number),
+                (mark.x, z),
+                xytext=(0, -13),
+                textcoords="offset points",
+                ha="center",
+                fontsize=9,
+            )
 
 
 def _masts(axes: Axes, line: Line) -> None:

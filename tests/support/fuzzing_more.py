@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import random
 
+from fuzzing_defects import put_defects
 from fuzzing_incidents import put_incidents
 from fuzzing_numerics import is_second_opinion, put_numerics
 
@@ -47,6 +48,11 @@ def put_more(rng: random.Random, words: Words, span: float, room: float, n_steps
     if rng.random() < 2 * _NOW_AND_THEN and not is_second_opinion(words):
         placed = str(words["train.pantographs"]).count("name=")
         put_incidents(rng, words, n_steps, _droppers_by_span(words), placed)
+    if rng.random() < 2 * _NOW_AND_THEN:
+        # Of spans of two lengths this is the shorter one.
+        length = 0.99 * span * int(str(words["line.n_spans"]))
+        droppers = _droppers_by_span(words)
+        put_defects(rng, words, droppers, length, smooth=is_second_opinion(words))
 
 
 def _wires(rng: random.Random, words: Words, span: float) -> None:

@@ -17,7 +17,11 @@ _NOT_SINGLE = (
     "line.damping.per_component.droppers",
     "effects.residual_dropper_stiffness",
     "incidents",
+    "defects",
+    "irregularities.dropper_lengths",
 )
+# What is on the contact wire by its place, of lines with several ones.
+_ON_THE_WIRE = ("defects", "line.fittings")
 
 
 def put_topology(rng: random.Random, words: Words, span: float) -> str:
@@ -61,13 +65,13 @@ def _compound(rng: random.Random, words: Words, span: float) -> None:
 
 
 def _twin(rng: random.Random, words: Words, span: float) -> None:
+    _leave_out(words, _ON_THE_WIRE)
     droppers = rng.choice(("pairs", "alternating"))
     words["line.twin"] = f"{{spacing_m={rng.uniform(0.02, 0.2)!r},droppers='{droppers}'}}"
 
 
 def _single(rng: random.Random, words: Words, span: float) -> None:
-    for key in [key for key in words if key.startswith(_NOT_SINGLE)]:
-        del words[key]
+    _leave_out(words, _NOT_SINGLE)
     words |= {f"line.{key}": "" for key in ("messenger_wire", "dropper", "encumbrance_m")}
     words["mesh.elements_per_gap"] = rng.randint(8, 64)
     if rng.random() < _BRIDLES:
@@ -79,12 +83,19 @@ def _single(rng: random.Random, words: Words, span: float) -> None:
 
 def _overlap(rng: random.Random, words: Words) -> None:
     """In the spans that trains run on, as far as there can be one."""
+    _leave_out(words, _ON_THE_WIRE)
     n_spans = rng.randint(3, 5)
     words["line.n_spans"] = n = max(n_spans + 2, int(str(words["line.n_spans"])))
     words["line.overlap"] = (
         f"{{first_span={rng.randint(2, n - n_spans)},n_spans={n_spans},"
         f"rise_m={rng.uniform(0.05, 0.8)!r},distance_m={rng.uniform(0.1, 1.0)!r}}}"
     )
+
+
+def _leave_out(words: Words, begins: tuple[str, ...]) -> None:
+    """Words whose keys begin so are no part of such a line."""
+    for key in [key for key in words if key.startswith(begins)]:
+        del words[key]
 
 
 def _wire(rng: random.Random, tension: float, mass: float) -> str:

@@ -1,0 +1,90 @@
+"""A line with defects of all kinds on one rank and on all; a run that goes on from amid them.
+
+Run by ``mpirun -n N python -m mpi4py -m pytest tests/mpi``; on one rank it compares a run with
+itself.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
+from catenary.solver.base.parallel import on_root
+from catenary.solver.statics.line_at_rest import line_at_rest_on_all
+from catenary.solver.time_loop.march import March
+from catenary.solver.time_loop.observers import Stage, StepView
+
+WORLD = MPI.COMM_WORLD
+# See test_same_answers.py.
+TOLERANCE = 1e-9
+# The train passes the middle of the line, where two ranks meet; a slack dropper breaks there, too.
+SCENE = (
+    "line.n_spans=7",
+    "train.start_m=180",
+    "train.end_m=230",
+    "train.raise_time_s=0.1",
+    "evaluation.from_m=210",
+    "evaluation.to_m=220",
+    "irregularities.contact_wire_height.standard_deviation_mm=10",
+    "irregularities.running_surface.standard_deviation_mm=0.2",
+    "irregularities.dropper_lengths={standard_deviation_mm=5,by_dropper=[[4,5,60],[4,9,60]]}",
+    "defects=[{type='missing_dropper',span=4,dropper=3},{type='loose_clamp',span=5,dropper=2},"
+    "{type='worn_wire',from_m=190,to_m=215,lost_share=0.2},"
+    "{type='wrong_tension',wire='messenger_wire',factor=0.9},"
+    "{type='hard_spot',at_m=205.3,mass_kg=5,stiffness_N_per_m=500},"
+    "{type='kink',at_m=212.0,angle_deg=0.3}]",
+    "line.fittings=[{kind='splice',at_m=209.4,mass_kg=1.2}]",
+    "incidents=[{type='dropper_break',at_s=0.45,span=4,dropper=9}]",
+)
+
+
+class Watching:
+    """Keeps forces and energies of each state, and the checkpoint of one."""
+
+    def __init__(self, kept: int = -1) -> None:
+        self._kept = kept
+        self.checkpoint: dict[str, Any] | None = None
+        self.rows: list[np.ndarray] = []
+
+    def start(self, stage: Stage) -> None:
+        """Nothing is needed."""
+
+    def observe(self, view: StepView) -> None:
+        self.rows.append(np.array([*view.contact_force, *view.energies()]))
+        if view.step == self._kept:
+            self.checkpoint = WORLD.bcast(view.checkpoint())
+
+    def finish(self, outcome: str) -> None:
+        assert outcome == "done"
+
+
+def test_defects_on_all_ranks_and_after_a_restart() -> None:
+    problem = problem_of(load_scene("en50318_2002", list(SCENE)))
+    mesh = on_root(WORLD, lambda: mesh_of(load_scene("en50318_2002", list(SCENE))))
+    rest = line_at_rest_on_all(problem, mesh, WORLD)
+    assert np.count_nonzero(rest.model.dropper_gap) >= 2
+    found = []
+    for comm in (MPI.COMM_SELF, WORLD):
+        watching = Watching(300)
+        with March(comm, *rest) as march:
+            march.run([watching])
+        found.append(watching)
+    again = Watching()
+    with March(WORLD, *rest) as march:
+        assert found[1].checkpoint is not None
+        march.restore(found[1].checkpoint)
+        march.run([again])
+    alone, shared = (np.array(watching.rows) for watching in found)
+    assert WORLD.rank > 0 or np.ptp(shared[:, 0]) > 50.0
+    # Contact forces are rank 0's, energies the line's.
+    own = slice(0 if WORLD.rank == 0 else 1, None)
+    scale = np.abs(alone).max(axis=0)
+    worst = (np.abs(alone - shared).max(axis=0) / scale)[own].max()
+    print(f"rank {WORLD.rank} of {WORLD.size}: {worst:.2e} of the largest")
+    assert worst < TOLERANCE
+    assert np.array_equal(np.array(again.rows)[:, own], shared[300:, own])

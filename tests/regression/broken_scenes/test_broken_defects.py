@@ -1,0 +1,165 @@
+"""Irregularities and defects that cannot be: one sentence with key, value and what is allowed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from catenary.cases.cli.main import app
+
+SOUND = Path(__file__).with_name("sound.toml")
+# Sound tables, of which an entry is changed at a time.
+DEFECTS = """
+[[line.fittings]]
+kind = "section_insulator"
+at_m = 600.0
+length_m = 1.6
+mass_kg = 12.0
+
+[irregularities.contact_wire_height]
+standard_deviation_mm = 10.0
+
+[irregularities.running_surface]
+by_place = [[100.0, 0.0], [110.0, -0.001], [120.0, 0.0]]
+
+[irregularities.dropper_lengths]
+by_dropper = [[7, 4, -10.0]]
+
+[[defects]]
+type = "missing_dropper"
+span = 5
+dropper = 3
+
+[[defects]]
+type = "loose_clamp"
+span = 6
+dropper = 1
+
+[[defects]]
+type = "worn_wire"
+from_m = 400.0
+to_m = 460.0
+lost_share = 0.2
+
+[[defects]]
+type = "wrong_tension"
+wire = "contact_wire"
+factor = 0.9
+
+[[defects]]
+type = "hard_spot"
+at_m = 500.0
+mass_kg = 5.0
+
+[[defects]]
+type = "kink"
+at_m = 550.0
+angle_deg = 0.5
+"""
+HEIGHT, SURFACE = "irregularities.contact_wire_height", "irregularities.running_surface"
+LENGTHS = "irregularities.dropper_lengths"
+
+ASSIGNMENTS = {
+    "no such kind": (["defects.0.type=rust"], "defects.0 on the command line (--set) must be of"),
+    "no such span": (["defects.0.span=23"], "defects.0.span is 23 on the command line (--set); the "
+                     "line has 22 spans"),
+    "no such dropper": (["defects.1.dropper=10"], "span 6 has 9 droppers"),
+    "a dropper twice": (
+        ["defects.1.span=5", "defects.1.dropper=3"],
+        "defects.1.dropper is 3 on the command line (--set); defects.0 has this already",
+    ),
+    "broken again": (
+        ["incidents=[{type='dropper_break',at_s=1.0,span=5,dropper=3}]"],
+        "incidents.0.dropper is 3 on the command line (--set); defects.0 lets this one carry",
+    ),
+    "no such wire": (["defects.2.wire=third_rail"], "the line has contact_wire, messenger_wire"),
+    "worn backwards": (["defects.2.to_m=300"], "must have to_m greater than from_m"),
+    "worn beyond the line": (["defects.2.to_m=2000"], "contact_wire runs from 0 to 1320 m"),
+    "worn away": (["defects.2.lost_share=0.6"], "must be at most 0.5"),
+    "worn twice": (
+        ["defects.6={type='worn_wire',from_m=450,to_m=480,lost_share=0.1}"],
+        "defects.2 has a stretch of contact_wire that reaches into this one",
+    ),
+    "slower than the train": (
+        ["defects.3.factor=0.6", "train.speed_km_h=350"],
+        "the wave speed of contact_wire would be 339.4 km/h",
+    ),
+    "tension of nothing": (["defects.3.factor=0"], "must be at least 0.5"),
+    "two tensions": (
+        ["defects.6={type='wrong_tension',wire='contact_wire',factor=1.1}"],
+        "defects.3 has this already",
+    ),
+    "spot of nothing": (["defects.4.mass_kg=0"], "needs mass_kg or stiffness_N_per_m"),
+    "spot beyond the line": (["defects.4.at_m=1321"], "contact_wire runs from 0 to 1320 m"),
+    "kink of a messenger": (["defects.5.wire=messenger_wire"], "strips run on contact wires only"),
+    "kink like a hook": (["defects.5.angle_deg=90"], "must be at most 10 [deg]"),
+    "key of another kind": (["defects.0.factor=2"], "does not belong to type missing_dropper"),
+    "misspelt key": (["defects.0.droper=3"], "did you mean defects.0.dropper?"),
+    "no gravity": (
+        ["effects.gravity=false", "effects.pre_sag=false", "effects.dropper_slackening=false"],
+        "requires effects.gravity",
+    ),
+    "a second opinion on kinks": (
+        ["numerics.scheme=ts_alpha2", f"{SURFACE}="],
+        'defects.5.type is "kink"',
+    ),
+    "a second opinion on waves": (
+        ["numerics.scheme=ts_alpha2", "effects.kink=false"],
+        "effects.running_surface is true",
+    ),
+    "no heights": ([f"{HEIGHT}.standard_deviation_mm="], "needs standard_deviation_mm or by_place"),
+    "negative heights": ([f"{HEIGHT}.standard_deviation_mm=-1"], "must be greater than 0 [mm]"),
+    "no waves": ([f"{HEIGHT}.shortest_m=200"], "must have waves, but longest_m is 120"),
+    "no room": ([f"{HEIGHT}.from_m=1310", f"{HEIGHT}.to_m=1315"], "no wave of shortest_m"),
+    "begins nowhere": ([f"{HEIGHT}.from_m=1400"], "the line ends at 1320 m"),
+    "no begin without waves": ([f"{SURFACE}.from_m=10"], "must not have from_m without"),
+    "too many waves": (
+        ["line.n_spans=20000", f"{SURFACE}={{standard_deviation_mm=0.1,shortest_m=0.05}}"],
+        "it must be at least 3 m on 1.2e+06 m",
+    ),
+    "a table that goes back": (
+        [f"{SURFACE}.by_place=[[100,0],[90,0]]"],
+        "must list its first numbers in ascending order, but 90 follows 100",
+    ),
+    "a table of cliffs": ([f"{SURFACE}.by_place=[[1,0],[2,3]]"], "must stay within 0.5 m"),
+    "no such dropper's length": ([f"{LENGTHS}.by_dropper=[[7,14,1]]"], "span 7 has 9 droppers"),
+    "half a dropper": ([f"{LENGTHS}.by_dropper=[[7,1.5,1]]"], "with whole numbers from 1 on"),
+    "a metre too long": ([f"{LENGTHS}.by_dropper=[[7,1,1000]]"], "must have errors within 500 mm"),
+    "lengths of nothing": ([f"{LENGTHS}.by_dropper="], "needs standard_deviation_mm or by_dropper"),
+    "no such fitting": (["line.fittings.0.kind=lamp"], "must be section_insulator"),
+    "fitting beyond the line": (["line.fittings.0.at_m=1400"], "contact_wire runs from 0"),
+    "fitting that sticks out": (
+        ["line.fittings.0.at_m=1319"],
+        "line.fittings.0.length_m is 1.6 m",
+    ),
+    "fitting of nothing": (["line.fittings.0.mass_kg=0"], "must be greater than 0 [kg]"),
+    "fitting on no wire": (["line.fittings.0.wire=fence"], "the line has contact_wire"),
+}  # fmt: skip
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Path:
+    file = tmp_path / "case.toml"
+    file.write_text(SOUND.read_text(encoding="utf-8") + DEFECTS, encoding="utf-8")
+    return file
+
+
+@pytest.mark.parametrize("name", ASSIGNMENTS)
+def test_a_defect_that_cannot_be_is_refused(name: str, case: Path) -> None:
+    assignments, expected = ASSIGNMENTS[name]
+    words = [word for text in assignments for word in ("--set", text)]
+    out = case.parent / "out"
+    result = CliRunner().invoke(app, ["run", str(case), "-o", str(out), *words])
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    sentence = result.stderr.strip()
+    assert sentence.startswith("catenary: ") and "\n" not in sentence
+    assert expected in sentence, sentence
+    assert not out.exists()
+
+
+def test_the_tables_themselves_are_sound(case: Path) -> None:
+    result = CliRunner().invoke(app, ["check", str(case)])
+    assert result.exit_code == 0, result.output
