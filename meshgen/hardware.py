@@ -75,6 +75,8 @@ class SteadyArm:
     length [m], mass per length [kg/m], clamp mass [kg], vertical stiffness at the wire [N/m].
     ``holds_height``: whether the arm holds the wire at its height at rest and so carries weight
     there; otherwise the wire hangs freely between the droppers next to the arm.
+    ``inclination``: by how much it rises from the wire to its hinge at rest, with lateral motion
+    [rad]; None if it is what the weight that hangs at the arm makes of it.
     """
 
     length: float
@@ -82,6 +84,7 @@ class SteadyArm:
     clamp_mass: float
     stiffness: float
     holds_height: bool = False
+    inclination: float | None = None
 
 
 @dataclass(frozen=True)

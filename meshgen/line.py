@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from catenary.meshgen.curve import Curve
 from catenary.meshgen.hardware import Clamps, Droppers, Fittings, SteadyArms, Supports
 from catenary.meshgen.spans import Spans
 from catenary.meshgen.wires import End, Profile, Role, Wire
@@ -25,6 +26,7 @@ class Line(Spans):
     topology : name of what made it
     wires : from the contact wires upwards
     droppers, steady_arms, supports, clamps : groups
+    curve : of the track, None if it is straight; lateral positions count from the track's middle
     fittings : insulators and the like on wires, which no mesh file has
 
     Raises ValueError if names occur twice, a group names no wire, or droppers hang a wire without
@@ -38,6 +40,7 @@ class Line(Spans):
     supports: tuple[Supports, ...]
     clamps: tuple[Clamps, ...] = ()
     fittings: tuple[Fittings, ...] = ()
+    curve: Curve | None = None
 
     def __post_init__(self) -> None:
         wires = {wire.name for wire in self.wires}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from catenary.meshgen.line import Line
 from catenary.meshgen.topologies import (  # noqa: F401  register themselves
     compound,
@@ -33,7 +35,8 @@ def make_line(data: LineData) -> Line:
             raise InputError(f"the topology {data.topology} needs {part}")
     data.check()
     line = topology.make(data)
-    return line if data.overlap is None else with_overlap(line, data.overlap)
+    line = line if data.overlap is None else with_overlap(line, data.overlap)
+    return replace(line, curve=data.curve)
 
 
 __all__ = ["make_line", "registered"]

@@ -31,7 +31,7 @@ def compound_catenary(data: LineData) -> Line:
     )
     heights = level.level(data.support_positions).tolist()
     masts = tuple(data.support_positions.tolist())
-    course = Piece(masts, (0.0,) * len(masts), tuple(heights))
+    course = Piece(masts, data.over_track(data.support_positions), tuple(heights))
     middle = Wire.of(auxiliary.conductor, AUXILIARY_WIRE, Role.AUXILIARY, (course,), level)
     x = data.along(auxiliary.dropper_positions)
     hung = contact.mass_per_length + middle.mass_per_length

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from catenary.meshgen.curve import Curve
 from catenary.meshgen.hardware import DropperKind, SteadyArm
 from catenary.meshgen.spans import Spans
 from catenary.meshgen.wires import Conductor, Profile
@@ -94,6 +95,9 @@ class LineData(Spans):
     transition_rise : height gained by the contact wire over all transition spans of one end [m]
     topology : name of the topology that makes the line
     auxiliary_wire, stitch_wire, twin, bridle : parts of which some topologies make wires
+    messenger_stagger : lateral position of the messenger wire at each support, as ``stagger``; None
+        if it stays above the middle of the track
+    curve : of the track, None if it is straight
     overlap : where the line consists of two tension sections, None if of one
     """
 
@@ -114,6 +118,8 @@ class LineData(Spans):
     twin: Twin | None = None
     bridle: Bridle | None = None
     overlap: Overlap | None = None
+    messenger_stagger: tuple[float, ...] | None = None
+    curve: Curve | None = None
 
     @cached_property
     def dropper_x(self) -> np.ndarray:
@@ -130,6 +136,13 @@ class LineData(Spans):
         """Ends of stretches of ``length`` [m] about inner supports, shape (n_spans - 1, 2) [m]."""
         half = 0.5 * length
         return np.add.outer(self.support_positions[1:-1], (-half, half))
+
+    def over_track(self, x: np.ndarray) -> tuple[float, ...]:
+        """Lateral position of what hangs above the contact wire, at places ``x`` [m], straight
+        between supports."""
+        if self.messenger_stagger is None:
+            return (0.0,) * np.size(x)
+        return tuple(np.interp(x, self.support_positions, self.messenger_stagger).tolist())
 
     @cached_property
     def profile(self) -> Profile:
@@ -169,6 +182,11 @@ class LineData(Spans):
         ):
             if n != wanted:
                 raise InputError(f"{name} has {n} entries, but {self.n_spans} spans need {wanted}")
+        if self.messenger_stagger is not None and len(self.messenger_stagger) != self.n_spans + 1:
+            raise InputError(
+                f"messenger_stagger has {len(self.messenger_stagger)} entries, but {self.n_spans} "
+                f"spans need {self.n_spans + 1}"
+            )
         if self.auxiliary_wire is not None:
             above = self.auxiliary_wire.dropper_positions
             for span, (length, places) in enumerate(

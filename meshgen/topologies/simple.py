@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from catenary.meshgen.hardware import Droppers, SteadyArms, Supports
@@ -38,9 +40,10 @@ def simple_catenary(data: LineData) -> Line:
 
 
 def hung_messenger(data: LineData, x: np.ndarray, hung: float) -> Wire:
-    """A messenger wire above the track that carries ``hung`` [kg/m] at places ``x`` (n,) [m]."""
+    """A messenger wire that carries ``hung`` [kg/m] at places ``x`` (n,) [m]."""
     wire = data.messenger_wire
     assert wire is not None
     top = data.contact_height + data.encumbrance
     course = sagging(data, x, top, hung + wire.mass_per_length, wire.tension)
+    course = replace(course, y=data.over_track(np.array(course.x)))
     return Wire.of(wire, MESSENGER_WIRE, Role.MESSENGER, (course,))

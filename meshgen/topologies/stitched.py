@@ -55,7 +55,12 @@ def stitched_catenary(data: LineData) -> Line:
     for a, mast, b, left, right in zip(starts, masts, ends, *clamps, strict=True):
         x, z = (a, mast, b), (left, 0.5 * (left + right) - falls, right)
         pieces.append(
-            Piece(tuple(map(float, x)), (0.0,) * 3, tuple(map(float, z)), (End.CLAMPED,) * 2)
+            Piece(
+                tuple(map(float, x)),
+                data.over_track(np.array(x)),
+                tuple(map(float, z)),
+                (End.CLAMPED,) * 2,
+            )
         )
     taken = tuple((piece.x[0], piece.x[-1], stitch.conductor.tension) for piece in pieces)
     groups = [

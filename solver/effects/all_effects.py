@@ -10,6 +10,7 @@ from catenary.solver.effects import (  # noqa: F401  (registers)
     axial_effects,
     defect_effects,
     end_effects,
+    lateral_effects,
     pantograph_effects,
     vertical_effects,
 )

@@ -61,7 +61,8 @@ def _add_bars(builder: ModelBuilder, name: str) -> None:
 def _add_pendulums(builder: ModelBuilder) -> None:
     """What hangs swings along the track: droppers by their force, arms by their radial force."""
     model, mesh, line = builder.model, builder.mesh, builder.problem.line
-    unknowns, matrices = across_droppers(model)
+    (unknowns, weights), stiffness = across_droppers(model)
+    matrices = stiffness[:, None, None] * weights[:, :, None] * weights[:, None, :]
     for number, droppers in enumerate(line.droppers):
         mine = mesh.dropper_group == number
         kind = np.arange(np.count_nonzero(mine))
@@ -69,7 +70,9 @@ def _add_pendulums(builder: ModelBuilder) -> None:
     for number, arms in enumerate(line.steady_arms):
         nodes = mesh.steady_arms[mesh.arm_group == number]
         radial = np.abs(line.wire(arms.wire).radial_force(np.array(arms.x)))
-        if radial.any():
+        if model.form is not None and model.form.lateral is not None:
+            radial = model.form.lateral.arm_tension[mesh.arm_group == number]
+        if radial.any() and arms.kind.length > 0.0:
             builder.add_springs(arms.name, nodes, "u", radial / arms.kind.length)
 
 

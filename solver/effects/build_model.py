@@ -42,6 +42,7 @@ def build(
         dropper_lengths,
     )
     model.form = form
+    model.hanging_at_arms = np.zeros(mesh.steady_arms.size)
     model.missing = model.droppers_at(model.simulated.missing)
     model.broken = model.missing | model.droppers_at(model.simulated.loose)
     if broken is not None:

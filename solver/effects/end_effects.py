@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catenary.solver.effects import defect_effects  # noqa: F401  (built before)
+from catenary.solver.effects import defect_effects, lateral_effects  # noqa: F401  (built before)
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.model.absorbing_layers import layer_blocks
 from catenary.solver.model.model import Block

@@ -64,11 +64,14 @@ def _arm_inertia(builder: ModelBuilder) -> None:
         rod = arms.kind.mass_per_length * arms.kind.length
         # A rod hinged at its far end: a third of its mass moves with the wire, half of it hangs.
         builder.add_masses(arms.name, nodes, rod / 3 + clamp, hanging_mass=rod / 2 + clamp)
+        builder.model.hanging_at_arms[mesh.arm_group == number] = rod / 2 + clamp
 
 
 def _arm_stiffness(builder: ModelBuilder) -> None:
     mesh = builder.mesh
     for number, arms in enumerate(builder.problem.line.steady_arms):
+        if arms.kind.length > 0.0 and builder.model.simulated.lateral:
+            continue  # a bar, whose stiffness follows from its radial force
         nodes = mesh.steady_arms[mesh.arm_group == number]
         builder.add_springs(arms.name, nodes, "w", arms.kind.stiffness)
 
@@ -186,7 +189,11 @@ register(
         "springs from the contact wire to the ground at the arms",
         "EN 50318:2002 reference model",
         default=True,
-        applies=lambda p: any(group.kind.stiffness > 0 for group in p.line.steady_arms),
+        applies=lambda p: any(
+            group.kind.stiffness > 0
+            and not (group.kind.length > 0 and "lateral_motion" in p.effects)
+            for group in p.line.steady_arms
+        ),
         build=_arm_stiffness,
         data="line.steady_arm.stiffness_N_per_m above 0",
     )

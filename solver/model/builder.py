@@ -13,6 +13,9 @@ from catenary.solver.model.model import Block, Model, wire_elements
 from catenary.solver.model.stations import SAME_STATION
 from catenary.solver.problem.problem import Problem
 
+# Displacements of a node beside its height, in which its masses move as well.
+_LEVEL = ("u", "v")
+
 
 class ModelBuilder:
     """Collects terms of effects; ``finish`` gives the model."""
@@ -69,16 +72,15 @@ class ModelBuilder:
     ) -> None:
         """Point masses [kg]; ``hanging_mass`` is what the node carries if it is not the same.
 
-        Those of heights move along the track as well, where nodes do.
+        Those of heights move along the track and sideways as well, where nodes do.
         """
         values = np.broadcast_to(np.asarray(mass, dtype=float), nodes.shape)
         dofs = self.model.dofs(nodes, unknown)
         self._add_block(component, dofs[:, None], values[:, None, None].copy(), None)
-        along = nodes[self.model.numbering.has(nodes, "u")] if unknown == "w" else nodes[:0]
-        if along.size:
-            moved = values[self.model.numbering.has(nodes, "u")]
-            own = self.model.dofs(along, "u")[:, None]
-            self._add_block(component, own, moved[:, None, None].copy(), None)
+        for name in _LEVEL if unknown == "w" else ():
+            there = self.model.numbering.has(nodes, name)
+            if there.any():
+                self.add_masses(component, nodes[there], values[there], unknown=name)
         if unknown == "w":
             hanging = values if hanging_mass is None else hanging_mass
             self._hanging.append((dofs, np.broadcast_to(np.asarray(hanging), nodes.shape)))

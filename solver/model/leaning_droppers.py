@@ -1,4 +1,4 @@
-"""Droppers that lean along the track: their directions, and what their force does across them."""
+"""Droppers that lean: their directions, and what their force does across them."""
 
 from __future__ import annotations
 
@@ -11,52 +11,65 @@ from catenary.solver.model.links import Direction, between_nodes
 if TYPE_CHECKING:
     from catenary.solver.model.model import Model
 
+# Displacements along the components of a dropper's vector.
+_ALONG, _SIDEWAYS, _UP = range(3)
+_NAMES = ("u", "v", "w")
+# Parts of unit vectors below this are none: what round-off leaves of upright droppers [-].
+_NONE = 1e-9
+
 
 def dropper_directions(model: Model) -> Direction:
     """Stretch of the droppers as they stand at rest: upright ones in height only."""
     pairs = model.mesh.droppers
-    upright = between_nodes(model, pairs)
-    if model.form is None or not model.form.leaning(pairs).any():
-        return upright
-    along, height = _cosines(model)
-    unknowns = np.concatenate([upright.unknowns, model.dofs(pairs, "u")], axis=1)
-    return Direction(unknowns, _pairwise(height, along))
+    if model.form is None:
+        return between_nodes(model, pairs)
+    unit, _ = _unit_vectors(model)
+    return _along(model, unit, (_UP,))
 
 
-def across_droppers(model: Model) -> tuple[np.ndarray, np.ndarray]:
-    """What a dropper's force N at rest does across it, N / l of a pendulum of its length l.
+def across_droppers(model: Model) -> tuple[Direction, np.ndarray]:
+    """What a dropper's force at rest does across it, N / l of a pendulum of its length l, in the
+    plane along the track.
 
     Returns
     -------
-    unknowns : (n_droppers, 4) height and place along the track of the upper, then of the lower end
-    matrices : (n_droppers, 4, 4) [N/m], zero before the shape at rest is known
+    direction : Direction of each
+    stiffness : (n_droppers,) [N/m], zero before the shape at rest is known
     """
+    unit, pull = _unit_vectors(model)
+    return _along(model, _across(unit), (_UP, _ALONG)), pull
+
+
+def sideways_of_droppers(model: Model) -> tuple[Direction, np.ndarray]:
+    """The same in the plane across the track, at right angles to ``across_droppers``."""
+    unit, pull = _unit_vectors(model)
+    return _along(model, np.cross(unit, _across(unit)), (_SIDEWAYS,)), pull
+
+
+def _across(unit: np.ndarray) -> np.ndarray:
+    """Unit vectors across others in the plane along the track, (n, 3)."""
+    level = np.stack([unit[:, _UP], np.zeros(len(unit)), -unit[:, _ALONG]], axis=1)
+    return np.asarray(level / np.linalg.norm(level, axis=1)[:, None])
+
+
+def _unit_vectors(model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors from lower to upper ends (n, 3), and N / l of each (n,) [N/m]."""
+    pairs, form = model.mesh.droppers, model.form
+    if form is None:
+        return np.tile([0.0, 0.0, 1.0], (len(pairs), 1)), np.zeros(len(pairs))
+    vectors = form.dropper_vectors(pairs)
+    length = np.linalg.norm(vectors, axis=1)
+    force = np.where(model.broken, 0.0, np.maximum(form.dropper_force, 0.0))
+    return vectors / length[:, None], force / length
+
+
+def _along(model: Model, unit: np.ndarray, needed: tuple[int, ...]) -> Direction:
+    """Motion of upper less lower ends along vectors (n, 3), in ``needed`` components first and in
+    others that any vector has."""
     pairs = model.mesh.droppers
-    unknowns = np.concatenate([model.dofs(pairs), model.dofs(pairs, "u")], axis=1)
-    if model.form is None:
-        return unknowns, np.zeros((len(pairs), 4, 4))
-    along, height = _cosines(model)
-    across = _pairwise(-along, height)
-    force = np.where(model.broken, 0.0, model.form.dropper_force)
-    pull = force / np.hypot(model.form.leaning(pairs), _drop(model))
-    return unknowns, pull[:, None, None] * across[:, :, None] * across[:, None, :]
-
-
-def _drop(model: Model) -> np.ndarray:
-    """Height of each dropper's upper end above the lower one at rest [m]."""
-    assert model.form is not None
-    upper, lower = model.mesh.droppers.T
-    return np.asarray(model.form.height[upper] - model.form.height[lower])
-
-
-def _cosines(model: Model) -> tuple[np.ndarray, np.ndarray]:
-    """Components of the unit vectors from lower to upper ends: along the track, and upwards."""
-    assert model.form is not None
-    leaning, drop = model.form.leaning(model.mesh.droppers), _drop(model)
-    length = np.hypot(leaning, drop)
-    return leaning / length, drop / length
-
-
-def _pairwise(height: np.ndarray, along: np.ndarray) -> np.ndarray:
-    """Weights (n, 4) of heights, then of places along the track, upper less lower end."""
-    return np.stack([height, -height, along, -along], axis=1)
+    large = np.abs(unit).max(axis=0, initial=0.0) > _NONE
+    others = [k for k in (_UP, _ALONG, _SIDEWAYS) if large[k] and k not in needed]
+    parts = (*needed, *others)
+    unknowns = [model.dofs(pairs, _NAMES[k]) for k in parts]
+    weights = [unit[:, [k]] * np.array([1.0, -1.0]) for k in parts]
+    return Direction(np.concatenate(unknowns, axis=1), np.concatenate(weights, axis=1))

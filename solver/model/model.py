@@ -64,6 +64,7 @@ class Model:
     loads : beside those of contacts and links, from the start of the march on
     links : droppers, and whatever else was added as links
     droppers : those of the mesh, in its order; they only pull where they may slacken
+    hanging_at_arms : (n_arms,) what of each arm's mass hangs at its wire [kg]
     form : the shape at rest that matrices are made about, None before it is found
     terms_of : effect name -> number of terms, laws and lifted limits that it contributes
     """
@@ -84,6 +85,7 @@ class Model:
     terms_of: dict[str, int] = field(default_factory=dict)
     broken: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
     form: Equilibrium | None = None
+    hanging_at_arms: np.ndarray = field(default_factory=lambda: np.zeros(0))
     missing: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
     dropper_gap: np.ndarray = field(default_factory=lambda: np.zeros(0))
 

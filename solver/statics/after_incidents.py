@@ -6,7 +6,8 @@ matrices M, C', K' of the changed line
     M a + C' v + K' d = f + g,      g = -(K' - K) z + sum_b l_b N0_b
 
 where K' - K is the part of the wires whose tension changed, and N0_b the force at rest of the
-droppers b that broke. Displacement and velocity go through an incident unchanged; forces jump, and
+droppers b that broke. Steady arms and droppers keep the geometric stiffness of the first rest.
+Displacement and velocity go through an incident unchanged; forces jump, and
 with them the acceleration:
 
     M (a+ - a-) = g' - g - (K' - K) d - (C' - C) v + sum_b l_b s_b
@@ -36,7 +37,7 @@ from catenary.solver.model import elements
 from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.links import Direction
 from catenary.solver.model.loads import ShapeLoad
-from catenary.solver.model.model import Model
+from catenary.solver.model.model import Model, wire_elements
 from catenary.solver.model.partition import Ownership
 from catenary.solver.problem.incidents import DropperBreak, LineIncident
 from catenary.solver.statics.equilibrium import Equilibrium
@@ -82,11 +83,12 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
         lost = now.tension_at(middle) - wire.tension_at(middle)
         if not lost.any():
             continue
-        dofs, length = first.wire_elements(wire.name)
-        shape = np.stack([form.height[pairs], form.slope[pairs]], axis=2).reshape(-1, 4)
-        pull = np.einsum("nij,nj->ni", elements.stiffness(length, 0.0, lost), shape)
-        np.add.at(load, dofs, -pull)
-        energy += 0.5 * float((shape * pull).sum())
+        for plane, course, slope in form.planes():
+            dofs, length = wire_elements(first, wire.name, plane)
+            shape = np.stack([course[pairs], slope[pairs]], axis=2).reshape(-1, 4)
+            pull = np.einsum("nij,nj->ni", elements.stiffness(length, 0.0, lost), shape)
+            np.add.at(load, dofs, -pull)
+            energy += 0.5 * float((shape * pull).sum())
     rest = form.dropper_force[broken]
     unknowns, weights = _droppers(model, broken)
     np.add.at(load, unknowns, rest[:, None] * weights)

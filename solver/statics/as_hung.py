@@ -26,7 +26,7 @@ from catenary.solver.base.errors import InputError
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.effects.build_model import build
 from catenary.solver.model import axial_elements, elements
-from catenary.solver.model.model import Model
+from catenary.solver.model.model import Model, wire_elements
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.problem import Problem
 
@@ -90,6 +90,12 @@ def _moved(model: Model, form: Equilibrium, moved: np.ndarray) -> Equilibrium:
         "height": form.height + moved[model.dofs(every)],
         "slope": form.slope + moved[model.dofs(every, "theta_y")],
     }
+    if form.lateral is not None:
+        changes["lateral"] = replace(
+            form.lateral,
+            y=form.lateral.y + moved[model.dofs(every, "v")],
+            slope=form.lateral.slope + moved[model.dofs(every, "theta_z")],
+        )
     if "u" in model.unknowns:
         before = form.along if form.along.size else np.zeros(every.size)
         gained = dict(form.gained_tension)
@@ -123,15 +129,17 @@ def _by_wires(cut: Model, model: Model, form: Equilibrium) -> np.ndarray:
         if (before.tension, before.taken, before.worn) == (now.tension, now.taken, now.worn):
             continue
         pairs = mesh.elements(now.name)
-        dofs, length = model.wire_elements(now.name)
         ends = mesh.x(pairs)
         middle = ends.mean(axis=1)
         tension = now.tension_at(middle) - before.tension_at(middle)
         bending = now.left_of(ends)[1] - before.left_of(ends)[1]
-        matrices = elements.stiffness(length, 0.0, tension)
-        matrices += bending[:, None, None] * elements.stiffness(length, now.bending_stiffness, 0.0)
-        shape = np.stack([form.height[pairs], form.slope[pairs]], axis=2).reshape(-1, 4)
-        np.add.at(result, dofs, np.einsum("nij,nj->ni", matrices, shape))
+        for plane, course, slope in form.planes():
+            dofs, length = wire_elements(model, now.name, plane)
+            bent = elements.stiffness(length, now.bending_stiffness, 0.0)
+            matrices = elements.stiffness(length, 0.0, tension)
+            matrices += bending[:, None, None] * bent
+            shape = np.stack([course[pairs], slope[pairs]], axis=2).reshape(-1, 4)
+            np.add.at(result, dofs, np.einsum("nij,nj->ni", matrices, shape))
     return result
 
 

@@ -8,6 +8,7 @@ a height that is given has its force as unknown. Any number of wires may hang be
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from scipy import sparse
@@ -20,17 +21,21 @@ from catenary.meshgen.wires import Wire
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
-from catenary.solver.model import elements
+from catenary.solver.model.lateral_shape import LateralShape
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium as Equilibrium
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.as_hung import hang
 from catenary.solver.statics.at_temperature import at_temperature
+from catenary.solver.statics.lateral_equilibrium import lateral_shape
+from catenary.solver.statics.sparse_sum import clamp_parts, summed, wire_parts
 
 # Lengths are printed to the millimetre; the iteration contracts by the ratio of dropper weight
 # to tension sag, about 1e-3, so that this costs one more pass and leaves no trace in the forces.
 _LENGTH_TOLERANCE = 1e-10
 _MAX_PASSES = 30
+# Of what steady arms lift, which follows from the lateral plane [N].
+_FORCE_TOLERANCE = 1e-8
 
 
 def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
@@ -60,15 +65,21 @@ def _cut(problem: Problem, mesh: LineMesh, pushing: bool = False) -> tuple[Model
     """The line for which droppers are cut; they may push where ``pushing`` says so."""
     length = mesh.points[mesh.droppers[:, 0], 2] - mesh.points[mesh.droppers[:, 1], 2]
     hanging: _HangingWires | None = None
+    lateral: LateralShape | None = None
     for _ in range(_MAX_PASSES):
         model = build(problem, mesh, length)
         hanging = hanging or _HangingWires(model)
-        form = hanging.at_rest(model)
+        form = hanging.at_rest(model, lateral)
         _check(problem.line, mesh, form, pushing)
-        geometric = form.height[mesh.droppers[:, 0]] - form.height[mesh.droppers[:, 1]]
+        still_lifted, before = 0.0, lateral
+        if model.simulated.lateral:
+            form = _with_lateral(model, form)
+            lateral = form.lateral
+            still_lifted = _most_change(before, lateral)
+        geometric = np.linalg.norm(form.dropper_vectors(mesh.droppers), axis=1)
         change = np.abs(geometric - length).max(initial=0.0)
         length = geometric
-        if change < _LENGTH_TOLERANCE:
+        if change < _LENGTH_TOLERANCE and still_lifted < _FORCE_TOLERANCE:
             return about(model, form)
     raise InputError(
         f"the lengths of the droppers do not settle: they still change by {1e3 * change:.2g} mm "
@@ -87,6 +98,25 @@ def about(model: Model, form: Equilibrium) -> tuple[Model, Equilibrium]:
         return made, form
     form = at_temperature(made, form)
     return build(model.problem, model.mesh, model.dropper_lengths, form=form), form
+
+
+def _with_lateral(model: Model, form: Equilibrium) -> Equilibrium:
+    """The equilibrium with its lateral plane, in which droppers may lean."""
+    shape = lateral_shape(model, form)
+    form = replace(form, lateral=shape)
+    vectors = form.dropper_vectors(model.mesh.droppers)
+    length = np.linalg.norm(vectors, axis=1)
+    force = form.dropper_force * length / vectors[:, 2]
+    return replace(
+        form, dropper_force=force, dropper_length=length - force / model.dropper_stiffness
+    )
+
+
+def _most_change(before: LateralShape | None, after: LateralShape | None) -> float:
+    """Largest change of the vertical force of an arm [N]."""
+    if before is None or after is None:
+        return np.inf
+    return float(np.abs(after.arm_force - before.arm_force)[:, 1].max(initial=0.0))
 
 
 class _HangingWires:
@@ -117,12 +147,17 @@ class _HangingWires:
         matrix = (stiffness @ sparse.diags(free) + forces).tocsc()
         self._factor = sparse_linalg.splu(matrix, permc_spec="NATURAL")
 
-    def at_rest(self, model: Model) -> Equilibrium:
-        """The line at rest under the weights of ``model``, which may differ in them only."""
+    def at_rest(self, model: Model, lateral: LateralShape | None) -> Equilibrium:
+        """The line at rest under the weights of ``model``, which may differ in them only, and
+        under what arms lift of their own in the lateral plane."""
         mesh, every = model.mesh, np.arange(model.mesh.n_nodes)
         load = self._spring_load - self._from_given
         load[self._w] += model.weight[model.dofs(every)]
         load[self._w + 1] += model.weight[model.dofs(every, "theta_y")]
+        holding = _holding(model)
+        if lateral is not None:
+            at = self._w[mesh.steady_arms[~holding]]
+            np.add.at(load, at, lateral.arm_force[~holding, 1])
         solution = self._factor.solve(load)
         held_by = solution[self._given]
         solution[self._given] = self._heights[self._given]
@@ -130,7 +165,17 @@ class _HangingWires:
         n = mesh.droppers.shape[0]
         force = held_by[:n] if self._weighted else np.zeros(n)
         stretched = height[mesh.droppers[:, 0]] - height[mesh.droppers[:, 1]]
-        return Equilibrium(height, slope, force, stretched - force / model.dropper_stiffness)
+        lift, first = np.zeros(mesh.steady_arms.size), mesh.droppers.shape[0]
+        by_group = np.argsort(mesh.arm_group[holding], kind="stable")
+        lift[np.flatnonzero(holding)[by_group]] = held_by[first : first + by_group.size]
+        cut = stretched - force / model.dropper_stiffness
+        return Equilibrium(height, slope, force, cut, arm_lift=lift)
+
+
+def _holding(model: Model) -> np.ndarray:
+    """Which steady arms hold their wire at its height, (n_arms,) bool."""
+    holds = [arms.kind.holds_height for arms in model.problem.line.steady_arms]
+    return np.array([*holds, False])[model.mesh.arm_group]
 
 
 def _assembled(model: Model, w: np.ndarray) -> tuple[sparse.csc_matrix, np.ndarray]:
@@ -143,13 +188,7 @@ def _assembled(model: Model, w: np.ndarray) -> tuple[sparse.csc_matrix, np.ndarr
     mesh, line = model.mesh, model.problem.line
     n = 2 * mesh.n_nodes
     load = np.zeros(n)
-    parts: list[tuple[np.ndarray, np.ndarray]] = []
-    for wire in line.wires:
-        first, second = mesh.elements(wire.name).T
-        length = mesh.x(second) - mesh.x(first)
-        dofs = np.stack([w[first], w[first] + 1, w[second], w[second] + 1], axis=1)
-        tension = wire.tension_at(0.5 * (mesh.x(first) + mesh.x(second)))
-        parts.append((dofs, elements.stiffness(length, wire.bending_stiffness, tension)))
+    parts = wire_parts(model, w)
     for number, supports in enumerate(line.supports):
         if supports.holds:
             continue
@@ -157,18 +196,8 @@ def _assembled(model: Model, w: np.ndarray) -> tuple[sparse.csc_matrix, np.ndarr
         parts.append((dofs[:, None], np.full((dofs.size, 1, 1), supports.stiffness)))
         relaxed = line.wire(supports.wire).points(np.array(supports.x))[:, 2]
         np.add.at(load, dofs, supports.stiffness * relaxed)
-    for number, clamps in enumerate(line.clamps):
-        dofs = w[mesh.clamps[line.clamp_group == number]]
-        unit = clamps.stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])
-        parts.append((dofs, np.broadcast_to(unit, (len(dofs), 2, 2))))
-    at = [
-        np.concatenate(
-            [np.broadcast_to(dofs[axes], matrix.shape).ravel() for dofs, matrix in parts]
-        )
-        for axes in (np.s_[:, :, None], np.s_[:, None, :])
-    ]
-    values = np.concatenate([matrix.ravel() for _, matrix in parts])
-    return sparse.csc_matrix((values, (at[0], at[1])), shape=(n, n)), load
+    parts += clamp_parts(model, w)
+    return summed(parts, n), load
 
 
 def _given_heights(model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -26,6 +26,7 @@ from catenary.cases.scene.checks.line.droppers import (
     check_droppers_inside_spans,
 )
 from catenary.cases.scene.checks.line.ends import check_ends
+from catenary.cases.scene.checks.line.lateral import check_lateral
 from catenary.cases.scene.checks.line.mesh_size import size_faults
 from catenary.cases.scene.checks.line.topology import check_names, check_parts, check_topology
 from catenary.cases.scene.checks.run.contact import check_contact
@@ -288,6 +289,7 @@ _OF_TABLES: tuple[Callable[[Scene], Iterator[Fault]], ...] = (
     check_effect_names,
     check_requirements_of_chosen,
     check_effect_data,
+    check_lateral,
     check_contact,
     _separations,
     _standard,

@@ -12,7 +12,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.tables.line.droppers import DropperTable, HangingTable
 from catenary.cases.scene.tables.line.line import LineTable
 from catenary.cases.scene.tables.line.wires import BridleTable, StitchWireTable, WireTable
-from catenary.cases.scene.tables.units import length_from_mm
+from catenary.cases.scene.tables.units import angle_from_deg, length_from_mm
 from catenary.meshgen.hardware import DropperKind, Fittings, SteadyArm
 from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.all_topologies import make_line
@@ -91,6 +91,7 @@ def line_data_of(scene: Scene) -> LineData:
             clamp_mass=table.steady_arm.clamp_kg,
             stiffness=table.steady_arm.stiffness_N_per_m,
             holds_height=table.steady_arm.holds_height,
+            inclination=_optional(angle_from_deg, table.steady_arm.inclination_deg),
         ),
         n_transition=(table.transition.n_spans_start, table.transition.n_spans_end),
         transition_rise=table.transition.rise_m,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from catenary.cases.scene.tables.table import Table
+from catenary.cases.scene.tables.table import TAKE_AWAY, Table
 
 
 class SupportTable(Table):
@@ -27,3 +27,18 @@ class SteadyArmTable(Table):
         description="whether the arm holds the contact wire at its height at rest; otherwise the "
         "wire hangs freely between the droppers next to it",
     )
+    inclination_deg: float | None = Field(
+        None,
+        ge=0,
+        le=30,
+        description="by how much it rises from the wire to its hinge at rest, with lateral motion; "
+        "if absent, what the weight that hangs at the arm makes of it",
+    )
+
+    @model_validator(mode="after")
+    def _one_height(self) -> SteadyArmTable:
+        if self.holds_height and self.inclination_deg is not None:
+            raise ValueError(
+                f"takes holds_height or inclination_deg, but both are given{TAKE_AWAY}"
+            )
+        return self

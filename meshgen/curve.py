@@ -1,0 +1,43 @@
+"""A curve of the track: curvature and cant along the line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A stretch of the line in which the track is a circle, with transitions at both ends.
+
+    Attributes
+    ----------
+    curvature : 1/R of the circle, > 0 where its centre is to the left, in the sense of y [1/m]
+    tilt : of the canted track towards the centre, >= 0 [rad]
+    stretch : from and to, transitions included; infinite for the whole line [m]
+    transition : length at both ends over which curvature and cant grow linearly [m]
+    """
+
+    curvature: float
+    tilt: float = 0.0
+    stretch: tuple[float, float] = (-np.inf, np.inf)
+    transition: float = 0.0
+
+    def share(self, x: np.ndarray) -> np.ndarray:
+        """How much of curvature and cant there is at places ``x`` [m], 0 to 1, shape as ``x``."""
+        x = np.asarray(x, dtype=float)
+        first, last = self.stretch
+        inside = np.minimum(x - first, last - x)
+        if self.transition == 0.0:
+            return np.where(inside >= 0.0, 1.0, 0.0)
+        return np.clip(inside / self.transition, 0.0, 1.0)
+
+    def curvature_at(self, x: np.ndarray) -> np.ndarray:
+        """1/R at places ``x`` [m], > 0 to the left, shape as ``x`` [1/m]."""
+        return self.curvature * self.share(x)
+
+    def sideways_pull_at(self, x: np.ndarray) -> np.ndarray:
+        """What of a weight pulls sideways across the canted track at places ``x`` [m], > 0 to the
+        left, shape as ``x`` [-]."""
+        return np.sign(self.curvature) * np.tan(self.tilt * self.share(x))

@@ -1,0 +1,50 @@
+"""The line at rest in the lateral plane: where wires are, and what arms pull."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+# Forces smaller than this give a bar no direction [N].
+_NO_FORCE = 1e-6
+
+
+@dataclass(frozen=True)
+class LateralShape:
+    """Where wires are laterally at rest, and what steady arms do there.
+
+    Attributes
+    ----------
+    y, slope : (n_nodes,) lateral position [m] and dy/dx [-] of every mesh node
+    arm_force : (n_arms, 2) of each steady arm on its wire, lateral and upward [N]; an arm without
+        length has one as well
+    """
+
+    y: np.ndarray
+    slope: np.ndarray
+    arm_force: np.ndarray
+
+    @property
+    def arm_tension(self) -> np.ndarray:
+        """Tension of each steady arm as a bar between hinge and clamp, (n_arms,) [N]."""
+        return np.hypot(*self.arm_force.T)
+
+    @property
+    def arm_direction(self) -> np.ndarray:
+        """Unit vectors from clamps to hinges, (n_arms, 2), lateral and upward [-].
+
+        A bar can only pull along itself; without a force it lies level.
+        """
+        tension = self.arm_tension
+        level = np.broadcast_to(np.array([1.0, 0.0]), self.arm_force.shape)
+        pulled = tension > _NO_FORCE
+        return np.where(
+            pulled[:, None], self.arm_force / np.where(pulled, tension, 1.0)[:, None], level
+        )
+
+    @property
+    def arm_inclination(self) -> np.ndarray:
+        """By how much each arm rises from its wire to its hinge, (n_arms,) [rad]."""
+        sideways, upward = self.arm_direction.T
+        return np.arctan2(upward, np.abs(sideways))

@@ -1,0 +1,133 @@
+"""Form finding in the lateral plane: stagger, curve and cant, and what droppers pull sideways.
+
+A dropper that leans pulls its wires sideways by its vertical force times its lateral over its
+vertical span. Both of these are those of the vertical plane, in which it does not matter how it
+leans: laterally wires are then linear, and one sparse system gives their course.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import linalg as sparse_linalg
+
+from catenary.meshgen.hardware import SteadyArms
+from catenary.solver.base.errors import InputError
+from catenary.solver.model import elements
+from catenary.solver.model.lateral_shape import LateralShape
+from catenary.solver.model.model import Model
+from catenary.solver.model.rest_shape import Equilibrium
+from catenary.solver.statics.sparse_sum import clamp_parts, springs_between, summed, wire_parts
+
+# An arm that hangs freely carries its weight up to this inclination, the wire what is beyond [rad].
+STEEPEST = np.deg2rad(20.0)
+# Arms that hold their wire's height stand no steeper [rad].
+_UPRIGHT = np.deg2rad(60.0)
+
+
+def lateral_shape(model: Model, form: Equilibrium) -> LateralShape:
+    """The line at rest in the lateral plane. Not collective.
+
+    Parameters
+    ----------
+    form : the line at rest in the vertical plane, whose forces of droppers are vertical ones
+
+    Raises
+    ------
+    InputError
+        If an arm that holds its wire's height has too small a radial force to carry it.
+    """
+    mesh = model.mesh
+    at, n = 2 * model.row_of_node, 2 * mesh.n_nodes
+    upper, lower = mesh.droppers.T
+    rise = form.height[upper] - form.height[lower]
+    parts = wire_parts(model, at) + clamp_parts(model, at)
+    parts.append(springs_between(at[mesh.droppers], form.dropper_force / rise))
+    stiffness, load = summed(parts, n).tocsr(), _sideways_load(model, at)
+    nodes, places = _held(model)
+    given = np.zeros(n, dtype=bool)
+    given[at[nodes]] = True
+    course = np.zeros(n)
+    course[at[nodes]] = places
+    free = np.flatnonzero(~given)
+    right = (load - stiffness @ course)[free]
+    inner = stiffness[free][:, free].tocsc()
+    course[free] = sparse_linalg.splu(inner, permc_spec="NATURAL").solve(right)
+    y, slope = course[at], course[at + 1]
+    held_by = (stiffness @ course - load)[at[mesh.steady_arms]]
+    arm_force = np.column_stack([held_by, _carried(model, held_by, form.arm_lift)])
+    return LateralShape(y, slope, arm_force)
+
+
+def _sideways_load(model: Model, at: np.ndarray) -> np.ndarray:
+    """What pulls wires sideways in a curve: their tension, and their weight on a canted track.
+
+    A course y across a track of curvature c has the curvature y'' + c in plan.
+    """
+    mesh, line = model.mesh, model.problem.line
+    load = np.zeros(2 * mesh.n_nodes)
+    if line.curve is None:
+        return load
+    for wire in line.wires:
+        pairs = mesh.elements(wire.name)
+        length, middle = np.diff(mesh.x(pairs), axis=1)[:, 0], mesh.x(pairs).mean(axis=1)
+        pull = wire.tension_at(middle) * line.curve.curvature_at(middle)
+        dofs = np.stack(
+            [at[pairs[:, 0]], at[pairs[:, 0]] + 1, at[pairs[:, 1]], at[pairs[:, 1]] + 1]
+        )
+        np.add.at(load, dofs, (pull[:, None] * elements.uniform_load(length)).T)
+    every = np.arange(mesh.n_nodes)
+    share = line.curve.sideways_pull_at(mesh.x(every))
+    load[at] -= share * model.weight[model.dofs(every)]
+    load[at + 1] -= share * model.weight[model.dofs(every, "theta_y")]
+    return load
+
+
+def _held(model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes that arms, supports and anchors hold sideways, and where [m]; each node once."""
+    mesh, line = model.mesh, model.problem.line
+    nodes, places = [], []
+    for what, group in (
+        *((mesh.steady_arms[mesh.arm_group == i], arms) for i, arms in enumerate(line.steady_arms)),
+        *((mesh.supports[mesh.support_group == i], s) for i, s in enumerate(line.supports)),
+    ):
+        nodes.append(what)
+        places.append(line.wire(group.wire).points(mesh.x(what))[:, 1])
+    for wire in line.wires:
+        nodes.append(mesh.anchors[np.isin(mesh.anchors, mesh.wires[wire.name])])
+        places.append(wire.points(mesh.x(nodes[-1]))[:, 1])
+    held, first = np.unique(np.concatenate(nodes), return_index=True)
+    return held, np.concatenate(places)[first]
+
+
+def _carried(model: Model, radial: np.ndarray, arm_lift: np.ndarray) -> np.ndarray:
+    """Vertical force of each arm on its wire, (n_arms,) [N]; ``radial`` (n_arms,) is the lateral
+    one [N]."""
+    mesh, force = model.mesh, np.zeros(radial.size)
+    for number, arms in enumerate(model.problem.line.steady_arms):
+        mine, kind = mesh.arm_group == number, arms.kind
+        pull = np.abs(radial[mine])
+        if kind.length == 0.0:
+            continue
+        if kind.inclination is not None:
+            force[mine] = pull * np.tan(kind.inclination)
+        elif kind.holds_height:
+            force[mine] = arm_lift[mine]
+            _check_slope(model, arms, pull, arm_lift[mine], mesh.x(mesh.steady_arms[mine]))
+        else:
+            weight = model.simulated.gravity * model.hanging_at_arms[mine]
+            force[mine] = np.minimum(weight, pull * np.tan(STEEPEST))
+    return force
+
+
+def _check_slope(
+    model: Model, arms: SteadyArms, pull: np.ndarray, lift: np.ndarray, x: np.ndarray
+) -> None:
+    steep = np.flatnonzero(np.abs(lift) > pull * np.tan(_UPRIGHT))
+    if steep.size:
+        i = steep[0]
+        raise InputError(
+            f"the steady arm at {x[i]:.2f} m is to hold the {arms.wire.replace('_', ' ')} with "
+            f"{lift[i]:.0f} N upwards at a radial force of {pull[i]:.0f} N, which is steeper than "
+            f"{np.rad2deg(_UPRIGHT):.0f} degrees: make line.stagger_m greater, or take "
+            "line.steady_arm.holds_height off"
+        )

@@ -1,0 +1,53 @@
+"""Sparse matrices in one plane of a line at rest, summed over element matrices."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from catenary.solver.model import elements
+from catenary.solver.model.model import Model
+
+# Unknowns (n, m) of n elements, and their matrices (n, m, m).
+Part = tuple[np.ndarray, np.ndarray]
+
+
+def wire_parts(model: Model, at: np.ndarray) -> list[Part]:
+    """Bending and tension of all wires; ``at`` (n_nodes,) is the number of each node's deflection,
+    that of its slope follows."""
+    mesh, parts = model.mesh, []
+    for wire in model.problem.line.wires:
+        first, second = mesh.elements(wire.name).T
+        length = mesh.x(second) - mesh.x(first)
+        dofs = np.stack([at[first], at[first] + 1, at[second], at[second] + 1], axis=1)
+        tension = wire.tension_at(0.5 * (mesh.x(first) + mesh.x(second)))
+        parts.append((dofs, elements.stiffness(length, wire.bending_stiffness, tension)))
+    return parts
+
+
+def springs_between(dofs: np.ndarray, stiffness: np.ndarray | float) -> Part:
+    """Springs between pairs of unknowns (n, 2), of stiffness (n,) or all of one [N/m]."""
+    unit = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    values = np.broadcast_to(np.asarray(stiffness, dtype=float), (len(dofs),))
+    return dofs, values[:, None, None] * unit
+
+
+def clamp_parts(model: Model, at: np.ndarray) -> list[Part]:
+    """Clamps of one wire on another, which hold both ways; ``at`` as in ``wire_parts``."""
+    line, parts = model.problem.line, []
+    for number, clamps in enumerate(line.clamps):
+        pairs = at[model.mesh.clamps[line.clamp_group == number]]
+        parts.append(springs_between(pairs, clamps.stiffness))
+    return parts
+
+
+def summed(parts: list[Part], size: int) -> sparse.csc_matrix:
+    """The matrix (size, size) of all parts."""
+    at = [
+        np.concatenate(
+            [np.broadcast_to(dofs[axes], matrix.shape).ravel() for dofs, matrix in parts]
+        )
+        for axes in (np.s_[:, :, None], np.s_[:, None, :])
+    ]
+    values = np.concatenate([matrix.ravel() for _, matrix in parts])
+    return sparse.csc_matrix((values, (at[0], at[1])), shape=(size, size))
