@@ -85,18 +85,18 @@ def _sideways_load(model: Model, at: np.ndarray) -> np.ndarray:
 def _held(model: Model) -> tuple[np.ndarray, np.ndarray]:
     """Nodes that arms, supports and anchors hold sideways, and where [m]; each node once."""
     mesh, line = model.mesh, model.problem.line
-    nodes, places = [], []
-    for what, group in (
-        *((mesh.steady_arms[mesh.arm_group == i], arms) for i, arms in enumerate(line.steady_arms)),
-        *((mesh.supports[mesh.support_group == i], s) for i, s in enumerate(line.supports)),
-    ):
+    nodes: list[np.ndarray] = []
+    places: list[np.ndarray] = []
+    held = [(mesh.steady_arms[mesh.arm_group == i], a.wire) for i, a in enumerate(line.steady_arms)]
+    held += [(mesh.supports[mesh.support_group == i], s.wire) for i, s in enumerate(line.supports)]
+    for what, name in held:
         nodes.append(what)
-        places.append(line.wire(group.wire).points(mesh.x(what))[:, 1])
+        places.append(line.wire(name).points(mesh.x(what))[:, 1])
     for wire in line.wires:
         nodes.append(mesh.anchors[np.isin(mesh.anchors, mesh.wires[wire.name])])
         places.append(wire.points(mesh.x(nodes[-1]))[:, 1])
-    held, first = np.unique(np.concatenate(nodes), return_index=True)
-    return held, np.concatenate(places)[first]
+    each, first = np.unique(np.concatenate(nodes), return_index=True)
+    return each, np.concatenate(places)[first]
 
 
 def _carried(model: Model, radial: np.ndarray, arm_lift: np.ndarray) -> np.ndarray:
