@@ -217,7 +217,8 @@ def place(x, wires, data, touches, answers):
     for i in range(x.size):
         touch = touches[i]
         low, high = by_force.shape[1], 0
-        for side in range(2):
+        # Where there is no wire on a strip nothing answers: the answer stays cleared.
+        for side in range(2 if touch.present != 0.0 else 0):
             node = nodes[touch.element + side]
             if node.width == 0:
                 continue
@@ -237,7 +238,7 @@ def heights(motion, touches, train_speed, height, rate):
     for i in range(touches.size):
         touch = touches[i]
         w, rising, steep = 0.0, 0.0, 0.0
-        for k in range(4):
+        for k in range(4 if touch.present != 0.0 else 0):
             total = touch.rest[k]
             if motion[0].size:
                 total += displacement_at(touch.local[k], motion)
@@ -273,6 +274,9 @@ def meet(motion, touches, gains, answers, line):
         touch = touches[i]
         total += line.place[i] + line.rate[i]
         for j in range(touches.size):
+            if touch.present == 0.0 or touches[j].present == 0.0:
+                line.by_force[i, j] = line.rate_by_force[i, j] = 0.0
+                continue
             by_value = answer_at(touch.local, touch.value, by_force[j])
             line.by_force[i, j] = gains.position * by_value
             if by_slope.shape[1] > 0:
@@ -338,7 +342,7 @@ def watch(followed, bounds, touches, answers, gains, rows):
         per_acceleration = law.stiffness * gains.position + law.damping * gains.velocity
         if not candidate:
             for i in range(n):
-                if abs(law.place - touches[i].x) <= gains.reach:
+                if touches[i].present != 0.0 and abs(law.place - touches[i].x) <= gains.reach:
                     change = per_acceleration * spread(d, links, by_force[i])
                     if reserve[d] + change * limits[i] < margin:
                         candidate = True

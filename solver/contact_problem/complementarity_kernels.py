@@ -160,6 +160,30 @@ def couple(rows, count, coupled, by_depth, by_rate, matrix, right):
         matrix[row, row] += 1.0
 
 
+@in_line
+def solve_two(matrix, right, acts, solution):
+    """The same for two that act, in the same order of operations."""
+    first = 0
+    while not acts[first]:
+        first += 1
+    second = first + 1
+    while not acts[second]:
+        second += 1
+    top, low = first, second
+    if abs(matrix[second, first]) > abs(matrix[first, first]):
+        top, low = second, first
+    share = matrix[low, first] / matrix[top, first]
+    pivot = matrix[low, second] - share * matrix[top, second]
+    x, y = 0.0, 0.0
+    for _ in range(2):
+        of_top = right[top] - matrix[top, first] * x - matrix[top, second] * y
+        of_low = right[low] - matrix[low, first] * x - matrix[low, second] * y
+        change = (of_low - share * of_top) / pivot
+        y += change
+        x += (of_top - matrix[top, second] * change) / matrix[top, first]
+    solution[first], solution[second] = x, y
+
+
 @compiled
 def solve_on(matrix, right, acts, solution):
     """Solution of the rows and columns that act, zero elsewhere, by elimination with pivoting.
@@ -177,6 +201,10 @@ def solve_on(matrix, right, acts, solution):
         # One contact and taut droppers, mostly.
         if m:
             solution[last] = right[last] / matrix[last, last]
+        return
+    if m == 2:
+        # Two contacts and taut droppers: without arrays.
+        solve_two(matrix, right, acts, solution)
         return
     index = np.flatnonzero(acts)
     a, order = np.empty((m, m)), np.arange(m)
