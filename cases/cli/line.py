@@ -111,17 +111,33 @@ def static(
         typer.Option(
             "-o",
             "--out",
-            help="Also write a file: *.csv holds the dropper table, *.json everything.",
+            help="Also write a file: *.csv holds the dropper table, *.json everything; with "
+            "--temperatures *.png and *.svg draw them.",
         ),
     ] = None,
     force: Force = False,
+    over: Annotated[
+        str | None,
+        typer.Option(
+            "--temperatures",
+            metavar="LOW,HIGH",
+            help="Instead print tensions along the section and how far the ends of wires move, "
+            "from LOW to HIGH K above the installation.",
+        ),
+    ] = None,
 ) -> None:
     """Serial."""
     from catenary.cases.result_folder.output_files import new_file, write_static
     from catenary.cases.terminal import terminal_text
 
     if out is not None:
-        new_file(out, (".csv", ".json"), force)
+        new_file(out, (".csv", ".json") if over is None else (".png", ".svg"), force)
+    if over is not None:
+        from catenary.cases.run.temperatures import range_of, temperatures
+
+        differences = range_of(over)
+        console.say(temperatures(load(case, assignments, extras), differences, out))
+        return
     scene = load(case, assignments, extras)
     from catenary.cases.run.describe.defects import defect_facts
     from catenary.cases.run.runner import static_table
@@ -133,3 +149,9 @@ def static(
     for fact in defect_facts(scene, problem):
         console.say(fact["says"])
     console.say(terminal_text.static_text(table, problem.line))
+    warmer = problem.along.warmer
+    if warmer and {"axial_motion", "temperature"} <= problem.effects:
+        from catenary.cases.run.temperatures import temperatures
+
+        console.say("")
+        console.say(temperatures(scene, [warmer], None))

@@ -36,6 +36,7 @@ class RecordedLine:
     masts : (n,) places along the track [m]
     slope : (n_nodes,) dw/dx of the wires at rest, empty if not known
     bending_stiffness : of the wires by name [N m2]
+    axial_stiffness : EA of the wires whose stretch is known [N]
     """
 
     wires: Mapping[str, np.ndarray]
@@ -46,6 +47,7 @@ class RecordedLine:
     masts: np.ndarray = field(default_factory=lambda: np.zeros(0))
     slope: np.ndarray = field(default_factory=lambda: np.zeros(0))
     bending_stiffness: Mapping[str, float] = field(default_factory=dict)
+    axial_stiffness: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, line: Line, mesh: LineMesh, slope: np.ndarray) -> RecordedLine:
@@ -59,6 +61,7 @@ class RecordedLine:
             line.support_positions,
             slope,
             {wire.name: wire.bending_stiffness for wire in line.wires},
+            {own.name: own.axial_stiffness for own in line.wires if own.axial_stiffness},
         )
 
 

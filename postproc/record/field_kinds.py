@@ -5,6 +5,7 @@ Scene, recorder, files and readers follow from ``FIELDS``.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -15,8 +16,9 @@ from catenary.postproc.record.blocks import Block
 
 _Count = TypeVar("_Count", int, np.ndarray)
 
-# Unknowns of a node that fields are made of: upward and lateral displacement, slope dw/dx.
-UP, ASIDE, SLOPE = "w", "v", "theta_y"
+# Unknowns of a node that fields are made of: upward and lateral displacement, slope dw/dx, and
+# displacement along the track.
+UP, ASIDE, SLOPE, ALONG = "w", "v", "theta_y", "u"
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,7 @@ class FieldKind:
     motions : unknowns that it takes at all nodes, each with whether their rate is meant
     of_wires : whether wires alone have it; other blocks that move have those that are not
     of_droppers : whether it belongs to the cells of the droppers
+    only_with : unknown without which it takes no motion, "" if it always does
     number : how it is stored, a type of NumPy
     """
 
@@ -42,12 +45,19 @@ class FieldKind:
     motions: tuple[tuple[str, bool], ...] = ()
     of_wires: bool = False
     of_droppers: bool = False
+    only_with: str = ""
     number: str = "<f4"
 
     @property
     def item_bytes(self) -> int:
         """Bytes of a value."""
         return int(self.number[-1]) * self.components
+
+    def motions_of(self, unknowns: Sequence[str]) -> list[tuple[str, bool]]:
+        """Those of ``motions`` that it takes where nodes have these unknowns."""
+        if self.only_with and self.only_with not in unknowns:
+            return []
+        return [motion for motion in self.motions if motion[0] in unknowns]
 
     def belongs_to(self, block: Block) -> bool:
         """Whether a block has it."""
@@ -69,16 +79,24 @@ KINDS: dict[str, FieldKind] = {
             "m",
             "displacement from rest along x, y, z",
             components=3,
-            motions=((UP, False), (ASIDE, False)),
+            motions=((UP, False), (ASIDE, False), (ALONG, False)),
         ),
         FieldKind(
             "velocity",
             "m/s",
             "velocity along x, y, z",
             components=3,
-            motions=((UP, True), (ASIDE, True)),
+            motions=((UP, True), (ASIDE, True), (ALONG, True)),
         ),
-        FieldKind("tension", "N", "tension of the wire ahead of the point", of_wires=True),
+        FieldKind(
+            "tension",
+            "N",
+            "tension of the wire ahead of the point, with what its stretch adds where wires move "
+            "along the track",
+            motions=((UP, False), (SLOPE, False), (ALONG, False)),
+            only_with=ALONG,
+            of_wires=True,
+        ),
         FieldKind(
             "bending_moment",
             "N m",

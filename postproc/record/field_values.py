@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.postproc.record.blocks import FIXED, Block, RecordedLine
-from catenary.postproc.record.field_kinds import ASIDE, SLOPE, UP, FieldKind
+from catenary.postproc.record.field_kinds import ALONG, ASIDE, SLOPE, UP, FieldKind
 from catenary.postproc.record.field_layout import Slots
+from catenary.solver.model.axial_elements import slope_rows
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ class FieldValues:
         self._height = points[:, 2]
         self._slope = line.slope if line.slope.size else np.zeros(len(points))
         self._stiffness = line.bending_stiffness
+        self._axial = line.axial_stiffness
 
     def of(self, kind: FieldKind, slots: Slots, first: int, known: Gathered) -> np.ndarray:
         """Values of a field in a block at snapshots from number ``first`` on, one after another.
@@ -54,7 +56,7 @@ class FieldValues:
         if kind.of_droppers:
             values = self._of_droppers(kind, slots.block, known)
         elif kind.name == "tension":
-            values = np.stack(known.tension)[:, slots.block.nodes]
+            values = self._tension(slots.block, known)
         elif kind.name == "bending_moment":
             values = self._bending_moment(slots.block, known)
         else:
@@ -75,6 +77,27 @@ class FieldValues:
         force = known.dropper_force[:, own]
         return force if kind.name == "dropper_force" else np.sign(force)
 
+    def _tension(self, block: Block, known: Gathered) -> np.ndarray:
+        """Tension ahead of the points of a wire, (rows, n) [N]."""
+        nodes, axial = block.nodes, self._axial.get(block.name)
+        tension = np.stack(known.tension)[:, nodes]
+        if (ALONG, False) not in known.motions or axial is None:
+            return tension
+        up, slope, along = (known.motions[name, False][:, nodes] for name in (UP, SLOPE, ALONG))
+        length = np.diff(block.points[:, 0])
+        joined = np.ones(length.size, dtype=bool)
+        joined[block.breaks - 1] = False
+        shape = _ends(self._height[None, nodes], self._slope[None, nodes])
+        rows = slope_rows(np.where(joined, length, 1.0), shape[0])
+        strain = np.diff(along, axis=1) / np.where(joined, length, np.inf)
+        strain += np.where(joined, (rows * _ends(up, slope)).sum(axis=2), 0.0)
+        gained = axial * strain
+        tension[:, :-1] += gained
+        # The last point of a piece has no element ahead of it.
+        last = np.append(block.breaks, nodes.size) - 1
+        tension[:, last] += gained[:, last - 1]
+        return tension
+
     def _bending_moment(self, block: Block, known: Gathered) -> np.ndarray:
         nodes = block.nodes
         height = self._height[nodes] + known.motions[UP, False][:, nodes]
@@ -82,6 +105,12 @@ class FieldValues:
         moment = curvature(block.points[:, 0], height, slope, block.breaks)
         moment *= self._stiffness.get(block.name, 0.0)
         return moment
+
+
+def _ends(height: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    """Height and slope of both ends of elements, (rows, n, 4), of those at nodes (rows, n + 1)."""
+    parts = height[:, :-1], slope[:, :-1], height[:, 1:], slope[:, 1:]
+    return np.stack(parts, axis=2)
 
 
 def curvature(x: np.ndarray, w: np.ndarray, slope: np.ndarray, breaks: np.ndarray) -> np.ndarray:
@@ -114,8 +143,9 @@ def _motion(kind: FieldKind, block: Block, known: Gathered) -> np.ndarray:
         return up
     result = np.zeros((*up.shape, 3))
     result[..., 2] = up
-    if (ASIDE, rate) in known.motions:
-        result[..., 1] = _at_points(known.motions[ASIDE, rate], block)
+    for axis, name in ((0, ALONG), (1, ASIDE)):
+        if (name, rate) in known.motions:
+            result[..., axis] = _at_points(known.motions[name, rate], block)
     return result
 
 

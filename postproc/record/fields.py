@@ -83,8 +83,8 @@ class FieldRecorder:
             On all ranks, if the files cannot be written.
         """
         self._first_step = round(stage.start_time / stage.dt)
-        wanted = {motion for kind in self._record.kinds for motion in kind.motions}
-        motions = sorted(motion for motion in wanted if motion[0] in stage.unknowns)
+        wanted = (kind.motions_of(stage.unknowns) for kind in self._record.kinds)
+        motions = sorted({motion for of_kind in wanted for motion in of_kind})
         n_nodes = int(stage.node_points.shape[0])
         n_bytes = 8 * n_nodes * max(1, len(motions))
         self._capacity = max(1, min(self._capacity, _MAX_BUFFER // n_bytes))

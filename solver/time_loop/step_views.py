@@ -275,7 +275,17 @@ class Showing:
         tension = np.zeros(mesh.n_nodes)
         for name, nodes in mesh.wires.items():
             tension[nodes] = line.wire(name).tension_at(mesh.x(nodes))
-        return tension
+        return tension + self._gained
+
+    @cached_property
+    def _gained(self) -> np.ndarray:
+        """What another temperature adds to that of the installation [N]."""
+        mesh, gained = self._model.mesh, np.zeros(self._model.mesh.n_nodes)
+        for name, more in self._form.gained_tension.items():
+            first, second = mesh.elements(name).T
+            gained[second] = more
+            gained[first] = more
+        return gained
 
     def _line_state(self) -> Mapping[str, np.ndarray]:
         self._refuse_kept_motion()

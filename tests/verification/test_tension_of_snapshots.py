@@ -1,0 +1,53 @@
+"""The tension of snapshots where wires move along the track, against the bar's own strain."""
+
+from __future__ import annotations
+
+import numpy as np
+from axial_lines import ALONG, elastic_line
+from measuring import check
+from small_lines import mesh_of, problem_of
+
+from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.postproc.record.blocks import RecordedLine, blocks_of
+from catenary.postproc.record.field_kinds import ALONG as U
+from catenary.postproc.record.field_kinds import KINDS, SLOPE, UP
+from catenary.postproc.record.field_layout import FieldRecord, layout_of
+from catenary.postproc.record.field_values import FieldValues, Gathered
+from catenary.solver.model.axial_elements import strain_rows, unknowns_along
+from catenary.solver.statics.equilibrium import find_form
+
+
+def test_a_snapshot_shows_what_the_stretch_adds() -> None:
+    line = elastic_line(2)
+    problem, mesh = problem_of(line, ALONG), mesh_of(line, 2)
+    model, form = find_form(problem, mesh)
+    rng = np.random.default_rng(4)
+    motion = {(name, False): 1e-3 * rng.normal(size=(1, mesh.n_nodes)) for name in (UP, SLOPE, U)}
+    state = np.zeros(model.n_dofs)
+    for (name, _), values in motion.items():
+        state[model.dofs(np.arange(mesh.n_nodes), name)] = values[0]
+    recorded = RecordedLine.of(problem.line, mesh, form.slope)
+    points = mesh.points.copy()
+    points[:, 2] = form.height
+    values = FieldValues(recorded, points)
+    tension = np.zeros(mesh.n_nodes)
+    known = Gathered(motion, np.zeros((1, 0)), [tension], np.zeros((1, 0)))
+    layout = layout_of(FieldRecord(), blocks_of(recorded, points), np.zeros(1))
+    for slots in layout:
+        block = slots.block
+        if block.name not in (CONTACT_WIRE, MESSENGER_WIRE):
+            continue
+        wire = problem.line.wire(block.name)
+        strain = (strain_rows(model, block.name) * state[unknowns_along(model, block.name)]).sum(1)
+        assert wire.axial_stiffness is not None
+        expected = wire.axial_stiffness * strain
+        found = values.of(KINDS["tension"], slots, 0, known)
+        # Numbers of 4 bytes, and slopes rounded to 1e-10.
+        scale = np.abs(expected).max()
+        check(block.name, found, np.append(expected, expected[-1]), within=1e-6 * scale)
+
+
+def test_a_line_without_that_motion_sends_none_for_its_tension() -> None:
+    kind = KINDS["tension"]
+    assert kind.motions_of(("w", "theta_y")) == []
+    assert len(kind.motions_of(("w", "theta_y", "u"))) == 3
