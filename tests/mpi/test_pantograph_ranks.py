@@ -145,3 +145,60 @@ def test_a_wire_out_of_reach_is_told_on_all_ranks(case: tuple[Problem, LineMesh]
     problem = replace(problem, train=replace(problem.train, placements=(high,)))
     with pytest.raises(RunBroken, match="does not reach a wire at a height of 5"):
         marched(MPI.COMM_WORLD, problem, mesh)
+
+
+def test_laws_and_regulators_give_the_answer_of_one_rank() -> None:
+    """A limiter, a pneumatic damper, and a lift regulated by the contact force, on a track that
+    reaches the base through a car."""
+
+    def make() -> tuple[Problem, LineMesh]:
+        kind = "pantographs.reference"
+        scene = load_scene(
+            "en50318_2002",
+            [
+                "line.n_spans=6",
+                "mesh.elements_per_gap=3",
+                "train.start_m=120",
+                "train.end_m=150",
+                "train.raise_time_s=0.1",
+                "evaluation.from_m=130",
+                "evaluation.to_m=150",
+                f"{kind}.laws=[{{type='limiter',rise_m=0,stiffness_N_per_m=1e4}},"
+                "{type='damper',up_N_s_per_m=200,down_N_s_per_m=30}]",
+                f"{kind}.regulation={{measures='contact_force',target=140,"
+                "gains=[{at=0,error=0.2,integral_per_s=3}],filter_s=0.05,delay_s=0.02}",
+                "effects.vehicle_motion=true",
+                "vehicle.irregularity.spectrum=fra_5",
+                "vehicle.suspension={body_mass_kg=3e4,pitch_inertia_kg_m2=2e6,"
+                "stiffness_N_per_m=9e5,damping_N_s_per_m=4e4,bogie_distance_m=19,wheelbase_m=2.5}",
+            ],
+        )
+        return problem_of(scene), mesh_of(scene)
+
+    problem, mesh = on_root(MPI.COMM_WORLD, make)
+    forces = []
+    for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
+        watched = Forces()
+        with March(comm, *line_at_rest(problem, mesh)) as march:
+            assert march.run([watched]).outcome == "done"
+        forces.append(np.array(watched.force))
+    if MPI.COMM_WORLD.rank == 0:
+        off = np.abs(forces[0] - forces[1]).max() / forces[1].max()
+        print(f"{MPI.COMM_WORLD.size} ranks: {off:.2e}, expected below {TOLERANCE}")
+        assert off < TOLERANCE
+
+
+class Forces:
+    """Observer that keeps contact forces on rank 0."""
+
+    def __init__(self) -> None:
+        self.force: list[np.ndarray] = []
+
+    def start(self, stage: Stage) -> None:
+        """Nothing to do."""
+
+    def observe(self, view: StepView) -> None:
+        self.force.append(view.contact_force.copy())
+
+    def finish(self, outcome: str) -> None:
+        """Nothing to do."""

@@ -34,6 +34,11 @@ def put_more(rng: random.Random, words: Words, span: float, room: float, n_steps
         _strips(rng, words)
     if rng.random() < _NOW_AND_THEN:
         _vehicle(rng, words)
+    own = random.Random(f"laws {rng.random()}")
+    if own.random() < _NOW_AND_THEN:
+        _laws(own, words)
+    if own.random() < _NOW_AND_THEN:
+        _regulation(own, words)
     if rng.random() < _NOW_AND_THEN:
         _air(rng, words)
     # Droppers must be able to slacken if they are to keep a share of their stiffness then.
@@ -177,6 +182,49 @@ def _vehicle(rng: random.Random, words: Words) -> None:
     words["vehicle.vertical.amplitude_m"] = rng.uniform(1e-3, 0.03)
     words["vehicle.vertical.frequency_hz"] = rng.uniform(0.3, 5.0)
     words["vehicle.vertical.phase_deg"] = rng.uniform(-180.0, 180.0)
+
+
+def _laws(rng: random.Random, words: Words) -> None:
+    """Some laws that are not linear, on any mass."""
+    masses = words["pantographs.reference.masses_kg"]
+    assert isinstance(masses, list)
+    laws = []
+    for _ in range(rng.randint(1, 3)):
+        at = f"mass={rng.randint(1, len(masses))}"
+        up, down = (rng.choice([0.0, 10 ** rng.uniform(0.0, 3.0)]) for _ in range(2))
+        laws.append(
+            rng.choice(
+                (
+                    f"{{type='limiter',{at},rise_m={rng.uniform(0.0, 0.1)!r},"
+                    f"stiffness_N_per_m={10 ** rng.uniform(2.0, 7.0)!r}}}",
+                    f"{{type='damper',{at},up_N_s_per_m={up!r},down_N_s_per_m={down!r}}}",
+                    f"{{type='friction',{at},force_N={rng.uniform(0.1, 30.0)!r}}}",
+                    f"{{type='spring',{at},force_by_extension="
+                    f"[[-0.1,{-rng.uniform(0.0, 900.0)!r}],[-0.02,-3.0],[0.05,0.0]]}}",
+                )
+            )
+        )
+    words["pantographs.reference.laws"] = f"[{','.join(laws)}]"
+
+
+def _regulation(rng: random.Random, words: Words) -> None:
+    """A regulated lift, stable or not; its limits keep it sound."""
+    sample = float(str(words["numerics.dt_s"])) * rng.uniform(1.0, 20.0)
+    table = "pantographs.reference.regulation"
+    height = rng.random() < 0.5
+    words[f"{table}.measures"] = "'head_height'" if height else "'contact_force'"
+    words[f"{table}.target"] = rng.uniform(4.8, 5.5) if height else rng.uniform(50.0, 200.0)
+    scale = 1e3 if height else 1.0
+    gains = ",".join(
+        f"{{at={at!r},error={scale * rng.uniform(0.0, 0.5)!r},"
+        f"integral_per_s={scale * rng.uniform(0.1, 5.0)!r},rate_s={scale * 1e-3 * rng.random()!r}}}"
+        for at in ((4.0, 6.0) if height else (0.0, 150.0))
+    )
+    words[f"{table}.gains"] = f"[{gains}]"
+    words[f"{table}.sample_s"] = sample
+    words[f"{table}.delay_s"] = rng.choice([0, 1, 5]) * sample
+    words[f"{table}.filter_s"] = rng.choice([0.0, 20.0 * sample])
+    words[f"{table}.least_N"], words[f"{table}.most_N"] = -15.0, rng.uniform(5.0, 60.0)
 
 
 def _suspension(rng: random.Random, words: Words) -> None:

@@ -38,6 +38,8 @@ def _is_plain(words: Words) -> bool:
             "pantographs.reference.strips.number",
             "effects.head_roll",
             "effects.vehicle_motion",
+            "pantographs.reference.laws",
+            "pantographs.reference.regulation.measures",
         )
     )
 

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from measuring import History, check, start_march
-from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
+from small_lines import EN_PANTOGRAPH, WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
+from catenary.mbs.control.regulation import Regulation
+from catenary.mbs.head.laws import Law
 from catenary.solver.problem.contact_laws import LinearLaw
 
 
@@ -55,6 +57,46 @@ def test_continued_run_equals_the_uninterrupted_one(scheme: str, integrator: str
         expected = whole[channel][at:]
         within = 1e-12 * np.abs(expected).max()
         check(channel, rest[channel], expected, within=within)
+
+
+def test_laws_and_regulators_go_on_where_they_were() -> None:
+    """The controller's integral, what waits for its delay, contact forces of the step before."""
+    line = en50318_line(6)
+    law = Law(1, 2, True, (-1.0, 0.0, 1.0), (-30.0, 0.0, 200.0))
+    data = replace(EN_PANTOGRAPH, laws=(law,))
+    gains = ((0.0, 0.2, 3.0, 0.001),)
+    regulator = Regulation(False, 130.0, gains, -50.0, 50.0, 5e-3, 0.02, 0.05)
+    ours = train(70.0, 120.0, 150.0, data=data, raise_time=0.1)
+    (place,) = ours.placements
+    ours = replace(ours, placements=(replace(place, regulator=regulator),))
+    names = WHOLE | {"contact_damping", "pantograph_laws", "regulated_lift"}
+    contact, steps = LinearLaw(5e4, 50.0), numerics(1e-3, "one_solve")
+    problem = problem_of(line, names, contact=contact, train=ours, numerics=steps)
+    mesh, checkpoints = mesh_of(line, 3), {}
+
+    def keep(view: object) -> None:
+        if view.step == 203:
+            checkpoints["at"] = view.checkpoint()
+
+    whole, rest = History(keep), History()
+    run, _ = start_march(problem, mesh)
+    run.run([whole])
+    run.destroy()
+    again, _ = start_march(problem, mesh)
+    again.restore({name: np.array(value) for name, value in checkpoints["at"].items()})
+    again.run([rest])
+    again.destroy()
+    plain = np.array(whole["contact_force"][203:])
+    check("contact force [N]", rest["contact_force"], plain, within=1e-9)
+    forgetful, changed = {**checkpoints["at"]}, History()
+    (name,) = (key for key in forgetful if key.startswith("pantograph_"))
+    forgetful[name] = np.array(forgetful[name])
+    forgetful[name][-7:] = 0.0  # without what the controller remembers the run is another one
+    again, _ = start_march(problem, mesh)
+    again.restore({name: np.array(value) for name, value in forgetful.items()})
+    again.run([changed])
+    again.destroy()
+    assert np.abs(np.array(changed["contact_force"]) - plain).max() > 0.1
 
 
 def test_step_numbers_go_on() -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.head.strips import Strips
 from catenary.mbs.lumped_data import LumpedData
+from catenary.postproc.evaluate.wording import counted
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.problem.problem import Placement, Problem
 
@@ -45,7 +46,13 @@ def _strips_of(strips: Strips) -> str:
 def _description(placement: Placement, problem: Problem) -> str:
     """A line about a pantograph under way."""
     text = description_of(placement.data, placement.static_force)
-    if not (simulated(problem).meets_air and placement.data.meets_air):
+    acts = simulated(problem)
+    if acts.pantograph_laws and placement.data.laws:
+        n = len(placement.data.laws)
+        text += f"; {counted(n, 'law')} not linear"
+    if acts.regulated_lift and placement.regulator is not None:
+        text += "; regulated lift"
+    if not (acts.meets_air and placement.data.meets_air):
         return text
     from catenary.mbs.build import steady_forces
 

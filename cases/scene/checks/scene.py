@@ -40,6 +40,7 @@ from catenary.cases.scene.checks.train.aerodynamics import (
     check_uplift,
     has_front,
 )
+from catenary.cases.scene.checks.train.laws import check_laws
 from catenary.cases.scene.checks.train.pantograph import check_mechanisms, check_pantographs
 from catenary.cases.scene.checks.train.vehicle import check_vehicle
 from catenary.cases.scene.convert.course import end_of, strips_ahead
@@ -76,6 +77,7 @@ def faults_of(scene: Scene) -> list[Fault]:
     if found.nothing_by(_pantograph_names, scene):
         found.nothing_by(check_pantographs, scene)
         found.nothing_by(check_scheme, scene)
+        found.nothing_by(check_laws, scene)
     # What is too large is not made, and what follows from a wrong unit is not reported.
     sound = not whole or found.nothing_by(size_faults, scene)
     sound = sound and found.nothing_by(usual_faults, scene)

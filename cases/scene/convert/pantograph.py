@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catenary.cases.scene.convert.aerodynamics import uplift_of
+from catenary.cases.scene.convert.laws import laws_of
 from catenary.cases.scene.tables.train.head import StripsTable
 from catenary.cases.scene.tables.train.pantograph import MultibodyTable, PantographTable
 from catenary.mbs.head.strips import Strips, Suspension, Turning
@@ -32,7 +33,9 @@ def pantograph_of(
         from catenary.cases.scene.convert.mechanism import multibody_of, turned
 
         data = replace(
-            multibody_of(name, table, speed_km_h), uplift=uplift_of(table.aerodynamics, reversed)
+            multibody_of(name, table, speed_km_h),
+            uplift=uplift_of(table.aerodynamics, reversed),
+            laws=laws_of(table.laws, 2),
         )
         return turned(data) if reversed else data
     spring, damper = table.stiffnesses_N_per_m[0], table.dampings_N_s_per_m[0]
@@ -46,6 +49,7 @@ def pantograph_of(
         if roll is None
         else _turning(roll.inertia_kg_m2, roll.spring_distance_m, spring, damper),
         uplift_of(table.aerodynamics, reversed),
+        laws_of(table.laws, len(table.masses_kg)),
     )
 
 

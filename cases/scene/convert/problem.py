@@ -15,6 +15,7 @@ from catenary.cases.scene.convert.course import end_of
 from catenary.cases.scene.convert.defects import defects_of, irregularities_of
 from catenary.cases.scene.convert.ends import ends_of
 from catenary.cases.scene.convert.incidents import line_incidents, lowering_of
+from catenary.cases.scene.convert.laws import regulation_of
 from catenary.cases.scene.convert.line import line_of
 from catenary.cases.scene.convert.pantograph import pantograph_of, static_force
 from catenary.cases.scene.convert.vehicle import vehicle_of
@@ -109,6 +110,7 @@ def _train(scene: Scene) -> Train:
                 behind=place.behind_m,
                 nominal_height=kind.nominal_height_m,
                 lowering=lowering_of(scene.incidents, number, scene.numerics.dt_s),
+                regulator=regulation_of(kind.regulation),
             )
         )
     return Train(

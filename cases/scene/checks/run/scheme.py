@@ -48,6 +48,12 @@ def check_scheme(scene: Scene) -> Iterator[Fault]:
             key = f"pantographs.{name}.type"
             yield refusal(scene.origin, key, table.type, f"{knows} type lumped")
             continue
+        switches_of = {"laws": "pantograph_laws", "regulation": "regulated_lift"}
+        for part, effect in switches_of.items():
+            if getattr(table, part) and switches[effect]:
+                key = f"effects.{effect}"
+                why = f"{knows} linear pantographs, but {name} has {part}: switch it off"
+                yield refusal(scene.origin, key, True, why)
         key = f"pantographs.{name}.strips"
         if table.strips.number != 1:
             yield refusal(scene.origin, f"{key}.number", table.strips.number, f"{knows} one strip")

@@ -18,6 +18,7 @@ from catenary.cases.scene.input.toml_input import assign
 from catenary.cases.scene.tables.table import TAKE_AWAY, Table, ascending, exactly_one
 from catenary.cases.scene.tables.train.aerodynamics import AerodynamicsTable
 from catenary.cases.scene.tables.train.head import RollTable, SomeMass, StripsTable
+from catenary.cases.scene.tables.train.laws import LawTable, RegulationTable
 from catenary.cases.scene.tables.train.mechanism import BodyTable, ForceTable, JointTable, Name
 from catenary.mbs.library import READY
 from catenary.solver.base.errors import InputError
@@ -52,6 +53,12 @@ class _Pressing(Table):
     strips: StripsTable = Field(default_factory=StripsTable, description="collector strips")
     aerodynamics: AerodynamicsTable | None = Field(
         None, description="uplift by the air under way, on top of the static force"
+    )
+    laws: list[LawTable] = Field(
+        default_factory=list, max_length=20, description="what is not linear between its masses"
+    )
+    regulation: RegulationTable | None = Field(
+        None, description="a controller that changes the static force under way"
     )
 
     @model_validator(mode="after")
@@ -126,6 +133,11 @@ class LumpedTable(_Pressing):
         own = self.static_force_N is not None or self.static_force_by_speed is not None
         if own or self.model is None or READY[self.model].static_force is None:
             exactly_one(self, "static_force_N", "static_force_by_speed")
+        elif any(READY[self.model].uplift) and self.aerodynamics is not None:
+            raise ValueError(
+                f'must have static_force_N beside aerodynamics: the force of "{self.model}" '
+                "holds the uplift of its source"
+            )
         if self.strips.mass >= self.masses_kg[0]:
             raise ValueError(
                 f"must have a head heavier than its strips, but masses_kg gives it "
