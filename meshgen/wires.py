@@ -39,7 +39,8 @@ class Conductor:
     """A tensioned conductor: tension [N], mass per length [kg/m], bending stiffness EI [N m2].
 
     ``axial_stiffness`` EA [N] is that of a bar, None where nothing says it; ``expansion`` is by
-    temperature [1/K].
+    temperature [1/K]. Wind meets it with its ``diameter`` [m], None where nothing says it, times
+    ``drag_coefficient``.
     """
 
     tension: float
@@ -47,6 +48,8 @@ class Conductor:
     bending_stiffness: float
     axial_stiffness: float | None = field(default=None, kw_only=True)
     expansion: float = field(default=EXPANSION_OF_COPPER, kw_only=True)
+    diameter: float | None = field(default=None, kw_only=True)
+    drag_coefficient: float = field(default=1.2, kw_only=True)
 
     @property
     def wave_speed(self) -> float:
@@ -167,6 +170,8 @@ class Wire(Conductor):
             taken,
             axial_stiffness=conductor.axial_stiffness,
             expansion=conductor.expansion,
+            diameter=conductor.diameter,
+            drag_coefficient=conductor.drag_coefficient,
         )
 
     def tension_at(self, x: np.ndarray | float) -> np.ndarray:

@@ -23,6 +23,7 @@ from catenary.cases.scene.tables.run.incidents import Incident
 from catenary.cases.scene.tables.run.numerics import NumericsTable
 from catenary.cases.scene.tables.run.output import OutputTable
 from catenary.cases.scene.tables.run.petsc import PetscTable
+from catenary.cases.scene.tables.run.wind import WindTable
 from catenary.cases.scene.tables.run.window import WindowTable
 from catenary.cases.scene.tables.table import Table
 from catenary.cases.scene.tables.train.mechanism import Name
@@ -52,6 +53,7 @@ class Scene(Table):
     vehicle: VehicleTable | None = Field(
         None, description="how the vehicle moves its pantographs' bases"
     )
+    wind: WindTable | None = Field(None, description="wind over the line")
     contact: ContactTable = Field(
         default_factory=ContactTable, description="contact between head and wire"
     )

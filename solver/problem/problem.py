@@ -17,6 +17,7 @@ from catenary.solver.problem.defects import Defect, WrongTension
 from catenary.solver.problem.ends import EndCondition, Fixed
 from catenary.solver.problem.incidents import LineIncident, TensionLoss
 from catenary.solver.problem.irregularities import Irregularities
+from catenary.solver.problem.wind import Wind
 from catenary.solver.problem.window import WindowChoice
 
 if TYPE_CHECKING:
@@ -121,8 +122,8 @@ class Problem:
     ``slack_dampers_act`` whether the damper of a dropper goes on acting when its spring is slack;
     ``irregularities`` and ``defects`` are what is wrong with the line from the start;
     ``incidents`` are what happens to the line on the way; ``ends`` how it begins and ends;
-    ``window`` which part of it steps take on; ``tunnels`` on the way; ``along`` what holds
-    wires along the track.
+    ``window`` which part of it steps take on; ``tunnels`` and ``wind`` on the way; ``along`` what
+    holds wires along the track.
     """
 
     line: Line
@@ -139,6 +140,7 @@ class Problem:
     ends: tuple[EndCondition, EndCondition] = (Fixed(), Fixed())
     window: WindowChoice = WindowChoice()
     tunnels: tuple[Tunnel, ...] = ()
+    wind: Wind | None = None
     along: AlongTrack = AlongTrack()
     irregularities: Irregularities = Irregularities()
     defects: tuple[Defect, ...] = ()

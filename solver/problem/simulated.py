@@ -15,6 +15,7 @@ from catenary.solver.problem.contact_laws import ContactLaw
 from catenary.solver.problem.incidents import LineIncident
 from catenary.solver.problem.irregularities import Heights, LengthErrors, Surface
 from catenary.solver.problem.problem import Damping
+from catenary.solver.problem.wind import Wind
 
 # Height [m] above ``Profile.height`` that a wire with a profile is to have at positions x [m].
 TargetHeight = Callable[[Profile, np.ndarray], np.ndarray]
@@ -40,6 +41,7 @@ class Simulated:
     meets_air : whether the air has forces on pantographs
     pantograph_laws : whether laws of pantographs act that are not linear
     regulated_lift : whether lifts are regulated as their placements say
+    wind : that blows on wires and pantographs, None in still air
     lowering : whether pantographs are lowered as their placements say
     vehicle : motion of the pantographs' bases, None if they move along a straight line
     suspension : of the vehicle between the track and these bases, None if they follow the track
@@ -65,6 +67,7 @@ class Simulated:
     meets_air: bool = False
     pantograph_laws: bool = False
     regulated_lift: bool = False
+    wind: Wind | None = None
     lowering: bool = False
     vehicle: VehicleMotion | None = None
     suspension: Vehicle | None = None

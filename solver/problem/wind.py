@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -101,6 +101,10 @@ class Wind:
     def mean(self) -> float:
         """Mean speed at the wires outside of the stretches [m/s]."""
         return float(self.speed * self.profile.growth(self.height, self.reference_height))
+
+    def with_gusts(self, gusts: Gusts | None) -> Wind:
+        """The same mean wind with other gusts."""
+        return replace(self, gusts=gusts)
 
     @property
     def friction_velocity(self) -> float:

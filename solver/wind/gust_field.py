@@ -34,6 +34,8 @@ class GustField:
     wind : with gusts
     part : ALONG, ACROSS or UPWARD
     points : (n,) places [m], ascending
+    spread : distance [m] of points between which a load is linear: the coherence of loads over
+        longer lengths is then that of the gusts themselves. None for the gusts at a point
 
     Attributes
     ----------
@@ -42,7 +44,9 @@ class GustField:
         squares is the variance of the spectrum from the lowest to the highest frequency
     """
 
-    def __init__(self, wind: Wind, part: int, points: np.ndarray) -> None:
+    def __init__(
+        self, wind: Wind, part: int, points: np.ndarray, spread: float | None = None
+    ) -> None:
         gusts = wind.gusts
         assert gusts is not None
         self.interval = 1.0 / (_SLICES * gusts.highest)
@@ -55,6 +59,8 @@ class GustField:
         # Between slices the field is linear, which takes this of a wave.
         self._raised = self.deviations / np.sinc(self.frequencies * self.interval) ** 2
         rates = gusts.decay[part] * self.frequencies / wind.mean
+        if spread is not None:
+            self._raised *= np.sqrt(narrowed(0.5 * rates * spread))
         # Each wave has two amplitudes, of its cosine and of its sine.
         self._rates = np.tile(rates, 2)
         self._posts = self._first_chain(random)
@@ -118,6 +124,15 @@ class GustField:
 
 
 Fill = Callable[[int, slice, np.ndarray], None]
+
+
+def narrowed(half: np.ndarray) -> np.ndarray:
+    """Power of a process of correlation exp(-a d) over that of what is linear between its values at
+    points h apart, both over lengths beyond h; ``half`` is a h / 2, shape as it.
+
+    2 / a over the sum of h exp(-a h |j|) over all j.
+    """
+    return np.asarray(np.tanh(half) / half)
 
 
 def _edges(lowest: float, highest: float) -> np.ndarray:

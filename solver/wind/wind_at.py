@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from catenary.mbs.air.airflow import Tunnel, WindAt
+from catenary.mbs.air.airflow import WindAt
 from catenary.solver.problem.wind import Wind
 from catenary.solver.wind.gust_field import GustField
 from catenary.solver.wind.mean_wind import directions, exposure
@@ -18,12 +16,14 @@ def gust_points(spacing: float, start: float, end: float) -> np.ndarray:
     return np.linspace(start, end, max(2, int(np.ceil((end - start) / spacing)) + 1))
 
 
-def horizontal_gusts(wind: Wind, points: np.ndarray) -> tuple[GustField, GustField]:
-    """Gusts along the mean wind and across it to the left."""
-    return GustField(wind, ALONG, points), GustField(wind, ACROSS, points)
+def horizontal_gusts(
+    wind: Wind, points: np.ndarray, spread: float | None = None
+) -> tuple[GustField, GustField]:
+    """Gusts along the mean wind and across it to the left; ``spread`` as of ``GustField``."""
+    return GustField(wind, ALONG, points, spread), GustField(wind, ACROSS, points, spread)
 
 
-def wind_at(wind: Wind, tunnels: Sequence[Tunnel], start: float, end: float) -> WindAt:
+def wind_at(wind: Wind, start: float, end: float) -> WindAt:
     """Wind [m/s] with the train and across it to the left, at any places and times.
 
     ``start`` and ``end`` [m] of the line, beyond which gusts are as at its ends. Tunnels are left

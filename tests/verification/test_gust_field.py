@@ -162,7 +162,7 @@ def test_mean_wind_follows_profile_and_exposure() -> None:
 
 def test_wind_at_moving_places_is_that_of_the_field() -> None:
     """Between points and slices it is linear; across the track it is the gust along the wind."""
-    moving = wind_at(WIND, (), 0.0, 600.0)
+    moving = wind_at(WIND, 0.0, 600.0)
     points = np.linspace(0.0, 600.0, 121)
     field, slices = GustField(WIND, ALONG, points), np.empty((2, 121))
     field.fill(50, slice(0, 121), slices)
@@ -172,6 +172,6 @@ def test_wind_at_moving_places_is_that_of_the_field() -> None:
     with_train, across = moving(places, times)
     expected = WIND.mean + np.interp(places, points, nodes)
     check("across [m/s]", across, expected, within=1e-10)
-    against = wind_at(replace(WIND, direction=np.pi), (), 0.0, 600.0)
+    against = wind_at(replace(WIND, direction=np.pi), 0.0, 600.0)
     check("head wind [m/s]", against(places, times)[0], -expected, within=1e-10)
     assert np.abs(with_train).max() < 4 * WIND.mean

@@ -34,6 +34,7 @@ from catenary.cases.scene.checks.run.incidents import check_incidents
 from catenary.cases.scene.checks.run.output import check_output, check_recorded_parts
 from catenary.cases.scene.checks.run.scheme import check_scheme
 from catenary.cases.scene.checks.run.usual import usual_faults
+from catenary.cases.scene.checks.run.wind import check_wind
 from catenary.cases.scene.checks.run.window import check_window
 from catenary.cases.scene.checks.train.aerodynamics import (
     check_tunnels,
@@ -88,7 +89,14 @@ def faults_of(scene: Scene) -> list[Fault]:
         return found.faults
     if not found.nothing_by(check_names, scene, line):
         return found.faults
-    of_lines = check_dropper_lengths, check_recorded_parts, check_tunnels, _speed, check_defects
+    of_lines = (
+        check_dropper_lengths,
+        check_recorded_parts,
+        check_tunnels,
+        check_wind,
+        _speed,
+        check_defects,
+    )
     for of_line in of_lines:
         found.nothing_by(of_line, scene, line)
     if found.nothing_by(_running, scene, line) and found.nothing_by(_evaluation, scene):

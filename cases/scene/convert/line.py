@@ -205,4 +205,6 @@ def _conductor(table: WireTable) -> Conductor:
         table.bending_stiffness_N_m2,
         axial_stiffness=table.stiffness_along(),
         expansion=table.expansion_per_K,
+        diameter=None if table.diameter_mm is None else length_from_mm(table.diameter_mm),
+        drag_coefficient=table.drag_coefficient,
     )

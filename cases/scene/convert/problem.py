@@ -19,6 +19,7 @@ from catenary.cases.scene.convert.laws import regulation_of
 from catenary.cases.scene.convert.line import line_of
 from catenary.cases.scene.convert.pantograph import pantograph_of, static_force
 from catenary.cases.scene.convert.vehicle import vehicle_of
+from catenary.cases.scene.convert.wind import wind_of
 from catenary.cases.scene.tables.line.line import LineTable
 from catenary.cases.scene.tables.run.window import WindowTable
 from catenary.cases.scene.tables.units import speed_from_km_h
@@ -63,6 +64,7 @@ def problem_of(scene: Scene) -> Problem:
         slack_dampers_act=hung is not None and hung.slack_damping == "kept",
         ends=ends_of(scene.line.ends),
         tunnels=tunnels_of(scene.line.tunnels),
+        wind=wind_of(scene.wind),
         along=along_of(scene.line),
         irregularities=irregularities_of(scene.irregularities, line),
         defects=defects_of(scene.defects, line),

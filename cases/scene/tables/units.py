@@ -7,6 +7,7 @@ import math
 # One table gives each key its unit. Longest suffix first, so that "_kg_per_m" is not read as "_m".
 SUFFIXES: dict[str, str] = {
     "_N_s2_per_m2": "N s2/m2",
+    "_kg_per_m3": "kg/m3",
     "_N_per_m1_5": "N/m^1.5",
     "_N_s_per_m": "N s/m",
     "_m_per_s": "m/s",

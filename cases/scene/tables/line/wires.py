@@ -33,6 +33,12 @@ class WireTable(Table):
         le=1e-3,
         description="thermal expansion; acts with effects.temperature",
     )
+    diameter_mm: float | None = Field(
+        None, gt=0, le=200, description="diameter that the wind meets; acts with effects.wind"
+    )
+    drag_coefficient: float = Field(
+        1.2, ge=0, le=3, description="drag coefficient; acts with effects.wind"
+    )
 
     @model_validator(mode="after")
     def _one_stiffness(self) -> Self:

@@ -1,0 +1,51 @@
+"""Whether the wind of a scene finds what it needs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from catenary.cases.scene.convert.wind import wind_of
+from catenary.cases.scene.input.faults import Fault
+from catenary.cases.scene.keys.error_sentences import refusal
+from catenary.meshgen.topologies.line_data import LineData
+
+if TYPE_CHECKING:
+    from catenary.cases.scene.scene import Scene
+
+# Tables of wires in a line.
+_WIRES = ("contact_wire", "messenger_wire", "auxiliary_wire", "stitch_wire", "bridle")
+
+
+def check_wind(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Wires without a diameter, stretches that overlap or are nowhere, heights in the ground."""
+    table = scene.wind
+    if table is None:
+        return
+    if scene.switches()["wind"]:
+        for name in _WIRES:
+            wire = getattr(scene.line, name)
+            if wire is not None and wire.diameter_mm is None:
+                key = f"line.{name}.diameter_mm"
+                yield Fault(
+                    key,
+                    f"{key} is missing {scene.origin.of(f'line.{name}')}: the drag of the wind "
+                    "depends on it; give it, or write effects.wind = false",
+                )
+    end = line.support_positions[-1]
+    for i, stretch in enumerate(table.stretches):
+        if stretch.from_m >= end:
+            key = f"wind.stretches.{i}.from_m"
+            yield refusal(scene.origin, key, stretch.from_m, f"the line ends at {end:g} m")
+    for i, (before, after) in enumerate(pairwise(table.stretches), start=1):
+        if after.from_m < before.to_m:
+            why = f"it must be {before.to_m:g} at least, where the stretch before it ends"
+            yield refusal(scene.origin, f"wind.stretches.{i}.from_m", after.from_m, why)
+    wind = wind_of(table)
+    assert wind is not None
+    if not math.isfinite(wind.mean) or wind.mean <= 0.0:
+        yield refusal(
+            scene.origin, "wind.height_m", table.height_m, "there is no wind at that height"
+        )
