@@ -1,0 +1,83 @@
+"""A line in gusts, on one rank and on all, with a pantograph that meets them; a run that goes on.
+
+Run by ``mpirun -n N python -m mpi4py -m pytest tests/mpi``; on one rank it compares a run with
+itself.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
+from catenary.solver.base.parallel import on_root
+from catenary.solver.statics.line_at_rest import line_at_rest_on_all
+from catenary.solver.time_loop.march import March
+from catenary.solver.time_loop.observers import Stage, StepView
+
+WORLD = MPI.COMM_WORLD
+# See test_same_answers.py.
+TOLERANCE = 1e-9
+SCENE = (
+    "line.n_spans=7",
+    "train.start_m=120",
+    "train.end_m=155",
+    "train.raise_time_s=0.1",
+    "evaluation.from_m=140",
+    "evaluation.to_m=150",
+    "line.contact_wire.diameter_mm=14.4",
+    "line.messenger_wire.diameter_mm=14",
+    "pantographs.reference.aerodynamics={uplift_polynomial=[0, 0, 1e-3], head_share=0.7}",
+    "line.tunnels=[{from_m=145, to_m=300, force_factor=1.5}]",
+    "wind={speed_m_per_s=30, direction_deg=120, drag='quadratic', gusts={highest_hz=2}}",
+)
+
+
+class Watching:
+    """Keeps forces and energies of each state, and the checkpoint of one."""
+
+    def __init__(self, kept: int = -1) -> None:
+        self._kept = kept
+        self.checkpoint: dict[str, Any] | None = None
+        self.rows: list[np.ndarray] = []
+
+    def start(self, stage: Stage) -> None:
+        """Nothing is needed."""
+
+    def observe(self, view: StepView) -> None:
+        self.rows.append(np.array([*view.contact_force, *view.energies()]))
+        if view.step == self._kept:
+            self.checkpoint = WORLD.bcast(view.checkpoint())
+
+    def finish(self, outcome: str) -> None:
+        assert outcome == "done"
+
+
+def test_wind_on_all_ranks() -> None:
+    scene = load_scene("en50318_2002", list(SCENE))
+    problem = problem_of(scene)
+    assert {"wind", "gusts", "pantograph_aerodynamics"} <= problem.effects
+    mesh = on_root(WORLD, lambda: mesh_of(scene))
+    rest = line_at_rest_on_all(problem, mesh, WORLD)
+    found = []
+    for comm in (MPI.COMM_SELF, WORLD):
+        watching = Watching(300)
+        with March(comm, *rest) as march:
+            march.run([watching])
+        found.append(watching)
+    again = Watching()
+    with March(WORLD, *rest) as march:
+        assert found[1].checkpoint is not None
+        march.restore(found[1].checkpoint)
+        march.run([again])
+    alone, shared = (np.array(watching.rows) for watching in found)
+    assert alone.shape == shared.shape
+    # Contact forces are rank 0's, energies the line's.
+    own = slice(0 if WORLD.rank == 0 else 1, None)
+    scale = np.abs(alone).max(axis=0)
+    assert (np.abs(alone - shared).max(axis=0) < TOLERANCE * scale)[own].all()
+    assert np.array_equal(np.array(again.rows)[:, own], shared[300:, own])
