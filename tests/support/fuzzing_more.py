@@ -41,6 +41,8 @@ def put_more(rng: random.Random, words: Words, span: float, room: float, n_steps
         _regulation(own, words)
     if rng.random() < _NOW_AND_THEN:
         _air(rng, words)
+    if rng.random() < _NOW_AND_THEN:
+        _wind(rng, words)
     # Droppers must be able to slacken if they are to keep a share of their stiffness then.
     if words["effects.dropper_slackening"] == "true" and rng.random() < _NOW_AND_THEN:
         words["line.dropper.residual_stiffness_ratio"] = rng.uniform(1e-3, 0.5)
@@ -241,6 +243,18 @@ def _suspension(rng: random.Random, words: Words) -> None:
         words[f"{table}.bogie_mass_kg"] = rng.uniform(1e3, 6e3)
         words[f"{table}.primary_stiffness_N_per_m"] = 10 ** rng.uniform(6.0, 7.3)
         words[f"{table}.primary_damping_N_s_per_m"] = 10 ** rng.uniform(3.0, 5.0)
+
+
+def _wind(rng: random.Random, words: Words) -> None:
+    """A steady wind, or gusts of few waves; further wires of topologies have a diameter."""
+    for wire in ("contact_wire", "messenger_wire"):
+        words[f"line.{wire}.diameter_mm"] = rng.uniform(5.0, 20.0)
+    words["wind.speed_m_per_s"] = rng.uniform(1.0, 40.0)
+    words["wind.direction_deg"] = rng.uniform(-180.0, 180.0)
+    words["wind.drag"] = rng.choice(["'linear'", "'quadratic'"])
+    if rng.random() < 0.5:
+        words["wind.gusts.highest_hz"] = rng.uniform(0.1, 1.0)
+        words["wind.gusts.seed"] = rng.randrange(1000)
 
 
 def _air(rng: random.Random, words: Words) -> None:

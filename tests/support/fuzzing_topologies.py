@@ -100,7 +100,8 @@ def _leave_out(words: Words, begins: tuple[str, ...]) -> None:
 
 def _wire(rng: random.Random, tension: float, mass: float) -> str:
     bending = rng.choice([0.0, rng.uniform(1.0, 50.0)])
-    return f"tension_N={tension!r},mass_kg_per_m={mass!r},bending_stiffness_N_m2={bending!r}"
+    numbers = f"tension_N={tension!r},mass_kg_per_m={mass!r},bending_stiffness_N_m2={bending!r}"
+    return f"{numbers},diameter_mm={rng.uniform(5.0, 15.0)!r}"
 
 
 _TOPOLOGIES: dict[str, Callable[[random.Random, Words, float], None]] = {

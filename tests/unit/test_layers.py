@@ -41,8 +41,8 @@ ROOMS = {
         "lumped_data", "library", "response", "lumped", "lowering", "roll", "shape", "build",
     ),
     "solver": (
-        "base", "problem", "model", "ends", "effects", "linear", "statics", "waves", "window",
-        "integrators", "contact", "contact_problem", "schemes", "time_loop",
+        "base", "problem", "model", "wind", "ends", "effects", "linear", "statics", "waves",
+        "window", "integrators", "contact", "contact_problem", "schemes", "time_loop",
     ),
     "postproc": ("standards", "channels", "files", "read", "record", "evaluate", "film", "paraview",
         "report",

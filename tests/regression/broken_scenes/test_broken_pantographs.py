@@ -95,6 +95,50 @@ ASSIGNMENTS = {
         ],
         "the line ends at",
     ),
+    "wind without diameters": (
+        ["wind.speed_m_per_s=20"],
+        "line.contact_wire.diameter_mm is missing",
+    ),
+    "wind of no speed": (["wind.height_m=6"], "wind.speed_m_per_s is missing"),
+    "two strengths of gusts": (
+        ["wind={speed_m_per_s=20, gusts={turbulence_intensity=0.2, friction_velocity_m_per_s=2}}"],
+        "must have turbulence_intensity or friction_velocity_m_per_s, but both are given",
+    ),
+    "no frequencies": (
+        ["wind={speed_m_per_s=20, gusts={lowest_hz=0.5, highest_hz=0.2}}"],
+        "must have frequencies, but lowest_hz is 0.5 and highest_hz 0.2",
+    ),
+    "von Karman without a length": (
+        ["wind={speed_m_per_s=20, gusts={spectrum='von_karman'}}"],
+        "must have length_scale_m with the spectrum von_karman",
+    ),
+    "unknown spectrum": (
+        ["wind={speed_m_per_s=20, gusts={spectrum='simiu'}}"],
+        'wind.gusts.spectrum is "simiu"',
+    ),
+    "power law without exponent": (
+        ["wind={speed_m_per_s=20, profile='power'}"],
+        "must have exponent with the profile power",
+    ),
+    "stretch without length": (
+        ["wind={speed_m_per_s=20, stretches=[{from_m=5, to_m=5}]}"],
+        "must end behind its start, but to_m is 5 and from_m 5",
+    ),
+    "stretches that overlap": (
+        [
+            "wind={speed_m_per_s=20, stretches=[{from_m=5, to_m=50}, {from_m=40, to_m=60}]}",
+            "effects.wind=false",
+            "effects.gusts=false",
+        ],
+        "wind.stretches.1.from_m is 40 m on the command line (--set); it must be 50 at least",
+    ),
+    "gusts without wind": (
+        [
+            "wind={speed_m_per_s=20, gusts={seed=1}}",
+            "effects.wind=false",
+        ],
+        "effects.gusts is on by default and requires effects.wind",
+    ),
     "tunnel that nothing notices": (
         ["line.tunnels=[{from_m=100, to_m=300}]"],
         "changes nothing: no pantograph of the train has aerodynamics",

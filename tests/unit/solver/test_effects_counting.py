@@ -41,9 +41,11 @@ from catenary.solver.problem.defects import (
 from catenary.solver.problem.incidents import DropperBreak, TensionLoss
 from catenary.solver.problem.irregularities import Heights, Irregularities, LengthErrors
 from catenary.solver.problem.problem import Damping, Problem
+from catenary.solver.problem.wind import Gusts, Wind
 from catenary.solver.statics.equilibrium import find_form
 
 N_SPANS = 4
+WIND = Wind(25.0, gusts=Gusts(2.0))
 CAR = Vehicle(3e4, 2e6, 9e5, 4e4, 19.0, 2.5)
 INSULATORS = Fittings("section_insulator", CONTACT_WIRE, (100.3, 101.7), (5.0, 5.0))
 DEFECTS = (
@@ -62,6 +64,8 @@ def full_line() -> LineData:
     return replace(
         line,
         steady_arm=replace(line.steady_arm, stiffness=300.0),
+        contact_wire=replace(line.contact_wire, diameter=0.0144),
+        messenger_wire=replace(line.messenger_wire, diameter=0.014),
         n_transition=(1, 1),
         transition_rise=0.2,
     )
@@ -94,7 +98,15 @@ def full_problem(names: frozenset[str]) -> Problem:
         incidents=(DropperBreak(0.5, 80.0), TensionLoss(0.6, MESSENGER_WIRE, 0.9)),
         irregularities=Irregularities(heights, heights, LengthErrors(0.001, 2.0, 1)),
         defects=DEFECTS,
+        wind=WIND,
     )
+
+
+def expected_terms(terms: object, n: dict[str, int]) -> int:
+    """A number, a multiple of a count, or multiples of several counts."""
+    if isinstance(terms, dict):
+        return sum(factor * n.get(size, 1) for size, factor in terms.items())
+    return terms if isinstance(terms, int) else terms[1] * n[terms[0]]
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +134,8 @@ def counts(mesh: LineMesh) -> dict[str, int]:
         "arms": mesh.steady_arms.size,
         "supports": mesh.supports.size,
         "fittings": 2,
+        "one wire": (mesh.n_nodes - 2) // 2,
+        "unknowns": 2 * mesh.n_nodes,
         "spots": 1,
     }
 
@@ -174,6 +188,14 @@ BLOCKS = {
     "tension_loss": ({}, 1),
     "lowering": ({}, 1),
     "pantograph_aerodynamics": ({}, 1),
+    "wind": (
+        {
+            ("messenger_wire", "one wire", False, False): 1,
+            ("contact_wire", "one wire", False, False): 1,
+        },
+        {"elements": 1, "laws": 1},
+    ),
+    "gusts": ({}, {"unknowns": 1, "laws": 1}),
     "supercritical_speed": ({}, 1),
     "fittings": ({("contact_wire", "fittings", True, False): 1}, ("fittings", 1)),
     "contact_wire_height": ({}, 1),
@@ -210,6 +232,8 @@ LAWS = {
     "tension_loss": "incidents",
     "lowering": "lowering",
     "pantograph_aerodynamics": "meets_air",
+    "wind": "wind",
+    "gusts": "wind",
     "contact_wire_height": "irregular_heights",
     "dropper_lengths": "length_errors",
     "running_surface": "surface",
@@ -300,7 +324,7 @@ def test_an_effect_alone_adds_what_it_declares_and_nothing_else(name: str, mesh:
     assert added == {(part, n[size], *has): many for (part, size, *has), many in blocks.items()}
     assert not contents(bare) - contents(model)
     assert set(model.terms_of) == {"vertical", name}
-    assert model.terms_of[name] == (terms if isinstance(terms, int) else terms[1] * n[terms[0]])
+    assert model.terms_of[name] == expected_terms(terms, n)
     assert model.terms_of["vertical"] == bare.terms_of["vertical"]
     assert model.unknowns == bare.unknowns
     assert np.array_equal(model.constrained, bare.constrained)
@@ -355,6 +379,8 @@ def test_a_scene_without_an_effect_has_no_trace_of_it(name: str, mesh: LineMesh)
         ("head_roll", lambda p: replace(p, train=train(70.0, 60.0, 160.0))),
         ("vehicle_motion", lambda p: replace(p, train=replace(p.train, vehicle=None))),
         ("pantograph_aerodynamics", lambda p: replace(p, train=train(70.0, 60.0, 160.0))),
+        ("wind", lambda p: replace(p, wind=None)),
+        ("gusts", lambda p: replace(p, wind=WIND.with_gusts(None))),
         ("supercritical_speed", lambda p: replace(p, train=replace(p.train, speed=70.0))),
         ("fittings", lambda p: replace(p, line=replace(p.line, fittings=()))),
         *(
