@@ -17,6 +17,7 @@ from catenary.solver.model.lateral_shape import LateralShape
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.statics.sparse_sum import clamp_parts, springs_between, summed, wire_parts
+from catenary.solver.wind.drag import mean_load
 
 # An arm that hangs freely carries its weight up to this inclination, the wire what is beyond [rad].
 STEEPEST = np.deg2rad(20.0)
@@ -59,22 +60,29 @@ def lateral_shape(model: Model, form: Equilibrium) -> LateralShape:
 
 
 def _sideways_load(model: Model, at: np.ndarray) -> np.ndarray:
-    """What pulls wires sideways in a curve: their tension, and their weight on a canted track.
+    """What pulls wires sideways: the mean wind; in a curve their tension, and their weight on a
+    canted track.
 
     A course y across a track of curvature c has the curvature y'' + c in plan.
     """
-    mesh, line = model.mesh, model.problem.line
+    mesh, line, wind = model.mesh, model.problem.line, model.simulated.wind
     load = np.zeros(2 * mesh.n_nodes)
-    if line.curve is None:
+    if line.curve is None and wind is None:
         return load
     for wire in line.wires:
         pairs = mesh.elements(wire.name)
         length, middle = np.diff(mesh.x(pairs), axis=1)[:, 0], mesh.x(pairs).mean(axis=1)
-        pull = wire.tension_at(middle) * line.curve.curvature_at(middle)
+        pull = np.zeros(middle.size)
+        if line.curve is not None:
+            pull += wire.tension_at(middle) * line.curve.curvature_at(middle)
+        if wind is not None:
+            pull += mean_load(wind, model.problem.tunnels, wire, middle)
         dofs = np.stack(
             [at[pairs[:, 0]], at[pairs[:, 0]] + 1, at[pairs[:, 1]], at[pairs[:, 1]] + 1]
         )
         np.add.at(load, dofs, (pull[:, None] * elements.uniform_load(length)).T)
+    if line.curve is None:
+        return load
     every = np.arange(mesh.n_nodes)
     share = line.curve.sideways_pull_at(mesh.x(every))
     load[at] -= share * model.weight[model.dofs(every)]
