@@ -14,5 +14,5 @@ def airflow(problem: Problem, simulated: Simulated, placement: Placement) -> Air
         return None
     train, wind = problem.train, simulated.wind
     masts = problem.line.support_positions
-    blowing = wind and wind_at(wind, float(masts[0]), float(masts[-1]))
+    blowing = None if wind is None else wind_at(wind, float(masts[0]), float(masts[-1]))
     return Airflow(train.speed, train.start - placement.behind, problem.tunnels, blowing)
