@@ -52,7 +52,8 @@ class ContactWires:
         self.dofs = np.stack([model.dofs(nodes), model.dofs(nodes, "theta_y")], axis=1)
         mine = ownership.owned(self.dofs)
         self.nodes = np.zeros(self.x.size, dtype=NODE)
-        self.nodes["x"], self.nodes["y"] = self.x, model.mesh.points[nodes, 1]
+        course = model.mesh.points[:, 1] if form.lateral is None else form.lateral.y
+        self.nodes["x"], self.nodes["y"] = self.x, course[nodes]
         self.nodes["joined"] = 1.0
         for name, first, end in zip(names, ends[:-1], ends[1:], strict=True):
             # No element leads from the end of a piece to the next one.

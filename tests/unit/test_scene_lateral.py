@@ -18,6 +18,22 @@ def test_an_inclination_is_an_angle_of_the_arm() -> None:
     assert line_data_of(load_scene("ac_simple", [])).steady_arm.inclination is None
 
 
+def test_a_curve_is_a_curvature_a_tilt_and_a_stretch() -> None:
+    given = "{radius_m=2000, side='right', cant_mm=150, from_m=200, to_m=900, transition_m=100}"
+    line = line_data_of(load_scene("ac_simple", [ON, f"line.curve={given}"]))
+    assert line.curve is not None
+    x = np.array([100.0, 250.0, 500.0])
+    assert np.allclose(line.curve.curvature_at(x), [0.0, -1 / 4000, -1 / 2000], atol=1e-18)
+    assert np.allclose(line.curve.tilt, np.arcsin(0.1))
+    assert line.curve.sideways_pull_at(x)[-1] == pytest.approx(-np.tan(np.arcsin(0.1)))
+
+
+def test_a_messenger_wire_has_a_stagger_of_its_own() -> None:
+    line = line_data_of(load_scene("ac_simple", [ON, "line.messenger_stagger_m=0.1"]))
+    assert line.messenger_stagger is not None
+    assert line.messenger_stagger[:3] == (0.1, -0.1, 0.1) and line.stagger[0] == 0.2
+
+
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
@@ -27,6 +43,17 @@ def test_an_inclination_is_an_angle_of_the_arm() -> None:
             "takes holds_height or inclination_deg, but both are given",
         ),
         ([ON, "line.steady_arm.inclination_deg=40"], "inclination_deg"),
+        (["line.messenger_stagger_m=0.2"], "line.messenger_stagger_m .* acts only with"),
+        (["line.curve.radius_m=3000"], "acts only with effects.lateral_motion = true"),
+        ([ON, "line.curve.radius_m=50"], "line.curve.radius_m"),
+        ([ON, "line.curve={radius_m=3000, side='up'}"], "left.* or .*right"),
+        ([ON, "line.curve={radius_m=3000, from_m=100}"], "needs from_m and to_m together"),
+        ([ON, "line.curve={radius_m=3000, transition_m=100}"], "takes transition_m with from_m"),
+        (
+            [ON, "line.curve={radius_m=3000, from_m=100, to_m=200, transition_m=60}"],
+            r"to_m \(200\) must be greater than 220 m",
+        ),
+        ([ON, "line.messenger_stagger_m=[0.1, 0.2]"], "must give messenger_stagger_m as one"),
         ([ON, 'line.ends.end.kind="periodic"'], "with effects.lateral_motion it must be fixed"),
     ],
 )

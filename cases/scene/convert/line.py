@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
@@ -9,10 +10,12 @@ from typing import TypeVar
 import numpy as np
 
 from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.tables.line.curve import CurveTable
 from catenary.cases.scene.tables.line.droppers import DropperTable, HangingTable
 from catenary.cases.scene.tables.line.line import LineTable
 from catenary.cases.scene.tables.line.wires import BridleTable, StitchWireTable, WireTable
 from catenary.cases.scene.tables.units import angle_from_deg, length_from_mm
+from catenary.meshgen.curve import Curve
 from catenary.meshgen.hardware import DropperKind, Fittings, SteadyArm
 from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.all_topologies import make_line
@@ -78,7 +81,11 @@ def line_data_of(scene: Scene) -> LineData:
         span_lengths=spans,
         dropper_positions=tuple(positions),
         pre_sag=tuple(pre_sag),
-        stagger=_stagger(table),
+        stagger=_stagger(table.stagger_m, table.n_spans),
+        messenger_stagger=_optional(
+            lambda own: _stagger(own, table.n_spans), table.messenger_stagger_m
+        ),
+        curve=_optional(_curve, table.curve),
         contact_height=table.contact_height_m,
         encumbrance=table.encumbrance_m or 0.0,
         contact_wire=_conductor(table.contact_wire),
@@ -191,11 +198,19 @@ def _pre_sag(kind: DropperTable, span: float, positions: tuple[float, ...]) -> t
     return tuple(float(v) for v in length_from_mm(kind.pre_sag_mid_mm) * (1 - across**2))
 
 
-def _stagger(table: LineTable) -> tuple[float, ...]:
-    if len(table.stagger_m) > 1:
-        return tuple(table.stagger_m)
-    side = table.stagger_m[0]
-    return tuple(side if i % 2 == 0 else -side for i in range(table.n_spans + 1))
+def _stagger(given: list[float], n_spans: int) -> tuple[float, ...]:
+    if len(given) > 1:
+        return tuple(given)
+    side = given[0]
+    return tuple(side if i % 2 == 0 else -side for i in range(n_spans + 1))
+
+
+def _curve(table: CurveTable) -> Curve:
+    to_left = 1.0 if table.side == "left" else -1.0
+    first = -np.inf if table.from_m is None else table.from_m
+    last = np.inf if table.to_m is None else table.to_m
+    tilt = math.asin(table.cant_mm / table.rail_distance_mm)
+    return Curve(to_left / table.radius_m, tilt, (first, last), table.transition_m)
 
 
 def _conductor(table: WireTable) -> Conductor:

@@ -20,6 +20,9 @@ USUAL: dict[str, tuple[float, float]] = {
     "line.contact_height_m": (4, 7),
     "line.encumbrance_m": (0.3, 3),
     "line.stagger_m": (0.05, 0.6),
+    "line.messenger_stagger_m": (0.05, 0.6),
+    "line.curve.radius_m": (150, 2e4),
+    "line.curve.cant_mm": (10, 200),
     "line.contact_wire.tension_N": (5e3, 4e4),
     "line.contact_wire.mass_kg_per_m": (0.5, 2),
     "line.contact_wire.bending_stiffness_N_m2": (30, 600),
@@ -54,7 +57,7 @@ USUAL: dict[str, tuple[float, float]] = {
     "contact.stiffness_N_per_m": (5e3, 1e7),
     "numerics.dt_s": (1e-5, 5e-3),
 }
-_SIGNED = ("line.stagger_m", "line.dropper.pre_sag")
+_SIGNED = ("line.stagger_m", "line.messenger_stagger_m", "line.dropper.pre_sag")
 _MARGIN = 10.0  # beyond a usual range without a question
 # What a number a thousand times too small, or too large, was probably written in.
 _LARGER = {"N": "kN", "N/m": "kN/m", "mm": "m", "N m2": "kN m2"}

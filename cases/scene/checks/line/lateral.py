@@ -33,6 +33,8 @@ def check_lateral(scene: Scene) -> Iterator[Fault]:
         return
     given = {
         "line.steady_arm.inclination_deg": line.steady_arm.inclination_deg,
+        "line.messenger_stagger_m": line.messenger_stagger_m,
+        "line.curve": line.curve and line.curve.radius_m,
     }
     for key, value in given.items():
         if value is not None and _EFFECT not in scene.effects:

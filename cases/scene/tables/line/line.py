@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from catenary.cases.scene.tables.line.along import Along, TemperatureTable, TensionerTable
+from catenary.cases.scene.tables.line.curve import CurveTable
 from catenary.cases.scene.tables.line.damping import DampingTable
 from catenary.cases.scene.tables.line.droppers import DropperTable
 from catenary.cases.scene.tables.line.ends import EndsTable
@@ -83,6 +84,16 @@ class LineTable(Table):
     stagger_m: Annotated[list[Stagger], OneOrMore, Field(min_length=1, max_length=2001)] = Field(
         [0.0], description="alternating sideways offset at the supports, or one value per support"
     )
+    messenger_stagger_m: (
+        Annotated[list[Stagger], OneOrMore, Field(min_length=1, max_length=2001)] | None
+    ) = Field(
+        None,
+        description="the same of the messenger wire, which stays above the track if absent; acts "
+        "with effects.lateral_motion",
+    )
+    curve: CurveTable | None = Field(
+        None, description="curve of the track; acts with effects.lateral_motion"
+    )
     contact_wire: WireTable = Field(description="contact wire")
     messenger_wire: WireTable | None = Field(None, description="messenger wire")
     auxiliary_wire: AuxiliaryWireTable | None = Field(
@@ -134,9 +145,11 @@ class LineTable(Table):
                 f"must not list more lengths in span_m ({len(self.span_m)}) than there are spans "
                 f"for them ({covered})"
             )
-        if len(self.stagger_m) not in (1, self.n_spans + 1):
-            raise ValueError(
-                f"must give stagger_m as one number or one per support ({self.n_spans + 1}), "
-                f"but lists {len(self.stagger_m)}"
-            )
+        for key in ("stagger_m", "messenger_stagger_m"):
+            given = getattr(self, key)
+            if given is not None and len(given) not in (1, self.n_spans + 1):
+                raise ValueError(
+                    f"must give {key} as one number or one per support ({self.n_spans + 1}), "
+                    f"but lists {len(given)}"
+                )
         return self
