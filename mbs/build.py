@@ -41,7 +41,7 @@ class Operation(NamedTuple):
     ``lateral`` is where the wire crosses the strips, without which the head does not roll, and
     ``base`` how the vehicle moves, without which it does not. ``air`` is the air that it meets,
     without which there is none. ``lowering`` is how the pantograph is lowered on the way,
-    ``regulator`` what regulates its lift.
+    ``regulator`` what regulates its lift. ``rolls`` is whether a head may roll that can.
     """
 
     static_force: float
@@ -55,6 +55,7 @@ class Operation(NamedTuple):
     air: Airflow | None = None
     lowering: Lowering | None = None
     regulator: Regulator | None = None
+    rolls: bool = True
 
 
 def make_pantograph(data: PantographData, operation: Operation) -> Pantograph:
@@ -87,13 +88,16 @@ def _model(
         air = AirForces(operation.air, data.uplift, operation.raise_time)
         on_frame = steady_forces(data, operation.air.speed).on_frame
     force, height = operation[:2]
-    moved = *operation[2:-3], air
+    moved = *operation[2:-4], air
     if isinstance(data, MultibodyData):
         pressing = force + on_frame
         if data.all_bodies is not None:
             way = data.all_bodies
             return FullPantograph(data, pressing, height, *moved, way.handling, way.substeps)
-        return RaisingPantograph(raising_data(data, pressing, height), *moved)
+        raising = raising_data(data, pressing, height)
+        raising = raising if operation.rolls else replace(raising, roll=None)
+        return RaisingPantograph(raising, *moved)
+    data = data if operation.rolls else replace(data, roll=None)
     return LumpedPantograph(data, force, height, *moved, steady_air=on_frame)
 
 

@@ -273,6 +273,23 @@ def chain_step(chain, laws, newmark, head, drive, added):
     respond(matrix, newmark, head)
 
 
+@compiled
+def bend(touch, breaks, coefficients, first, wires, place, rate):
+    """Let strips that bend touch at places (s,) that move with a rate [m], [m/s].
+
+    ``touch`` (2, s, n) and the tables of m modes; those of the strips are the coordinates from
+    ``first`` on. ``wires`` may touch each strip.
+    """
+    s, m = touch.shape[1], coefficients.shape[1]
+    values, slopes = np.empty(m), np.empty(m)
+    for j in range(s):
+        table_at(breaks, coefficients, place[j], values, slopes)
+        at = first + (j // wires) * m
+        for k in range(m):
+            touch[0, j, at + k] = values[k]
+            touch[1, j, at + k] = slopes[k] * rate[j]
+
+
 @in_line
 def take(head, contact_force):
     """Make ``head.state`` the state under contact forces (s,), after a step without."""

@@ -14,6 +14,7 @@ import numpy as np
 from catenary.mbs.control import control_kernels
 from catenary.mbs.control.control_kernels import ACTING, N_SETTINGS, ControlArrays
 from catenary.mbs.head import head_kernels
+from catenary.mbs.head.flexure import ModeTables
 from catenary.mbs.head.head_kernels import (
     N_DRIVE,
     Chain,
@@ -29,12 +30,13 @@ from catenary.solver.base.pointers import address_of, cube_at, numbers_at, table
 # Models, as `head_kernels` steps them.
 LUMPED, REDUCED, LAWFUL = 0, 1, 2
 
-_KINDS = (HeadArrays, LinearStep, RaisedHead, Chain, LawArrays, ControlArrays)
+_KINDS = (ModeTables, HeadArrays, LinearStep, RaisedHead, Chain, LawArrays, ControlArrays)
 _ADDRESSES = tuple(dict.fromkeys(name for kind in _KINDS for name in kind._fields))
 # A head: its model, how many coordinates and strips it has, the coordinate of its roll or -1, its
 # first contact; the heights that a reduced mechanism reaches [m], and how many breaks and columns
 # its tables have; how many laws and points of these it has, rows of gains and numbers that a
-# controller remembers; its factors, and the addresses of its arrays, named as in `head_kernels`.
+# controller remembers; modes of its strips, points of their tables, the first mode's coordinate and
+# the wires of a strip; its factors, and the addresses of its arrays, named as in `head_kernels`.
 HEAD = np.dtype(
     [
         ("model", np.int64),
@@ -46,6 +48,10 @@ HEAD = np.dtype(
         ("highest", np.float64),
         ("n_breaks", np.int64),
         ("n_columns", np.int64),
+        ("n_modes", np.int64),
+        ("n_mode_breaks", np.int64),
+        ("first_mode", np.int64),
+        ("wires", np.int64),
         ("n_laws", np.int64),
         ("n_points", np.int64),
         ("n_gains", np.int64),
@@ -123,6 +129,12 @@ def predict(head, drive, numbers, n_contacts):
         for j in range(s):
             touch[0, j, head.roll] = drive[N_DRIVE + j]
             touch[1, j, head.roll] = drive[N_DRIVE + s + j]
+    if head.n_modes > 0:
+        m = head.n_mode_breaks
+        breaks = numbers_at(head.mode_breaks, m)
+        coefficients = cube_at(head.mode_coefficients, m - 1, head.n_modes, 4)
+        place, rate = drive[N_DRIVE : N_DRIVE + s], drive[N_DRIVE + s : N_DRIVE + 2 * s]
+        head_kernels.bend(touch, breaks, coefficients, head.first_mode, head.wires, place, rate)
     within, added = True, 0.0
     if head.n_gains > 0:
         added = numbers_at(head.memory, head.n_memory)[ACTING]

@@ -44,7 +44,8 @@ class SteppedHead(ABC):
         s = len(head.offsets)
         self.strip_offsets = head.offsets
         # Where the wire crosses the strips of a head that cannot roll makes no difference.
-        self._n, self._roll, self._lateral = n, head.roll, lateral if head.roll >= 0 else None
+        moves = head.roll >= 0 or head.bending is not None
+        self._n, self._roll, self._lateral = n, head.roll, lateral if moves else None
         self._level = np.ones(n)
         self._level[: head.n] = head.level
         self._touch = np.zeros((2, s, n))
@@ -68,6 +69,11 @@ class SteppedHead(ABC):
         self._take = bound(head_kernels.take, self._arrays, later=(np.zeros(s),))
         self._laws: LawsInPlace = in_place((), (), n, ())
         self._law_arrays = self._laws.arrays(s)
+        self._bending = head.bending
+        if self._bending is not None:
+            tables, first, wires = self._bending
+            arguments = self._touch, *tables, first, wires
+            self._bend = bound(head_kernels.bend, *arguments, later=(np.zeros(s), np.zeros(s)))
         self._control: ControlArrays | None = None
         self._controller: Controller | None = None
         self._added, self._time = 0.0, 0.0
@@ -137,8 +143,15 @@ class SteppedHead(ABC):
         """The head as `head_records.fill_head` takes it; arrays are the head's own."""
         control = self._control
         watched = {} if control is None else control._asdict()
+        bends: dict[str, Any] = {"n_modes": 0}
+        if self._bending is not None and self._lateral is not None:
+            tables, first, wires = self._bending
+            points, m = tables.mode_coefficients.shape[:2]
+            bends = {"n_modes": m, "n_mode_breaks": points + 1, "first_mode": first, "wires": wires}
+            bends |= tables._asdict()
         return {
             **watched,
+            **bends,
             **self._law_arrays._asdict(),
             "n_laws": self._law_arrays.zero.size,
             "n_points": self._law_arrays.points.size,
@@ -212,8 +225,12 @@ class SteppedHead(ABC):
         if self._lateral is None:
             return
         self._lateral.move_to(time)
-        self._touch[0, :, self._roll] = self._lateral.place
-        self._touch[1, :, self._roll] = self._lateral.rate
+        place, rate = self._lateral.place, self._lateral.rate
+        if self._roll >= 0:
+            self._touch[0, :, self._roll] = place
+            self._touch[1, :, self._roll] = rate
+        if self._bending is not None:
+            self._bend(np.ascontiguousarray(place), np.ascontiguousarray(rate))
 
 
 def raised(time: float, raise_time: float) -> float:

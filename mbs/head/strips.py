@@ -1,9 +1,10 @@
 """Collector strips and the head that carries them: masses on springs above what raises them.
 
 Coordinates of a head, in this order: the heights of strips on springs of their own, the head's
-height, its roll about the track, its pitch across it. A strip touches the wire at a height
-z + l phi + p theta: l [m] is the lateral place of the wire on it, p [m] the strip's place ahead of
-the head's centre, phi and theta roll and pitch [rad], which lift what is left of and ahead of the
+height, its roll about the track, its pitch across it, the bending of its strips (`flexure`). A
+strip touches the wire at a height z + l phi + p theta: l [m] is the lateral place of the wire on
+it, p [m] the strip's place ahead of the head's centre, phi and theta roll and pitch [rad], which
+lift what is left of and ahead of the
 centre. Angles are small: 0.1 rad would be an error of 0.5 %.
 """
 
@@ -13,6 +14,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+
+from catenary.mbs.head.flexure import Bending, Flexure, mode_tables, shapes
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,7 @@ class Strips:
     suspension : of each strip, whose mass is part of the head's; None if it is fixed to the head
     pitch : how the head turns across the track, None if it does not
     wires : contact wires side by side, each of which may touch each strip
+    flexure : how strips on springs of their own bend, None if they are rigid
     """
 
     number: int = 1
@@ -55,6 +59,7 @@ class Strips:
     suspension: Suspension | None = None
     pitch: Turning | None = None
     wires: int = 1
+    flexure: Flexure | None = None
 
     @property
     def offsets(self) -> tuple[float, ...]:
@@ -91,6 +96,7 @@ class HeadParts:
     level : (n,) 1 for heights, 0 for angles
     roll : number of the roll's coordinate, -1 without it
     offsets : (s,) places of the contacts ahead of the head's centre [m]
+    bending : of its strips, None if they are rigid
     """
 
     masses: np.ndarray
@@ -100,6 +106,7 @@ class HeadParts:
     level: np.ndarray
     roll: int
     offsets: tuple[float, ...]
+    bending: Bending | None = None
 
     @cached_property
     def n(self) -> int:
@@ -127,8 +134,10 @@ def head_parts(
     if own_mass >= mass:
         raise ValueError(f"strips of {own_mass:g} kg are part of a head of {mass:g} kg")
     turns = [turning for turning in (roll, strips.pitch) if turning is not None]
-    head, n = n_own, n_own + 1 + len(turns)
-    pitch = n - 1 if strips.pitch is not None else -1
+    n_modes = 0 if strips.flexure is None or sprung is None else strips.flexure.n_modes
+    head, n_rigid = n_own, n_own + 1 + len(turns)
+    n = n_rigid + n_own * n_modes
+    pitch = n_rigid - 1 if strips.pitch is not None else -1
     masses = np.zeros(n)
     springs, dampers = np.zeros((n + 1, n + 1)), np.zeros((n + 1, n + 1))
     masses[head] = mass - own_mass
@@ -151,13 +160,39 @@ def head_parts(
         touch[i, i] = 1.0
         stretch = -place
         stretch[i] = 1.0
-        _join(springs, stretch, sprung.stiffness)
-        _join(dampers, stretch, sprung.damping)
+        own = slice(n_rigid + i * n_modes, n_rigid + (i + 1) * n_modes)
+        ways = _stretches(stretch, own, strips)
+        for way in ways:
+            _join(springs, way, sprung.stiffness / len(ways))
+            _join(dampers, way, sprung.damping / len(ways))
+        if strips.flexure is not None and strips.length is not None:
+            rates, diagonal = strips.flexure.rates(sprung.mass, strips.length), np.arange(n)[own]
+            masses[own] = sprung.mass
+            touch[i, own] = shapes(n_modes, strips.length, np.zeros(1))[:, 0]
+            springs[diagonal, diagonal] += sprung.mass * rates**2
+            dampers[diagonal, diagonal] += 2.0 * strips.flexure.damping_ratio * sprung.mass * rates
     level = np.zeros(n)
     level[: head + 1] = 1.0
     number = head + 1 if roll is not None else -1
     touch = np.repeat(touch, strips.wires, axis=0)
-    return HeadParts(masses, springs, dampers, touch, level, number, strips.contact_offsets)
+    offsets = strips.contact_offsets
+    bending = None
+    if n_modes and strips.length is not None:
+        bending = Bending(mode_tables(n_modes, strips.length), n_rigid, strips.wires)
+    return HeadParts(masses, springs, dampers, touch, level, number, offsets, bending)
+
+
+def _stretches(rigid: np.ndarray, own: slice, strips: Strips) -> list[np.ndarray]:
+    """Stretch of a strip's suspension; of its two halves if it bends, with modes at ``own``."""
+    if strips.flexure is None or strips.length is None:
+        return [rigid]
+    half = 0.5 * strips.flexure.spring_distance
+    found = []
+    for column in shapes(strips.flexure.n_modes, strips.length, np.array([half, -half])).T:
+        stretch = rigid.copy()
+        stretch[own] = column
+        found.append(stretch)
+    return found
 
 
 def _difference(n: int, upper: int, lower: int) -> np.ndarray:

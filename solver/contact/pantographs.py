@@ -258,23 +258,27 @@ def _make(
         numerics.dt,
         numerics.beta,
         numerics.gamma,
-        _lateral_path(problem, placement, base) if simulated.head_roll else None,
+        _lateral_path(problem, placement, base, simulated),
         base,
         airflow(problem, simulated, placement),
         placement.lowering if simulated.lowering else None,
         placement.regulator if simulated.regulated_lift else None,
+        simulated.head_roll,
     )
     data = placement.data
     laws = data.laws if simulated.pantograph_laws else ()
-    data = replace(data, strips=replace(data.strips, wires=n_wires), laws=laws)
+    flexure = data.strips.flexure if simulated.flexible_strips else None
+    strips = replace(data.strips, wires=n_wires, flexure=flexure)
+    data = replace(data, strips=strips, laws=laws)
     return make_pantograph(data, operation)
 
 
 def _lateral_path(
-    problem: Problem, placement: Placement, base: BaseMotion | None
+    problem: Problem, placement: Placement, base: BaseMotion | None, simulated: Simulated
 ) -> LateralPath | SeveralPaths | None:
-    """Where the wires cross the strips of a pantograph, None if its head cannot roll."""
-    if roll_of(placement.data) is None:
+    """Where the wires cross the strips, None if its head neither rolls nor bends."""
+    bends = simulated.flexible_strips and placement.data.strips.flexure is not None
+    if not bends and (not simulated.head_roll or roll_of(placement.data) is None):
         return None
     train = problem.train
     paths = [

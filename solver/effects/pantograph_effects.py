@@ -30,6 +30,18 @@ register(
 )
 register(
     Effect(
+        "flexible_strips",
+        "collector strips that bend",
+        "modes of each strip as a beam, where the wire crosses it",
+        "Euler-Bernoulli beam with free ends on two springs (Ritz)",
+        default=True,
+        applies=lambda p: any(place.data.strips.flexure for place in p.train.placements),
+        law=lambda laws, p: replace(laws, flexible_strips=True),
+        data="a table [pantographs.NAME.strips.flexure]",
+    )
+)
+register(
+    Effect(
         "regulated_lift",
         "pantographs whose static force is regulated",
         "a force on the lift, by a sampled controller of the contact force or the head's height",

@@ -38,6 +38,7 @@ class Simulated:
     kept_ratio : share of its stiffness that a pushed dropper keeps; 1 if droppers do not slacken
     contact_loss : whether heads leave the wire; without it the contact force may pull
     head_roll : whether heads roll
+    flexible_strips : whether strips bend
     meets_air : whether the air has forces on pantographs
     pantograph_laws : whether laws of pantographs act that are not linear
     regulated_lift : whether lifts are regulated as their placements say
@@ -64,6 +65,7 @@ class Simulated:
     kept_ratio: float = 1.0
     contact_loss: bool = False
     head_roll: bool = False
+    flexible_strips: bool = False
     meets_air: bool = False
     pantograph_laws: bool = False
     regulated_lift: bool = False

@@ -158,6 +158,11 @@ def _strips(rng: random.Random, words: Words) -> None:
         words[f"{table}.strips.mass_kg"] = rng.uniform(0.1, 0.4) * masses[0]
         words[f"{table}.strips.stiffness_N_per_m"] = 10 ** rng.uniform(3.0, 4.5)
         words[f"{table}.strips.damping_N_s_per_m"] = rng.choice([0.0, rng.uniform(1.0, 50.0)])
+        if rng.random() < 0.5:
+            words[f"{table}.strips.flexure.bending_stiffness_N_m2"] = 10 ** rng.uniform(1.0, 4.0)
+            words[f"{table}.strips.flexure.spring_distance_m"] = rng.uniform(0.1, 1.2)
+            words[f"{table}.strips.flexure.modes"] = rng.randint(1, 6)
+            words["line.stagger_m"] = rng.uniform(-0.3, 0.3)
     if len(masses) > 1 and rng.random() < 0.5:
         words[f"{table}.strips.pitch_inertia_kg_m2"] = rng.uniform(0.05, 1.0)
         words[f"{table}.strips.pitch_spring_distance_m"] = rng.uniform(0.2, 0.6)

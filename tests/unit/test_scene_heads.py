@@ -14,6 +14,7 @@ from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.scene.scene import Scene
+from catenary.mbs.head.flexure import Flexure
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.mechanism.pantograph_data import MultibodyData
 from catenary.mbs.vehicle.irregularity import Irregularity
@@ -240,3 +241,33 @@ def test_a_sway_that_the_strip_covers_is_fine() -> None:
     needed = float(str(refused.value).split("at least ")[1].split(" m")[0])
     assert 0.45 < needed <= 0.5
     assert np.isclose(needed, 0.5, atol=0.03)
+
+
+BENDS = [
+    *TWO,
+    LONG,
+    f"{KIND}.strips.mass_kg=1.0",
+    f"{KIND}.strips.stiffness_N_per_m=8000",
+    f"{KIND}.strips.flexure.bending_stiffness_N_m2=600",
+    f"{KIND}.strips.flexure.spring_distance_m=0.9",
+]
+
+
+def test_strips_that_bend_are_beams() -> None:
+    (place,) = problem_of(load(*BENDS)).train.placements
+    assert place.data.strips.flexure == Flexure(600.0, 0.9, 3, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([f"{KIND}.strips.length_m="], "needs length_m, mass_kg and stiffness_N_per_m"),
+        ([f"{KIND}.strips.flexure.spring_distance_m=1.7"], "springs below its strips"),
+        ([f"{KIND}.strips.flexure.modes=7"], "modes is 7"),
+        ([f"{KIND}.strips.flexure.bending_stiffness_N_m2=0"], "greater than 0"),
+    ],
+)
+def test_strips_that_cannot_bend_so_are_refused(words: list[str], said: str) -> None:
+    with pytest.raises(InputError) as refused:
+        load(*BENDS, *words)
+    assert said in str(refused.value)

@@ -47,6 +47,9 @@ def _description(placement: Placement, problem: Problem) -> str:
     """A line about a pantograph under way."""
     text = description_of(placement.data, placement.static_force)
     acts = simulated(problem)
+    flexure = placement.data.strips.flexure
+    if acts.flexible_strips and flexure is not None:
+        text += f"; strips bend in {counted(flexure.n_modes, 'mode')}"
     if acts.pantograph_laws and placement.data.laws:
         n = len(placement.data.laws)
         text += f"; {counted(n, 'law')} not linear"

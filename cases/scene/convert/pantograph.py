@@ -11,6 +11,7 @@ from catenary.cases.scene.convert.aerodynamics import uplift_of
 from catenary.cases.scene.convert.laws import laws_of
 from catenary.cases.scene.tables.train.head import StripsTable
 from catenary.cases.scene.tables.train.pantograph import MultibodyTable, PantographTable
+from catenary.mbs.head.flexure import Flexure
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.library import READY
 from catenary.mbs.lumped_data import LumpedData
@@ -61,7 +62,14 @@ def strips_of(table: StripsTable, spring: float = 0.0, damper: float = 0.0) -> S
     inertia, distance = table.pitch_inertia_kg_m2, table.pitch_spring_distance_m
     if inertia is not None and distance is not None:
         pitch = _turning(inertia, distance, spring, damper)
-    return Strips(table.number, table.spacing_m or 0.0, table.length_m, suspension, pitch)
+    flexure = None
+    if table.flexure is not None:
+        own = table.flexure
+        flexure = Flexure(
+            own.bending_stiffness_N_m2, own.spring_distance_m, own.modes, own.damping_ratio
+        )
+    spacing = table.spacing_m or 0.0
+    return Strips(table.number, spacing, table.length_m, suspension, pitch, flexure=flexure)
 
 
 def _turning(inertia: float, distance: float, spring: float, damper: float) -> Turning:

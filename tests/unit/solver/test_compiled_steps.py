@@ -16,6 +16,7 @@ from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, tr
 from catenary.mbs.air.airflow import Tunnel
 from catenary.mbs.air.uplift import Polynomial, Uplift
 from catenary.mbs.control.regulation import Regulation
+from catenary.mbs.head.flexure import Flexure
 from catenary.mbs.head.laws import Law
 from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.lumped_data import LumpedData
@@ -47,6 +48,7 @@ from catenary.solver.time_loop.observers import Stage, StepView
 LINE = replace(ac_simple_line(4), stagger=(0.2, -0.2, 0.2, -0.2, 0.2))
 TWO = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0))
 PAIR = Strips(2, 0.56, 1.6, Suspension(1.0, 8000.0, 10.0))
+BENDING = replace(PAIR, flexure=Flexure(600.0, 0.9, 3, 0.01))
 ROLLING = replace(TWO, strips=PAIR, roll=Turning(2.0, 600.0, 4.0))
 # A limiter, a pneumatic damper and a spring that stiffens, on head and frame.
 LAWS = (
@@ -74,6 +76,11 @@ SCENES: dict[str, tuple[tuple[Any, ...], Any, set[str]]] = {
         (replace(TWO, uplift=UPLIFT), replace(paper.data(), wind=DRAG, uplift=UPLIFT)),
         LINEAR,
         {"contact_damping", "pantograph_aerodynamics"},
+    ),
+    "strips that bend": (
+        (replace(TWO, strips=BENDING), replace(paper.data(), strips=BENDING)),
+        LINEAR,
+        {"contact_damping", "flexible_strips"},
     ),
     "laws and controllers": (
         (replace(ROLLING, laws=LAWS), replace(paper.data(), laws=LAWS), TWO),

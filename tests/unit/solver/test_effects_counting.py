@@ -15,8 +15,9 @@ from small_lines import BARE, EN_PANTOGRAPH, ac_simple_line, mesh_of, problem_of
 from catenary.mbs.air.uplift import Polynomial, Uplift
 from catenary.mbs.build import Operation, make_pantograph
 from catenary.mbs.control.regulation import Regulation
+from catenary.mbs.head.flexure import Flexure
 from catenary.mbs.head.laws import Law
-from catenary.mbs.head.strips import Turning
+from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lowering import Lowering
 from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
@@ -76,6 +77,10 @@ def full_problem(names: frozenset[str]) -> Problem:
     uplift = Uplift(Polynomial((0.0, 0.0, 0.01)))
     limiter = Law(1, 2, False, (-1.0, 0.1, 1.0), (0.0, 0.0, 9e3), from_rest=True)
     rolling = replace(EN_PANTOGRAPH, roll=Turning(2.0, 470.0, 1.0), uplift=uplift, laws=(limiter,))
+    bending = Strips(
+        length=1.6, suspension=Suspension(1.0, 8e3, 10.0), flexure=Flexure(600.0, 0.9, 2)
+    )
+    rolling = replace(rolling, strips=bending)
     speed = 1.1 * line.contact_wire.wave_speed
     ours = train(speed, 60.0, 160.0, data=rolling, behind=(0.0, 31.0))
     lowered = replace(
@@ -182,6 +187,7 @@ BLOCKS = {
     "head_roll": ({}, 1),
     "vehicle_motion": ({}, 1),
     "pantograph_laws": ({}, 1),
+    "flexible_strips": ({}, 1),
     "regulated_lift": ({}, 1),
     "vehicle_suspension": ({}, 1),
     "dropper_break": ({}, 1),
@@ -226,6 +232,7 @@ LAWS = {
     "head_roll": "head_roll",
     "vehicle_motion": "vehicle",
     "pantograph_laws": "pantograph_laws",
+    "flexible_strips": "flexible_strips",
     "regulated_lift": "regulated_lift",
     "vehicle_suspension": "suspension",
     "dropper_break": "incidents",

@@ -39,6 +39,17 @@ SomeMass = AfterValidator(_no_less_mass)
 SomeInertia = AfterValidator(_no_less_inertia)
 
 
+class FlexureTable(Table):
+    """How strips on springs of their own bend, as beams whose ends are free."""
+
+    bending_stiffness_N_m2: float = Field(gt=0, le=1e9, description="EI of a strip")
+    spring_distance_m: float = Field(
+        gt=0, le=5, description="across the track, between the two springs below a strip"
+    )
+    modes: int = Field(3, ge=1, le=6, description="of bending that are followed")
+    damping_ratio: float = Field(0.01, ge=0, lt=1, description="of each mode")
+
+
 class StripsTable(Table):
     """Collector strips, fixed to the head or on springs of their own."""
 
@@ -64,6 +75,25 @@ class StripsTable(Table):
     pitch_spring_distance_m: float | None = Field(
         None, gt=0, le=3, description="along the track, between the springs below such a head"
     )
+
+    flexure: FlexureTable | None = Field(
+        None, description="how strips on springs of their own bend"
+    )
+
+    @model_validator(mode="after")
+    def _bends(self) -> StripsTable:
+        if self.flexure is None:
+            return self
+        if self.length_m is None or self.mass_kg is None:
+            raise ValueError(
+                "needs length_m, mass_kg and stiffness_N_per_m for strips with flexure"
+            )
+        if self.flexure.spring_distance_m > self.length_m:
+            raise ValueError(
+                f"must have springs below its strips, but flexure.spring_distance_m is "
+                f"{self.flexure.spring_distance_m:g} and length_m {self.length_m:g}"
+            )
+        return self
 
     @model_validator(mode="after")
     def _consistent(self) -> StripsTable:
