@@ -52,7 +52,7 @@ def put_defects(
         elif kind == "hard_spot":
             entry |= {"at_m": rng.uniform(0.0, length), "mass_kg": 10 ** rng.uniform(-2, 1.5)}
             entry["stiffness_N_per_m"] = rng.choice([0.0, 10 ** rng.uniform(0.0, 5.0)])
-        elif smooth:
+        elif smooth or words.get("line.contact_wire.bending_stiffness_N_m2") == 0.0:
             continue
         else:
             entry |= {"at_m": rng.uniform(0.0, length), "angle_deg": rng.uniform(-2.0, 2.0)}

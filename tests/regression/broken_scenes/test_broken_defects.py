@@ -95,6 +95,10 @@ ASSIGNMENTS = {
     "spot beyond the line": (["defects.4.at_m=1321"], "contact_wire runs from 0 to 1320 m"),
     "kink of a messenger": (["defects.5.wire=messenger_wire"], "strips run on contact wires only"),
     "kink like a hook": (["defects.5.angle_deg=90"], "must be at most 10 [deg]"),
+    "kink of a string": (
+        ["line.contact_wire.bending_stiffness_N_m2=0"],
+        "contact_wire has no bending stiffness, and so keeps no bend under tension",
+    ),
     "key of another kind": (["defects.0.factor=2"], "does not belong to type missing_dropper"),
     "misspelt key": (["defects.0.droper=3"], "did you mean defects.0.dropper?"),
     "no gravity": (

@@ -60,6 +60,9 @@ def check_defects(scene: Scene, data: LineData) -> Iterator[Fault]:
             if isinstance(table, KinkTable) and wire.role is not Role.CONTACT:
                 why = "strips run on contact wires only"
                 yield refusal(scene.origin, f"{key}.wire", table.wire, why)
+            elif isinstance(table, KinkTable) and not wire.bending_stiffness:
+                why = f"{wire.name} has no bending stiffness, and so keeps no bend under tension"
+                yield refusal(scene.origin, f"{key}.angle_deg", table.angle_deg, why)
     yield from _broken_later(scene, seen)
 
 
