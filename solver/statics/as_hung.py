@@ -96,6 +96,10 @@ def _moved(model: Model, form: Equilibrium, moved: np.ndarray) -> Equilibrium:
             y=form.lateral.y + moved[model.dofs(every, "v")],
             slope=form.lateral.slope + moved[model.dofs(every, "theta_z")],
         )
+    if form.lateral is not None:
+        sideways = moved[model.dofs(every, "v")], moved[model.dofs(every, "theta_z")]
+        y, slope = form.lateral.y + sideways[0], form.lateral.slope + sideways[1]
+        changes["lateral"] = replace(form.lateral, y=y, slope=slope)
     if "u" in model.unknowns:
         before = form.along if form.along.size else np.zeros(every.size)
         gained = dict(form.gained_tension)

@@ -17,7 +17,6 @@ from catenary.solver.base.errors import InputError
 from catenary.solver.effects.build_model import build
 from catenary.solver.model import elements
 from catenary.solver.model.axial_elements import slope_rows, unknowns_along
-from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Block, Model
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.wire_ends import WireEnd, tensioned_ends
@@ -131,6 +130,8 @@ class _WarmLine:
             about.constrained = constrained
             lacks = pulls - self._pull_back(moved, form)
             lacks[constrained] = 0.0
+            from catenary.solver.model.matrices import whole_matrix  # loads PETSc
+
             tangent = whole_matrix(about, stiffness=1.0, held_diagonal=1.0)
             step = sparse_linalg.spsolve(tangent, lacks)
             if not np.isfinite(step).all():
