@@ -16,6 +16,7 @@ from catenary.meshgen.wires import End, Piece, Profile, Wire
 _SAME_PLACE = 1e-6  # [m]
 
 _Joining = TypeVar("_Joining", Droppers, Clamps)
+_AtWire = TypeVar("_AtWire", SteadyArms, Supports)
 
 
 def of_next(name: str) -> str:
@@ -151,28 +152,19 @@ class _Section:
 
     def arms(self) -> list[SteadyArms]:
         """Steady arms inside the section."""
-        return [
-            replace(
-                group,
-                name=self._name(group.name),
-                wire=self._name(group.wire),
-                x=self._places(group.x),
-            )
-            for group in self._line.steady_arms
-        ]
+        return [self._at_wire(group) for group in self._line.steady_arms]
 
     def supports(self) -> list[Supports]:
         """Supports inside the section."""
         return [
-            replace(
-                group,
-                name=self._name(group.name),
-                wire=self._name(group.wire),
-                x=self._places(group.x),
-                holds=self._name(group.holds) if group.holds else "",
-            )
+            replace(self._at_wire(group), holds=self._name(group.holds) if group.holds else "")
             for group in self._line.supports
         ]
+
+    def _at_wire(self, group: _AtWire) -> _AtWire:
+        """What of a group at one wire stands inside the section, with its names."""
+        name, wire = self._name(group.name), self._name(group.wire)
+        return replace(group, name=name, wire=wire, x=self._places(group.x))
 
     def clamps(self) -> list[Clamps]:
         """Clamps at the ends of pieces that the section has."""

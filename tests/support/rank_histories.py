@@ -1,0 +1,75 @@
+"""Histories of a march on one rank and on all, and how far they differ."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from catenary.meshgen.mesh import LineMesh
+from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.line_at_rest import line_at_rest
+from catenary.solver.time_loop.march import March
+from catenary.solver.time_loop.observers import Stage, StepView
+
+
+class Histories:
+    """Observer that keeps what it is shown and joins the ranks' parts."""
+
+    def __init__(self, comm: Any) -> None:
+        self._comm = comm
+        self._rows: dict[str, list[np.ndarray]] = {"force": [], "arms": [], "droppers": []}
+
+    def start(self, stage: Stage) -> None:
+        self._stage = stage
+
+    def observe(self, view: StepView) -> None:
+        self._rows["force"].append(view.contact_force.copy())
+        self._rows["arms"].append(view.arm_uplift.copy())
+        self._rows["droppers"].append(view.dropper_force.copy())
+
+    def finish(self, outcome: str) -> None:
+        assert outcome == "done"
+
+    def joined(self) -> dict[str, np.ndarray] | None:
+        """All histories on rank 0, None elsewhere. Collective."""
+        stage = self._stage
+        result = {"force": np.array(self._rows["force"])}
+        for name, owned, total in (
+            ("arms", stage.owned_arms, stage.arm_x.size),
+            ("droppers", stage.owned_droppers, stage.dropper_x.size),
+        ):
+            parts = self._comm.gather((owned, np.array(self._rows[name])), root=0)
+            if parts is not None:
+                whole = np.full((len(self._rows[name]), total), np.nan)
+                for numbers, values in parts:
+                    whole[:, numbers] = values
+                result[name] = whole
+        return result if self._comm.rank == 0 else None
+
+
+def histories(comm: Any, problem: Problem, mesh: LineMesh) -> dict[str, np.ndarray] | None:
+    """March a problem on ``comm`` and return its histories on rank 0. Collective."""
+    march = March(comm, *line_at_rest(problem, mesh))
+    watched = Histories(comm)
+    march.run([watched])
+    march.destroy()
+    return watched.joined()
+
+
+def relative(values: np.ndarray, reference: np.ndarray) -> float:
+    """Largest difference over the largest reference; 0 for histories of nothing."""
+    if reference.size == 0:
+        return 0.0
+    return float(np.abs(values - reference).max() / np.abs(reference).max())
+
+
+def largest_difference(problem: Problem, mesh: LineMesh) -> dict[str, float]:
+    """Largest relative difference of each history between one rank and all, on all ranks."""
+    alone = histories(MPI.COMM_SELF, problem, mesh)
+    together = histories(MPI.COMM_WORLD, problem, mesh)
+    found = {}
+    if together is not None and alone is not None:
+        found = {name: relative(together[name], alone[name]) for name in together}
+    return dict(MPI.COMM_WORLD.bcast(found, root=0))
