@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -39,6 +41,7 @@ class FollowedLinks:
         self._local = table.arrays._replace(unknowns=table.arrays.unknowns - line.ownership.first)
         self.numbers = np.flatnonzero(mine & ~table.broken)
         self.links = self._local.of(self.numbers)
+        self._released = self.links.law["released"].copy()
         self.reserve = np.zeros(self.numbers.size)
         self.moving = np.array([0, self.numbers.size], dtype=np.int64)
         self._line = line
@@ -61,13 +64,16 @@ class FollowedLinks:
 
     def find_reserve(self) -> np.ndarray:
         """Reserve in the line's present motion [N], shape (n,), overwritten by the next call."""
-        state_kernels.reserves(self._line.motion.read, self.links, self.reserve)
+        self._find_reserve()
         return self.reserve
+
+    @cached_property
+    def _find_reserve(self) -> Callable[[], None]:
+        return bound(state_kernels.reserves, self._line.motion.read, self.links, self.reserve)
 
     def compensation(self) -> np.ndarray:
         """Compensations in the line's present motion [N], (n,) (eq. 2.7)."""
-        released = self.links.law["released"]
-        return np.asarray(released * np.maximum(0.0, -self.find_reserve()))
+        return np.asarray(self._released * np.maximum(0.0, -self.find_reserve()))
 
     def energy_of_switching(self, displacement: np.ndarray, begin: int, end: int) -> float:
         """What elastic energy of the line lacks where owned links have switched, were they springs:
@@ -80,11 +86,10 @@ class FollowedLinks:
     def loads(self, compensation: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Local unknowns and forces of compensations (n,) [N] of all of them."""
         acting = np.flatnonzero(compensation)
-        unknowns, weights, _ = self.links.of(acting)
-        forces = -compensation[acting][:, None] * weights
-        return [(unknowns[:, k], forces[:, k]) for k in range(unknowns.shape[1])] * bool(
-            acting.size
-        )
+        if not acting.size:
+            return []
+        forces = -compensation[acting][:, None] * self.links.weights[acting]
+        return [(self.links.unknowns[acting].ravel(), forces.ravel())]
 
 
 def link_columns(comm: Any, table: LinkTable, line: LineIntegrator) -> unit_responses.ShortColumns:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -55,7 +56,6 @@ class ForcesOnLine:
         self.line = line
         self.wires = ContactWires(model, form, line.ownership)
         self.links = FollowedLinks(table, line)
-        self._speed = train_speed
         # A force on an unknown that is held, at an anchor, moves nothing.
         free = np.ones(model.n_dofs)
         free[model.constrained] = 0.0
@@ -81,6 +81,7 @@ class ForcesOnLine:
         self.superposing = self._answers, self._touches, *motion
         self._superpose = bound(contact_kernels.superpose, self._force, *self.superposing)
         self.compensating = (*columns.packed(), *motion)
+        self._speed = float(train_speed)
 
     def place(self) -> None:
         """Look where the contacts are now, and work out the line's answer to a unit force at
@@ -100,7 +101,12 @@ class ForcesOnLine:
 
         The total rate is what the pan head meets: dw/dt + V dw/dx. Shares add up over the ranks.
         """
-        contact_kernels.heights(self.line.motion.read, self._touches, self._speed, height, rate)
+        self._heights(height, rate)
+
+    @cached_property
+    def _heights(self) -> Callable[[np.ndarray, np.ndarray], None]:
+        seen = self.line.motion.read, self._touches, self._speed
+        return bound(contact_kernels.heights, *seen, later=(self._force, self._force))
 
     def responder(self, response: LineResponse) -> Callable[[], None]:
         """What fills in this rank's share of the inner problem, after ``place`` and the free solve.
@@ -136,15 +142,11 @@ class ForcesOnLine:
         self, contact_force: np.ndarray, compensation: np.ndarray
     ) -> list[tuple[np.ndarray, np.ndarray]]:
         """Local unknowns and forces of contacts (n,) and of all followed links' compensations."""
-        result = []
         if self.line.ownership.n_local == 0:
             return []
-        for touch, force in zip(self._touches, contact_force, strict=True):
-            local, value = touch["local"], touch["value"]
-            if force:
-                result.append((local, force * value * self._free[local]))
-        result += self.links.loads(compensation)
-        return result
+        local, value = self._touches["local"], self._touches["value"]
+        pushed = contact_force[:, None] * value * self._free[local]
+        return [(local.ravel(), pushed.ravel()), *self.links.loads(compensation)]
 
     def _columns_of_nodes(
         self, comm: Any, range_of_run: tuple[float, float], free: np.ndarray

@@ -44,8 +44,10 @@ class FixedPoint:
         n = self.interaction.line.ownership.n_local
         self._predicted = np.zeros((2, n))
         self._latest = np.zeros((2, n))
+        self._change = np.zeros((2, n))
         self._heads = Heads(self.pantographs.n_contacts)
         self._force = np.zeros(self.pantographs.n_contacts)
+        self._nowhere = np.zeros(self._force.size, dtype=bool)
 
     # Iterates that grow beyond all numbers are reported by ``_settled``, not by NumPy.
     @np.errstate(over="ignore", invalid="ignore")
@@ -54,22 +56,23 @@ class FixedPoint:
         if self.comm.size > 1:
             stop = self.comm.allreduce(int(stop)) > 0
         line.predict()
-        self._predicted[0] = line.displacement
-        self._predicted[1] = line.velocity
+        # Of this scheme's lines they are the arrays themselves.
+        moved, sped = line.displacement, line.velocity
+        self._predicted[0] = moved
+        self._predicted[1] = sped
         line.load_at(time)
         line.internal_forces()
         self.pantographs.move_to(time)
         self.interaction.locate()
+        self._nowhere = ~self.interaction.present()
         heads = self._heads_everywhere(time)
         force = self._force
         fixed = self.numerics.iterations
         for number in range(1, (fixed or self.numerics.max_iterations) + 1):
             force, depth, rate = self._contact(heads, force)
             compensation = self._compensation()
-            self._latest[0] = line.displacement
-            self._latest[1] = line.velocity
-            np.copyto(line.displacement, self._predicted[0])
-            np.copyto(line.velocity, self._predicted[1])
+            self._latest[0], self._latest[1] = moved, sped
+            moved[:], sped[:] = self._predicted
             line.solve(self.interaction.loads(force, compensation))
             line.correct()
             self.counters.rounds += 1
@@ -89,8 +92,8 @@ class FixedPoint:
         self._force = force
         # All ranks hold the same forces, so that all remember the same impacts.
         self.law.accept(time, depth, rate, force)
-        moved = self.pantographs
-        on_root(self.comm, lambda: moved.advance(force, self.law.reported(force), depth))
+        heads_below = self.pantographs
+        on_root(self.comm, lambda: heads_below.advance(force, self.law.reported(force), depth))
         return not stop
 
     def _ask(
@@ -142,11 +145,10 @@ class FixedPoint:
             self.comm.Allreduce(MPI.IN_PLACE, both)
         height, rate = both
         depth = heads.height - heads.height_compliance @ force - height
-        nowhere = ~self.interaction.present()
-        depth[nowhere] = NOWHERE
+        depth[self._nowhere] = NOWHERE
         speed = heads.velocity - heads.velocity_compliance @ force - rate
         new = self.law.force(depth, speed).copy()
-        new[nowhere] = 0.0
+        new[self._nowhere] = 0.0
         return (new if self.law.pulls else np.maximum(new, 0.0)), depth, speed
 
     def _compensation(self) -> np.ndarray:
@@ -155,10 +157,12 @@ class FixedPoint:
         return links.compensation() if links.table.switches else np.zeros(0)
 
     def _settled(self) -> bool:
-        line, numerics = self.interaction.line, self.numerics
-        moved = np.abs(line.displacement - self._latest[0]).max(initial=0.0)
-        sped = np.abs(line.velocity - self._latest[1]).max(initial=0.0)
-        largest = float(max(moved / numerics.eps_d, sped / numerics.eps_v))
+        line, numerics, change = self.interaction.line, self.numerics, self._change
+        np.subtract(line.displacement, self._latest[0], out=change[0])
+        np.subtract(line.velocity, self._latest[1], out=change[1])
+        np.abs(change, out=change)
+        moved, sped = change.max(axis=1, initial=0.0).tolist()
+        largest = max(moved / numerics.eps_d, sped / numerics.eps_v)
         if not (moved < _FAR and np.isfinite(sped)):  # also true for what is no number
             largest = np.inf
         if self.comm.size > 1:

@@ -42,6 +42,8 @@ class Bounce:
         self.ball = LumpedPantograph(data, self.lift, 0.0, raise_time=0.0, dt=self.dt)
         self.inner = InnerProblem(self.law, no_links())
         self.heads = Heads(1)
+        # One response for all steps: the kernel is bound to its arrays.
+        self.line = LineResponse(1, 0)
         self.time, self.depth, self.force = 0.0, 0.0, 0.0
 
     def start(self, height: float, velocity: float) -> None:
@@ -57,9 +59,8 @@ class Bounce:
         self.heads.height[:], self.heads.velocity[:] = head.height, head.velocity
         self.heads.height_compliance[:] = head.height_compliance
         self.heads.velocity_compliance[:] = head.velocity_compliance
-        line = LineResponse(1, 0)
-        line.line.place[:] = wire
-        found = self.inner.solve(line, self.heads)
+        self.line.line.place[:] = wire
+        found = self.inner.solve(self.line, self.heads)
         self.ball.advance(found.contact_force)
         self.law.accept(self.time, found.depth, found.rate, found.contact_force)
         self.depth, self.force = float(found.depth[0]), float(found.contact_force[0])
