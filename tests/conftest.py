@@ -17,6 +17,9 @@ FIRST = (
     "unit/solver/test_varying_stations.py",
     "unit/solver/test_lines_in_two_passes.py",
     "unit/solver/test_wires_that_come_and_go.py",
+    # Both of these compile lines of many topologies, which others need later.
+    "regression/test_cases.py",
+    "regression/test_fuzz.py",
 )
 
 sys.path.insert(0, str(Path(__file__).with_name("support")))

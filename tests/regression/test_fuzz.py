@@ -125,11 +125,6 @@ def check_topology(made: RandomScene) -> str:
         sentence = str(error)
         assert sentence and "\n" not in sentence and len(sentence) < 1500, sentence
         return "refused"
-    several = made.says("line.twin") or made.says("line.overlap")
-    if several and made.says("numerics.scheme='ts_alpha2'"):
-        with pytest.raises(InputError, match="ts_alpha2, for one contact wire only"):
-            check_wide(made)
-        return "refused"
     return check_wide(made)
 
 

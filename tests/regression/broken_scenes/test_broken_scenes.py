@@ -233,6 +233,17 @@ ASSIGNMENTS = {
         ["numerics.scheme=ts_alpha2", "contact.law=hertz"],
         "ts_alpha2 knows only law linear",
     ),
+    "TSALPHA2 under two contact wires": (
+        ["numerics.scheme=ts_alpha2", "line.topology=twin", "line.twin={spacing_m=0.1}"],
+        "ts_alpha2 knows only one contact wire",
+    ),
+    "TSALPHA2 in an overlap": (
+        [
+            "numerics.scheme=ts_alpha2",
+            "line.overlap={first_span=8,n_spans=3,rise_m=0.3,distance_m=0.4}",
+        ],
+        "ts_alpha2 knows only one contact wire",
+    ),
     "TSALPHA2 with a moving base": (
         [
             "numerics.scheme=ts_alpha2",

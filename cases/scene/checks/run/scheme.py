@@ -23,6 +23,10 @@ def check_scheme(scene: Scene) -> Iterator[Fault]:
     knows = "numerics.scheme ts_alpha2 knows only"
     if scene.contact.law != "linear":
         yield refusal(scene.origin, "contact.law", scene.contact.law, f"{knows} law linear")
+    for key in ("twin", "overlap"):
+        if getattr(scene.line, key) is not None:
+            why = f"{knows} one contact wire: take one_solve or fixed_point"
+            yield Fault(f"line.{key}", f"line.{key} {scene.origin.of(f'line.{key}')}; {why}")
     switches = scene.switches()
     for i, incident in enumerate(scene.incidents):
         if switches[incident.type]:
