@@ -27,11 +27,15 @@ from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.integrators.detour import Detour, detour_of
 from catenary.solver.problem.problem import Problem
 from catenary.solver.time_loop.single_steps import single_steps_of
+from catenary.solver.window.choice import moving_share
 
 # Time between two flushes of the result file at full speed, each of which takes some 5 ms [s], and
 # what may wait for one in memory [B].
 FLUSH_EVERY = 0.2
 FLUSH_MEMORY = 1e8
+# Time to write the state to continue from [s an unknown], and what it may take of a march with a
+# window.
+STATE_PER_UNKNOWN, STATE_SHARE = 1e-7, 0.05
 # Steps of a flush whose chunks are not too small.
 LEAST_FLUSH = 256
 
@@ -92,6 +96,7 @@ def needs_of(
         groups = effects.unknown_groups(active, problem.line.wires)
         widths = tuple(sum(map(len, group.values())) for group in groups)
     scheme, n_substeps = problem.numerics.scheme, _substeps(problem)
+    n_moving = round(n_dofs * moving_share(problem))
     n_steps = max(1, math.floor(simulated_time(problem) / problem.numerics.dt + 1e-9))
     recording = recording_of(scene.output, problem, extent, n_steps)
     flush_every = scene.output.flush_every_steps or flush_cadence(problem, n_dofs, recording)
@@ -99,7 +104,7 @@ def needs_of(
         n_steps=n_steps,
         memory=estimate_memory(n_dofs, n_steps),
         march=_slower(detour, n_substeps)
-        * estimate_march(n_dofs, n_steps, scheme, n_substeps, widths),
+        * estimate_march(n_moving, n_steps, scheme, n_substeps, widths),
         files=estimate_files(scene, problem, recording, n_dofs, flush_every),
         recording=recording,
         detour=detour,
@@ -176,14 +181,33 @@ def flush_cadence(problem: Problem, n_dofs: int, recording: Recording) -> int:
     """Steps between two flushes: about 0.2 s of wall time at full speed, and what fits into memory.
 
     Not so few that the file is made of small chunks, and whole chunks of them. The same on any
-    number of ranks, so that their files are.
+    number of ranks, so that their files are. Where a window moves the state of the whole line is
+    written so rarely that this does not count.
     """
-    step = estimate_march(n_dofs, 1, problem.numerics.scheme, _substeps(problem))
-    columns = _PER_PANTOGRAPH * len(problem.train.placements)
-    columns += recording.arm_x.size + recording.dropper_x.size
-    wanted = max(round(FLUSH_EVERY / step), LEAST_FLUSH)
-    steps = max(1, min(wanted, int(FLUSH_MEMORY / (_BYTES * columns))))
+    n_moving = round(n_dofs * moving_share(problem))
+    step = estimate_march(n_moving, 1, problem.numerics.scheme, _substeps(problem))
+    spent = FLUSH_EVERY
+    if problem.window.moves:
+        spent = max(spent, STATE_PER_UNKNOWN * n_dofs / STATE_SHARE)
+    wanted = max(round(spent / step), LEAST_FLUSH)
+    steps = max(1, min(wanted, _steps_in_memory(problem, recording)))
     for part in (LEAST_FLUSH * recording.line.every, LEAST_FLUSH, recording.line.every):
         if steps >= part:
             return steps - steps % part
     return steps
+
+
+def _steps_in_memory(problem: Problem, recording: Recording) -> int:
+    """Steps whose channels fit into memory."""
+    of_train = _PER_PANTOGRAPH * len(problem.train.placements)
+    columns = recording.arm_x.size + recording.dropper_x.size
+    window, masts = recording.line.window, problem.line.support_positions
+    if window is None or not problem.window.moves:
+        return int(FLUSH_MEMORY / (_BYTES * (of_train + columns)))
+    # Of n steps the columns near the train: those at first, and those that it comes to.
+    per_metre = columns / (masts[-1] - masts[0]) / recording.line.every
+    behind = [placement.behind for placement in problem.train.placements]
+    at_first = of_train + per_metre * (sum(window) + max(behind) - min(behind))
+    later = per_metre * problem.train.speed * problem.numerics.dt
+    room = FLUSH_MEMORY / _BYTES
+    return int((math.sqrt(at_first**2 + 4.0 * later * room) - at_first) / (2.0 * later))

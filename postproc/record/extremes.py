@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 
 from catenary.postproc.record.column_gather import ColumnGather
+from catenary.solver.base.bound import bound
+from catenary.solver.time_loop.row_kernels import take_extremes
 
 
 class Extremes:
@@ -26,20 +28,25 @@ class Extremes:
         self._gather = ColumnGather(comm, self._owned, n_columns, 2)
         self._kept = np.empty((2, self._owned.size))
         self._kept[0], self._kept[1] = np.inf, -np.inf
+        self._take = bound(take_extremes, later=(np.zeros((0, 0)), 0, 0, 0, self._kept))
 
     def restore(self, whole: np.ndarray) -> None:
         """Continue from what ``whole`` gave, (2, n_columns), on any ranks. Not collective."""
         self._kept[:] = whole[:, self._owned]
 
-    def take(self, rows: np.ndarray, columns: slice) -> None:
-        """Take in rows of the owned columns, (rows, n_owned), as far as these have changed.
+    def take(self, rows: np.ndarray, part: slice, columns: slice) -> None:
+        """Take in rows of a step's channels, as far as the owned columns have changed.
 
         Not collective.
+
+        Parameters
+        ----------
+        rows : (rows, n) contiguous
+        part : where in a row the owned columns are
+        columns : which of these have changed
         """
-        if rows.shape[0]:
-            shown, kept = rows[:, columns], self._kept[:, columns]
-            np.minimum(kept[0], shown.min(axis=0), out=kept[0])
-            np.maximum(kept[1], shown.max(axis=0), out=kept[1])
+        begin, end, _ = columns.indices(self._owned.size)
+        self._take(rows, part.start, begin, end, self._kept)
 
     def whole(self) -> np.ndarray:
         """Smallest and largest value of all columns, (2, n_columns), on rank 0. Collective."""

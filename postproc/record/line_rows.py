@@ -84,27 +84,30 @@ class LineGather:
         for name, whole in extremes.items():
             self._parts[name].extremes.restore(whole)
 
-    def take(self, first_step: int, rows: Mapping[str, np.ndarray], *, all_move: bool) -> None:
+    def take(
+        self, first_step: int, rows: np.ndarray, parts: Mapping[str, slice], *, all_move: bool
+    ) -> None:
         """Take in steps that follow one another. Not collective.
 
         Parameters
         ----------
         first_step : number of the first one
-        rows : name of a channel -> (steps, owned columns)
+        rows : (steps, n) contiguous, of all channels
+        parts : name of a channel -> where in a row its owned columns are
         all_move : whether any column may have changed; those of ``stage.moving`` if not
         """
-        every, position = self._record.every, rows["contact_position"]
+        every, position = self._record.every, rows[:, parts["contact_position"]]
         start, n_steps = -first_step % every, len(position)
         self._chosen.append(np.arange(start, n_steps, every) + self._n_taken)
         self._n_taken += n_steps
         edges = self._record.within(position[start::every])
         for name, part in self._parts.items():
-            block = rows[name]
-            part.extremes.take(block, slice(None) if all_move else self._moving.columns(name))
+            moved = slice(None) if all_move else self._moving.columns(name)
+            part.extremes.take(rows, parts[name], moved)
             if part.kept is not None and start < n_steps:
-                shown = block[start::every]
+                shown = rows[start::every, parts[name]]
                 own = part.kept.columns_within(edges)
-                if part.columns.size != block.shape[1]:
+                if part.columns.size != shown.shape[1]:
                     part.kept.put(shown[:, part.columns[own]], own)
                 else:
                     part.kept.put(shown[:, own], own)

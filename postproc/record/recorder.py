@@ -221,8 +221,7 @@ class Recorder:
             self._take(self._first_step + self._n_taken, self._waiting[:n], all_move=True)
 
     def _take(self, first_step: int, rows: np.ndarray, *, all_move: bool) -> None:
-        by_name = {name: rows[:, part] for name, part in self._parts.items()}
-        self._line.take(first_step, by_name, all_move=all_move)
+        self._line.take(first_step, rows, self._parts, all_move=all_move)
         self._n_taken += len(rows)
 
     def _columns(self, name: str) -> np.ndarray:

@@ -122,9 +122,11 @@ def reserves(motion, links, result):
 def motion_within(motion, begin, end, displacement, velocity):
     """Fill in displacements and velocities of the unknowns from ``begin`` to ``end``; ``motion`` as
     ``LineState.read``."""
-    for i in range(begin, end):
-        displacement[i] = displacement_at(i, motion)
-        velocity[i] = velocity_at(i, motion)
+    x, y, z, shares = motion
+    # Counted from zero, so that loops become such of vector instructions.
+    part = x[begin:end], y[begin:end], z[begin:end], shares
+    displacements(part, displacement[begin:end])
+    velocities(part, velocity[begin:end])
 
 
 @compiled

@@ -35,18 +35,20 @@ class LineEnergy:
         self._products = line.operators.by_rows()
         n, n_links = line.ownership.n_local, links.numbers.size
         in_parts = line.window is not None and self._products is not None
-        self._edges = _edges(columns.n_stations, _STATIONS if in_parts else columns.n_stations)
+        self._size = _STATIONS if in_parts else max(1, columns.n_stations)
+        self._links_size = _LINKS if in_parts else max(1, n_links)
+        # Where parts begin, and where the last one ends.
+        self._edges = np.append(np.arange(0, columns.n_stations, self._size), columns.n_stations)
         self._starts = columns.starts[self._edges]
         # Without a window the line is one station, of which a product has many rows.
         self._rows = self._edges
         if not in_parts and self._products is not None:
             self._rows = np.array([0, self._products[0].kinds.size])
-        self._link_edges = _edges(n_links, _LINKS if in_parts else n_links)
         stations = None if line.window is None else line.window.stations
         self._of_links = columns_of((links.links.unknowns,), n, stations)
         self._force = np.zeros(n)
         self._sums = np.zeros((2, self._edges.size - 1))
-        self._switched = np.zeros(self._link_edges.size - 1)
+        self._switched = np.zeros(-(-n_links // self._links_size))
 
     @property
     def pad(self) -> int:
@@ -57,54 +59,47 @@ class LineEnergy:
         """What this rank adds to kinetic and elastic energy, the latter relative to rest without
         loads, links switched as they are [J], shape (2,)."""
         begin, end = motion.take_changes()
-        displacement = motion.displacement
+        displacement, velocity = motion.displacement, motion.velocity
         if self._products is None:
-            parts = self._line.energy_parts(displacement, motion.velocity)
+            parts = self._line.energy_parts(displacement, velocity)
         else:
             if begin < end:
                 # What joins two stations changes with either.
-                n = int(self._edges[-1])
-                self._sum_stations(motion, max(0, begin - 1), min(n, end + 1))
-            parts = 0.5 * self._sums.sum(axis=1)
+                changed = max(0, begin - 1), min(int(self._edges[-1]), end + 1)
+                self._sum_stations(motion.padded, (displacement, velocity), *changed)
+            parts = 0.5 * np.add.reduce(self._sums, axis=1)
         if begin < end:
             self._sum_links(displacement, begin, end)
-        elastic = self._switched.sum() - self._load @ displacement[self._loaded]
-        return np.array([parts[0], parts[1] + elastic])
+        parts[1] += np.add.reduce(self._switched)
+        if self._loaded.size:
+            parts[1] -= self._load @ displacement[self._loaded]
+        return parts
 
-    def _sum_stations(self, motion: ShownMotion, begin: int, end: int) -> None:
+    def _sum_stations(
+        self,
+        padded: tuple[np.ndarray, ...],
+        motion: tuple[np.ndarray, np.ndarray],
+        begin: int,
+        end: int,
+    ) -> None:
         assert self._products is not None
-        first, last = _covering(self._edges, begin, end)
-        rows = int(self._rows[first]), int(self._rows[last])
-        own = slice(int(self._starts[first]), int(self._starts[last]))
-        force, arrays = self._force, (motion.velocity, motion.displacement)
-        factors = motion.padded[1], motion.padded[0]
-        for sums, product, factor, array in zip(
-            self._sums, self._products[:2], factors, arrays, strict=True
-        ):
-            product.multiply_rows(*rows, factor, force)
+        first, last = begin // self._size, -(-end // self._size)
+        begin, end = self._rows[[first, last]].tolist()
+        own = slice(*self._starts[[first, last]].tolist())
+        for row, product in enumerate(self._products[:2]):
+            # The kinetic energy is that of the velocity.
+            factor, values = padded[1 - row], motion[1 - row][own]
+            product.multiply_rows(begin, end, factor, self._force)
+            force = self._force[own]
             if last == first + 1:
-                sums[first] = force[own] @ array[own]
-            elif last > first:
+                self._sums[row, first] = force @ values
+            else:
                 places = self._starts[first:last] - own.start
-                sums[first:last] = np.add.reduceat(force[own] * array[own], places)
+                self._sums[row, first:last] = np.add.reduceat(force * values, places)
 
     def _sum_links(self, displacement: np.ndarray, begin: int, end: int) -> None:
-        columns = self._of_links
-        links = int(columns.first[begin, 0]), int(columns.last[end, 0])
-        if links[0] >= links[1]:
-            return
-        for part in range(*_covering(self._link_edges, *links)):
-            own = self._link_edges[part : part + 2].tolist()
+        first, last = int(self._of_links.first[begin, 0]), int(self._of_links.last[end, 0])
+        size = self._links_size
+        for part in range(first // size, -(-last // size) if first < last else 0):
+            own = size * part, min(size * (part + 1), self._links.numbers.size)
             self._switched[part] = self._links.energy_of_switching(displacement, *own)
-
-
-def _edges(n: int, size: int) -> np.ndarray:
-    """Where parts of ``size`` begin that ``n`` are divided into, and where the last one ends."""
-    return np.append(np.arange(0, n, max(1, size)), n)
-
-
-def _covering(edges: np.ndarray, begin: int, end: int) -> tuple[int, int]:
-    """The first of the parts between ``edges`` that reaches into a range, and the one after the
-    last."""
-    first = int(np.searchsorted(edges, begin, side="right")) - 1
-    return max(0, first), min(int(np.searchsorted(edges, end)), edges.size - 1)

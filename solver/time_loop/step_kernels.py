@@ -156,9 +156,10 @@ def keep(kept, number, motion, columns):
     size, at = end - begin, kept.used[0]
     if at + 2 * size > kept.numbers.size:
         return False
-    for i in range(size):
-        kept.numbers[at + i] = state_kernels.displacement_at(begin + i, motion)
-        kept.numbers[at + size + i] = state_kernels.velocity_at(begin + i, motion)
+    x, y, z, shares = motion
+    part = x[begin:end], y[begin:end], z[begin:end], shares
+    state_kernels.displacements(part, kept.numbers[at : at + size])
+    state_kernels.velocities(part, kept.numbers[at + size : at + 2 * size])
     stations = kept.stations[number]
     stations[0], stations[1], stations[2] = kept.moved[0], kept.moved[1], at
     kept.used[0] = at + 2 * size

@@ -20,7 +20,12 @@ from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.after_incidents import ChangedLine
 from catenary.solver.statics.equilibrium import Equilibrium
-from catenary.solver.time_loop.channels import Energies, Sources, energies_of
+from catenary.solver.time_loop.channels import (
+    Energies,
+    Sources,
+    energies_follow_motion,
+    energies_of,
+)
 from catenary.solver.time_loop.line_energy import LineEnergy
 from catenary.solver.time_loop.observers import Stage, StepView
 from catenary.solver.time_loop.row_layout import RowLayout
@@ -88,10 +93,11 @@ class Showing:
         self._is_kept = False
         self._rows_of_unknown: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self._kept_places = np.zeros(0)
+        self._row = np.zeros(self.layout.width)
         self._view = StepView(
             step=0,
             time=0.0,
-            row=np.zeros(self.layout.width),
+            row=self._row,
             columns=self.layout.columns,
             node_uplift=lambda: self.motion.displacement[self._node_rows],
             node_motion=self._node_motion,
@@ -155,7 +161,7 @@ class Showing:
         self.motion.late(followed=followed)
         if not followed:
             self._moving.all_move()
-        view.step, view.time = step, time
+        view.step, view.time, view.row = step, time, self._row
         self._shown[: outputs.size] = outputs
         self._show()
         view.row[: self._shown.size] = self._shown
@@ -189,9 +195,8 @@ class Showing:
 
     def _viewed(self, step: int, time: float, row: np.ndarray, *, is_kept: bool) -> StepView:
         view, self._is_kept = self._view, is_kept
-        view.step, view.time = step, time
-        view.row[:] = row
-        self._shown[:] = row[: self._shown.size]
+        # Of a long line a row is not to be copied.
+        view.step, view.time, view.row = step, time, row
         return view
 
     def restore(self, checkpoint: dict[str, Any]) -> None:
@@ -297,6 +302,8 @@ class Showing:
 
     def _energies(self) -> tuple[float, ...]:
         """The energies that are recorded, in the order of their table. Collective."""
+        if not energies_follow_motion():
+            self._shown[:] = self._view.row[: self._shown.size]
         return energies_of(Energies(*self._line_energies(), self._sources))
 
     def _line_energies(self) -> tuple[float, float]:

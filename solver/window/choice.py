@@ -22,6 +22,8 @@ _AHEAD = (4.0, 6.0, 8.0, 10.0, 15.0, 20.0, 25.0, 30.0)
 _ERROR = (9.8, 5.9, 3.8, 2.4, 1.1, 0.7, 0.6, 0.09)
 # So many times as many spans ahead are needed as behind.
 _BEHIND = 1.25
+# Times at which what moves is counted.
+_SAMPLES = 200
 _FEWEST, _WANTED = 4, 30.0
 # Rate of fading below which the ends of a window are damped on mass, and by how much [1/s].
 _SLOW, _FADING = 0.1, 1.0
@@ -60,6 +62,30 @@ def spans_of_window(
     return WindowChoice(
         BOUNDED, None, ahead, behind, _FADING if _fading_rate(problem) < _SLOW else 0.0
     )
+
+
+def moving_share(problem: Problem) -> float:
+    """Share of the line that moves, its mean over a run: 1 without a window.
+
+    Where motion decides it is what waves could have reached by then; that which has faded rests
+    before. Not collective.
+    """
+    window, train = problem.window, problem.train
+    masts = np.asarray(problem.line.support_positions, dtype=float)
+    begin, end = float(masts[0]), float(masts[-1])
+    if not window.moves or end <= begin:
+        return 1.0
+    last = train.start - max(placement.behind for placement in train.placements)
+    time = np.linspace(0.0, (train.end - train.start) / train.speed, _SAMPLES)
+    if window.by_motion > 0.0:
+        speed = max(wire.wave_speed for wire in problem.line.wires)
+        low, high = last - speed * time, train.start + speed * time
+    else:
+        span = (end - begin) / (masts.size - 1)
+        low = last + train.speed * time - window.spans_behind * span
+        high = train.start + train.speed * time + window.spans_ahead * span
+    alive = np.clip(np.minimum(high, end) - np.maximum(low, begin), 0.0, None)
+    return float(alive.mean() / (end - begin))
 
 
 def estimated_error(problem: Problem, ahead: float, behind: float) -> float:

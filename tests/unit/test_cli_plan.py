@@ -4,10 +4,19 @@ from __future__ import annotations
 
 import pytest
 
+from catenary.cases.run.needs import (
+    LEAST_FLUSH,
+    Needs,
+    flush_cadence,
+    needs_before_meshing,
+)
 from catenary.cases.run.plan import make_plan, plan_text
 from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.checks.line.mesh_size import size_of
+from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.cost_model import estimate_march, estimate_memory
 from catenary.cases.scene.load import load_scene
+from catenary.solver.window.choice import moving_share
 
 
 def test_unknowns_are_the_nodes_of_the_mesh_times_the_unknowns_of_the_effects() -> None:
@@ -37,6 +46,39 @@ def test_estimates_grow_with_size_steps_and_scheme() -> None:
     assert estimate_march(20_000, 1000, "one_solve") > small
     assert estimate_march(10_000, 2000, "one_solve") == pytest.approx(2 * small)
     assert estimate_march(10_000, 1000, "fixed_point") > small
+
+
+def needs(*changes: str) -> Needs:
+    found = needs_before_meshing(load_scene("ambrosio2012", ["train.end_m=1110", *changes]))
+    assert found is not None
+    return found
+
+
+def test_a_window_is_estimated_by_what_moves() -> None:
+    """Spans of the paper are 54 m long, those at the ends 50 m."""
+    window = "window.mode=bounded", "window.spans_ahead=6", "window.spans_behind=6"
+    short, long = (needs(f"line.n_spans={n}", *window) for n in (100, 400))
+    assert long.march == pytest.approx(short.march, rel=0.01)
+    assert short.march < 0.5 * needs("line.n_spans=100").march
+    scene = load_scene("ambrosio2012", ["line.n_spans=400", "train.end_m=20110", *window])
+    # The train starts at 110 m, so that three of its spans are missing on the way to the sixth.
+    assert moving_share(problem_of(scene)) == pytest.approx(12 / 400, rel=0.02)
+    # What waves could have reached grows: half as much as at the end, in the mean.
+    exact = load_scene("ambrosio2012", ["line.n_spans=100", "window.mode=exact"])
+    assert 0.05 < moving_share(problem_of(exact)) < 1.0
+    assert moving_share(problem_of(load_scene("ambrosio2012"))) == 1.0
+
+
+def test_flushes_of_a_window_are_as_rare_as_what_moves_is_small() -> None:
+    """They were as frequent as steps of the whole line are slow, and wrote its state each time."""
+    near = "output.line_channels_window_m=[300,200]", "output.line_channels_every_s=0.005"
+    steps = {}
+    for mode in ("off", "bounded"):
+        scene = load_scene("ambrosio2012", ["line.n_spans=400", f"window.mode={mode}", *near])
+        found, size = needs_before_meshing(scene), size_of(scene)
+        assert found is not None and size is not None
+        steps[mode] = flush_cadence(problem_of(scene), size.unknowns, found.recording)
+    assert steps["bounded"] > 5 * steps["off"] >= 5 * LEAST_FLUSH
 
 
 def test_the_text_tells_trains_of_several_pantographs() -> None:

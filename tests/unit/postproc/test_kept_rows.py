@@ -54,13 +54,16 @@ def test_what_rests_is_not_looked_at(record: LineRecord) -> None:
     columns = Columns(np.array([0, N]), np.arange(N + 1), table, table)
     first = np.random.default_rng(7).normal(size=(1, N))
     names = "arm_uplift", "dropper_force"
-    given = {name: first for name in names}
-    gather.take(0, {**given, "contact_position": np.array([[50.0]])}, all_move=True)
+    parts = {
+        "contact_position": slice(0, 1),
+        names[0]: slice(1, N + 1),
+        names[1]: slice(N + 1, None),
+    }
+    gather.take(0, np.hstack([[[50.0]], first, first]), parts, all_move=True)
     position, rows, step = [np.array([50.0])], [first], 1
     for at, block, (begin, end) in blocks():
         moving.follow(columns, names, np.array([begin, end]))
-        shown = {name: block for name in names}
-        gather.take(step, {**shown, "contact_position": at[:, None]}, all_move=False)
+        gather.take(step, np.hstack([at[:, None], block, block]), parts, all_move=False)
         position.append(at)
         rows.append(block)
         step += BLOCK
