@@ -63,7 +63,11 @@ MAY_STOP = (
 )
 
 # What form finding says of droppers that cannot be.
-NOT_AT_REST = ("would be slack at rest", "would have a length of")
+NOT_AT_REST = (
+    "would be slack at",
+    "would have a length of",
+    "finds no rest at",
+)
 
 # Of these, what counts as a step whose equations were not solved.
 UNSOLVED = ("do not agree", "does not converge", "correction diverges", "finds no solution")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass
 
+from fuzzing_along import put_along
 from fuzzing_broken import INCIDENTS, a_way
 from fuzzing_more import SLACK_DAMPINGS, as_assignments, mechanism, put_more
 from fuzzing_topologies import put_topology
@@ -45,7 +46,8 @@ def topology_scene(seed: int, n_steps: int = N_STEPS) -> RandomScene:
     rng = random.Random(f"topology {seed}")
     words = _words(seed, n_steps, rng)
     span = words["line.span_m"]
-    put_topology(rng, words, float(str(span[0] if isinstance(span, list) else span)))
+    name = put_topology(rng, words, float(str(span[0] if isinstance(span, list) else span)))
+    put_along(random.Random(f"along {seed}"), words, name)
     return RandomScene(seed, as_assignments(words))
 
 
