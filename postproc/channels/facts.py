@@ -17,6 +17,7 @@ from catenary.solver.effects.all_effects import simulated
 from catenary.solver.problem.contact_laws import ContactLaw, HertzLaw, LinearLaw
 from catenary.solver.problem.integrator_parameters import Integration, integration_of
 from catenary.solver.time_loop.channels import PANTOGRAPH, RUN
+from catenary.solver.wind.spectra import PEAK
 
 if TYPE_CHECKING:
     from catenary.meshgen.mesh import LineMesh
@@ -131,6 +132,14 @@ def _stiffness_under(law: ContactLaw, force: float) -> float:
         share = 1.0 / law.exponent
         return float(law.exponent * law.stiffness**share * force ** (1.0 - share))
     return math.inf
+
+
+def _strongest_gust(source: Derivation) -> float:
+    """Of gusts whose drag is linearised, over the mean wind."""
+    wind = simulated(source.problem).wind
+    if wind is None or wind.gusts is None or wind.quadratic:
+        return NONE
+    return PEAK * wind.intensity
 
 
 def _touching_masses(source: Derivation) -> list[float]:
@@ -260,6 +269,13 @@ FACTS: dict[str, Fact] = {
         "share of its stiffness that a pushed dropper keeps, 1 where droppers do not slacken",
         lambda source: simulated(source.problem).kept_ratio,
         high=1.0,
+    ),
+    "strongest_gust": Fact(
+        "-",
+        "gust that is hardly exceeded, over the mean wind, where drag is linearised about that; "
+        "NaN without such gusts",
+        _strongest_gust,
+        may_be_nan=True,
     ),
     "static_force": Fact(
         "N",

@@ -9,6 +9,8 @@ import numpy as np
 
 from catenary.postproc.read.results import Results
 
+# Share of a gust's load that linear drag may leave out.
+_LEFT_OUT = 0.15
 # Statistics are taken below 20 Hz; a resonance below twice that still shows in them.
 _FELT_HZ = 40.0
 # Phase of the contact's own motion in a step beyond which its hops are not resolved [rad].
@@ -46,6 +48,7 @@ def remarks(results: Results) -> list[str]:
         *_about_droppers(results),
         *_about_iterations(results),
         *_about_sizes(results),
+        *_about_gusts(results),
     ]
 
 
@@ -72,6 +75,21 @@ def _about_sizes(results: Results) -> list[str]:
         f"{above} of {counted['steps']} steps were taken with an estimated error of the contact "
         f"force above numerics.adaptive_tolerance_N = {results.fact('step_tolerance'):g}, being "
         "the shortest: take a smaller numerics.smallest_dt_s, or a larger tolerance."
+    ]
+
+
+def _about_gusts(results: Results) -> list[str]:
+    """That linear drag leaves out much of the load of strong gusts."""
+    gust = results.fact("strongest_gust")
+    # Not of NaN either.
+    if not gust > 0.0:
+        return []
+    left_out = (gust / (1.0 + gust)) ** 2
+    if left_out < _LEFT_OUT:
+        return []
+    return [
+        f"Gusts reach {gust:.2g} times the mean wind, about which their drag is linear: in those "
+        f'{1e2 * left_out:.0f} % of the load on a wire are left out. Take wind.drag = "quadratic".'
     ]
 
 

@@ -102,6 +102,13 @@ class Wind:
         """Mean speed at the wires outside of the stretches [m/s]."""
         return float(self.speed * self.profile.growth(self.height, self.reference_height))
 
+    @property
+    def intensity(self) -> float:
+        """Standard deviation of the gusts along the wind over the mean, 0 without gusts."""
+        if self.gusts is None:
+            return 0.0
+        return math.sqrt(_DAVENPORT) * self.gusts.friction_velocity / self.mean
+
     def with_gusts(self, gusts: Gusts | None) -> Wind:
         """The same mean wind with other gusts."""
         return replace(self, gusts=gusts)

@@ -17,6 +17,8 @@ from scipy.special import hyp2f1
 
 from catenary.solver.problem.wind import Wind
 
+# A gust that is hardly exceeded in ten minutes, in standard deviations.
+PEAK = 3.5
 # Parts of a gust: along the mean wind, across it to the left, upward.
 ALONG, ACROSS, UPWARD = range(3)
 

@@ -99,7 +99,7 @@ ASSIGNMENTS = {
         ["wind.speed_m_per_s=20"],
         "line.contact_wire.diameter_mm is missing",
     ),
-    "wind of no speed": (["wind.height_m=6"], "wind.speed_m_per_s is missing"),
+    "wind of no speed": (["wind.height_m=6"], "wind.speed_m_per_s (mean speed"),
     "two strengths of gusts": (
         ["wind={speed_m_per_s=20, gusts={turbulence_intensity=0.2, friction_velocity_m_per_s=2}}"],
         "must have turbulence_intensity or friction_velocity_m_per_s, but both are given",

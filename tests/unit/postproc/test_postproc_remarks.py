@@ -20,6 +20,7 @@ class Told:
             "shortest_step": dt,
             "fixed_iterations": np.nan,
             "step_tolerance": np.nan,
+            "strongest_gust": np.nan,
             "stiffest_dropper": 1e5,
             "dropper_stiffness_damping": 0.0,
             "touching_mass": np.full(2, mass),
@@ -128,3 +129,10 @@ def test_incidents_that_the_statistics_cover_are_told() -> None:
     (sentence,) = remarks(Running(early, late))  # type: ignore[arg-type]
     assert sentence.startswith("At 2.59 s it breaks. ") and "statistics" in sentence
     assert remarks(Running(late)) == []  # type: ignore[arg-type]
+
+
+def test_strong_gusts_of_linear_drag_are_told() -> None:
+    """(U + g)^2 in place of U^2 + 2 U g: g^2 of it are left out, 25 % for g = U, 11 % for U / 2."""
+    (sentence,) = said(7.2, 1e-3, 1e6, strongest_gust=1.0)
+    assert "25 % of the load" in sentence and "quadratic" in sentence
+    assert said(7.2, 1e-3, 1e6, strongest_gust=0.5) == []
