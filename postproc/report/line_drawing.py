@@ -27,7 +27,7 @@ _COLOUR = {
 # Exaggerations of heights and lateral places, and sizes of figure and panels [inch].
 _FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 _WIDTH, _HEIGHT = 12.0, 8.1
-_LEFT, _LONG, _CROSS = 0.75, 7.7, 2.7
+_LEFT, _LONG, _CROSS = 0.95, 7.5, 2.7
 _SIDE, _PLAN, _LOW, _GAP = 3.9, 1.75, 0.6, 0.8
 _MARGIN = 0.08  # of a range, on both sides
 _MOST_NAMED = 12  # marks that have a number and a line below
@@ -76,13 +76,15 @@ def draw_line(
     cross = panel(_LEFT + _LONG + _GAP, _LOW, _CROSS, _PLAN + _GAP + _SIDE)
     points = mesh.points.copy()
     points[:, 2] = form.height
+    if form.lateral is not None:
+        points[:, 1] = form.lateral.y
     _side_view(side, line, mesh, points, form, stretch)
     _marks(side, mesh, points, marks)
     for number, mark in enumerate(marks[:_MOST_NAMED]):
         high = (below - _LINE * (number + 0.5)) / (_HEIGHT + below)
         figure.text(_LEFT / _WIDTH, high, f"{number + 1}  {mark.says}", fontsize=9)
     _plan_view(plan, line, mesh, points, stretch, half_head)
-    _cross_section(cross, line, mesh, points, stretch, half_head)
+    _cross_section(cross, line, mesh, points, form, stretch, half_head)
     names = {wire.role: wire.name.replace("_", " ") for wire in reversed(line.wires)}
     handles = [Line2D([], [], color=_COLOUR[role], label=name) for role, name in names.items()]
     figure.legend(handles=handles, loc="upper right", ncols=len(handles), frameon=False)
@@ -138,6 +140,7 @@ def _cross_section(
     line: Line,
     mesh: LineMesh,
     points: np.ndarray,
+    form: Equilibrium,
     stretch: tuple[float, float],
     half_head: float | None,
 ) -> None:
@@ -160,17 +163,21 @@ def _cross_section(
     for group in line.steady_arms:
         for node in mesh.steady_arms[np.abs(mesh.x(mesh.steady_arms) - at) < 1e-6]:
             if node in mesh.wires[group.wire] and group.kind.length > 0.0:
-                _, y, z = points[node]
-                side = 1.0 if y >= 0.0 else -1.0
-                axes.plot([y, y + side * group.kind.length], [z, z + 0.15], color=GREY, lw=1.2)
+                (_, y, z), length = points[node], group.kind.length
+                across, up = (1.0 if y >= 0.0 else -1.0) * length, 0.15
+                if form.lateral is not None:
+                    number = int(np.flatnonzero(mesh.steady_arms == node)[0])
+                    across, up = length * form.lateral.arm_direction[number]
+                axes.plot([y, y + across], [z, z + up], color=GREY, lw=1.2)
     if half_head is not None:
         axes.plot([-half_head, half_head], [lowest, lowest], color="black", lw=2.0)
     axes.axvline(0.0, color=GREY, lw=0.5, ls="--")
     axes.set_aspect("equal", adjustable="box", anchor="N")
     axes.margins(0.15)
     axes.set_xlabel("to the left [m]")
+    arms = "sketched" if form.lateral is None else "at rest"
     axes.set_title(
-        f"cross-section at {at:g} m, arms\nsketched; hollow: at {between:g} m",
+        f"cross-section at {at:g} m, arms\n{arms}; hollow: at {between:g} m",
         loc="left",
         fontsize=10,
     )

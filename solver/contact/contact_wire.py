@@ -47,6 +47,8 @@ class ContactWires:
         chains = [model.mesh.wires[name] for name in names]
         ends = np.cumsum([0, *(chain.size for chain in chains)])
         self.ranges = np.stack([ends[:-1], ends[1:]], axis=1)
+        self._pieces = [wire.pieces for wire in model.problem.line.wires_of(Role.CONTACT)]
+        self._at_rest = form.lateral is not None
         nodes = np.concatenate(chains)
         self.x = model.mesh.x(nodes)
         self.dofs = np.stack([model.dofs(nodes), model.dofs(nodes, "theta_y")], axis=1)
@@ -69,6 +71,18 @@ class ContactWires:
     def n_wires(self) -> int:
         """Number of contact wires."""
         return len(self.ranges)
+
+    def course(self, wire: int) -> tuple[np.ndarray, np.ndarray]:
+        """Places along the track (n,) and lateral places (n,) of a wire at rest [m], straight in
+        between: of supports without lateral motion, with it of all nodes."""
+        if self._at_rest:
+            first, end = self.ranges[wire]
+            return self.x[first:end], self.nodes["y"][first:end].copy()
+        pieces = self._pieces[wire]
+        return (
+            np.concatenate([piece.x for piece in pieces]),
+            np.concatenate([piece.y for piece in pieces]),
+        )
 
     def on_wires(self, wire: np.ndarray, half_length: float | np.ndarray = np.inf) -> np.ndarray:
         """Records of ``TOUCH`` (n,) on wires (n,), not located yet."""

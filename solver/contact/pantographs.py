@@ -19,7 +19,6 @@ from catenary.mbs.lowering import LoweredPantograph
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.roll import roll_of
 from catenary.mbs.vehicle.base_motion import BaseMotion
-from catenary.meshgen.wires import Role
 from catenary.solver.base.bound import bound
 from catenary.solver.base.parallel import on_root
 from catenary.solver.contact import contact_kernels
@@ -226,7 +225,7 @@ class Pantographs:
             velocity = self.speed * self._wires.rest_slope(self._start)
         for number, placement in enumerate(problem.train.placements):
             height = nominal_height(placement)
-            model = _make(problem, simulated, placement, height, self._wires.n_wires)
+            model = _make(problem, simulated, placement, height, self._wires)
             model.place(float(self.head_height[number]), float(velocity[number]))
             self.models.append(model)
         self._models_with_contacts = list(zip(self.models, self._contacts, strict=True))
@@ -244,7 +243,7 @@ def _make(
     simulated: Simulated,
     placement: Placement,
     nominal_height: float,
-    n_wires: int,
+    wires: ContactWires,
 ) -> Pantograph:
     numerics, train = problem.numerics, problem.train
     start, base = train.start - placement.behind, None
@@ -258,7 +257,7 @@ def _make(
         numerics.dt,
         numerics.beta,
         numerics.gamma,
-        _lateral_path(problem, placement, base, simulated),
+        _lateral_path(problem, placement, base, simulated, wires),
         base,
         airflow(problem, simulated, placement),
         placement.lowering if simulated.lowering else None,
@@ -268,13 +267,17 @@ def _make(
     data = placement.data
     laws = data.laws if simulated.pantograph_laws else ()
     flexure = data.strips.flexure if simulated.flexible_strips else None
-    strips = replace(data.strips, wires=n_wires, flexure=flexure)
+    strips = replace(data.strips, wires=wires.n_wires, flexure=flexure)
     data = replace(data, strips=strips, laws=laws)
     return make_pantograph(data, operation)
 
 
 def _lateral_path(
-    problem: Problem, placement: Placement, base: BaseMotion | None, simulated: Simulated
+    problem: Problem,
+    placement: Placement,
+    base: BaseMotion | None,
+    simulated: Simulated,
+    wires: ContactWires,
 ) -> LateralPath | SeveralPaths | None:
     """Where the wires cross the strips, None if its head neither rolls nor bends."""
     bends = simulated.flexible_strips and placement.data.strips.flexure is not None
@@ -283,14 +286,13 @@ def _lateral_path(
     train = problem.train
     paths = [
         LateralPath(
-            np.concatenate([piece.x for piece in wire.pieces]),
-            tuple(y for piece in wire.pieces for y in piece.y),
+            *wires.course(number),
             train.start - placement.behind,
             placement.data.strip_offsets,
             train.speed,
             base,
         )
-        for wire in problem.line.wires_of(Role.CONTACT)
+        for number in range(wires.n_wires)
     ]
     return paths[0] if len(paths) == 1 else SeveralPaths(paths)
 
