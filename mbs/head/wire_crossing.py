@@ -31,7 +31,7 @@ class LateralPath:
     def __init__(
         self,
         support_x: np.ndarray,
-        stagger: Sequence[float],
+        stagger: Sequence[float] | np.ndarray,
         start: float,
         offsets: Sequence[float],
         speed: float,
