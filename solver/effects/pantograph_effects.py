@@ -25,7 +25,7 @@ register(
         default=True,
         applies=lambda p: any(place.data.laws for place in p.train.placements),
         law=lambda laws, p: replace(laws, pantograph_laws=True),
-        data="[[pantographs.NAME.laws]]",
+        data="pantographs.*.laws",
     )
 )
 register(
@@ -37,7 +37,7 @@ register(
         default=True,
         applies=lambda p: any(place.data.strips.flexure for place in p.train.placements),
         law=lambda laws, p: replace(laws, flexible_strips=True),
-        data="a table [pantographs.NAME.strips.flexure]",
+        data="pantographs.*.strips.flexure",
     )
 )
 register(
@@ -49,7 +49,7 @@ register(
         default=True,
         applies=lambda p: any(place.regulator is not None for place in p.train.placements),
         law=lambda laws, p: replace(laws, regulated_lift=True),
-        data="a table [pantographs.NAME.regulation]",
+        data="pantographs.*.regulation",
     )
 )
 register(

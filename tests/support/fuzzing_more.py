@@ -197,7 +197,7 @@ def _laws(rng: random.Random, words: Words) -> None:
     assert isinstance(masses, list)
     laws = []
     for _ in range(rng.randint(1, 3)):
-        at = f"mass={rng.randint(1, len(masses))}"
+        at = f"at_mass={rng.randint(1, len(masses))}"
         up, down = (rng.choice([0.0, 10 ** rng.uniform(0.0, 3.0)]) for _ in range(2))
         laws.append(
             rng.choice(

@@ -20,16 +20,16 @@ LAWS = {
     "{type='limiter',rise_m=0.1,stiffness_N_per_m=2e4}": Law(
         1, 2, False, (-1.0, 0.1, 1.1), (0.0, 0.0, 2e4), from_rest=True
     ),
-    "{type='limiter',mass=1,force_by_rise=[[0.0,0.0],[0.1,50.0]]}": Law(
+    "{type='limiter',at_mass=1,force_by_rise=[[0.0,0.0],[0.1,50.0]]}": Law(
         0, 2, False, (-1.0, 0.0, 0.1), (0.0, 0.0, 50.0), from_rest=True
     ),
     "{type='damper',up_N_s_per_m=200,down_N_s_per_m=30}": Law(
         1, 2, True, (-1.0, 0.0, 1.0), (-30.0, 0.0, 200.0)
     ),
-    "{type='damper',mass=1,force_by_velocity=[[-1.0,-5.0],[0.0,0.0],[2.0,9.0]]}": Law(
+    "{type='damper',at_mass=1,force_by_velocity=[[-1.0,-5.0],[0.0,0.0],[2.0,9.0]]}": Law(
         0, 1, True, (-1.0, 0.0, 2.0), (-5.0, 0.0, 9.0)
     ),
-    "{type='spring',mass=1,force_by_extension=[[-0.05,-400.0],[0.0,0.0]]}": Law(
+    "{type='spring',at_mass=1,force_by_extension=[[-0.05,-400.0],[0.0,0.0]]}": Law(
         0, 1, False, (-0.05, 0.0), (-400.0, 0.0)
     ),
     "{type='friction',force_N=3}": Law(
@@ -83,7 +83,7 @@ REFUSED = {
     f"{KIND}.laws=[{{type='brake'}}]": "must be of type limiter, damper, spring or friction",
     f"{KIND}.laws=[{{type='limiter',rise_m=0.1}}]": "needs exactly one of stiffness_N_per_m",
     f"{KIND}.laws=[{{type='limiter',stiffness_N_per_m=1e4}}]": "needs rise_m and stiffness_N_per_m",
-    f"{KIND}.laws=[{{type='friction',force_N=3,mass=3}}]": "the pantograph has 2 masses",
+    f"{KIND}.laws=[{{type='friction',force_N=3,at_mass=3}}]": "the pantograph has 2 masses",
     f"{KIND}.laws=[{{type='damper',up_N_s_per_m=3}}]": "needs up_N_s_per_m and down_N_s_per_m",
     f"{KIND}.laws=[{{type='damper',force_by_velocity=[[-1,5],[1,9]]}}]": "must brake, but has 5 N",
     f"{KIND}.laws=[{{type='spring',force_by_extension=[[0,9],[1,5]]}}]": "must not fall",

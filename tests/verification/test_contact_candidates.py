@@ -16,7 +16,8 @@ from dense_line import DenseLine
 from measuring import History, check, march, start_march
 from small_lines import WHOLE, mesh_of, numerics, train
 
-from catenary.mbs.head.strips import Strips, Turning
+from catenary.mbs.head.flexure import Flexure
+from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
@@ -47,6 +48,45 @@ def test_twins_of_half_a_wire_are_the_wire(way: str) -> None:
     check("wire [m]", seen["wire_height"], expected["wire_height"], within=1e-8)
     pairs = seen["dropper_force"].reshape(len(seen.time), -1, 2).sum(axis=2)
     check("dropper forces [N]", pairs, expected["dropper_force"], within=close)
+
+
+LEVER = Strips(2, 0.5, 1.6, Suspension(1.0, 8000.0, 10.0), Turning(0.4, 300.0, 0.5))
+BENDING = replace(LEVER, flexure=Flexure(600.0, 0.9, 2))
+
+
+@pytest.mark.parametrize("strips", [Strips(2, 0.5), LEVER, BENDING], ids=["fixed", "lever", "bend"])
+def test_two_strips_under_twins_of_half_a_wire_are_two_strips_under_the_wire(
+    strips: Strips,
+) -> None:
+    """Four contacts: fixed strips, strips at both ends of a lever that pitches, strips that bend.
+
+    The twins stand where the one wire does and share the force of each strip alike.
+    """
+    data = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0), strips)
+
+    def with_strips(line: Any, **given: Any) -> Problem:
+        names = WHOLE | {"flexible_strips"}
+        made = problem_on(line, **given)
+        (place,) = made.train.placements
+        place = replace(place, data=data)
+        ours = replace(made.train, placements=(place,))
+        return replace(made, train=ours, effects=made.effects | (names & {"flexible_strips"}))
+
+    whole = with_strips(one_wire())
+    halves = with_strips(twins(0.5), contact=LinearLaw(0.5 * STIFFNESS, 0.0))
+    forces = []
+    for one in (whole, halves):
+        kept: list[np.ndarray] = []
+        march(one, mesh_of(one.line, 2), lambda view, kept=kept: kept.append(
+            np.concatenate([view.strip_force, view.contact_wire_force])
+        ))  # fmt: skip
+        forces.append(np.array(kept))
+    expected, of_strips, of_wires = forces[0], forces[1][:, :2], forces[1][:, 2:]
+    assert (expected == 0.0).any() and (expected > 0.0).any(axis=0).all()
+    largest = expected.max()
+    check("force of each strip [N]", of_strips, expected, within=1e-8 * largest)
+    total = of_strips.sum(axis=1)
+    check("sum of wires [N]", of_wires.sum(axis=1), total, within=1e-9 * largest)
 
 
 def in_dense(problem: Problem, mesh: LineMesh, seen: History) -> tuple[DenseLine, np.ndarray]:

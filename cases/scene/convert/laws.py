@@ -24,7 +24,7 @@ def laws_of(tables: Sequence[LawTable], n_masses: int) -> tuple[Law, ...]:
 
 
 def _law(table: LawTable, n: int) -> Law:
-    mass = (n if table.mass is None else table.mass) - 1
+    mass = (n if table.at_mass is None else table.at_mass) - 1
     if isinstance(table, LimiterTable):
         pairs = table.force_by_rise
         if pairs is None:

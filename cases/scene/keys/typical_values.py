@@ -62,6 +62,9 @@ TYPICAL: dict[str, str] = {
     "pantographs.*.stiffnesses_N_per_m": "[4200, 50] for two masses (EN 50318)",
     "pantographs.*.dampings_N_s_per_m": "[10, 90] for two masses (EN 50318)",
     "pantographs.*.strips.length_m": "0.8 to 1.2",
+    "pantographs.*.strips.flexure.bending_stiffness_N_m2": (
+        "of a carbon strip on its holder some hundreds to some thousands"
+    ),
     "train.speed_km_h": "below 0.7 of the contact wire's wave speed",
     "train.start_m": "two spans after the start of the line",
     "evaluation.from_m": "after the run-in, where a span begins",

@@ -20,10 +20,13 @@ def check_laws(scene: Scene) -> Iterator[Fault]:
         lumped = isinstance(table, LumpedTable)
         n = len(table.masses_kg) if isinstance(table, LumpedTable) else 2
         for number, law in enumerate(table.laws):
-            if law.mass is not None and law.mass > n:
+            if law.at_mass is not None and law.at_mass > n:
                 has = f"{n} masses" if lumped else "2, the head and the arm"
                 yield refusal(
-                    scene.origin, f"{key}.laws.{number}.mass", law.mass, f"the pantograph has {has}"
+                    scene.origin,
+                    f"{key}.laws.{number}.at_mass",
+                    law.at_mass,
+                    f"the pantograph has {has}",
                 )
         whole = not isinstance(table, LumpedTable) and table.motion == "all_bodies"
         for part, given in (("laws", table.laws), ("regulation", table.regulation)):

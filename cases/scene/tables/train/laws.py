@@ -42,7 +42,7 @@ Pushing = Annotated[Rising, AfterValidator(_pushing)]
 
 
 class _Law(Table):
-    mass: int | None = Field(
+    at_mass: int | None = Field(
         None, ge=1, le=20, description="which mass it holds, 1 is the head; the last one if absent"
     )
 
