@@ -220,7 +220,7 @@ def test_an_effect_that_a_scene_refuses_to_leave_out_is_told() -> None:
         (["--json"], "--json belongs to plan --cost"),
         (["--cost", "--only", "vertical"], "--only vertical: it is part of every scene"),
         (["--cost", "--only", "pre_sag"], "the scene has no data for it: line.dropper.pre_sag_mm"),
-        (["--cost", "--only", "wind"], "--only wind is no effect; there are gravity"),
+        (["--cost", "--only", "nothing"], "--only nothing is no effect; there are gravity"),
         (["--cost", "--rounds", "0"], "--rounds 0 must be between 1 and 1000"),
         (["--cost", "--stretch-m", "0"], "--stretch-m 0 must be between 1 and 1e+07"),
         (["--cost", "--tolerance", "x"], "--tolerance x must be a percentage"),
