@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from catenary.mbs.control.control_kernels import (
+from catenary.mbs.control.control_arrays import (
     DT,
     HEIGHT,
     LEAST,

@@ -16,8 +16,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.optimize import brentq
 
 # Points of the tables of modes along half a wave of the highest one.
 _POINTS_A_WAVE = 100
@@ -77,6 +75,8 @@ def shapes(n_modes: int, length: float, places: np.ndarray) -> np.ndarray:
 
 def mode_tables(n_modes: int, length: float) -> ModeTables:
     """The shapes as tables over the whole strip."""
+    from scipy.interpolate import CubicSpline  # not loaded for strips that are rigid
+
     places = np.linspace(-0.5 * length, 0.5 * length, _POINTS_A_WAVE * (n_modes + 1) + 1)
     spline = CubicSpline(places, shapes(n_modes, length, places).T)
     return ModeTables(places, np.ascontiguousarray(np.moveaxis(spline.c, 0, 2)))
@@ -85,5 +85,7 @@ def mode_tables(n_modes: int, length: float) -> ModeTables:
 @lru_cache(maxsize=32)
 def _root(number: int) -> float:
     """Of cosh(b) cos(b) = 1, the first being 4.73."""
+    from scipy.optimize import brentq  # not loaded for strips that are rigid
+
     near = (number + 1.5) * np.pi
     return float(brentq(lambda b: np.cos(b) - 1.0 / np.cosh(b), near - 0.2, near + 0.2, xtol=1e-13))

@@ -179,7 +179,7 @@ def table_at(breaks, coefficients, x, values, slopes):
 def raising_step(raised, laws, newmark, head, drive, added):
     """Step a head over a mechanism without contact, with a row ``drive`` (N_DRIVE,).
 
-    ``laws`` are `law_kernels.LawArrays`, of none or some; ``added`` [N] is what a controller adds
+    ``laws`` are `laws.LawArrays`, of none or some; ``added`` [N] is what a controller adds
     to the static force.
 
     Returns the height of the mechanism at which its tables were taken [m].

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from catenary.mbs.control import control_kernels
-from catenary.mbs.control.control_kernels import ACTING, N_SETTINGS, ControlArrays
+from catenary.mbs.control.control_arrays import ACTING, N_SETTINGS, ControlArrays
 from catenary.mbs.head import head_kernels
 from catenary.mbs.head.flexure import ModeTables
 from catenary.mbs.head.head_kernels import (
@@ -23,7 +23,7 @@ from catenary.mbs.head.head_kernels import (
     NewmarkFactors,
     RaisedHead,
 )
-from catenary.mbs.head.law_kernels import LawArrays
+from catenary.mbs.head.laws import LawArrays
 from catenary.solver.base.compiled import in_line
 from catenary.solver.base.pointers import address_of, cube_at, numbers_at, table_at_address
 

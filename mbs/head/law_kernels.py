@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from catenary.solver.base.compiled import compiled
@@ -11,29 +9,6 @@ from catenary.solver.base.inverse import invert
 
 # Segments of tables mostly settle in two rounds; what goes round in circles is left there.
 _MAX_ROUNDS = 20
-
-
-class LawArrays(NamedTuple):
-    """m laws on n coordinates; a law's extension is way @ coordinates + part * base - zero.
-
-    Attributes
-    ----------
-    ways : (m, n)
-    of_rate : (m,) 1 for forces over the rate of the extension
-    by_base, zero : (m,) part of the base's height; where extensions count from [m]
-    first_point : (m + 1,) number of the first point of each law
-    points, forces : (k,) of all laws [m] or [m/s], [N]
-    pressed : (s,) contact forces of the latest step [N]
-    """
-
-    ways: np.ndarray
-    of_rate: np.ndarray
-    by_base: np.ndarray
-    zero: np.ndarray
-    first_point: np.ndarray
-    points: np.ndarray
-    forces: np.ndarray
-    pressed: np.ndarray
 
 
 @compiled

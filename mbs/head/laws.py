@@ -8,11 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-
-from catenary.mbs.head.law_kernels import LawArrays
 
 
 @dataclass(frozen=True)
@@ -53,6 +51,29 @@ class Law:
     def _segment(self, x: float) -> int:
         i = int(np.searchsorted(self.points, x, side="right")) - 1
         return min(max(i, 0), len(self.points) - 2)
+
+
+class LawArrays(NamedTuple):
+    """m laws on n coordinates; a law's extension is way @ coordinates + part * base - zero.
+
+    Attributes
+    ----------
+    ways : (m, n)
+    of_rate : (m,) 1 for forces over the rate of the extension
+    by_base, zero : (m,) part of the base's height; where extensions count from [m]
+    first_point : (m + 1,) number of the first point of each law
+    points, forces : (k,) of all laws [m] or [m/s], [N]
+    pressed : (s,) contact forces of the latest step [N]
+    """
+
+    ways: np.ndarray
+    of_rate: np.ndarray
+    by_base: np.ndarray
+    zero: np.ndarray
+    first_point: np.ndarray
+    points: np.ndarray
+    forces: np.ndarray
+    pressed: np.ndarray
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from catenary.mbs.control import control_kernels
-from catenary.mbs.control.control_kernels import ACTING, ControlArrays
+from catenary.mbs.control.control_arrays import ACTING, ControlArrays
 from catenary.mbs.control.regulation import Controller, Regulation, Regulator
 from catenary.mbs.head import head_kernels
 from catenary.mbs.head.head_kernels import N_DRIVE, HeadArrays, NewmarkFactors

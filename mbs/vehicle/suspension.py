@@ -24,10 +24,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy import signal
+
+if TYPE_CHECKING:
+    from scipy import signal
 
 GRAVITY = 9.81
 # Steps of a wave of the fastest own motion, where a course of the track is followed in time, and
@@ -160,6 +162,8 @@ def roof_course(
         ],
         axis=1,
     )
+    from scipy import signal  # not loaded for vehicles without suspension
+
     # The vehicle begins at rest on a track of the first height, which is none of its motion.
     rest = values[0]
     _, motion, _ = signal.lsim(system, track - rest, step / speed * np.arange(n))
@@ -168,6 +172,8 @@ def roof_course(
 
 def _in_time(found: Matrices) -> signal.StateSpace:
     """The equations with u alone: velocities are counted without what u' gives them."""
+    from scipy import signal
+
     n = len(found.mass)
     inverse = np.linalg.inv(found.mass)
     stiffness, damping = inverse @ found.stiffness, inverse @ found.damping

@@ -17,7 +17,7 @@ from catenary.solver.model.lateral_shape import LateralShape
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.statics.sparse_sum import clamp_parts, springs_between, summed, wire_parts
-from catenary.solver.wind.drag import mean_load
+from catenary.solver.wind.mean_wind import mean_load
 
 # An arm that hangs freely carries its weight up to this inclination, the wire what is beyond [rad].
 STEEPEST = np.deg2rad(20.0)

@@ -1,4 +1,4 @@
-"""Drag of wires in the wind: mean load, gusts, aerodynamic damping.
+"""Drag of wires in the wind: gusts and aerodynamic damping; `mean_wind` has the mean load.
 
 A wire of diameter d is met by the wind across it, q = (W_y - v', W_z - w') less its own velocity,
 with the force 1/2 rho d C_d |q| q per length (J. Dyrbye, S. O. Hansen, Wind Loads on Structures).
@@ -13,44 +13,20 @@ and without linearisation about the mean the gusts' part is 1/2 rho d C_d (|q| q
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
 
-from catenary.mbs.air.airflow import Tunnel
 from catenary.solver.model import elements
 from catenary.solver.model.loads import FieldLoad, along
 from catenary.solver.model.model import Block, Model, wire_elements
 from catenary.solver.problem.wind import Wind
 from catenary.solver.wind.gust_field import GustField
-from catenary.solver.wind.mean_wind import directions, exposure
+from catenary.solver.wind.mean_wind import across_at, directions, drag_width, exposure
 from catenary.solver.wind.spectra import UPWARD
 from catenary.solver.wind.wind_at import gust_points, horizontal_gusts
 
-if TYPE_CHECKING:
-    from catenary.meshgen.wires import Wire
-
 VERTICAL, LATERAL = ("w", "theta_y"), ("v", "theta_z")
-
-
-def across_at(wind: Wind, tunnels: tuple[Tunnel, ...], places: np.ndarray) -> np.ndarray:
-    """Mean wind to the left of the track at places [m/s], shape as ``places``."""
-    return directions(wind)[1] * wind.mean * exposure(wind, places, tunnels)
-
-
-def mean_load(
-    wind: Wind, tunnels: tuple[Tunnel, ...], wire: Wire, places: np.ndarray
-) -> np.ndarray:
-    """Mean lateral load on a wire at places [N/m], shape as ``places``; to the left positive."""
-    speed = across_at(wind, tunnels, places)
-    return np.asarray(0.5 * wind.density * drag_width(wire) * np.abs(speed) * speed)
-
-
-def drag_width(wire: Wire) -> float:
-    """Diameter times drag coefficient of a wire [m]."""
-    assert wire.diameter is not None  # check_wind has refused scenes without
-    return wire.diameter * wire.drag_coefficient
 
 
 def planes_of(model: Model, wire: str) -> tuple[tuple[str, str], ...]:

@@ -1,4 +1,4 @@
-"""The mean wind along a line: exposure by place, parts with the train and across the track."""
+"""The mean wind along a line: exposure by place, parts along and across, load on wires."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from catenary.mbs.air.airflow import Tunnel
+from catenary.meshgen.wires import Wire
 from catenary.solver.problem.wind import Wind
 
 
@@ -31,3 +32,22 @@ def directions(wind: Wind) -> tuple[float, float]:
     along, across = math.cos(wind.direction), math.sin(wind.direction)
     # Of a wind straight across nothing is left along the track but round-off, and so the other way.
     return (0.0 if abs(along) < 1e-12 else along), (0.0 if abs(across) < 1e-12 else across)
+
+
+def across_at(wind: Wind, tunnels: tuple[Tunnel, ...], places: np.ndarray) -> np.ndarray:
+    """Mean wind to the left of the track at places [m/s], shape as ``places``."""
+    return directions(wind)[1] * wind.mean * exposure(wind, places, tunnels)
+
+
+def mean_load(
+    wind: Wind, tunnels: tuple[Tunnel, ...], wire: Wire, places: np.ndarray
+) -> np.ndarray:
+    """Mean lateral load on a wire at places [N/m], shape as ``places``; to the left positive."""
+    speed = across_at(wind, tunnels, places)
+    return np.asarray(0.5 * wind.density * drag_width(wire) * np.abs(speed) * speed)
+
+
+def drag_width(wire: Wire) -> float:
+    """Diameter times drag coefficient of a wire [m]."""
+    assert wire.diameter is not None  # check_wind has refused scenes without
+    return wire.diameter * wire.drag_coefficient

@@ -135,7 +135,8 @@ def test_plan_names_all_effects_and_the_size(case: str) -> None:
     for name, effect in effects.registry().items():
         assert (f"\n  {name} " in simulated) != (f"\n  {name} " in left_out)
         assert effect.title in result.stdout
-    assert "nodes x 2 (w, theta_y)" in simulated
+    sideways = ", v, theta_z" if load_scene(case).switches()["lateral_motion"] else ""
+    assert f"nodes x {4 if sideways else 2} (w, theta_y{sideways})" in simulated
     assert "real-time factor" in simulated
 
 

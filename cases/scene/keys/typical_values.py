@@ -41,6 +41,7 @@ TYPICAL: dict[str, str] = {
     "wind.roughness_length_m": "0.003 (sea), 0.05 (open country), 0.3 (suburbs)",
     "wind.gusts.turbulence_intensity": "0.1 to 0.25",
     "wind.gusts.decay": "7 to 16",
+    "line.curve.radius_m": "3000 to 7000 at 200 to 300 km/h, 300 and less on tramways",
     "line.tunnels.*.from_m": "where the train enters it",
     "line.tunnels.*.to_m": "where the train leaves it",
     "line.tunnels.*.force_factor": "1.2 to 2, by the tunnel's cross-section (assumed)",

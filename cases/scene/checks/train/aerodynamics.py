@@ -46,12 +46,12 @@ def check_uplift(scene: Scene) -> Iterator[Fault]:
     """Air that presses a pantograph down by more than its static force. Mechanisms are sound."""
     if not scene.switches()["pantograph_aerodynamics"]:
         return
-    from catenary.mbs.build import steady_forces
-
     speed = scene.train.speed_km_h
     for name, turned in dict.fromkeys((p.name, p.reversed) for p in scene.train.pantographs):
         if not _meets_air(scene, name):
             continue
+        from catenary.mbs.build import steady_forces  # loads the compiled loops of all models
+
         table = scene.pantographs[name]
         data = pantograph_of(name, table, speed, reversed=turned)
         lifted, force = (
