@@ -27,12 +27,21 @@ if TYPE_CHECKING:
     from catenary.meshgen.mesh import LineMesh
 
 
+# Why an effect without data is left out; the keys that would give it some follow.
+_NO_DATA = "the scene has no data for it: "
+
+
 class EffectRow(NamedTuple):
     """An effect and why it is, or is not, part of a run."""
 
     name: str
     title: str
     reason: str
+
+    @property
+    def needs(self) -> str:
+        """Keys that would give it data; empty if it has some."""
+        return self.reason.removeprefix(_NO_DATA) if self.reason.startswith(_NO_DATA) else ""
 
 
 @dataclass(frozen=True)
@@ -115,16 +124,16 @@ def effect_rows(scene: Scene, problem: Problem) -> tuple[list[EffectRow], list[E
                 reason = "asked for by the scene" if name in scene.effects else "default"
             on.append(EffectRow(name, effect.title, reason))
         else:
-            off.append(EffectRow(name, effect.title, _why_off(scene, problem, effect)))
+            off.append(_left_out(scene, problem, effect))
     return on, off
 
 
-def _why_off(scene: Scene, problem: Problem, effect: Effect) -> str:
+def _left_out(scene: Scene, problem: Problem, effect: Effect) -> EffectRow:
     if scene.effects.get(effect.name) is False:
-        return "left out by the scene"
+        return EffectRow(effect.name, effect.title, "left out by the scene")
     if effect.applies(problem):
-        return "off unless the scene asks for it"
-    return "the scene has no data for it" + (f": {effect.data}" if effect.data else "")
+        return EffectRow(effect.name, effect.title, "off unless the scene asks for it")
+    return EffectRow(effect.name, effect.title, _NO_DATA + effect.data)
 
 
 def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
@@ -263,7 +272,13 @@ def plan_text(plan: Plan) -> str:
     lines += [f"  {label:10} {text}" for label, text in rows]
     lines += [""] * bool(plan.warnings) + [f"  WARNING    {text}" for text in plan.warnings]
     lines += ["", "Simulated:", *_effect_lines(plan.on)]
-    lines += ["", "Not simulated:", *_effect_lines(plan.off)]
+    able = [row for row in plan.off if not row.needs]
+    unable = [row for row in plan.off if row.needs]
+    lines += ["", "Not simulated:", *_effect_lines(able)]
+    if unable:
+        width = max(len(row.name) for row in unable)
+        lines += ["", "Not simulated, since the scene has no data for it; what gives it data:"]
+        lines += [f"  {row.name:{width}}  {row.title}: {row.needs}" for row in unable]
     return "\n".join(lines)
 
 

@@ -63,6 +63,8 @@ def as_text(found: Costs) -> str:
                 )
     lines += ["", "Advice:"]
     lines += [f"  {row.switch.name:{width}}  {sentence(found, row)}" for row in found.rows]
+    if found.wish.only:
+        return "\n".join(lines)
     if found.choice.always:
         lines += ["", f"Part of every scene: {', '.join(found.choice.always)}."]
     if found.choice.lacking:
