@@ -101,6 +101,8 @@ def _sample(scene: Scene, lengths: tuple[float, ...]) -> tuple[Line, np.ndarray]
         "n_spans": len(spans),
         "span_m": spans,
         "transition": TransitionTable(),
+        "stagger_m": [0.0],
+        "messenger_stagger_m": None,
     }
     if table.overlap is not None:
         overlap = table.overlap.model_copy(update={"first_span": 2 + len(inner)})
