@@ -33,8 +33,8 @@ endif
 .DEFAULT_GOAL := help
 # The targets share .venv and two cores: one after the other, also under make -j.
 .NOTPARALLEL:
-.PHONY: help setup setup-newest compile update-versions run check test test-unit test-verification test-mpi \
-    test-regression bench long-runs fuzz test-paraview lint types format clean
+.PHONY: help setup setup-newest compile update-versions run check test test-studies test-unit \
+    test-verification test-regression test-mpi bench long-runs fuzz test-paraview lint types format clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -66,9 +66,12 @@ BESIDE_LINT = @mkdir -p build; $(MAKE) --no-print-directory lint >build/lint.log
 check: setup ## lint, and the unit tests that start no process; under a minute
 	$(call BESIDE_LINT,$(PYTEST_SHARED) -q -m "not process" tests/unit)
 
-test: setup ## lint and all tests, as CI runs them
-	$(call BESIDE_LINT,$(PYTEST_SHARED) tests/regression tests/verification tests/unit)
+test: setup ## lint and tests, also on several ranks
+	$(call BESIDE_LINT,$(PYTEST_SHARED) -m "not study" tests/regression tests/verification tests/unit)
 	@$(MAKE) --no-print-directory test-mpi
+
+test-studies: setup ## whole studies: hard cases, maps of stability, what accuracy costs, the paper's study
+	$(PYTEST_SHARED) -m study tests/regression tests/verification
 
 test-unit: setup ## tests of single parts
 	$(PYTEST_SHARED) tests/unit

@@ -10,6 +10,8 @@ import pytest
 from measuring import check
 from program import catenary
 
+pytestmark = pytest.mark.study
+
 CASE = "en50318_2002"
 AXES = "dt,grid,scheme,dropper"
 # Six spans less than the case's short form has; two are evaluated.

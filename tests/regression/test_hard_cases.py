@@ -12,6 +12,8 @@ from program import MPIRUN, catenary
 from catenary.cases.studies.hard.cases import HardCase, hard_cases
 from catenary.cases.studies.hard.checks import check_case
 
+pytestmark = pytest.mark.study
+
 # What the parallel solve and the coupling meet: stiff contact, several heads, switches at a cut,
 # lines that change on the way.
 IN_PARALLEL = (

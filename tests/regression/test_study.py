@@ -13,6 +13,8 @@ from program import catenary
 
 from catenary.postproc.read.results import Results
 
+pytestmark = pytest.mark.study
+
 # Coarse: what is tested is the study, not its figures.
 COARSE = ("mesh.elements_per_gap=2", "numerics.dt_s=0.002")
 

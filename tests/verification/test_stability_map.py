@@ -20,6 +20,8 @@ from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.line_at_rest import line_at_rest
 
+pytestmark = pytest.mark.study
+
 GRID = ((1e5, 0.5), (1e5, 8.0), (1e7, 2.0))
 NEWMARK = (0.25, 0.5)
 
