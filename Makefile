@@ -70,8 +70,8 @@ test: setup ## lint and tests, also on several ranks
 	$(call BESIDE_LINT,$(PYTEST_SHARED) -m "not study" tests/regression tests/verification tests/unit)
 	@$(MAKE) --no-print-directory test-mpi
 
-test-studies: setup ## whole studies: hard cases, maps of stability, what accuracy costs, the paper's study
-	$(PYTEST_SHARED) -m study tests/regression tests/verification
+test-studies: setup ## whole studies: hard cases, stability, accuracy, waves, the paper's; random topologies
+	$(PYTEST_SHARED) -m study tests/regression tests/verification tests/unit
 
 test-unit: setup ## tests of single parts
 	$(PYTEST_SHARED) tests/unit

@@ -109,6 +109,7 @@ def test_wide_scenes_run_or_say_why_not(seeds: range) -> None:
 
 @pytest.mark.skipif(WORLD.size > 1, reason="processes of their own: test_fuzz_processes")
 @pytest.mark.parametrize("seeds", TOPOLOGIES, ids=str)
+@pytest.mark.study
 def test_scenes_of_any_topology_run_or_say_why_not(seeds: range) -> None:
     """Wires, clamps and sections in any combination: done, or one sentence."""
     ends = {"done": 0, "slack at rest": 0, "stopped": 0, "refused": 0}

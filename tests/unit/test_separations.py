@@ -16,6 +16,8 @@ from catenary.cases.studies.waves.theory import WaveTheory
 from catenary.solver.base.errors import InputError
 from catenary.solver.waves.bloch import BlochWaves
 
+pytestmark = pytest.mark.study
+
 SPEED, WAVES, SPAN = 80.0, 120.0, 50.0
 BAND = (1.0, 1.25)
 

@@ -14,6 +14,8 @@ from catenary.cases.studies.waves.study import as_rows
 from catenary.cases.studies.waves.theory import MOST_SPEEDS, WaveTheory
 from catenary.solver.waves.bloch import BlochWaves
 
+pytestmark = pytest.mark.study
+
 SPEED = 40.0
 
 

@@ -23,6 +23,8 @@ from catenary.meshgen.wires import Conductor
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.waves.scattering import answer, change_of_wire, scattered
 
+pytestmark = pytest.mark.study
+
 HZ = np.array([2.0, 10.0, 20.0])
 OMEGA = 2 * np.pi * HZ
 STRING = Conductor(20e3, 1.35, 0.0)
