@@ -6,10 +6,9 @@ itself.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from mpi4py import MPI
+from rank_histories import Watching
 
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
@@ -17,7 +16,6 @@ from catenary.cases.scene.load import load_scene
 from catenary.solver.base.parallel import on_root
 from catenary.solver.statics.line_at_rest import line_at_rest_on_all
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
 
 WORLD = MPI.COMM_WORLD
 # See test_same_answers.py.
@@ -41,26 +39,6 @@ SCENE = (
     "line.fittings=[{kind='splice',at_m=209.4,mass_kg=1.2}]",
     "incidents=[{type='dropper_break',at_s=0.45,span=4,dropper=9}]",
 )
-
-
-class Watching:
-    """Keeps forces and energies of each state, and the checkpoint of one."""
-
-    def __init__(self, kept: int = -1) -> None:
-        self._kept = kept
-        self.checkpoint: dict[str, Any] | None = None
-        self.rows: list[np.ndarray] = []
-
-    def start(self, stage: Stage) -> None:
-        """Nothing is needed."""
-
-    def observe(self, view: StepView) -> None:
-        self.rows.append(np.array([*view.contact_force, *view.energies()]))
-        if view.step == self._kept:
-            self.checkpoint = WORLD.bcast(view.checkpoint())
-
-    def finish(self, outcome: str) -> None:
-        assert outcome == "done"
 
 
 def test_defects_on_all_ranks_and_after_a_restart() -> None:

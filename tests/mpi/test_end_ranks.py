@@ -6,11 +6,10 @@ itself.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 from mpi4py import MPI
+from rank_histories import Watching
 
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
@@ -18,7 +17,6 @@ from catenary.cases.scene.load import load_scene
 from catenary.solver.base.parallel import on_root
 from catenary.solver.statics.line_at_rest import line_at_rest_on_all
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
 
 WORLD = MPI.COMM_WORLD
 # See test_same_answers.py.
@@ -37,25 +35,6 @@ SCENE = (
 KEPT = 300
 
 
-class Watching:
-    """Keeps forces and energies of each state, and the checkpoint of one."""
-
-    def __init__(self) -> None:
-        self.checkpoint: dict[str, Any] | None = None
-        self.rows: list[np.ndarray] = []
-
-    def start(self, stage: Stage) -> None:
-        """Nothing is needed."""
-
-    def observe(self, view: StepView) -> None:
-        self.rows.append(np.array([*view.contact_force, *view.energies()]))
-        if view.step == KEPT:
-            self.checkpoint = WORLD.bcast(view.checkpoint())
-
-    def finish(self, outcome: str) -> None:
-        assert outcome == "done"
-
-
 # Long elements make the overlap of ranks long: several solve for what stands at an end.
 @pytest.mark.parametrize("elements", [1, 4])
 def test_ends_go_on_the_same_on_all_ranks(elements: int) -> None:
@@ -65,11 +44,11 @@ def test_ends_go_on_the_same_on_all_ranks(elements: int) -> None:
     rest = line_at_rest_on_all(problem, mesh, WORLD)
     found = []
     for comm in (MPI.COMM_SELF, WORLD):
-        watching = Watching()
+        watching = Watching(KEPT)
         with March(comm, *rest) as march:
             march.run([watching])
         found.append(watching)
-    again = Watching()
+    again = Watching(KEPT)
     with March(WORLD, *rest) as march:
         assert found[0].checkpoint is not None  # of one rank
         march.restore(found[0].checkpoint)

@@ -6,11 +6,10 @@ itself.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from measuring import registered
 from mpi4py import MPI
+from rank_histories import Watching
 
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
@@ -23,7 +22,6 @@ from catenary.solver.model.loads import FieldLoad, FunctionLoad, ShapeLoad, alon
 from catenary.solver.problem.incidents import DropperBreak
 from catenary.solver.statics.line_at_rest import line_at_rest_on_all
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
 
 WORLD = MPI.COMM_WORLD
 # See test_same_answers.py.
@@ -56,26 +54,6 @@ def blow(builder: ModelBuilder) -> None:
     at = builder.model.dofs(builder.mesh.droppers[:, 1])
     pull = np.linspace(1.0, 5.0, at.size)
     builder.add_load(FunctionLoad("function", at, lambda time: pull * np.sin(30.0 * time)))
-
-
-class Watching:
-    """Keeps forces and energies of each state, and the checkpoint of one."""
-
-    def __init__(self, kept: int = -1) -> None:
-        self._kept = kept
-        self.checkpoint: dict[str, Any] | None = None
-        self.rows: list[np.ndarray] = []
-
-    def start(self, stage: Stage) -> None:
-        """Nothing is needed."""
-
-    def observe(self, view: StepView) -> None:
-        self.rows.append(np.array([*view.contact_force, *view.energies()]))
-        if view.step == self._kept:
-            self.checkpoint = WORLD.bcast(view.checkpoint())
-
-    def finish(self, outcome: str) -> None:
-        assert outcome == "done"
 
 
 def test_loads_in_time_on_all_ranks() -> None:

@@ -49,6 +49,26 @@ class Histories:
         return result if self._comm.rank == 0 else None
 
 
+class Watching:
+    """Keeps forces and energies of each state, and on all ranks the checkpoint of step ``kept``."""
+
+    def __init__(self, kept: int = -1) -> None:
+        self._kept = kept
+        self.checkpoint: dict[str, Any] | None = None
+        self.rows: list[np.ndarray] = []
+
+    def start(self, stage: Stage) -> None:
+        """Nothing is needed."""
+
+    def observe(self, view: StepView) -> None:
+        self.rows.append(np.array([*view.contact_force, *view.energies()]))
+        if view.step == self._kept:
+            self.checkpoint = MPI.COMM_WORLD.bcast(view.checkpoint())
+
+    def finish(self, outcome: str) -> None:
+        assert outcome == "done"
+
+
 def histories(comm: Any, problem: Problem, mesh: LineMesh) -> dict[str, np.ndarray] | None:
     """March a problem on ``comm`` and return its histories on rank 0. Collective."""
     march = March(comm, *line_at_rest(problem, mesh))

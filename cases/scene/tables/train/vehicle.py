@@ -6,24 +6,16 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from catenary.cases.scene.tables.table import TAKE_AWAY, Table, ascending
+from catenary.cases.scene.tables.courses import PAIR, within
+from catenary.cases.scene.tables.table import TAKE_AWAY, Table
 from catenary.mbs.vehicle.suspension import GRAVITY
 
-_PAIR = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=2, max_length=2)]
 # Farther than this no vehicle moves [m].
 MOST = 1.0
 
 
-def _course(pairs: list[list[float]]) -> list[list[float]]:
-    ascending([pair[0] for pair in pairs], "its first numbers")
-    for at, value in pairs:
-        if abs(value) > MOST:
-            raise ValueError(f"must stay within {MOST:g} m, but is {value:g} m at {at:g}")
-    return pairs
-
-
 Course = Annotated[
-    list[_PAIR], Field(min_length=4, max_length=100_000), AfterValidator(_course)
+    list[PAIR], Field(min_length=4, max_length=100_000), AfterValidator(within(MOST))
 ]  # fmt: skip
 
 
