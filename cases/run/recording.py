@@ -10,8 +10,8 @@ import numpy as np
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.channels.line_record import GZIP, NONE, LineRecord, says
-from catenary.postproc.record.field_kinds import USUAL_FIELDS
-from catenary.postproc.record.field_layout import Course, FieldRecord
+from catenary.postproc.record.snapshots.field_kinds import USUAL_FIELDS
+from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.solver.problem.problem import Problem
 from catenary.solver.time_loop import channels
 

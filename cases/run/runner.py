@@ -47,10 +47,10 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
 from catenary.postproc.files.own_files import remove_stale
-from catenary.postproc.record.blocks import RecordedLine
-from catenary.postproc.record.fields import FieldRecorder
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
+from catenary.postproc.record.snapshots.blocks import RecordedLine
+from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.base.errors import CatenaryError, RunBroken
 from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.problem import Problem

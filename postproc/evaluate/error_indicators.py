@@ -20,7 +20,7 @@ from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import covers
 from catenary.postproc.read.results import Results
 from catenary.solver.base.errors import InputError
-from catenary.solver.model import elements
+from catenary.solver.model.elements import beam
 from catenary.solver.problem.integrator_parameters import (
     AVERAGE_ACCELERATION,
     Integration,
@@ -213,8 +213,8 @@ def resolved_frequency(
     tension, bending_stiffness, mass_per_length : of the wire [N], [N m2], [kg/m]
     """
     h = np.array([length])
-    stiffness = elements.stiffness(h, bending_stiffness, tension)[0]
-    mass = elements.mass(h, mass_per_length)[0]
+    stiffness = beam.stiffness(h, bending_stiffness, tension)[0]
+    mass = beam.mass(h, mass_per_length)[0]
     numbers = np.linspace(0.0, 2.0 * np.pi / length, _WAVE_NUMBERS + 1)[1:]
     exact = np.sqrt((tension + bending_stiffness * numbers**2) / mass_per_length) * numbers
     best = 0.0

@@ -11,8 +11,8 @@ import numpy as np
 
 from catenary.postproc.files.checked import text_of
 from catenary.postproc.read.guard import survives
-from catenary.postproc.record.blocks import OTHER_PARTS
-from catenary.postproc.record.fields_file import FORMAT, PLACES, SIZES
+from catenary.postproc.record.snapshots.blocks import OTHER_PARTS
+from catenary.postproc.record.snapshots.fields_file import FORMAT, PLACES, SIZES
 from catenary.solver.base.errors import InputError
 
 FIELDS_FILE = "fields.h5"

@@ -18,7 +18,7 @@ from catenary.postproc.film.snapshots import FIELDS_FILE, Snapshots
 from catenary.postproc.paraview import scenery
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.vtkhdf import write_vtkhdf
+from catenary.postproc.record.snapshots.vtkhdf import write_vtkhdf
 from catenary.solver.base.errors import InputError
 
 SCRIPT, FOLDER = "view.py", "paraview"

@@ -16,7 +16,7 @@ from catenary.solver.integrators.state_kernels import (
     in_line,
     velocity_at,
 )
-from catenary.solver.model.shape_functions import shape_slopes, shape_values
+from catenary.solver.model.elements.shape_functions import shape_slopes, shape_values
 from catenary.solver.model.switching_links import LinkArrays
 
 # Far more than the round-off of a position, far less than an element [m].

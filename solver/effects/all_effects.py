@@ -15,7 +15,7 @@ from catenary.solver.effects import (  # noqa: F401  (registers)
     vertical_effects,
 )
 from catenary.solver.effects.effect import Effect, NamedWire, registered
-from catenary.solver.model.unknowns import Group
+from catenary.solver.model.unknowns.registry import Group
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
 

@@ -11,10 +11,10 @@ from catenary.meshgen.wires import End
 from catenary.solver.effects import vertical_effects  # noqa: F401  (built before)
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.model import axial_elements, wire_ends
-from catenary.solver.model.leaning_droppers import across_droppers
-from catenary.solver.model.links import PULLS, PUSHES, Direction, between_nodes, law
+from catenary.solver.model.links.leaning import across_droppers
+from catenary.solver.model.links.links import PULLS, PUSHES, Direction, between_nodes, law
 from catenary.solver.model.model import Block
-from catenary.solver.model.stations import SAME_STATION
+from catenary.solver.model.unknowns.stations import SAME_STATION
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from catenary.solver.effects import vertical_effects  # noqa: F401  (built before)
 from catenary.solver.effects.effect import Effect, register
-from catenary.solver.model.links import at_places
+from catenary.solver.model.links.links import at_places
 
 if TYPE_CHECKING:
     from catenary.solver.model.builder import ModelBuilder

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from catenary.mbs.roll import roll_of
 from catenary.solver.effects import target_heights
 from catenary.solver.effects.effect import Effect, Limit, register
-from catenary.solver.model.links import between_nodes, law
+from catenary.solver.model.links.links import between_nodes, law
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
 from catenary.solver.problem.problem import Problem, slowest_wave_speed

@@ -12,7 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from catenary.solver.linear.make_ups import ALIKE, Places
-from catenary.solver.model.unknowns import Unknowns
+from catenary.solver.model.unknowns.registry import Unknowns
 
 
 @dataclass(frozen=True)

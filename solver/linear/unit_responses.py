@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.model.partition import Ownership
-from catenary.solver.model.unknowns import Unknowns
+from catenary.solver.model.unknowns.registry import Unknowns
 
 # What may stand outside the windows, relative to the peak: round-off of one solve.
 _LEAK = 1e-13

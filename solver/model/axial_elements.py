@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.model import elements
+from catenary.solver.model.elements import beam
 from catenary.solver.model.model import Model, wire_elements
 
 # Slopes at rest that differ by less are one, so that like spans have like matrices [-]. What that
@@ -41,7 +41,7 @@ def strain_rows(model: Model, wire: str) -> np.ndarray:
 
 def slope_rows(length: np.ndarray, shape: np.ndarray) -> np.ndarray:
     """(1 / h) integral of z' N' dx of elements, (n, 4), of their shapes z (n, 4)."""
-    pull = elements.stiffness(length, 0.0, 1.0)
+    pull = beam.stiffness(length, 0.0, 1.0)
     return np.asarray(np.einsum("nij,nj->ni", pull, shape) / length[:, None])
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.meshgen.mesh import DROPPERS
-from catenary.solver.model import elements
-from catenary.solver.model.leaning_droppers import dropper_directions
-from catenary.solver.model.links import BOTH, PULLS, Direction, Links, law
+from catenary.solver.model.elements import beam
+from catenary.solver.model.links.leaning import dropper_directions
+from catenary.solver.model.links.links import BOTH, PULLS, Direction, Links, law
 from catenary.solver.model.loads import Load
 from catenary.solver.model.model import Block, Model, wire_elements
-from catenary.solver.model.stations import SAME_STATION
+from catenary.solver.model.unknowns.stations import SAME_STATION
 from catenary.solver.problem.problem import Problem
 
 # Displacements of a node beside its height, in which its masses move as well.
@@ -35,18 +35,18 @@ class ModelBuilder:
         tension = self.model.tension_of(wire)
         # Length and tension as one number, of which NumPy finds those that are alike.
         alike, kind = np.unique(length + 1j * tension, return_inverse=True)
-        mass = elements.mass(alike.real, data.mass_per_length)
-        stiffness = elements.stiffness(alike.real, data.bending_stiffness, alike.imag)
-        load = data.mass_per_length * elements.uniform_load(length)
+        mass = beam.mass(alike.real, data.mass_per_length)
+        stiffness = beam.stiffness(alike.real, data.bending_stiffness, alike.imag)
+        load = data.mass_per_length * beam.uniform_load(length)
         if data.worn:
             section, bending = data.left_of(self.mesh.x(self.mesh.elements(wire)))
             worn = section < 1.0
             # Each worn element is a kind of its own, after those that are alike.
             kind[worn] = alike.size + np.arange(np.count_nonzero(worn))
             own, left = length[worn], section[worn, None, None]
-            bent = elements.stiffness(own, data.bending_stiffness, 0.0)
-            pulled = elements.stiffness(own, 0.0, tension[worn])
-            mass = np.concatenate([mass, left * elements.mass(own, data.mass_per_length)])
+            bent = beam.stiffness(own, data.bending_stiffness, 0.0)
+            pulled = beam.stiffness(own, 0.0, tension[worn])
+            mass = np.concatenate([mass, left * beam.mass(own, data.mass_per_length)])
             stiffness = np.concatenate([stiffness, bending[worn, None, None] * bent + pulled])
             load *= section[:, None]
         self._add_block(wire, dofs, mass, stiffness, kind)

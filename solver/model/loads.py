@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from catenary.solver.model import elements
+from catenary.solver.model.elements import beam
 from catenary.solver.model.model import Model, wire_elements
 
 CONSTANT, TABLE, HARMONICS = range(3)
@@ -152,7 +152,7 @@ def along(
     number = np.empty(model.mesh.n_nodes, dtype=np.int64)
     number[nodes] = np.arange(nodes.size)
     rows, row_of = np.unique(dofs, return_inverse=True)
-    forces = elements.linear_load(length)
+    forces = beam.linear_load(length)
     at = np.broadcast_to(row_of.reshape(dofs.shape)[:, :, None], forces.shape)
     column = np.broadcast_to(number[model.mesh.elements(wire)][:, None, :], forces.shape)
     weights = sparse.coo_matrix(

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.model.links import BOTH, PUSHES, Links
+from catenary.solver.model.links.links import BOTH, PUSHES, Links
 from catenary.solver.model.model import Model
 
 # Reserve at rest [N] and what it gains from stretch [N/m] and its rate [N s/m], as long as the link

@@ -22,9 +22,9 @@ from catenary.mbs.head.newmark_head import raised
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.contact.air_around import airflow
 from catenary.solver.integrators.line_loads import LineLoads
+from catenary.solver.model.elements.shape_functions import shape_slopes, shape_values
 from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model
-from catenary.solver.model.shape_functions import shape_slopes, shape_values
 from catenary.solver.model.switching_links import switching_links
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Placement, Problem

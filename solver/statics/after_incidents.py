@@ -33,9 +33,9 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.step_operators import LineOperators
 from catenary.solver.linear.unit_responses import Windows
-from catenary.solver.model import elements
+from catenary.solver.model.elements import beam
 from catenary.solver.model.entries import iterate_entries
-from catenary.solver.model.links import Direction
+from catenary.solver.model.links.links import Direction
 from catenary.solver.model.loads import ShapeLoad
 from catenary.solver.model.model import Model, wire_elements
 from catenary.solver.model.partition import Ownership
@@ -86,7 +86,7 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
         for plane, course, slope in form.planes():
             dofs, length = wire_elements(first, wire.name, plane)
             shape = np.stack([course[pairs], slope[pairs]], axis=2).reshape(-1, 4)
-            pull = np.einsum("nij,nj->ni", elements.stiffness(length, 0.0, lost), shape)
+            pull = np.einsum("nij,nj->ni", beam.stiffness(length, 0.0, lost), shape)
             np.add.at(load, dofs, -pull)
             energy += 0.5 * float((shape * pull).sum())
     rest = form.dropper_force[broken]

@@ -25,9 +25,10 @@ from scipy.sparse import linalg as sparse_linalg
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.effects.build_model import build
-from catenary.solver.model import axial_elements, elements
+from catenary.solver.model import axial_elements
+from catenary.solver.model.elements import beam
 from catenary.solver.model.model import Model, wire_elements
-from catenary.solver.model.rest_shape import Equilibrium
+from catenary.solver.model.rest.rest_shape import Equilibrium
 from catenary.solver.problem.problem import Problem
 
 # Passes in which all switch at once, before one at a time does.
@@ -139,8 +140,8 @@ def _by_wires(cut: Model, model: Model, form: Equilibrium) -> np.ndarray:
         bending = now.left_of(ends)[1] - before.left_of(ends)[1]
         for plane, course, slope in form.planes():
             dofs, length = wire_elements(model, now.name, plane)
-            bent = elements.stiffness(length, now.bending_stiffness, 0.0)
-            matrices = elements.stiffness(length, 0.0, tension)
+            bent = beam.stiffness(length, now.bending_stiffness, 0.0)
+            matrices = beam.stiffness(length, 0.0, tension)
             matrices += bending[:, None, None] * bent
             shape = np.stack([course[pairs], slope[pairs]], axis=2).reshape(-1, 4)
             np.add.at(result, dofs, np.einsum("nij,nj->ni", matrices, shape))

@@ -15,10 +15,10 @@ from scipy.sparse import linalg as sparse_linalg
 from catenary.meshgen.wires import Wire
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects.build_model import build
-from catenary.solver.model import elements
 from catenary.solver.model.axial_elements import slope_rows, unknowns_along
+from catenary.solver.model.elements import beam
 from catenary.solver.model.model import Block, Model
-from catenary.solver.model.rest_shape import Equilibrium
+from catenary.solver.model.rest.rest_shape import Equilibrium
 from catenary.solver.model.wire_ends import WireEnd, tensioned_ends
 
 # Displacements change by less than this where Newton's method ends [m].
@@ -209,7 +209,7 @@ class _WarmWire:
         shape = np.stack([installed.height[pairs], installed.slope[pairs]], axis=2)
         self._shape = shape.reshape(-1, 4)
         self._tension = wire.tension_at(model.mesh.x(pairs).mean(axis=1))
-        self._bending = elements.stiffness(self._length, wire.bending_stiffness, 0.0)
+        self._bending = beam.stiffness(self._length, wire.bending_stiffness, 0.0)
 
     def gained(self, moved: np.ndarray) -> np.ndarray:
         """Tension of each element beside that of the installation [N]."""

@@ -11,7 +11,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 from catenary.meshgen.spans import Spans
 from catenary.meshgen.wires import Role
-from catenary.solver.model.links import Direction, at_nodes, at_places
+from catenary.solver.model.links.links import Direction, at_nodes, at_places
 from catenary.solver.model.matrices import part_of
 from catenary.solver.model.model import Model
 

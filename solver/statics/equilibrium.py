@@ -21,9 +21,9 @@ from catenary.meshgen.wires import Wire
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
-from catenary.solver.model.lateral_shape import LateralShape
 from catenary.solver.model.model import Model
-from catenary.solver.model.rest_shape import Equilibrium as Equilibrium
+from catenary.solver.model.rest.lateral_shape import LateralShape
+from catenary.solver.model.rest.rest_shape import Equilibrium as Equilibrium
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.as_hung import hang
 from catenary.solver.statics.at_temperature import at_temperature

@@ -12,10 +12,10 @@ from scipy.sparse import linalg as sparse_linalg
 
 from catenary.meshgen.hardware import SteadyArms
 from catenary.solver.base.errors import InputError
-from catenary.solver.model import elements
-from catenary.solver.model.lateral_shape import LateralShape
+from catenary.solver.model.elements import beam
 from catenary.solver.model.model import Model
-from catenary.solver.model.rest_shape import Equilibrium
+from catenary.solver.model.rest.lateral_shape import LateralShape
+from catenary.solver.model.rest.rest_shape import Equilibrium
 from catenary.solver.statics.sparse_sum import clamp_parts, springs_between, summed, wire_parts
 from catenary.solver.wind.mean_wind import mean_load
 
@@ -80,7 +80,7 @@ def _sideways_load(model: Model, at: np.ndarray) -> np.ndarray:
         dofs = np.stack(
             [at[pairs[:, 0]], at[pairs[:, 0]] + 1, at[pairs[:, 1]], at[pairs[:, 1]] + 1]
         )
-        np.add.at(load, dofs, (pull[:, None] * elements.uniform_load(length)).T)
+        np.add.at(load, dofs, (pull[:, None] * beam.uniform_load(length)).T)
     if line.curve is None:
         return load
     every = np.arange(mesh.n_nodes)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from catenary.solver.model import elements
+from catenary.solver.model.elements import beam
 from catenary.solver.model.model import Model
 
 # Unknowns (n, m) of n elements, and their matrices (n, m, m).
@@ -21,7 +21,7 @@ def wire_parts(model: Model, at: np.ndarray) -> list[Part]:
         length = mesh.x(second) - mesh.x(first)
         dofs = np.stack([at[first], at[first] + 1, at[second], at[second] + 1], axis=1)
         tension = wire.tension_at(0.5 * (mesh.x(first) + mesh.x(second)))
-        parts.append((dofs, elements.stiffness(length, wire.bending_stiffness, tension)))
+        parts.append((dofs, beam.stiffness(length, wire.bending_stiffness, tension)))
     return parts
 
 

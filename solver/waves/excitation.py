@@ -12,9 +12,9 @@ import numpy as np
 from scipy import sparse
 
 from catenary.solver.base.compiled import compiled
+from catenary.solver.model.elements.shape_functions import shape_values
 from catenary.solver.model.loads import FieldLoad, Load, ShapeLoad, table
 from catenary.solver.model.model import Model
-from catenary.solver.model.shape_functions import shape_values
 
 # Points in time by which half a sine or a whole cosine is drawn.
 _POINTS = 41

@@ -17,7 +17,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy import sparse
 
-from catenary.solver.model import elements
+from catenary.solver.model.elements import beam
 from catenary.solver.model.loads import FieldLoad, along
 from catenary.solver.model.model import Block, Model, wire_elements
 from catenary.solver.problem.wind import Wind
@@ -48,7 +48,7 @@ def damping_blocks(model: Model, wind: Wind) -> list[Block]:
             rate = share * wind.density * drag_width(wire) * speed
             # Length and rate as one number, of which NumPy finds those that are alike.
             alike, kind = np.unique(np.round(length, 9) + 1j * rate, return_inverse=True)
-            matrices = alike.imag[:, None, None] * elements.mass(alike.real, 1.0)
+            matrices = alike.imag[:, None, None] * beam.mass(alike.real, 1.0)
             found.append(Block(wire.name, dofs, kind, None, None, matrices))
     return found
 

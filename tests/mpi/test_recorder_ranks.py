@@ -22,10 +22,10 @@ from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files import result_file
 from catenary.postproc.files.disk import NoRoom
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.blocks import RecordedLine
-from catenary.postproc.record.field_layout import FieldRecord
-from catenary.postproc.record.fields import FieldRecorder
 from catenary.postproc.record.recorder import Recorder
+from catenary.postproc.record.snapshots.blocks import RecordedLine
+from catenary.postproc.record.snapshots.field_layout import FieldRecord
+from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.time_loop.observers import Stage, StepView, row_of
 

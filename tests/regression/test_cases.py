@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from program import assert_sound, catenary
 
-from catenary.cases.scene.convert.line import line_of
+from catenary.cases.scene.convert.line.line import line_of
 from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.load import load_scene
 

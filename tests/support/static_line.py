@@ -9,7 +9,7 @@ from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from catenary.meshgen.wires import End
-from catenary.solver.model import elements
+from catenary.solver.model.elements import beam
 from catenary.solver.model.model import Model
 from catenary.solver.statics.equilibrium import Equilibrium
 
@@ -38,7 +38,7 @@ def absolute_rest(
                 if End.CLAMPED in piece.ends:
                     inside = (middle > piece.x[0]) & (middle < piece.x[-1])
                     taken[inside] += tensions[other.name]
-        stiffness = elements.stiffness(length, data.bending_stiffness, tensions[wire] - taken)
+        stiffness = beam.stiffness(length, data.bending_stiffness, tensions[wire] - taken)
         for own, values in zip(dofs, stiffness, strict=True):
             matrix[np.ix_(own, own)] += values
     (supports,), (arms,) = line.supports, line.steady_arms

@@ -36,9 +36,9 @@ from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE, LineMe
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.header import line_datasets
-from catenary.postproc.record.blocks import RecordedLine, blocks_of
+from catenary.postproc.record.snapshots.blocks import RecordedLine, blocks_of
 from catenary.solver.base.errors import InputError
-from catenary.solver.model.elements import uniform_load
+from catenary.solver.model.elements.beam import uniform_load
 from catenary.solver.problem.incidents import DropperBreak, TensionLoss
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.statics.after_incidents import changed_line

@@ -11,7 +11,7 @@ import pytest
 
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.checks.line.droppers import estimated_dropper_lengths
-from catenary.cases.scene.convert.line import line_data_of
+from catenary.cases.scene.convert.line.line import line_data_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.load import load_scene

@@ -10,7 +10,7 @@ from catenary.cases.run.describe.defects import defect_facts
 from catenary.cases.run.plan import make_plan, plan_text
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.course import resolved
-from catenary.cases.scene.convert.line import line_data_of
+from catenary.cases.scene.convert.line.line import line_data_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.load import load_scene, scene_from

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from catenary.cases.scene.convert.line import line_data_of
+from catenary.cases.scene.convert.line.line import line_data_of
 from catenary.cases.scene.load import load_scene
 from catenary.solver.base.errors import InputError
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from catenary.cases.scene.convert.course import end_of, resolved
-from catenary.cases.scene.convert.line import line_data_of
+from catenary.cases.scene.convert.line.line import line_data_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.case_files import find_case, shipped
 from catenary.cases.scene.input.origin import Origin

@@ -12,9 +12,9 @@ from paper_pantograph import corrections, data, number_at, table
 
 from catenary.cases.run.describe.pantographs import header_words, kind_lines
 from catenary.cases.scene.checks.train.pantograph import check_pantographs
-from catenary.cases.scene.convert.mechanism import multibody_of
-from catenary.cases.scene.convert.pantograph import static_force
 from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.convert.train.mechanism import multibody_of
+from catenary.cases.scene.convert.train.pantograph import static_force
 from catenary.cases.scene.input.toml_input import read_toml
 from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.cases.scene.load import load_scene

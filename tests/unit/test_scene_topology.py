@@ -10,7 +10,7 @@ from measuring import check
 
 from catenary.cases.run.runner import static_table
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.line import line_of
+from catenary.cases.scene.convert.line.line import line_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.scene.load import load_scene

@@ -20,7 +20,7 @@ from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.wires import Conductor
 from catenary.solver.base.errors import InputError
-from catenary.solver.model.lateral_shape import LateralShape
+from catenary.solver.model.rest.lateral_shape import LateralShape
 from catenary.solver.statics.elasticity import elasticity
 from catenary.solver.statics.equilibrium import Equilibrium, find_form
 

@@ -14,9 +14,9 @@ from static_line import absolute_rest, first_rest
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.wires import worn_bending
 from catenary.solver.effects.effect import Effect
-from catenary.solver.model import elements
 from catenary.solver.model.builder import ModelBuilder
-from catenary.solver.model.links import PULLS, between_nodes, law
+from catenary.solver.model.elements import beam
+from catenary.solver.model.links.links import PULLS, between_nodes, law
 from catenary.solver.model.model import Model
 from catenary.solver.problem.defects import (
     Defect,
@@ -162,8 +162,8 @@ def test_a_worn_stretch_is_lighter_and_softer() -> None:
         x = mesh.x(pairs)
         inside = np.clip(np.minimum(x[:, 1], 97.1) - np.maximum(x[:, 0], 60.3), 0.0, None) / length
         left = 1.0 - inside * (1.0 - worn_bending(0.2)) * (wire == CONTACT_WIRE)
-        bent = left[:, None, None] * elements.stiffness(length, data.bending_stiffness, 0.0)
-        for own, matrix in zip(dofs, bent + elements.stiffness(length, 0.0, data.tension),
+        bent = left[:, None, None] * beam.stiffness(length, data.bending_stiffness, 0.0)
+        for own, matrix in zip(dofs, bent + beam.stiffness(length, 0.0, data.tension),
                                strict=True):  # fmt: skip
             stiffness[np.ix_(own, own)] += matrix
     load = changed.weight.copy()

@@ -31,7 +31,7 @@ from stops import (
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.solver.model.builder import ModelBuilder
-from catenary.solver.model.links import BOTH, PULLS, at_nodes, law
+from catenary.solver.model.links.links import BOTH, PULLS, at_nodes, law
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.schemes.monolithic_system import WholeSystem
 from catenary.solver.statics.equilibrium import find_form

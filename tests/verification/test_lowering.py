@@ -21,7 +21,7 @@ from small_lines import (
     train,
 )
 
-from catenary.cases.scene.convert.pantograph import pantograph_of
+from catenary.cases.scene.convert.train.pantograph import pantograph_of
 from catenary.cases.scene.input.toml_input import read_toml
 from catenary.cases.scene.tables.train.pantograph import MultibodyTable
 from catenary.mbs.build import PantographData

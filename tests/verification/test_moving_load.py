@@ -29,8 +29,8 @@ from small_lines import (
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
+from catenary.solver.model.elements.shape_functions import shape_values
 from catenary.solver.model.loads import FunctionLoad
-from catenary.solver.model.shape_functions import shape_values
 from catenary.solver.problem.contact_laws import LinearLaw
 
 TENSION, DENSITY = EN_CONTACT_WIRE.tension, EN_CONTACT_WIRE.mass_per_length

@@ -8,11 +8,11 @@ from measuring import check
 from small_lines import mesh_of, problem_of
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
-from catenary.postproc.record.blocks import RecordedLine, blocks_of
-from catenary.postproc.record.field_kinds import ALONG as U
-from catenary.postproc.record.field_kinds import KINDS, SLOPE, UP
-from catenary.postproc.record.field_layout import FieldRecord, layout_of
-from catenary.postproc.record.field_values import FieldValues, Gathered
+from catenary.postproc.record.snapshots.blocks import RecordedLine, blocks_of
+from catenary.postproc.record.snapshots.field_kinds import ALONG as U
+from catenary.postproc.record.snapshots.field_kinds import KINDS, SLOPE, UP
+from catenary.postproc.record.snapshots.field_layout import FieldRecord, layout_of
+from catenary.postproc.record.snapshots.field_values import FieldValues, Gathered
 from catenary.solver.model.axial_elements import strain_rows, unknowns_along
 from catenary.solver.statics.equilibrium import find_form
 

@@ -20,7 +20,7 @@ from catenary.meshgen.topologies.overlap import of_next
 from catenary.meshgen.topologies.single import BRIDLE_WIRE
 from catenary.meshgen.topologies.twin import second
 from catenary.meshgen.wires import Conductor, Role
-from catenary.solver.model import elements
+from catenary.solver.model.elements import beam
 from catenary.solver.statics.elasticity import elasticity
 from catenary.solver.statics.equilibrium import Equilibrium, find_form
 
@@ -208,9 +208,7 @@ def test_wires_in_an_overlap_are_in_equilibrium() -> None:
             out = 1.0 if end == last else -1.0
             u = np.array([form.height[inner], out * form.slope[inner], form.height[end],
                           out * form.slope[end]])  # fmt: skip
-            row = elements.stiffness(
-                np.array([h]), wire.bending_stiffness, np.array([wire.tension])
-            )
-            load = GRAVITY * wire.mass_per_length * elements.uniform_load(np.array([h]))[0]
+            row = beam.stiffness(np.array([h]), wire.bending_stiffness, np.array([wire.tension]))
+            load = GRAVITY * wire.mass_per_length * beam.uniform_load(np.array([h]))[0]
             held += float(row[0][2] @ u) + load[2]
     check("vertical balance [N]", held, weight, within=1e-8 * wire.tension)

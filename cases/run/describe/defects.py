@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from catenary.cases.scene.convert.defects import place_of, stretch_of
+from catenary.cases.scene.convert.line.defects import place_of, stretch_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.tables.line.defects import (
     Defect,

@@ -45,7 +45,7 @@ from catenary.cases.scene.checks.train.laws import check_laws
 from catenary.cases.scene.checks.train.pantograph import check_mechanisms, check_pantographs
 from catenary.cases.scene.checks.train.vehicle import check_vehicle
 from catenary.cases.scene.convert.course import end_of, strips_ahead
-from catenary.cases.scene.convert.line import line_data_of
+from catenary.cases.scene.convert.line.line import line_data_of
 from catenary.cases.scene.input.faults import Fault, SceneError
 from catenary.cases.scene.keys.error_sentences import refusal, unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from catenary.cases.scene.convert.line import line_data_of
+from catenary.cases.scene.convert.line.line import line_data_of
 from catenary.cases.scene.scene import Scene
 
 

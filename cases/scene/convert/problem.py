@@ -8,18 +8,18 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from catenary.cases.scene.convert.aerodynamics import tunnels_of
-from catenary.cases.scene.convert.along import along_of
 from catenary.cases.scene.convert.contact import contact_law_of
 from catenary.cases.scene.convert.course import end_of
-from catenary.cases.scene.convert.defects import defects_of, irregularities_of
-from catenary.cases.scene.convert.ends import ends_of
 from catenary.cases.scene.convert.incidents import line_incidents, lowering_of
-from catenary.cases.scene.convert.laws import regulation_of
-from catenary.cases.scene.convert.line import line_of
-from catenary.cases.scene.convert.pantograph import pantograph_of, static_force
-from catenary.cases.scene.convert.vehicle import vehicle_of
-from catenary.cases.scene.convert.wind import wind_of
+from catenary.cases.scene.convert.line.along import along_of
+from catenary.cases.scene.convert.line.defects import defects_of, irregularities_of
+from catenary.cases.scene.convert.line.ends import ends_of
+from catenary.cases.scene.convert.line.line import line_of
+from catenary.cases.scene.convert.line.wind import wind_of
+from catenary.cases.scene.convert.train.aerodynamics import tunnels_of
+from catenary.cases.scene.convert.train.laws import regulation_of
+from catenary.cases.scene.convert.train.pantograph import pantograph_of, static_force
+from catenary.cases.scene.convert.train.vehicle import vehicle_of
 from catenary.cases.scene.tables.line.line import LineTable
 from catenary.cases.scene.tables.run.window import WindowTable
 from catenary.cases.scene.tables.units import speed_from_km_h

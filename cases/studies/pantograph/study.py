@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.cases.run.describe.pantographs import description_of
-from catenary.cases.scene.convert.pantograph import pantograph_of, static_force
+from catenary.cases.scene.convert.train.pantograph import pantograph_of, static_force
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.build import PantographData
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand

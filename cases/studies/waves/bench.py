@@ -20,7 +20,7 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Conductor, Piece, Profile, Wire
 from catenary.solver.effects.build_model import build
 from catenary.solver.integrators.make_line import make_line
-from catenary.solver.model import elements
+from catenary.solver.model.elements import beam
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Block, Model, wire_elements
 from catenary.solver.model.partition import distribute
@@ -142,8 +142,8 @@ def _change(model: Model, wire: Wire, beyond: Conductor) -> None:
     dofs, length = wire_elements(model, wire.name, ("w", "theta_y"))
     there = model.mesh.x(model.mesh.elements(wire.name)).min(axis=1) > HALF - 1e-6
     dofs, length = dofs[there], length[there]
-    mass = elements.mass(length, beyond.mass_per_length - wire.mass_per_length)
-    stiffness = elements.stiffness(
+    mass = beam.mass(length, beyond.mass_per_length - wire.mass_per_length)
+    stiffness = beam.stiffness(
         length, beyond.bending_stiffness - wire.bending_stiffness, beyond.tension - wire.tension
     )
     model.blocks.append(Block(wire.name, dofs, np.arange(length.size), mass, stiffness))

@@ -19,8 +19,8 @@ from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.wires import Conductor
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
-from catenary.postproc.record.blocks import RecordedLine
 from catenary.postproc.record.recorder import Recorder
+from catenary.postproc.record.snapshots.blocks import RecordedLine
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Numerics, Placement, Problem, Train
 from catenary.solver.statics.elasticity import Elasticity

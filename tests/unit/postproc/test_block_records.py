@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from catenary.postproc.channels.line_record import GZIP, LineRecord
-from catenary.postproc.record.fields import FieldRecorder
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
+from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.time_loop.observers import BlockObserver, MotionObserver
 
 

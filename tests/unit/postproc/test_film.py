@@ -17,8 +17,8 @@ from catenary.postproc.film.film_data import film_data
 from catenary.postproc.film.pantograph_shape import LOWER_ARM, UPPER_ARM, MovingPantographs
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.field_layout import Course, FieldRecord
-from catenary.postproc.record.fields import FieldRecorder
+from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
+from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.base.errors import InputError
 
 # HDF5's files are examined, and films written, by processes of their own.

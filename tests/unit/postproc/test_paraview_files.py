@@ -13,7 +13,7 @@ import pyvista
 from catenary.postproc.film.film_data import film_data
 from catenary.postproc.paraview import open_in_paraview
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.fields import FieldRecorder
+from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.base.errors import InputError
 
 # HDF5's files are examined by a process of its own.

@@ -14,12 +14,12 @@ from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE
-from catenary.postproc.record import fields_file, growing_xdmf
-from catenary.postproc.record.blocks import ARMS, MASTS, RecordedLine, blocks_of
-from catenary.postproc.record.field_kinds import FIELDS
-from catenary.postproc.record.field_layout import Course, FieldRecord
-from catenary.postproc.record.field_values import curvature
-from catenary.postproc.record.fields import FieldRecorder
+from catenary.postproc.record.snapshots import fields_file, growing_xdmf
+from catenary.postproc.record.snapshots.blocks import ARMS, MASTS, RecordedLine, blocks_of
+from catenary.postproc.record.snapshots.field_kinds import FIELDS
+from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
+from catenary.postproc.record.snapshots.field_values import curvature
+from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.base.errors import RunBroken
 
 BLOCKS = (CONTACT_WIRE, MESSENGER_WIRE, DROPPERS, ARMS, MASTS)

@@ -20,8 +20,8 @@ from catenary.postproc.files.own_files import (
     remove_stale,
 )
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.fields import FieldRecorder
 from catenary.postproc.record.recorder import Recorder
+from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.base.errors import RunBroken
 
 

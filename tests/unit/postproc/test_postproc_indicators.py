@@ -21,7 +21,7 @@ from catenary.postproc.evaluate.error_indicators import (
     step_error,
 )
 from catenary.postproc.read.results import Results
-from catenary.solver.model import elements
+from catenary.solver.model.elements import beam
 from catenary.solver.problem.integrator_parameters import Integration, integration_of
 
 UNDAMPED = Method(0.0, 0.0)
@@ -102,7 +102,7 @@ def test_resolved_waves_are_the_modes_that_a_hinged_wire_gets_right(
     matrices = np.zeros((2, size, size))
     lengths = np.full(n, length)
     for which, parts in enumerate(
-        (elements.stiffness(lengths, stiffness, tension), elements.mass(lengths, mass))
+        (beam.stiffness(lengths, stiffness, tension), beam.mass(lengths, mass))
     ):
         for e in range(n):
             matrices[which, 2 * e : 2 * e + 4, 2 * e : 2 * e + 4] += parts[e]

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from catenary.solver.model import elements
-from catenary.solver.model.shape_functions import shape_slopes, shape_values
+from catenary.solver.model.elements import beam
+from catenary.solver.model.elements.shape_functions import shape_slopes, shape_values
 
 EPS = np.finfo(float).eps
 lengths = st.floats(0.05, 20.0)
@@ -24,9 +24,9 @@ def shape_of(polynomial: np.polynomial.Polynomial, length: float) -> np.ndarray:
 @given(lengths)
 def test_matrices_are_symmetric_and_do_not_resist_rigid_motions(length: float) -> None:
     one = np.array([length])
-    bending = elements.stiffness(one, 3.0, 0.0)[0]
-    tension = elements.stiffness(one, 0.0, 7.0)[0]
-    mass = elements.mass(one, 2.0)[0]
+    bending = beam.stiffness(one, 3.0, 0.0)[0]
+    tension = beam.stiffness(one, 0.0, 7.0)[0]
+    mass = beam.mass(one, 2.0)[0]
     for matrix in (bending, tension, mass):
         assert np.array_equal(matrix, matrix.T)
         # One eigenvalue may be zero for each rigid motion; none is negative.
@@ -48,9 +48,9 @@ def test_energies_of_cubics_are_exact(length: float, coefficients: list[float]) 
     unknowns = shape_of(w, length)
     one = np.array([length])
     for matrix, integrand in (
-        (elements.stiffness(one, 3.0, 0.0)[0], 3.0 * w.deriv(2) ** 2),
-        (elements.stiffness(one, 0.0, 7.0)[0], 7.0 * w.deriv() ** 2),
-        (elements.mass(one, 2.0)[0], 2.0 * w**2),
+        (beam.stiffness(one, 3.0, 0.0)[0], 3.0 * w.deriv(2) ** 2),
+        (beam.stiffness(one, 0.0, 7.0)[0], 7.0 * w.deriv() ** 2),
+        (beam.mass(one, 2.0)[0], 2.0 * w**2),
     ):
         whole = integrand.integ()
         # Round-off of the products that cancel.
@@ -85,7 +85,7 @@ def test_shape_functions_are_one_at_their_own_unknown() -> None:
 
 @given(lengths)
 def test_uniform_load_does_the_work_of_its_distribution(length: float) -> None:
-    load = elements.uniform_load(np.array([length]))[0]
+    load = beam.uniform_load(np.array([length]))[0]
     for coefficients in np.eye(4):
         w = np.polynomial.Polynomial(coefficients)
         whole = w.integ()(length)
@@ -94,6 +94,6 @@ def test_uniform_load_does_the_work_of_its_distribution(length: float) -> None:
 
 def test_many_lengths_are_many_elements() -> None:
     several = np.array([0.5, 1.0, 4.0])
-    matrices = elements.stiffness(several, 195.0, 20e3)
+    matrices = beam.stiffness(several, 195.0, 20e3)
     for length, matrix in zip(several, matrices, strict=True):
-        assert np.array_equal(matrix, elements.stiffness(np.array([length]), 195.0, 20e3)[0])
+        assert np.array_equal(matrix, beam.stiffness(np.array([length]), 195.0, 20e3)[0])

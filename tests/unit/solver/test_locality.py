@@ -28,7 +28,7 @@ from catenary.solver.linear import unit_responses
 from catenary.solver.linear.decay_length import DECAY, reach
 from catenary.solver.linear.unit_responses import Windows
 from catenary.solver.model.model import Model
-from catenary.solver.model.unknowns import Unknowns
+from catenary.solver.model.unknowns.registry import Unknowns
 from catenary.solver.problem.problem import Damping
 from catenary.solver.statics.equilibrium import find_form
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catenary.cases.scene.convert.along import TENSIONER, along_of
+from catenary.cases.scene.convert.line.along import TENSIONER, along_of
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.tables.line.line import LineTable

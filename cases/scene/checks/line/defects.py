@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from catenary.cases.scene.convert.defects import stretch_of
-from catenary.cases.scene.convert.line import line_of
+from catenary.cases.scene.convert.line.defects import stretch_of
+from catenary.cases.scene.convert.line.line import line_of
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.tables.line.defects import (

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from catenary.cases.scene.convert.line import line_of, span_lengths
+from catenary.cases.scene.convert.line.line import line_of, span_lengths
 from catenary.cases.scene.cost_model import estimate_memory, estimate_start
 from catenary.cases.scene.input.faults import Fault, SceneError
 from catenary.cases.scene.tables.line.line import TransitionTable

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.meshgen.topologies.all_topologies import make_line
-from catenary.postproc.record.blocks import OTHER_PARTS
+from catenary.postproc.record.snapshots.blocks import OTHER_PARTS
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene

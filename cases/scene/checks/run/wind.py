@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from catenary.cases.scene.convert.wind import wind_of
+from catenary.cases.scene.convert.line.wind import wind_of
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.meshgen.topologies.line_data import LineData

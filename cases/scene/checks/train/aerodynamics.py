@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from catenary.cases.scene.convert.pantograph import pantograph_of, static_force
+from catenary.cases.scene.convert.train.pantograph import pantograph_of, static_force
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.tables.train.pantograph import PantographTable

@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from catenary.cases.scene.convert.pantograph import wanted_force
+from catenary.cases.scene.convert.train.pantograph import wanted_force
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.input.origin import shown
 from catenary.cases.scene.keys.error_sentences import refusal
@@ -83,7 +83,7 @@ def reaches_below(scene: Scene, name: str, line: LineData, drop: float) -> bool:
 
 def _standing(scene: Scene, name: str, table: MultibodyTable) -> tuple[MultibodyData, float]:
     """A mechanism and the height of its arm above its base where it stands [m]."""
-    from catenary.cases.scene.convert.mechanism import multibody_of
+    from catenary.cases.scene.convert.train.mechanism import multibody_of
     from catenary.mbs.mechanism.pantograph_data import stand
 
     data = multibody_of(name, table, scene.train.speed_km_h)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catenary.cases.scene.convert.course import end_of, strips_ahead
-from catenary.cases.scene.convert.pantograph import pantograph_of
-from catenary.cases.scene.convert.vehicle import vehicle_of
+from catenary.cases.scene.convert.train.pantograph import pantograph_of
+from catenary.cases.scene.convert.train.vehicle import vehicle_of
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.tables.train.pantograph import LumpedTable, MultibodyTable

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catenary.cases.scene.convert.aerodynamics import uplift_of
-from catenary.cases.scene.convert.laws import laws_of
+from catenary.cases.scene.convert.train.aerodynamics import uplift_of
+from catenary.cases.scene.convert.train.laws import laws_of
 from catenary.cases.scene.tables.train.head import StripsTable
 from catenary.cases.scene.tables.train.pantograph import MultibodyTable, PantographTable
 from catenary.mbs.head.flexure import Flexure
@@ -31,7 +31,7 @@ def pantograph_of(
         Published numbers of a multibody pantograph are not allowed.
     """
     if isinstance(table, MultibodyTable):
-        from catenary.cases.scene.convert.mechanism import multibody_of, turned
+        from catenary.cases.scene.convert.train.mechanism import multibody_of, turned
 
         data = replace(
             multibody_of(name, table, speed_km_h),
@@ -84,7 +84,7 @@ def static_force(name: str, table: PantographTable, speed_km_h: float) -> float 
     That of a multibody pantograph that is not calibrated follows from its mechanism.
     """
     if isinstance(table, MultibodyTable) and not table.calibrate:
-        from catenary.cases.scene.convert.mechanism import multibody_of
+        from catenary.cases.scene.convert.train.mechanism import multibody_of
         from catenary.mbs.mechanism.pantograph_data import stand
 
         return stand(multibody_of(name, table, speed_km_h)).static_force

@@ -22,7 +22,7 @@ from catenary.postproc.files.array_writes import (
 )
 from catenary.postproc.files.checked import text_of
 from catenary.postproc.files.disk import appears_whole
-from catenary.postproc.record.field_kinds import KINDS
+from catenary.postproc.record.snapshots.field_kinds import KINDS
 
 SUFFIX = ".vtkhdf"
 _VERSION = np.array([2, 3], dtype=np.int64)

@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 
 from catenary.meshgen.mesh import DROPPERS
-from catenary.postproc.record.blocks import Block
+from catenary.postproc.record.snapshots.blocks import Block
 
 _Count = TypeVar("_Count", int, np.ndarray)
 

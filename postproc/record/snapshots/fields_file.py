@@ -23,11 +23,11 @@ from catenary.postproc.files.disk import MARGIN, check_in_place, opened, reserve
 from catenary.postproc.files.own_files import part_of
 from catenary.postproc.files.trimming import trimmed
 from catenary.postproc.read.guard import survives
-from catenary.postproc.record.blocks import Block
-from catenary.postproc.record.field_layout import FieldRecord, Slots, layout_of
-from catenary.postproc.record.field_values import FieldValues, Gathered
-from catenary.postproc.record.growing_xdmf import GrowingXdmf, grids_of
-from catenary.postproc.record.vtkhdf import SUFFIX, write_vtkhdf
+from catenary.postproc.record.snapshots.blocks import Block
+from catenary.postproc.record.snapshots.field_layout import FieldRecord, Slots, layout_of
+from catenary.postproc.record.snapshots.field_values import FieldValues, Gathered
+from catenary.postproc.record.snapshots.growing_xdmf import GrowingXdmf, grids_of
+from catenary.postproc.record.snapshots.vtkhdf import SUFFIX, write_vtkhdf
 
 logger = logging.getLogger("catenary.fields")
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.postproc.record.blocks import FIXED, Block, RecordedLine
-from catenary.postproc.record.field_kinds import ALONG, ASIDE, SLOPE, UP, FieldKind
-from catenary.postproc.record.field_layout import Slots
+from catenary.postproc.record.snapshots.blocks import FIXED, Block, RecordedLine
+from catenary.postproc.record.snapshots.field_kinds import ALONG, ASIDE, SLOPE, UP, FieldKind
+from catenary.postproc.record.snapshots.field_layout import Slots
 from catenary.solver.model.axial_elements import slope_rows
 
 

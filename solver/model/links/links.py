@@ -82,7 +82,7 @@ def at_places(
     By the Hermite functions of the element there, in a ``plane`` of deflection and slope.
     """
     # Compiled loops are not loaded by a check of a scene, which places no link within an element.
-    from catenary.solver.model.shape_functions import shape_values
+    from catenary.solver.model.elements.shape_functions import shape_values
 
     nodes = model.mesh.wires[wire]
     at = model.mesh.x(nodes)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.postproc.record.blocks import Block
-from catenary.postproc.record.field_kinds import USUAL_FIELDS, FieldKind, kinds_of
+from catenary.postproc.record.snapshots.blocks import Block
+from catenary.postproc.record.snapshots.field_kinds import USUAL_FIELDS, FieldKind, kinds_of
 
 # More than HDF5's tables take for a dataset or a group with its attributes [bytes].
 _TABLES = 1024

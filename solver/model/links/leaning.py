@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catenary.solver.model.links import Direction, between_nodes
+from catenary.solver.model.links.links import Direction, between_nodes
 
 if TYPE_CHECKING:
     from catenary.solver.model.model import Model

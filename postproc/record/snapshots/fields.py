@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from catenary.postproc.files.disk import broken_write
-from catenary.postproc.record.blocks import RecordedLine, blocks_of
 from catenary.postproc.record.column_gather import ColumnGather, next_flush
-from catenary.postproc.record.field_layout import FieldRecord
-from catenary.postproc.record.field_values import FieldValues, Gathered
-from catenary.postproc.record.fields_file import FieldsFile, LineSize
+from catenary.postproc.record.snapshots.blocks import RecordedLine, blocks_of
+from catenary.postproc.record.snapshots.field_layout import FieldRecord
+from catenary.postproc.record.snapshots.field_values import FieldValues, Gathered
+from catenary.postproc.record.snapshots.fields_file import FieldsFile, LineSize
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.base.parallel import on_root
 from catenary.solver.time_loop.observers import Stage, StepView

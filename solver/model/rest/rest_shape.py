@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from catenary.solver.model.lateral_shape import LateralShape
+from catenary.solver.model.rest.lateral_shape import LateralShape
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from catenary.postproc.files.disk import write_at, write_whole
-from catenary.postproc.record.field_layout import Slots
+from catenary.postproc.record.snapshots.field_layout import Slots
 
 _HIDE, _END = b"<![CDATA[", b"]]>"
 _SHOW = b" " * len(_HIDE)

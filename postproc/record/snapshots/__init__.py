@@ -1,0 +1,1 @@
+"""Snapshots of the moving line: its blocks, their fields, the files."""

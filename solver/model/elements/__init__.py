@@ -1,0 +1,1 @@
+"""Beams under tension: matrices of elements, and functions between nodes."""

@@ -1,0 +1,1 @@
+"""Links between unknowns: droppers, clamps, arms, stops, and droppers that lean."""

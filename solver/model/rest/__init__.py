@@ -1,0 +1,1 @@
+"""The line at rest as arrays, vertical and lateral."""

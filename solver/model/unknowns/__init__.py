@@ -1,0 +1,1 @@
+"""Which unknowns a line has, at which stations, and their numbers."""
