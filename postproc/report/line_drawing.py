@@ -167,7 +167,7 @@ def _cross_section(
                 across, up = (1.0 if y >= 0.0 else -1.0) * length, 0.15
                 if form.lateral is not None:
                     number = int(np.flatnonzero(mesh.steady_arms == node)[0])
-                    across, up = length * form.lateral.arm_direction[number]
+                    across, up, _ = length * form.lateral.arm_direction[number]
                 axes.plot([y, y + across], [z, z + up], color=GREY, lw=1.2)
     if half_head is not None:
         axes.plot([-half_head, half_head], [lowest, lowest], color="black", lw=2.0)

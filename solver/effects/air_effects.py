@@ -60,6 +60,7 @@ register(
         build=_damped,
         law=_steady,
         data="a table [wind]",
+        after_cutting=True,
     )
 )
 register(
@@ -74,5 +75,6 @@ register(
         build=_gusts,
         law=lambda laws, p: replace(laws, wind=p.wind),
         data="a table [wind.gusts]",
+        after_cutting=True,
     )
 )

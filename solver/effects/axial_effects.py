@@ -48,14 +48,14 @@ def _add_bars(builder: ModelBuilder, name: str) -> None:
     rows = axial_elements.strain_rows(model, name)
     left, _ = data.left_of(model.mesh.x(model.mesh.elements(name)))
     alike, kind = np.unique(np.column_stack([rows, left]), axis=0, return_inverse=True)
-    alike, left = alike[:, :6], alike[:, 6]
+    alike, left = alike[:, :-1], alike[:, -1]
     length = 1.0 / alike[:, 1]
     stiffness = (data.axial_stiffness * left * length)[:, None, None] * (
         alike[:, :, None] * alike[:, None, :]
     )
     mass = np.zeros_like(stiffness)
     mass[:, :2, :2] = axial_elements.bar_mass(left * length, data.mass_per_length)
-    builder.add_block(Block(name, unknowns, kind.ravel(), mass, stiffness))
+    builder.add_block(Block(name, unknowns, kind.ravel(), mass, stiffness, of_shape=True))
 
 
 def _add_pendulums(builder: ModelBuilder) -> None:
@@ -66,12 +66,13 @@ def _add_pendulums(builder: ModelBuilder) -> None:
     for number, droppers in enumerate(line.droppers):
         mine = mesh.dropper_group == number
         kind = np.arange(np.count_nonzero(mine))
-        builder.add_block(Block(droppers.name, unknowns[mine], kind, None, matrices[mine]))
+        block = Block(droppers.name, unknowns[mine], kind, None, matrices[mine], of_shape=True)
+        builder.add_block(block)
     for number, arms in enumerate(line.steady_arms):
+        if model.simulated.lateral:
+            continue  # bars, which swing along the track as well
         nodes = mesh.steady_arms[mesh.arm_group == number]
         radial = np.abs(line.wire(arms.wire).radial_force(np.array(arms.x)))
-        if model.form is not None and model.form.lateral is not None:
-            radial = model.form.lateral.arm_tension[mesh.arm_group == number]
         if radial.any() and arms.kind.length > 0.0:
             builder.add_springs(arms.name, nodes, "u", radial / arms.kind.length)
 
@@ -158,5 +159,6 @@ register(
         data="line.temperature.difference_K other than 0, and effects.axial_motion",
         law=lambda laws, p: replace(laws, warmer=p.along.warmer),
         of_form=True,
+        after_cutting=True,
     )
 )

@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 
 PLANE = ("v", "theta_z")
 # Of a bar along itself, far stiffer than what it holds [N/m].
-_BAR_STIFFNESS = 1e7
+BAR_STIFFNESS = 1e7
+# Parts of unit vectors along the track below this are none: round-off [-].
+_UPRIGHT = 1e-9
 
 
 def _lateral(builder: ModelBuilder) -> None:
@@ -49,18 +51,25 @@ def _pendulums(builder: ModelBuilder) -> None:
 
 def _bars(builder: ModelBuilder, name: str, mine: np.ndarray, length: float) -> None:
     """Bars from the wire to hinges: stiff along themselves, P/l across."""
-    model, mesh = builder.model, builder.mesh
-    nodes = mesh.steady_arms[mine]
-    direction = np.column_stack([np.ones(nodes.size), np.zeros(nodes.size)])
-    tension = np.zeros(nodes.size)
+    model, nodes = builder.model, builder.mesh.steady_arms[mine]
+    unit, tension = np.tile([1.0, 0.0, 0.0], (nodes.size, 1)), np.zeros(nodes.size)
     if model.form is not None and model.form.lateral is not None:
         shape = model.form.lateral
-        direction, tension = shape.arm_direction[mine], shape.arm_tension[mine]
-    unknowns = np.stack([model.dofs(nodes, "v"), model.dofs(nodes)], axis=1)
-    laws = law(mesh.x(nodes), _BAR_STIFFNESS, rest=tension)
-    builder.add_links(name, Direction(unknowns, -direction), laws)
-    across = Direction(unknowns, direction[:, ::-1] * np.array([-1.0, 1.0]))
-    _add_stiffness(builder, name, across, np.ones(nodes.size, dtype=bool), tension / length)
+        unit, tension = shape.arm_direction[mine], shape.arm_tension[mine]
+    # Along the track an arm that has not swung out does nothing but swing.
+    swings = "u" in model.unknowns
+    slewed = swings and bool((np.abs(unit[:, 2]) > _UPRIGHT).any())
+    names = ("v", "w", "u") if slewed else ("v", "w")
+    unit = unit[:, : len(names)]
+    unknowns = np.stack([model.dofs(nodes, one) for one in names], axis=1)
+    laws = law(builder.mesh.x(nodes), BAR_STIFFNESS, rest=tension)
+    builder.add_links(name, Direction(unknowns, -unit), laws, of_shape=True)
+    across = np.eye(len(names)) - unit[:, :, None] * unit[:, None, :]
+    matrices, kind = (tension / length)[:, None, None] * across, np.arange(nodes.size)
+    builder.add_block(Block(name, unknowns, kind, None, matrices, of_shape=True))
+    if swings and not slewed:
+        along, values = model.dofs(nodes, "u")[:, None], (tension / length)[:, None, None]
+        builder.add_block(Block(name, along, kind, None, values, of_shape=True))
 
 
 def _add_stiffness(
@@ -73,7 +82,8 @@ def _add_stiffness(
     """Springs along some of the directions, which are never cut [N/m]."""
     unknowns, weights = direction.unknowns[which], direction.weights[which]
     matrices = stiffness[which, None, None] * weights[:, :, None] * weights[:, None, :]
-    builder.add_block(Block(component, unknowns, np.arange(len(unknowns)), None, matrices))
+    kind = np.arange(len(unknowns))
+    builder.add_block(Block(component, unknowns, kind, None, matrices, of_shape=True))
 
 
 register(

@@ -1,8 +1,9 @@
 """Stretch of a tensioned wire along its course: a bar of the mean strain of each element.
 
 To first order in the motion (u, w) about a shape z at rest the mean strain of an element of length
-h is e = (u2 - u1) / h + (1 / h) integral of z' w' dx. One strain for an element keeps the bar from
-locking: what bends within it does not stretch it. Its tension gains EA e.
+h is e = (u2 - u1) / h + (1 / h) integral of z' w' dx, and of y' v' - c v in the lateral plane, in a
+curve of curvature c. One strain for an element keeps the bar from locking: what bends within it
+does not stretch it. Its tension gains EA e.
 """
 
 from __future__ import annotations
@@ -15,28 +16,51 @@ from catenary.solver.model.model import Model, wire_elements
 # Slopes at rest that differ by less are one, so that like spans have like matrices [-]. What that
 # changes of a stiffness is a share of 1e-11 of EA.
 _SLOPE = 1e-10
+_UPRIGHT, _LEVEL = ("w", "theta_y"), ("v", "theta_z")
 
 
 def unknowns_along(model: Model, wire: str) -> np.ndarray:
-    """Unknowns of the elements of a wire: u of both ends, then height and slope of both, (n, 6)."""
-    pairs = model.mesh.elements(wire)
-    bending, _ = wire_elements(model, wire, ("w", "theta_y"))
-    return np.concatenate([model.dofs(pairs, "u"), bending], axis=1)
+    """Unknowns of the elements of a wire: u of both ends, then deflection and slope of both in the
+    vertical plane, (n, 6), and in the lateral one where it is simulated, (n, 10)."""
+    parts = [model.dofs(model.mesh.elements(wire), "u")]
+    for plane in (_UPRIGHT, _LEVEL) if model.simulated.lateral else (_UPRIGHT,):
+        parts.append(wire_elements(model, wire, plane)[0])
+    return np.concatenate(parts, axis=1)
 
 
 def strain_rows(model: Model, wire: str) -> np.ndarray:
-    """Mean strain of the elements of a wire by their unknowns, (n, 6) [1/m], [1/rad].
+    """Mean strain of the elements of a wire by their unknowns, (n, 6) or (n, 10) [1/m], [1/rad].
 
     Before the shape at rest is known the wire is straight.
     """
-    pairs = model.mesh.elements(wire)
+    pairs, form = model.mesh.elements(wire), model.form
     length = np.diff(model.mesh.x(pairs), axis=1)[:, 0]
-    rows = np.zeros((len(pairs), 6))
+    rows = np.zeros((len(pairs), 10 if model.simulated.lateral else 6))
     rows[:, 0], rows[:, 1] = -1.0 / length, 1.0 / length
-    if model.form is not None:
-        shape = np.stack([model.form.height[pairs], model.form.slope[pairs]], axis=2)
-        rows[:, 2:] = np.round(slope_rows(length, shape.reshape(-1, 4)) / _SLOPE) * _SLOPE
+    if form is not None:
+        for number, (_, course, slope) in enumerate(form.planes()):
+            bent = slope_rows(length, shape_of(course, slope, pairs))
+            rows[:, 2 + 4 * number : 6 + 4 * number] = np.round(bent / _SLOPE) * _SLOPE
+        if form.lateral is not None:
+            rows[:, 6:] += curve_rows(model, wire)
     return rows
+
+
+def shape_of(course: np.ndarray, slope: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Deflection and slope at both ends of elements ``pairs`` (n, 2), (n, 4)."""
+    return np.stack([course[pairs], slope[pairs]], axis=2).reshape(-1, 4)
+
+
+def curve_rows(model: Model, wire: str) -> np.ndarray:
+    """Strain of elements by lateral deflection in a curve, -c times its mean, (n, 4) [1/m], [-]:
+    towards the centre a wire is shorter."""
+    pairs, curve = model.mesh.elements(wire), model.problem.line.curve
+    if curve is None:
+        return np.zeros((len(pairs), 4))
+    x = model.mesh.x(pairs)
+    length = np.diff(x, axis=1)
+    curvature = curve.curvature_at(x.mean(axis=1))
+    return np.asarray(-curvature[:, None] * beam.uniform_load(length[:, 0]) / length)
 
 
 def slope_rows(length: np.ndarray, shape: np.ndarray) -> np.ndarray:

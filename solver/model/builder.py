@@ -49,7 +49,7 @@ class ModelBuilder:
             mass = np.concatenate([mass, left * beam.mass(own, data.mass_per_length)])
             stiffness = np.concatenate([stiffness, bending[worn, None, None] * bent + pulled])
             load *= section[:, None]
-        self._add_block(wire, dofs, mass, stiffness, kind)
+        self.add_block(Block(wire, dofs, kind, mass, stiffness, of_shape=True))
         if unknowns[0] == "w":
             self._hanging.append((dofs.ravel(), load.ravel()))
 
@@ -92,8 +92,10 @@ class ModelBuilder:
         self._add_block(component, unknowns, matrices, None)
         self._hanging.append((unknowns.ravel(), (mass[:, None] * weights).ravel()))
 
-    def add_links(self, component: str, direction: Direction, law: np.ndarray) -> Links:
-        """Links with directions and laws as `model.links` makes them.
+    def add_links(
+        self, component: str, direction: Direction, law: np.ndarray, of_shape: bool = False
+    ) -> Links:
+        """Links with directions and laws as `model.links` makes them; of ``of_shape`` see `Block`.
 
         Those that act one way are followed in the time loop; what stands open at rest is no part of
         K. Their forces at rest are the rest shape's: no weight is added here.
@@ -103,19 +105,20 @@ class ModelBuilder:
         ValueError
             If further links of one sign are named like the droppers, whose channel they are not of.
         """
-        model, links = self.model, Links(component, direction, law)
+        model, links = self.model, Links(component, direction, law, of_shape)
         if model.droppers is not None and component == model.droppers.component:
             if (law["acts"] != BOTH).any():
                 raise ValueError(f"links of one sign need a name of their own, not {component}")
         model.links.append(links)
-        self._add_block(component, direction.unknowns, None, links.stiffness_matrices)
+        matrices, kind = links.stiffness_matrices, np.arange(len(direction.unknowns))
+        self.add_block(Block(component, direction.unknowns, kind, None, matrices, None, of_shape))
         return links
 
     def add_droppers(self) -> None:
         """The droppers of the mesh; those of each group are a component of their own."""
         model, mesh = self.model, self.mesh
         laws = law(mesh.x(mesh.droppers[:, 1]), model.dropper_stiffness, acts=PULLS)
-        model.droppers = Links(DROPPERS, dropper_directions(model), laws)
+        model.droppers = Links(DROPPERS, dropper_directions(model), laws, of_shape=True)
         model.links.append(model.droppers)
         matrices = model.droppers.stiffness_matrices
         # Of what is slack at rest K holds only what it keeps of its stiffness.
@@ -124,7 +127,8 @@ class ModelBuilder:
         for number, group in enumerate(self.problem.line.droppers):
             mine = mesh.dropper_group == number
             unknowns = model.droppers.direction.unknowns[mine]
-            self._add_block(group.name, unknowns, None, matrices[mine])
+            kind = np.arange(len(unknowns))
+            self.add_block(Block(group.name, unknowns, kind, None, matrices[mine], of_shape=True))
             if self.problem.slack_dampers_act and slack[mine].any():
                 self._add_dampers(group.name, mine & slack)
 

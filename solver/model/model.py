@@ -33,6 +33,8 @@ class Block:
     kind : (n,) int, of each element, which of the matrices it has
     mass, stiffness : (k, m, m) or None
     damping : (k, m, m) or None, beside what the component's damping makes of the other two
+    of_shape : whether the stiffness is the tangent of forces that the shape at rest decides, such
+        as those of wires and droppers; others are springs without a force at rest
     """
 
     component: str
@@ -41,6 +43,7 @@ class Block:
     mass: np.ndarray | None
     stiffness: np.ndarray | None
     damping: np.ndarray | None = None
+    of_shape: bool = False
 
 
 @dataclass

@@ -26,8 +26,8 @@ from catenary.solver.model.rest.lateral_shape import LateralShape
 from catenary.solver.model.rest.rest_shape import Equilibrium as Equilibrium
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.as_hung import hang
-from catenary.solver.statics.at_temperature import at_temperature
 from catenary.solver.statics.lateral_equilibrium import lateral_shape
+from catenary.solver.statics.rest_loads import dead_loads
 from catenary.solver.statics.sparse_sum import clamp_parts, summed, wire_parts
 
 # Lengths are printed to the millimetre; the iteration contracts by the ratio of dropper weight
@@ -89,14 +89,10 @@ def _cut(problem: Problem, mesh: LineMesh, pushing: bool = False) -> tuple[Model
 
 
 def about(model: Model, form: Equilibrium) -> tuple[Model, Equilibrium]:
-    """The model with matrices about its shape at rest, if any effect's are, and that shape, which
-    another temperature changes. Not collective."""
+    """The model with matrices about its shape at rest, if any effect's are, and that shape. Not
+    collective."""
     if not effects.needs_form(model.problem):
         return model, form
-    made = build(model.problem, model.mesh, model.dropper_lengths, form=form)
-    if not model.simulated.warmer:
-        return made, form
-    form = at_temperature(made, form)
     return build(model.problem, model.mesh, model.dropper_lengths, form=form), form
 
 
@@ -152,8 +148,9 @@ class _HangingWires:
         under what arms lift of their own in the lateral plane."""
         mesh, every = model.mesh, np.arange(model.mesh.n_nodes)
         load = self._spring_load - self._from_given
-        load[self._w] += model.weight[model.dofs(every)]
-        load[self._w + 1] += model.weight[model.dofs(every, "theta_y")]
+        dead = dead_loads(model)
+        load[self._w] += dead[model.dofs(every)]
+        load[self._w + 1] += dead[model.dofs(every, "theta_y")]
         holding = _holding(model)
         if lateral is not None:
             at = self._w[mesh.steady_arms[~holding]]

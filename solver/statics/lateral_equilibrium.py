@@ -12,12 +12,11 @@ from scipy.sparse import linalg as sparse_linalg
 
 from catenary.meshgen.hardware import SteadyArms
 from catenary.solver.base.errors import InputError
-from catenary.solver.model.elements import beam
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest.lateral_shape import LateralShape
 from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.statics.rest_loads import curve_load, dead_loads
 from catenary.solver.statics.sparse_sum import clamp_parts, springs_between, summed, wire_parts
-from catenary.solver.wind.mean_wind import mean_load
 
 # An arm that hangs freely carries its weight up to this inclination, the wire what is beyond [rad].
 STEEPEST = np.deg2rad(20.0)
@@ -43,7 +42,9 @@ def lateral_shape(model: Model, form: Equilibrium) -> LateralShape:
     rise = form.height[upper] - form.height[lower]
     parts = wire_parts(model, at) + clamp_parts(model, at)
     parts.append(springs_between(at[mesh.droppers], form.dropper_force / rise))
-    stiffness, load = summed(parts, n).tocsr(), _sideways_load(model, at)
+    stiffness, load = summed(parts, n).tocsr(), np.zeros(n)
+    every, pulls = np.arange(mesh.n_nodes), dead_loads(model) + curve_load(model)
+    load[at], load[at + 1] = pulls[model.dofs(every, "v")], pulls[model.dofs(every, "theta_z")]
     nodes, places = _held(model)
     given = np.zeros(n, dtype=bool)
     given[at[nodes]] = True
@@ -55,39 +56,9 @@ def lateral_shape(model: Model, form: Equilibrium) -> LateralShape:
     course[free] = sparse_linalg.splu(inner, permc_spec="NATURAL").solve(right)
     y, slope = course[at], course[at + 1]
     held_by = (stiffness @ course - load)[at[mesh.steady_arms]]
-    arm_force = np.column_stack([held_by, _carried(model, held_by, form.arm_lift)])
+    lift = _carried(model, held_by, form.arm_lift)
+    arm_force = np.column_stack([held_by, lift, np.zeros(held_by.size)])
     return LateralShape(y, slope, arm_force)
-
-
-def _sideways_load(model: Model, at: np.ndarray) -> np.ndarray:
-    """What pulls wires sideways: the mean wind; in a curve their tension, and their weight on a
-    canted track.
-
-    A course y across a track of curvature c has the curvature y'' + c in plan.
-    """
-    mesh, line, wind = model.mesh, model.problem.line, model.simulated.wind
-    load = np.zeros(2 * mesh.n_nodes)
-    if line.curve is None and wind is None:
-        return load
-    for wire in line.wires:
-        pairs = mesh.elements(wire.name)
-        length, middle = np.diff(mesh.x(pairs), axis=1)[:, 0], mesh.x(pairs).mean(axis=1)
-        pull = np.zeros(middle.size)
-        if line.curve is not None:
-            pull += wire.tension_at(middle) * line.curve.curvature_at(middle)
-        if wind is not None:
-            pull += mean_load(wind, model.problem.tunnels, wire, middle)
-        dofs = np.stack(
-            [at[pairs[:, 0]], at[pairs[:, 0]] + 1, at[pairs[:, 1]], at[pairs[:, 1]] + 1]
-        )
-        np.add.at(load, dofs, (pull[:, None] * beam.uniform_load(length)).T)
-    if line.curve is None:
-        return load
-    every = np.arange(mesh.n_nodes)
-    share = line.curve.sideways_pull_at(mesh.x(every))
-    load[at] -= share * model.weight[model.dofs(every)]
-    load[at + 1] -= share * model.weight[model.dofs(every, "theta_y")]
-    return load
 
 
 def _held(model: Model) -> tuple[np.ndarray, np.ndarray]:

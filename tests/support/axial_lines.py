@@ -61,13 +61,13 @@ class PotentialOfLine:
             wire, pairs = line.wire(name), mesh.elements(name)
             h = np.diff(mesh.x(pairs), axis=1)[:, 0]
             was = self._installed.height, self._installed.slope
-            grown = _square_of_slope(h, z[pairs], slope[pairs])
-            grown = grown - _square_of_slope(h, was[0][pairs], was[1][pairs])
+            grown = square_of_slope(h, z[pairs], slope[pairs])
+            grown = grown - square_of_slope(h, was[0][pairs], was[1][pairs])
             assert wire.axial_stiffness is not None
             warmer = self._problem.along.warmer
             strain = np.diff(u[pairs], axis=1)[:, 0] / h + 0.5 * grown - wire.expansion * warmer
             energy += (h * (wire.tension + 0.5 * wire.axial_stiffness * strain) * strain).sum()
-            bent = _square_of_curvature(h, z[pairs], slope[pairs])
+            bent = square_of_curvature(h, z[pairs], slope[pairs])
             energy += 0.5 * wire.bending_stiffness * (h * bent).sum()
             first, last = z[pairs].T
             turned = h * (slope[pairs[:, 0]] - slope[pairs[:, 1]]) / 12.0
@@ -85,22 +85,23 @@ class PotentialOfLine:
         return energy
 
 
-def _square_of_slope(h: np.ndarray, z: np.ndarray, slope: np.ndarray) -> np.ndarray:
+def square_of_slope(h: np.ndarray, z: np.ndarray, slope: np.ndarray) -> np.ndarray:
     """Mean of z'^2 over elements."""
-    total = np.zeros(h.shape, dtype=np.result_type(z, slope))
+    total = np.zeros(z.shape[:-1], dtype=np.result_type(z, slope))
     for s, weight in zip(_POINTS, _WEIGHTS, strict=True):
-        shape = 6 * s * (s - 1) * (z[:, 0] - z[:, 1]) / h
-        shape = shape + (1 - 4 * s + 3 * s * s) * slope[:, 0] + (3 * s * s - 2 * s) * slope[:, 1]
+        shape = 6 * s * (s - 1) * (z[..., 0] - z[..., 1]) / h
+        shape = shape + (1 - 4 * s + 3 * s * s) * slope[..., 0]
+        shape = shape + (3 * s * s - 2 * s) * slope[..., 1]
         total = total + weight * shape**2
     return total
 
 
-def _square_of_curvature(h: np.ndarray, z: np.ndarray, slope: np.ndarray) -> np.ndarray:
+def square_of_curvature(h: np.ndarray, z: np.ndarray, slope: np.ndarray) -> np.ndarray:
     """Mean of z''^2 over elements."""
-    total = np.zeros(h.shape, dtype=np.result_type(z, slope))
+    total = np.zeros(z.shape[:-1], dtype=np.result_type(z, slope))
     for s, weight in zip(_POINTS, _WEIGHTS, strict=True):
-        bend = (12 * s - 6) * (z[:, 0] - z[:, 1]) / h**2
-        bend = bend + ((6 * s - 4) * slope[:, 0] + (6 * s - 2) * slope[:, 1]) / h
+        bend = (12 * s - 6) * (z[..., 0] - z[..., 1]) / h**2
+        bend = bend + ((6 * s - 4) * slope[..., 0] + (6 * s - 2) * slope[..., 1]) / h
         total = total + weight * bend**2
     return total
 

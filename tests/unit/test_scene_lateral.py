@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from catenary.cases.scene.convert.line.line import line_data_of
+from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.solver.base.errors import InputError
+from catenary.solver.effects.all_effects import active
 
 ON = "effects.lateral_motion=true"
 
@@ -60,3 +62,11 @@ def test_a_messenger_wire_has_a_stagger_of_its_own() -> None:
 def test_keys_that_do_not_fit_are_refused(changes: list[str], sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
         load_scene("ac_simple", changes)
+
+
+def test_lateral_motion_goes_with_another_temperature() -> None:
+    """And finds its rest: arms slew, the line is warmer than at its installation."""
+    wires = [f"line.{wire}.axial_stiffness_N=1.5e7" for wire in ("contact_wire", "messenger_wire")]
+    changes = [ON, "effects.axial_motion=true", "line.temperature.difference_K=30", *wires]
+    problem = problem_of(load_scene("ac_simple", [*changes, "line.ends.end.along=tensioner"]))
+    assert {"lateral_motion", "temperature"} <= {effect.name for effect in active(problem)}

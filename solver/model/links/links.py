@@ -48,11 +48,13 @@ class Links:
     component : its name, which decides on damping (``line.damping.per_component``)
     direction : Direction of each
     law : (n,) records of ``LAW``
+    of_shape : whether form finding finds their forces at rest; those of others are given
     """
 
     component: str
     direction: Direction
     law: np.ndarray
+    of_shape: bool = False
 
     @property
     def stiffness_matrices(self) -> np.ndarray:

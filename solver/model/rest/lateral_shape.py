@@ -17,8 +17,8 @@ class LateralShape:
     Attributes
     ----------
     y, slope : (n_nodes,) lateral position [m] and dy/dx [-] of every mesh node
-    arm_force : (n_arms, 2) of each steady arm on its wire, lateral and upward [N]; an arm without
-        length has one as well
+    arm_force : (n_arms, 3) of each steady arm on its wire: lateral, upward and along the track [N];
+        an arm without length has one as well
     """
 
     y: np.ndarray
@@ -28,16 +28,16 @@ class LateralShape:
     @property
     def arm_tension(self) -> np.ndarray:
         """Tension of each steady arm as a bar between hinge and clamp, (n_arms,) [N]."""
-        return np.hypot(*self.arm_force.T)
+        return np.asarray(np.linalg.norm(self.arm_force, axis=1))
 
     @property
     def arm_direction(self) -> np.ndarray:
-        """Unit vectors from clamps to hinges, (n_arms, 2), lateral and upward [-].
+        """Unit vectors from clamps to hinges, (n_arms, 3): lateral, upward and along [-].
 
         A bar can only pull along itself; without a force it lies level.
         """
         tension = self.arm_tension
-        level = np.broadcast_to(np.array([1.0, 0.0]), self.arm_force.shape)
+        level = np.broadcast_to(np.array([1.0, 0.0, 0.0]), self.arm_force.shape)
         pulled = tension > _NO_FORCE
         return np.where(
             pulled[:, None], self.arm_force / np.where(pulled, tension, 1.0)[:, None], level
@@ -46,5 +46,12 @@ class LateralShape:
     @property
     def arm_inclination(self) -> np.ndarray:
         """By how much each arm rises from its wire to its hinge, (n_arms,) [rad]."""
-        sideways, upward = self.arm_direction.T
-        return np.arctan2(upward, np.abs(sideways))
+        sideways, upward, along = self.arm_direction.T
+        return np.arctan2(upward, np.hypot(sideways, along))
+
+    @property
+    def arm_slew(self) -> np.ndarray:
+        """By how much the hinge of each arm is ahead of its wire along the track, seen from above,
+        (n_arms,) [rad]."""
+        sideways, _, along = self.arm_direction.T
+        return np.arctan2(along, np.abs(sideways))

@@ -26,10 +26,6 @@ def check_lateral(scene: Scene) -> Iterator[Fault]:
                     "staggered line does not repeat itself from span to span"
                 )
                 yield refusal(scene.origin, key, end.kind, why)
-        if line.temperature.difference_K and scene.switches()["axial_motion"]:
-            why = f"with effects.{_EFFECT} it must be 0: the shape at rest would need both at once"
-            key = "line.temperature.difference_K"
-            yield refusal(scene.origin, key, line.temperature.difference_K, why)
         return
     given = {
         "line.steady_arm.inclination_deg": line.steady_arm.inclination_deg,

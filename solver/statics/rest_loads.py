@@ -1,0 +1,51 @@
+"""Loads of a line at rest: weights, cant, curve, mean wind, links with a force of their own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from catenary.solver.model.axial_elements import curve_rows
+from catenary.solver.model.elements import beam
+from catenary.solver.model.model import Model, wire_elements
+from catenary.solver.wind.mean_wind import mean_load
+
+_LEVEL = ("v", "theta_z")
+
+
+def dead_loads(model: Model) -> np.ndarray:
+    """What no shape changes, (n_dofs,) [N], [N m]: weights, their part sideways on a canted track,
+    the mean wind, and what links have that do not follow the shape at rest."""
+    load = model.weight.copy()
+    for links in model.links:
+        pulls = np.where(links.law["open"], 0.0, links.law["rest"])
+        if not links.of_shape and pulls.any():
+            unknowns, weights = links.direction
+            np.add.at(load, unknowns, -pulls[:, None] * weights)
+    if not model.simulated.lateral:
+        return load
+    line, wind = model.problem.line, model.simulated.wind
+    if line.curve is not None:
+        every = np.arange(model.mesh.n_nodes)
+        share = line.curve.sideways_pull_at(model.mesh.x(every))
+        for sideways, own in zip(_LEVEL, ("w", "theta_y"), strict=True):
+            load[model.dofs(every, sideways)] -= share * model.weight[model.dofs(every, own)]
+    if wind is None:
+        return load
+    for wire in line.wires:
+        dofs, length = wire_elements(model, wire.name, _LEVEL)
+        middle = model.mesh.x(model.mesh.elements(wire.name)).mean(axis=1)
+        pull = mean_load(wind, model.problem.tunnels, wire, middle)
+        np.add.at(load, dofs, pull[:, None] * beam.uniform_load(length))
+    return load
+
+
+def curve_load(model: Model) -> np.ndarray:
+    """What the tension of the installation pulls towards the centre of a curve, (n_dofs,) [N],
+    [N m]. A course y across a track of curvature c has the curvature y'' + c in plan."""
+    load = np.zeros(model.n_dofs)
+    for wire in model.problem.line.wires if model.problem.line.curve is not None else ():
+        dofs, length = wire_elements(model, wire.name, _LEVEL)
+        middle = model.mesh.x(model.mesh.elements(wire.name)).mean(axis=1)
+        pull = wire.tension_at(middle) * length
+        np.add.at(load, dofs, -pull[:, None] * curve_rows(model, wire.name))
+    return load

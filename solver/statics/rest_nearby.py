@@ -1,0 +1,162 @@
+"""The rest that a line comes to from one that is known, once something about it has changed.
+
+Newton's method on its potential energy, all planes at once; its tangent is the stiffness of the
+model about each shape, and one step is all that a line needs whose matrices do not depend on its
+shape. Droppers only pull, and wheels of tensioners stand or turn: which ones do is found by
+switching all at once, until nothing switches; should that go round, one at a time from the first
+on, which ends always where shapes are small displacements (K. G. Murty, Linear Algebra Appl. 7,
+1974: the matrix of that problem is positive definite).
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import linalg as sparse_linalg
+
+from catenary.solver.base.errors import InputError
+from catenary.solver.effects import all_effects as effects
+from catenary.solver.effects.build_model import build
+from catenary.solver.model.model import Model
+from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.wire_ends import tensioned_ends
+from catenary.solver.statics.potential import Potential
+from catenary.solver.statics.tensioned_end import TensionedEnd
+
+# Displacements change by less than this where Newton's method ends [m].
+_SETTLED = 1e-9
+_MOST_STEPS = 40
+# Passes in which all switch at once, before one at a time does, and the most after these.
+_ALL_AT_ONCE = 40
+# Forces below this are none [N]: what a dropper of 1e6 N/m pulls when it stretches by 1e-13 m.
+_NO_FORCE = 1e-7
+
+
+class RestNearby:
+    """The search for a rest near a known one. Not collective.
+
+    Parameters
+    ----------
+    potential : of the line as it is now about the known rest
+    load : (n_dofs,) what it has to carry beside the former line's loads [N], [N m]
+    """
+
+    def __init__(self, potential: Potential, load: np.ndarray) -> None:
+        self._potential, self._load = potential, load
+        self._model = model = potential.model
+        self._ends: list[TensionedEnd] = []
+        if model.simulated.tensioner is not None:
+            self._ends = [TensionedEnd(model, end) for end in tensioned_ends(model)]
+        self._bends = effects.needs_form(model.problem)
+        self._matrix: sparse.csc_matrix | None = None
+        self._lost = 1.0 - model.simulated.kept_ratio if model.simulated.slackening else 0.0
+
+    def find(self) -> tuple[Equilibrium, np.ndarray]:
+        """The rest, and what droppers that are slack there lack to be taut, (n_droppers,) [m].
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        model, potential = self._model, self._potential
+        k = model.dropper_stiffness
+        switches = ~model.broken & (self._lost > 0.0)
+        slack = switches & (potential.reserve(potential.known) < -_NO_FORCE)
+        moved = np.zeros(model.n_dofs)
+        for again in itertools.count():
+            moved, form = self._newton(moved, slack)
+            reserve = form.dropper_force
+            wrong = switches & np.where(slack, reserve > _NO_FORCE, reserve < -_NO_FORCE)
+            # All ends are looked at: each goes over to the state that follows.
+            turned = [end.changes(form) for end in self._ends]
+            if not (wrong.any() or any(turned)):
+                break
+            if again > _ALL_AT_ONCE + 2 * k.size + 2 * len(self._ends):
+                raise InputError(
+                    f"the line finds no rest{where(model)}: its droppers or tensioners start and "
+                    "stop without end"
+                )
+            chosen = wrong if again < _ALL_AT_ONCE else np.arange(k.size) == np.argmax(wrong)
+            slack = slack ^ (chosen & wrong)
+        gap = np.zeros(k.size)
+        gap[slack] = -reserve[slack] / k[slack]
+        force = np.where(np.abs(reserve) < _NO_FORCE, 0.0, reserve)
+        return replace(form, dropper_force=self._carried(force, slack)), gap
+
+    def _carried(self, reserve: np.ndarray, slack: np.ndarray) -> np.ndarray:
+        return np.where(slack, (1.0 - self._lost) * reserve, reserve)
+
+    def _newton(self, moved: np.ndarray, slack: np.ndarray) -> tuple[np.ndarray, Equilibrium]:
+        """Displacement and shape at rest with some droppers slack, from a displacement nearby."""
+        model, potential, moved = self._model, self._potential, moved.copy()
+        free = [end.unknown for end in self._ends if end.pull is not None]
+        held = [end.unknown for end in self._ends if end.pull is None]
+        constrained = np.union1d(np.setdiff1d(model.constrained, free), held).astype(np.int64)
+        load = self._load.copy()
+        for end in self._ends:
+            if end.pull is None:
+                moved[end.unknown] = end.end.outwards * end.held_at - self._already(end)
+            else:
+                tension = model.problem.line.wire(end.end.wire).tension
+                load[end.unknown] += end.end.outwards * (end.pull - tension)
+        change, form = np.inf, potential.form(moved)
+        for _ in range(_MOST_STEPS):
+            carried = self._carried(form.dropper_force, slack)
+            lacks = load - potential.pull(moved, form, carried)
+            lacks[constrained] = 0.0
+            about = model
+            if self._bends:
+                shape = replace(form, dropper_force=carried)
+                about = build(model.problem, model.mesh, model.dropper_lengths, form=shape)
+                about.constrained = constrained
+            step = self._solved(about, slack, lacks)
+            if not np.isfinite(step).all():
+                break
+            moved += step
+            form = potential.form(moved)
+            change = float(np.abs(step).max())
+            if change < _SETTLED or not self._bends:
+                return moved, form
+        raise InputError(
+            f"the line finds no rest{where(model)}: it still moves by {change:.2g} m after "
+            f"{_MOST_STEPS} steps of Newton's method; its wires may be slack there"
+        )
+
+    def _already(self, end: TensionedEnd) -> float:
+        """Where the known rest has an end, along the track since the installation [m]."""
+        known = self._potential.known
+        return float(known.along[end.end.node]) if known.along.size else 0.0
+
+    def _solved(self, about: Model, slack: np.ndarray, lacks: np.ndarray) -> np.ndarray:
+        """Displacement under what is lacking (n_dofs,), by the stiffness with droppers slack."""
+        # PETSc is not loaded by a check of a sound line.
+        from catenary.solver.model.matrices import stiffness_matrix
+
+        if self._matrix is None or self._bends:
+            self._matrix = stiffness_matrix(about)
+        matrix = self._matrix
+        if slack.any():
+            assert about.droppers is not None
+            unknowns, weights = (part[slack] for part in about.droppers.direction)
+            rows = np.repeat(np.arange(len(unknowns)), unknowns.shape[1])
+            shape = len(unknowns), about.n_dofs
+            spread = sparse.csr_matrix((weights.ravel(), (rows, unknowns.ravel())), shape=shape)
+            free = np.ones(about.n_dofs)
+            free[about.constrained] = 0.0
+            spread = spread @ sparse.diags(free)
+            gone = sparse.diags(self._lost * about.dropper_stiffness[slack])
+            matrix = (matrix - spread.T @ gone @ spread).tocsc()
+        return np.asarray(sparse_linalg.splu(matrix.tocsc()).solve(lacks))
+
+
+def where(model: Model) -> str:
+    """At what temperature a line is that has no rest, for a sentence; "" if at that of its
+    installation."""
+    warmer = model.simulated.warmer
+    if not warmer:
+        return ""
+    return f" at {abs(warmer):g} K {'above' if warmer > 0 else 'below'} its installation"
