@@ -110,7 +110,7 @@ class Line(Spans):
         A wire that is clamped to others carries the same share of what it took of their tension.
         """
         clamped = {
-            (piece.x[0], piece.x[-1]): shares.get(wire.name, 1.0)
+            (piece.x[0], piece.x[-1], wire.tension): shares.get(wire.name, 1.0)
             for wire in self.wires
             for piece in wire.pieces
             if End.CLAMPED in piece.ends
@@ -119,7 +119,7 @@ class Line(Spans):
             replace(
                 wire,
                 tension=shares.get(wire.name, 1.0) * wire.tension,
-                taken=tuple((a, b, clamped.get((a, b), 1.0) * less) for a, b, less in wire.taken),
+                taken=tuple((*part[:2], clamped.get(part, 1.0) * part[2]) for part in wire.taken),
             )
             for wire in self.wires
         )

@@ -65,12 +65,14 @@ class Piece:
     y : lateral positions [m]
     z : heights; of an end that is held and of a support those at which it stays [m]
     ends : how it begins and ends
+    tensioned : whether held ends have a tensioner along the track; None as the line's ends have
     """
 
     x: tuple[float, ...]
     y: tuple[float, ...]
     z: tuple[float, ...]
     ends: tuple[End, End] = (End.HELD, End.HELD)
+    tensioned: tuple[bool | None, bool | None] = (None, None)
 
     def points(self, x: np.ndarray) -> np.ndarray:
         """Points of the piece at positions ``x`` (n,) along the track, shape (n, 3) [m]."""
@@ -86,6 +88,7 @@ class Profile:
     rise : height gained over all transition spans at the start, and at the end [m]
     ends, running : from and to of the wire and of where it is level [m]
     end_rise : height gained at the end if it is another one [m]
+    above_x, above : further height at positions along the track, linear between them [m]
     """
 
     height: float
@@ -95,6 +98,13 @@ class Profile:
     ends: tuple[float, float]
     running: tuple[float, float]
     end_rise: float | None = None
+    above_x: tuple[float, ...] = ()
+    above: tuple[float, ...] = ()
+
+    def base(self, x: np.ndarray) -> np.ndarray:
+        """Height without pre-sag and rise towards the ends, shape as ``x`` [m]."""
+        height = np.full_like(x, self.height, dtype=float)
+        return height + np.interp(x, self.above_x, self.above) if self.above_x else height
 
     @property
     def rises(self) -> bool:
@@ -106,12 +116,12 @@ class Profile:
     def level(self, x: np.ndarray) -> np.ndarray:
         """Height without pre-sag at positions ``x`` [m], shape as ``x``.
 
-        Constant in the running spans; in the transition spans a parabola that leaves the running
-        height without a kink and has gained its rise at the anchor.
+        ``base`` in the running spans; in the transition spans with a parabola that leaves the
+        running height without a kink and has gained its rise at the anchor.
         """
         x = np.asarray(x, dtype=float)
         start, end = self.running
-        height = np.full_like(x, self.height)
+        height = self.base(x)
         if start > self.ends[0]:
             into = np.clip((start - x) / (start - self.ends[0]), 0.0, None)
             height += self.rise * into**2
@@ -136,7 +146,7 @@ class Wire(Conductor):
     pieces : where it runs, one piece or several by ascending x that do not overlap
     profile : heights wanted at its droppers' lower ends; None if none hangs it
     taken : stretches (from, to, tension) over which wires that are clamped to it carry that much of
-        its tension, in ascending order [m], [m], [N]
+        its tension; where they overlap, all of them do [m], [m], [N]
     worn : stretches (from, to, share) over which it has lost a share of its section, from below
         [m], [m], [-]
     """
@@ -178,10 +188,18 @@ class Wire(Conductor):
         """Tension at positions ``x`` [m], shape as ``x`` [N]."""
         tension = np.full(np.shape(x), self.tension)
         if self.taken:
-            start, end, less = np.array(self.taken).T
-            which = np.clip(np.searchsorted(start, x, side="right") - 1, 0, None)
-            tension -= np.where((x >= start[which]) & (x < end[which]), less[which], 0.0)
+            for at, change in zip(np.array(self.taken).T[:2], (-1.0, 1.0), strict=True):
+                order = np.argsort(at, kind="stable")
+                less = np.cumsum(np.array(self.taken)[order, 2])
+                passed = np.searchsorted(at[order], x, side="right")
+                tension += change * np.where(passed > 0, less[np.maximum(passed - 1, 0)], 0.0)
         return tension
+
+    @property
+    def most_taken(self) -> float:
+        """Largest part of its tension that wires clamped to it carry at one place [N]."""
+        starts = np.array([start for start, _, _ in self.taken])
+        return self.tension - float(np.min(self.tension_at(starts), initial=self.tension))
 
     def radial_force(self, x: np.ndarray) -> np.ndarray:
         """Lateral force that holds the wire where its course in plan has a kink, > 0 to the left.

@@ -7,6 +7,7 @@ from dataclasses import replace
 from catenary.meshgen.line import Line
 from catenary.meshgen.topologies import (  # noqa: F401  register themselves
     compound,
+    free,
     simple,
     single,
     stitched,

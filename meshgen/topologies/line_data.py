@@ -10,7 +10,8 @@ import numpy as np
 from catenary.meshgen.curve import Curve
 from catenary.meshgen.hardware import DropperKind, SteadyArm
 from catenary.meshgen.spans import Spans
-from catenary.meshgen.wires import Conductor, Profile
+from catenary.meshgen.topologies.free_data import FreeDroppers, FreeLink, FreeWire
+from catenary.meshgen.wires import Conductor, Profile, Role
 from catenary.solver.base.errors import InputError
 
 # Two cuts of a wire closer than this are taken for a slip of the pen [m].
@@ -99,6 +100,7 @@ class LineData(Spans):
         if it stays above the middle of the track
     curve : of the track, None if it is straight
     overlap : where the line consists of two tension sections, None if of one
+    wires, links : of a free line, None of others
     """
 
     dropper_positions: tuple[tuple[float, ...], ...]
@@ -120,6 +122,8 @@ class LineData(Spans):
     overlap: Overlap | None = None
     messenger_stagger: tuple[float, ...] | None = None
     curve: Curve | None = None
+    wires: tuple[FreeWire, ...] | None = None
+    links: tuple[FreeLink, ...] | None = None
 
     @cached_property
     def dropper_x(self) -> np.ndarray:
@@ -159,6 +163,28 @@ class LineData(Spans):
             (float(masts[0]), float(masts[-1])),
             self.running_range,
         )
+
+    @property
+    def lowest_contact(self) -> float:
+        """Height at which a contact wire is to hang at its lowest [m]."""
+        if self.wires is None or self.links is None:
+            return self.contact_height - max(max(sags, default=0.0) for sags in self.pre_sag)
+        contact = [wire for wire in self.wires if wire.role is Role.CONTACT]
+        names = [wire.name for wire in contact]
+        hanging = [link for link in self.links if isinstance(link, FreeDroppers)]
+        sags = [max(link.pre_sag) for link in hanging if link.lower in names]
+        heights = [min(wire.heights.value) for wire in contact if wire.heights is not None]
+        return min(heights) - max(sags, default=0.0)
+
+    def contact_sideways(self, x: np.ndarray) -> list[np.ndarray]:
+        """Lateral places of each contact wire at places ``x``, shape as ``x`` [m].
+
+        Those of a free line; of others the stagger, which wires are near to.
+        """
+        if self.wires is None:
+            return [np.interp(x, self.support_positions, self.stagger)]
+        contact = (wire for wire in self.wires if wire.role is Role.CONTACT)
+        return [wire.lateral.at(x) for wire in contact if wire.lateral is not None]
 
     def target_height(self, x: np.ndarray) -> np.ndarray:
         """Height that the contact wire is to have without pre-sag, shape as ``x`` [m]."""

@@ -23,7 +23,7 @@ class Topology(NamedTuple):
 
 
 # Parts of most topologies: wires hang by droppers from a messenger wire.
-HUNG = ("messenger_wire", "dropper")
+HUNG = ("contact_wire", "messenger_wire", "dropper")
 
 _TOPOLOGIES: dict[str, Topology] = {}
 

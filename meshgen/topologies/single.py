@@ -18,7 +18,7 @@ BRIDLE_WIRE = "bridle_wire"
 BRIDLE_CLAMPS = "bridle_clamps"
 
 
-@register(SINGLE, (), ("bridle",))
+@register(SINGLE, ("contact_wire",), ("bridle",))
 def single_wire(data: LineData) -> Line:
     """A contact wire that supports hold at its height at each mast, itself or by a bridle.
 

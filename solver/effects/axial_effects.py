@@ -110,14 +110,16 @@ def _with_tensioner(laws: Simulated, problem: Problem) -> Simulated:
 
 def _has_tensioner(problem: Problem) -> bool:
     along, masts = problem.along, problem.line.support_positions[[0, -1]]
-    inner = any(
-        abs(piece.x[end] - masts[end]) > SAME_STATION
+    line_ends = float(masts[0]), float(masts[1])
+    has_one = any(
+        along.tensioned(piece.x[end], line_ends, SAME_STATION)
+        if piece.tensioned[end] is None
+        else piece.tensioned[end]
         for wire in problem.line.wires
         for piece in wire.pieces
         for end in (0, -1)
         if piece.ends[end] is not End.CLAMPED
     )
-    has_one = along.start or along.end or (along.overlap and inner)
     return AXIAL in problem.effects and has_one
 
 

@@ -14,4 +14,4 @@ def pre_sag(wanted: Profile, x: np.ndarray) -> np.ndarray:
 
 def transition(wanted: Profile, x: np.ndarray) -> np.ndarray:
     """Rise towards the tensioners in the transition spans, shape as ``x`` [m]."""
-    return np.asarray(wanted.level(x) - wanted.height)
+    return np.asarray(wanted.level(x) - wanted.base(x))

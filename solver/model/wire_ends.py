@@ -32,10 +32,12 @@ def ends_of(model: Model) -> list[WireEnd]:
     found = []
     for wire in model.problem.line.wires:
         for piece, nodes in zip(wire.pieces, mesh.pieces(wire.name), strict=True):
-            for node, outwards, kind in zip(nodes[[0, -1]], (-1, 1), piece.ends, strict=True):
+            ends = zip(nodes[[0, -1]], (-1, 1), piece.ends, piece.tensioned, strict=True)
+            for node, outwards, kind, tensioned in ends:
                 if kind is not End.CLAMPED:
                     x = float(mesh.points[node, 0])
-                    tensioned = along.tensioned(x, line_ends, SAME_STATION)
+                    if tensioned is None:
+                        tensioned = along.tensioned(x, line_ends, SAME_STATION)
                     found.append(WireEnd(int(node), wire.name, tensioned, outwards))
     return found
 

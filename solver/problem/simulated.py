@@ -32,7 +32,7 @@ class Simulated:
     contact : law of the contact; without its damping, unless an effect adds it
     gravity : of all masses [m/s2]; at 0 nothing has weight and droppers carry nothing at rest
     target_heights : functions whose sum is the height at rest of wires with a profile above
-        ``Profile.height`` [m]
+        ``Profile.base`` [m]
     damping : of the line's components
     slackening : whether droppers slacken
     kept_ratio : share of its stiffness that a pushed dropper keeps; 1 if droppers do not slacken
@@ -91,7 +91,7 @@ class Simulated:
         """
         if wire.profile is None:
             raise ValueError(f"nothing says at what height {wire.name} is to be held")
-        height = np.full_like(x, wire.profile.height, dtype=float)
+        height = wire.profile.base(x)
         for above in self.target_heights:
             height += above(wire.profile, x)
         if self.irregular_heights is not None and wire.role is Role.CONTACT:

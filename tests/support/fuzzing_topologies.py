@@ -30,7 +30,7 @@ def put_topology(rng: random.Random, words: Words, span: float) -> str:
     name = rng.choice(tuple(_TOPOLOGIES))
     words["line.topology"] = f"'{name}'"
     _TOPOLOGIES[name](rng, words, span)
-    if rng.random() >= _OVERLAPS:
+    if name == "free" or rng.random() >= _OVERLAPS:
         return name
     _overlap(rng, words)
     return f"{name}+overlap"
@@ -81,6 +81,77 @@ def _single(rng: random.Random, words: Words, span: float) -> None:
         words["line.bridle"] = f"{{{wire},length_m={rng.uniform(0.1, 0.4) * span!r}}}"
 
 
+# What the base case says of each table of a simple line, beside the words.
+_BASE: dict[str, Words] = {
+    "contact_wire": {"name": "'contact_wire'", "role": "'contact'"},
+    "messenger_wire": {
+        "name": "'messenger_wire'",
+        "role": "'messenger'",
+        "mass_kg_per_m": 1.07,
+        "bending_stiffness_N_m2": 131.7,
+    },
+    "dropper": {
+        "type": "'droppers'",
+        "name": "'droppers'",
+        "upper": "'messenger_wire'",
+        "lower": "'contact_wire'",
+    },
+    "support": {"type": "'supports'", "name": "'supports'", "wire": "'messenger_wire'"},
+    "steady_arm": {
+        "type": "'steady_arms'",
+        "name": "'steady_arms'",
+        "wire": "'contact_wire'",
+        "holds_height": "true",
+    },
+}
+
+
+def _free(rng: random.Random, words: Words, span: float) -> None:
+    """The same wires and links as free tables, and now and then further ones."""
+    tables: dict[str, Words] = {name: dict(base) for name, base in _BASE.items()}
+    for key in [key for key in words if key.startswith("line.") and key.count(".") == 2]:
+        name, last = key.split(".")[1:]
+        if name in tables:
+            value = words.pop(key)
+            tables[name].pop(last, None)
+            if value != "":
+                tables[name][last] = value
+    contact = float(str(words.get("line.contact_height_m", 5.08)))
+    top = contact + float(str(words["line.encumbrance_m"]))
+    tables["messenger_wire"]["height_m"] = top
+    wires, links = list(tables.values())[:2], list(tables.values())[2:]
+    if rng.random() < 0.5:
+        wires.append(_further("feeder", "messenger", rng, height_m=top + rng.uniform(0.5, 2.0)))
+        links.append({"type": "'supports'", "name": "'feeder_supports'", "wire": "'feeder'"})
+    if int(str(words["line.n_spans"])) > 1 and rng.random() < 0.5:
+        ends = [rng.uniform(-0.4, -0.1) * span, rng.uniform(0.1, 0.4) * span]
+        clamps = {"start": "'messenger_wire'", "end": "'messenger_wire'", "clamp_kg": 0.3}
+        wires.append(_further("stitch", "stitch", rng, from_supports_m=ends, **clamps))
+    words |= {f"line.{key}": "" for key in (*tables, "encumbrance_m")}
+    words["line.wires"] = f"[{','.join(map(_inline, wires))}]"
+    words["line.links"] = f"[{','.join(map(_inline, links))}]"
+
+
+def _further(name: str, role: str, rng: random.Random, **more: object) -> Words:
+    """A further wire of a free line, thinner than those that carry."""
+    return {
+        "name": f"'{name}'",
+        "role": f"'{role}'",
+        "tension_N": rng.uniform(1e3, 8e3),
+        "mass_kg_per_m": rng.uniform(0.2, 0.8),
+        "bending_stiffness_N_m2": rng.choice([0.0, rng.uniform(1.0, 50.0)]),
+        "diameter_mm": rng.uniform(5.0, 15.0),
+        **more,
+    }
+
+
+def _inline(table: Words) -> str:
+    """A table in one line of TOML."""
+    pairs = (f"{key}={value if isinstance(value, str) else repr(value)}"
+             for key, value in table.items())  # fmt: skip
+    return f"{{{','.join(pairs)}}}"
+
+
 def _overlap(rng: random.Random, words: Words) -> None:
     """In the spans that trains run on, as far as there can be one."""
     _leave_out(words, _ON_THE_WIRE)
@@ -111,4 +182,5 @@ _TOPOLOGIES: dict[str, Callable[[random.Random, Words, float], None]] = {
     "twin": _twin,
     "twin_messenger": _twin,
     "single": _single,
+    "free": _free,
 }

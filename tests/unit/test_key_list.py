@@ -30,6 +30,7 @@ def first_words(text: str) -> list[str]:
     [
         ("bending_stiffness", [*(f"line.{wire}_wire.bending_stiffness_N_m2" for wire in WIRES),
                                "line.bridle.bending_stiffness_N_m2",
+                                   "line.wires.*.bending_stiffness_N_m2",
                                "pantographs.*.strips.flexure.bending_stiffness_N_m2"]),
         ("line.*_wire.tension_N", [f"line.{wire}_wire.tension_N" for wire in WIRES]),
         ("SPEED_km", ["train.speed_km_h"]),

@@ -7,6 +7,7 @@ import functools
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from catenary.cases.scene.convert.line.parts import hanging_table
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.input.origin import shown
 from catenary.cases.scene.keys.error_sentences import refusal
@@ -68,7 +69,7 @@ def _requirements(scene: Scene, name: str, how: str, key: str) -> Iterator[Fault
 
 def check_effect_data(scene: Scene) -> Iterator[Fault]:
     """Effects without the value that they need, and values without their effect."""
-    hung = scene.line.dropper
+    hung = hanging_table(scene.line)
     values = {
         "residual_dropper_stiffness": 0.0 if hung is None else hung.residual_stiffness_ratio,
     }

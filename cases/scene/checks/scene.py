@@ -26,6 +26,7 @@ from catenary.cases.scene.checks.line.droppers import (
     check_droppers_inside_spans,
 )
 from catenary.cases.scene.checks.line.ends import check_ends
+from catenary.cases.scene.checks.line.free_places import check_free_droppers
 from catenary.cases.scene.checks.line.lateral import check_lateral
 from catenary.cases.scene.checks.line.mesh_size import size_faults
 from catenary.cases.scene.checks.line.topology import check_names, check_parts, check_topology
@@ -140,6 +141,7 @@ def _line(scene: Scene, found: _Findings) -> LineData | None:
     def make() -> Iterator[Fault]:
         lines.append(line_data_of(scene))
         yield from check_droppers_inside_spans(scene, lines[0])
+        yield from check_free_droppers(scene, lines[0])
 
     return lines[0] if found.nothing_by(make) else None
 

@@ -15,6 +15,7 @@ from catenary.cases.scene.convert.line.along import along_of
 from catenary.cases.scene.convert.line.defects import defects_of, irregularities_of
 from catenary.cases.scene.convert.line.ends import ends_of
 from catenary.cases.scene.convert.line.line import line_of
+from catenary.cases.scene.convert.line.parts import hanging_table
 from catenary.cases.scene.convert.line.wind import wind_of
 from catenary.cases.scene.convert.train.aerodynamics import tunnels_of
 from catenary.cases.scene.convert.train.laws import regulation_of
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 def problem_of(scene: Scene) -> Problem:
     """The problem of a scene."""
     numerics, train, line = scene.numerics, _train(scene), line_of(scene)
-    hung = scene.line.dropper
+    hung = hanging_table(scene.line)
     problem = Problem(
         line=line,
         damping=_damping(scene.line),

@@ -48,6 +48,13 @@ USUAL: dict[str, tuple[float, float]] = {
     "line.dropper.pre_sag_mm": (5, 150),
     "line.dropper.pre_sag_mid_mm": (5, 150),
     "line.support.stiffness_N_per_m": (1e4, 1e7),
+    "line.wires.tension_N": (1e3, 4e4),
+    "line.wires.mass_kg_per_m": (0.1, 3),
+    "line.wires.height_m": (4, 9),
+    "line.wires.stagger_m": (0.05, 0.6),
+    "line.links.positions_m": (1, 80),
+    "line.links.pre_sag_mm": (5, 150),
+    "line.links.pre_sag_mid_mm": (5, 150),
     "line.transition.span_m": (20, 80),
     "pantographs.*.static_force_N": (30, 300),
     "pantographs.*.nominal_height_m": (4, 7),
@@ -57,7 +64,7 @@ USUAL: dict[str, tuple[float, float]] = {
     "contact.stiffness_N_per_m": (5e3, 1e7),
     "numerics.dt_s": (1e-5, 5e-3),
 }
-_SIGNED = ("line.stagger_m", "line.messenger_stagger_m", "line.dropper.pre_sag")
+_SIGNED = ("stagger_m", "messenger_stagger_m", "pre_sag")
 _MARGIN = 10.0  # beyond a usual range without a question
 # What a number a thousand times too small, or too large, was probably written in.
 _LARGER = {"N": "kN", "N/m": "kN/m", "mm": "m", "N m2": "kN m2"}
@@ -76,7 +83,8 @@ def unit_guess(key: str, value: float) -> str:
     """The sentence on a number whose unit is probably another one, "" for others."""
     usual, unit = usual_range(key), unit_of(key)
     # Sideways and below there are negative numbers, of which only the size can be a slip.
-    size = abs(value) if key.startswith(_SIGNED) else value
+    signed = any(part.startswith(_SIGNED) for part in key.split("."))
+    size = abs(value) if signed else value
     if usual is None or size <= 0 or usual[0] / _MARGIN <= size <= usual[1] * _MARGIN:
         return ""
     for others, factor in ((_LARGER, 1e3), (_SMALLER, 1e-3)):

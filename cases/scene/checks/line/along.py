@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catenary.cases.scene.convert.line.along import TENSIONER, along_of
+from catenary.cases.scene.convert.line.parts import wire_tables
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
+from catenary.cases.scene.tables.line.free import FreeWireTable
 from catenary.cases.scene.tables.line.line import LineTable
-from catenary.cases.scene.tables.line.wires import WireTable
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
 
@@ -58,15 +59,14 @@ def _data_of_effect(table: LineTable) -> dict[str, object]:
 
 
 def _wires(scene: Scene) -> Iterator[Fault]:
-    for name, field in LineTable.model_fields.items():
-        wire = getattr(scene.line, name)
-        if isinstance(wire, WireTable) and wire.stiffness_along() is None:
-            key = f"line.{name}"
+    for key, wire in wire_tables(scene.line).items():
+        if wire.stiffness_along() is None:
+            field = LineTable.model_fields.get(key.removeprefix("line."))
+            what = wire.name if isinstance(wire, FreeWireTable) else field and field.description
             yield Fault(
                 f"{key}.axial_stiffness_N",
-                f"effects.{_EFFECT} is on, but {key} ({field.description}) {scene.origin.of(key)} "
-                "has no axial stiffness; give it axial_stiffness_N, or section_mm2 and "
-                "youngs_modulus_GPa",
+                f"effects.{_EFFECT} is on, but {key} ({what}) {scene.origin.of(key)} has no "
+                "axial stiffness; give it axial_stiffness_N, or section_mm2 and youngs_modulus_GPa",
             )
 
 

@@ -153,7 +153,7 @@ def _worn_twice(scene: Scene, i: int, table: WornWireTable) -> Iterator[Fault]:
 
 
 def _tension(scene: Scene, wire: Wire, key: str, factor: float) -> Iterator[Fault]:
-    most = max((less for _, _, less in wire.taken), default=0.0)
+    most = wire.most_taken
     if factor * wire.tension <= most:
         why = (
             f"wires that are clamped to {wire.name} take {most:g} N of its {wire.tension:g} N: it "

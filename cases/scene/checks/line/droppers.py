@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from catenary.cases.scene.convert.line.parts import positions_in
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.tables.line.droppers import HangingTable
@@ -27,30 +28,27 @@ def check_droppers_inside_spans(scene: Scene, line: LineData) -> Iterator[Fault]
     """Of each group the first span whose droppers are outside or too close together."""
     table = scene.line
     if table.dropper is not None:
-        yield from _inside(scene, "line.dropper", table.dropper, line, line.dropper_positions)
+        yield from droppers_inside(scene, "line.dropper", table.dropper, line.span_lengths)
     if line.auxiliary_wire is not None and table.auxiliary_wire is not None:
-        places = line.auxiliary_wire.dropper_positions
-        key = "line.auxiliary_wire.dropper"
-        yield from _inside(scene, key, table.auxiliary_wire.dropper, line, places)
+        key, hung = "line.auxiliary_wire.dropper", table.auxiliary_wire.dropper
+        yield from droppers_inside(scene, key, hung, line.span_lengths)
 
 
-def _inside(
-    scene: Scene,
-    table: str,
-    kind: HangingTable,
-    line: LineData,
-    places: tuple[tuple[float, ...], ...],
+def droppers_inside(
+    scene: Scene, table: str, kind: HangingTable, spans: Sequence[float]
 ) -> Iterator[Fault]:
-    if kind.positions_m is not None and len(set(line.span_lengths)) > 1:
+    """The first of some spans in which droppers of a table are outside or too close together."""
+    if kind.positions_m is not None and len(set(spans)) > 1:
         key = f"{table}.positions_m"
-        lengths = ", ".join(f"{span:g}" for span in sorted(set(line.span_lengths))[:_SOME])
+        lengths = ", ".join(f"{span:g}" for span in sorted(set(spans))[:_SOME])
         yield Fault(
             key,
             f"{key} {scene.origin.of(key)} holds for one span length, but the spans are "
             f"{lengths} m long; give {table}.patterns or count and spacing_m",
         )
         return
-    for span, positions in zip(line.span_lengths, places, strict=True):
+    for span in spans:
+        positions = positions_in(scene, table, kind, span)
         outside = [x for x in positions if not SHORTEST_GAP <= x <= span - SHORTEST_GAP]
         close = [pair for pair in zip(positions, positions[1:], strict=False)
                  if pair[1] - pair[0] < SHORTEST_GAP]  # fmt: skip
@@ -121,7 +119,7 @@ def estimated_dropper_lengths(line: LineData, gravity: float) -> list[np.ndarray
 def check_dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
     """A messenger wire that would hang below the contact wire."""
     gravity = Problem.gravity if scene.switches().get("gravity", True) else 0.0
-    if line.overlap is not None:
+    if line.overlap is not None and line.wires is None:
         find_cuts(make_line(line))  # refuses wires that would cross
     lengths = estimated_dropper_lengths(line, gravity)
     shortest = [float(v.min(initial=np.inf)) for v in lengths] or [np.inf]

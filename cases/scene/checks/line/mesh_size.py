@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from catenary.cases.scene.checks.line.free_places import free_counts
+from catenary.cases.scene.convert.line.free import free_wires
 from catenary.cases.scene.convert.line.line import line_of, span_lengths
 from catenary.cases.scene.cost_model import estimate_memory, estimate_start
 from catenary.cases.scene.input.faults import Fault, SceneError
@@ -15,6 +17,7 @@ from catenary.cases.scene.tables.line.line import TransitionTable
 from catenary.meshgen.division import divisions_of
 from catenary.meshgen.geometry import find_cuts
 from catenary.meshgen.line import Line
+from catenary.meshgen.wires import Wire
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
 
@@ -53,6 +56,8 @@ def size_of(scene: Scene) -> Size | None:
     """
     if scene.mesh.file is not None:
         return None
+    if scene.line.wires is not None:
+        return _of_free_line(scene)
     lengths = span_lengths(scene.line)
     try:
         sample, times = _sample(scene, lengths)
@@ -71,11 +76,26 @@ def size_of(scene: Scene) -> Size | None:
         often = 1 if whole else times[span_of_gap[last - 1]]
         nodes[piece.wire] += int(weighted[piece.first : last].sum() + often)
     hanging = np.searchsorted(masts, sample.dropper_x) - 1
+    return _size(scene, int(times[hanging].sum()), nodes, sample.wires)
+
+
+def _of_free_line(scene: Scene) -> Size | None:
+    """The size of a line whose wires are listed, counted without making it."""
+    try:
+        n_droppers, nodes = free_counts(scene)
+        listed = free_wires(scene, span_lengths(scene.line)) or ()
+    except InputError:
+        return None
+    wires = [Wire.of(own.conductor, own.name, own.role, ()) for own in listed]
+    return _size(scene, n_droppers, nodes, wires)
+
+
+def _size(scene: Scene, n_droppers: int, nodes: dict[str, int], wires: Sequence[Wire]) -> Size:
     switches = scene.switches()
     chosen = (effect for name, effect in effects.registry().items() if switches[name])
-    groups = effects.unknown_groups(chosen, sample.wires)
+    groups = effects.unknown_groups(chosen, wires)
     unknowns = sum(nodes[wire] * len(own) for group in groups for wire, own in group.items())
-    return Size(scene.line.n_spans, int(times[hanging].sum()), sum(nodes.values()), unknowns)
+    return Size(scene.line.n_spans, n_droppers, sum(nodes.values()), unknowns)
 
 
 def _sample(scene: Scene, lengths: tuple[float, ...]) -> tuple[Line, np.ndarray]:

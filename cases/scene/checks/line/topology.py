@@ -6,11 +6,14 @@ import difflib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from catenary.cases.scene.checks.line.free import check_free_tables
+from catenary.cases.scene.checks.line.free_places import check_free_places
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.tables.line.line import LineTable
 from catenary.cases.scene.tables.run.incidents import TensionLossTable
 from catenary.meshgen.topologies.all_topologies import make_line, registered
+from catenary.meshgen.topologies.free import FREE
 from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData
 
 if TYPE_CHECKING:
@@ -45,6 +48,8 @@ def check_topology(scene: Scene) -> Iterator[Fault]:
                 f"{key} {scene.origin.of(key)} is no part of the topology {table.topology}; leave "
                 f"it out, or take line.topology = {' or '.join(users)}",
             )
+    if table.topology == FREE and table.wires is not None and table.links is not None:
+        yield from check_free_tables(scene)
 
 
 def _keys(parts: tuple[str, ...]) -> dict[str, None]:
@@ -54,6 +59,9 @@ def _keys(parts: tuple[str, ...]) -> dict[str, None]:
 
 def check_parts(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Parts of a topology that do not fit to each other."""
+    if line.wires is not None:
+        yield from check_free_places(scene, line)
+        return
     yield from _stitch_wire(scene, line)
     yield from _auxiliary_wire(scene, line)
     yield from _bridle(scene, line)

@@ -106,7 +106,7 @@ def _dropper(scene: Scene, i: int, table: DropperBreakTable, line: LineData) -> 
             scene, i, "span", table.span, f"the line has {counted(line.n_spans, 'span')}"
         )
         return
-    n = len(line.dropper_positions[table.span - 1])
+    n = len(make_line(line).droppers_of_span(table.span - 1))
     if table.dropper > n:
         why = f"span {table.span} has {counted(n, 'dropper')}"
         yield _refusal(scene, i, "dropper", table.dropper, why)
@@ -115,7 +115,7 @@ def _dropper(scene: Scene, i: int, table: DropperBreakTable, line: LineData) -> 
 def _tension(scene: Scene, i: int, table: TensionLossTable, line: LineData) -> Iterator[Fault]:
     yield from _hangs(scene, i, table)
     wire = make_line(line).wire(table.wire)
-    most = max((less for _, _, less in wire.taken), default=0.0)
+    most = wire.most_taken
     if table.share * wire.tension <= most:
         why = (
             f"wires that are clamped to {wire.name} take {most:g} N of its {wire.tension:g} N: it "

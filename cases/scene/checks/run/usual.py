@@ -20,6 +20,10 @@ def usual_faults(scene: Scene) -> Iterator[Fault]:
 
 
 def _faults(value: Any, parts: list[str], key: str, origin: Origin) -> Iterator[Fault]:
+    if parts and isinstance(value, list):
+        for i, entry in enumerate(value):
+            yield from _faults(entry, parts, f"{key}.{i}", origin)
+        return
     if parts:
         inner = value if isinstance(value, dict) else {}
         for name in inner if parts[0] == "*" else [parts[0]] if parts[0] in inner else []:

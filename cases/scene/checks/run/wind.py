@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from catenary.cases.scene.convert.line.parts import wire_tables
 from catenary.cases.scene.convert.line.wind import wind_of
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
@@ -15,9 +16,6 @@ from catenary.meshgen.topologies.line_data import LineData
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
 
-# Tables of wires in a line.
-_WIRES = ("contact_wire", "messenger_wire", "auxiliary_wire", "stitch_wire", "bridle")
-
 
 def check_wind(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Wires without a diameter, stretches that overlap or are nowhere, heights in the ground."""
@@ -25,13 +23,12 @@ def check_wind(scene: Scene, line: LineData) -> Iterator[Fault]:
     if table is None:
         return
     if scene.switches()["wind"]:
-        for name in _WIRES:
-            wire = getattr(scene.line, name)
-            if wire is not None and wire.diameter_mm is None:
-                key = f"line.{name}.diameter_mm"
+        for name, wire in wire_tables(scene.line).items():
+            if wire.diameter_mm is None:
+                key = f"{name}.diameter_mm"
                 yield Fault(
                     key,
-                    f"{key} is missing {scene.origin.of(f'line.{name}')}: the drag of the wind "
+                    f"{key} is missing {scene.origin.of(name)}: the drag of the wind "
                     "depends on it; give it, or write effects.wind = false",
                 )
     end = line.support_positions[-1]

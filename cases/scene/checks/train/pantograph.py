@@ -49,7 +49,7 @@ def check_mechanisms(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 
 def _heights(scene: Scene, line: LineData) -> Iterator[Fault]:
-    lowest = line.contact_height - max(max(sags, default=0.0) for sags in line.pre_sag)
+    lowest = line.lowest_contact
     heights = lowest, line.contact_height
     for name in dict.fromkeys(place.name for place in scene.train.pantographs):
         table = scene.pantographs[name]
@@ -75,7 +75,7 @@ def reaches_below(scene: Scene, name: str, line: LineData, drop: float) -> bool:
     table = scene.pantographs[name]
     if not isinstance(table, MultibodyTable):
         return True
-    lowest = line.contact_height - max(max(sags, default=0.0) for sags in line.pre_sag)
+    lowest = line.lowest_contact
     nominal = line.contact_height if table.nominal_height_m is None else table.nominal_height_m
     data, working = _standing(scene, name, table)
     return _reaches(data, working + lowest - nominal - drop - _LEADS)

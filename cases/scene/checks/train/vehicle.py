@@ -196,7 +196,8 @@ def _farthest(scene: Scene, line: LineData, number: int) -> tuple[float, float]:
         times = np.concatenate([times, np.linspace(0.0, duration, n)])
     times = times[(times >= 0.0) & (times <= duration)]
     ahead = start + speed * times[:, None] + offsets
-    places = np.interp(ahead, supports, line.stagger)
+    courses = np.array(line.contact_sideways(ahead))
+    places = np.take_along_axis(courses, np.abs(courses).argmax(axis=0)[None], axis=0)[0]
     if base is not None:
         places -= np.array([base.lateral(time).place for time in times.tolist()])[:, None]
     farthest = np.abs(places).max(axis=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -34,6 +34,9 @@ class DropperPattern(Table):
 class HangingTable(Table):
     """Droppers: what they are, and where they hang."""
 
+    # Keys that each say where they hang.
+    PLACED_BY: ClassVar[tuple[str, ...]] = ("positions_m", "count", "patterns")
+
     stiffness_N_per_m: float | None = Field(
         None, gt=0, le=1e9, description="stiffness in tension, the same for every length"
     )
@@ -61,7 +64,7 @@ class HangingTable(Table):
     @model_validator(mode="after")
     def _placed(self) -> HangingTable:
         exactly_one(self, "stiffness_N_per_m", "axial_stiffness_N")
-        exactly_one(self, "positions_m", "count", "patterns")
+        exactly_one(self, *self.PLACED_BY)
         if (self.count is None) != (self.spacing_m is None):
             raise ValueError("needs count and spacing_m together, but only one is given")
         if self.patterns is not None:

@@ -12,6 +12,7 @@ from catenary.cases.scene.tables.line.damping import DampingTable
 from catenary.cases.scene.tables.line.droppers import DropperTable
 from catenary.cases.scene.tables.line.ends import EndsTable
 from catenary.cases.scene.tables.line.fittings import FittingTable
+from catenary.cases.scene.tables.line.free import FreeLinkTable, FreeWireTable
 from catenary.cases.scene.tables.line.hardware import SteadyArmTable, SupportTable
 from catenary.cases.scene.tables.line.spans import Span
 from catenary.cases.scene.tables.line.tunnels import TunnelTable
@@ -94,7 +95,7 @@ class LineTable(Table):
     curve: CurveTable | None = Field(
         None, description="curve of the track; acts with effects.lateral_motion"
     )
-    contact_wire: WireTable = Field(description="contact wire")
+    contact_wire: WireTable | None = Field(None, description="contact wire")
     messenger_wire: WireTable | None = Field(None, description="messenger wire")
     auxiliary_wire: AuxiliaryWireTable | None = Field(
         None, description="wire between messenger and contact wire"
@@ -103,6 +104,12 @@ class LineTable(Table):
     twin: TwinTable | None = Field(None, description="two contact wires in place of one")
     bridle: BridleTable | None = Field(None, description="bridles of a single contact wire")
     dropper: DropperTable | None = Field(None, description="droppers of the contact wire")
+    wires: list[FreeWireTable] | None = Field(
+        None, min_length=1, max_length=100, description="wires of a free line"
+    )
+    links: list[FreeLinkTable] | None = Field(
+        None, min_length=1, max_length=1000, description="what joins and carries those wires"
+    )
     support: SupportTable = Field(default_factory=SupportTable, description="supports")
     steady_arm: SteadyArmTable = Field(default_factory=SteadyArmTable, description="steady arms")
     fittings: list[FittingTable] = Field(

@@ -1,0 +1,241 @@
+"""Whether the wires and links of a free line make a line."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from catenary.cases.scene.convert.line.free import FIXED, TENSIONER, stretches_of
+from catenary.cases.scene.convert.line.line import span_lengths
+from catenary.cases.scene.input.faults import Fault
+from catenary.cases.scene.keys.error_sentences import refusal
+from catenary.cases.scene.tables.line.free import (
+    FreeArmsTable,
+    FreeClampsTable,
+    FreeDroppersTable,
+    FreeSupportsTable,
+    FreeWireTable,
+)
+from catenary.meshgen.mesh import ANCHORS
+from catenary.meshgen.topologies.free import in_order
+from catenary.solver.base.errors import InputError
+
+if TYPE_CHECKING:
+    from catenary.cases.scene.scene import Scene
+
+# Names that mean something else in files and among ends.
+TAKEN = (ANCHORS, "droppers", "clamps", "steady_arms", "masts", "pantographs", TENSIONER, FIXED)
+# Tables of other topologies that have defaults, and would be read by none here.
+_ELSEWHERE = {"support": "a link of type supports", "steady_arm": "a link of type steady_arms"}
+# As many as spans of 20 droppers each on the longest line.
+MOST_DROPPERS = 400_000
+_TINY = 1e-6  # [m]
+
+
+def check_free_tables(scene: Scene) -> Iterator[Fault]:
+    """Names, numbers of spans and supports, and ends that cannot be."""
+    for key, instead in _ELSEWHERE.items():
+        if getattr(scene.line, key) != type(getattr(scene.line, key))():
+            why = f"is no part of the topology free; leave it out, and write {instead}"
+            yield Fault(f"line.{key}", f"line.{key} {scene.origin.of(f'line.{key}')} {why}")
+    if scene.line.overlap is not None:
+        key = "line.overlap"
+        yield Fault(
+            key,
+            f"{key} {scene.origin.of(key)} is no part of the topology free; leave it out, and give "
+            "the wires of both sections stretches_m in line.wires",
+        )
+    yield from _names(scene)
+    wires = {wire.name: wire for wire in scene.line.wires or []}
+    if not any(wire.role == "contact" for wire in wires.values()):
+        key = "line.wires"
+        yield Fault(
+            key, f"{key} {scene.origin.of(key)} has no wire of the role contact to run under"
+        )
+    for i, wire in enumerate(scene.line.wires or []):
+        yield from _wire(scene, f"line.wires.{i}", wire, wires)
+    for i, link in enumerate(scene.line.links or []):
+        key = f"line.links.{i}"
+        joined = ("upper", "lower", "wire", "holds")
+        for end in joined:
+            name = getattr(link, end, None)
+            if name is not None:
+                yield from _known(scene, f"{key}.{end}", name, wires)
+        if isinstance(link, FreeDroppersTable | FreeClampsTable) and link.upper == link.lower:
+            why = "a link joins two wires, and lower is this one too"
+            yield refusal(scene.origin, f"{key}.upper", link.upper, why)
+        yield from _numbers(scene, key, link)
+    yield from _circles(scene)
+    yield from _slack(scene)
+    yield from _many(scene)
+
+
+def _names(scene: Scene) -> Iterator[Fault]:
+    seen: dict[str, str] = {}
+    entries = [(f"line.wires.{i}", wire.name) for i, wire in enumerate(scene.line.wires or [])]
+    links = [(f"line.links.{i}", link.name) for i, link in enumerate(scene.line.links or [])]
+    for key, name in [*entries, *links]:
+        if name in TAKEN and key.startswith("line.wires"):
+            why = "this name means something else; take another one"
+            yield refusal(scene.origin, f"{key}.name", name, why)
+        if name in seen:
+            why = f"{seen[name]} has this name too; each wire and each link needs one of its own"
+            yield refusal(scene.origin, f"{key}.name", name, why)
+        seen.setdefault(name, key)
+    for _, name in entries:
+        if f"{name}_clamps" in seen:
+            why = f"the clamps at the ends of {name} have this name"
+            yield refusal(scene.origin, f"{seen[f'{name}_clamps']}.name", f"{name}_clamps", why)
+
+
+def _known(scene: Scene, key: str, name: str, wires: Iterable[str]) -> Iterator[Fault]:
+    if name not in wires:
+        near = difflib.get_close_matches(name, list(wires), n=1)
+        meant = f"did you mean {near[0]}? " if near else ""
+        why = f"{meant}line.wires has {', '.join(wires)}"
+        yield refusal(scene.origin, key, name, why)
+
+
+def _wire(
+    scene: Scene, key: str, table: FreeWireTable, wires: dict[str, FreeWireTable]
+) -> Iterator[Fault]:
+    masts = np.concatenate([[0.0], np.cumsum(span_lengths(scene.line))])
+    n, length = scene.line.n_spans, float(masts[-1])
+    for name in ("height_m", "stagger_m"):
+        given = getattr(table, name)
+        if given is not None and len(given) not in (1, n + 1):
+            yield Fault(
+                f"{key}.{name}",
+                f"{key}.{name} {scene.origin.of(f'{key}.{name}')} must be one number or one for "
+                f"each support ({n + 1}), but lists {len(given)}",
+            )
+    beyond = [number for number in table.supports or [] if number > n]
+    if beyond:
+        why = f"the line has the supports 0 to {n}"
+        yield refusal(scene.origin, f"{key}.supports", beyond[0], why)
+        return
+    which = "stretches_m" if table.stretches_m is not None else "from_supports_m"
+    stretches = stretches_of(table, masts)
+    if not stretches:
+        why = "the line has no inner support"
+        yield refusal(scene.origin, f"{key}.{which}", table.from_supports_m, why)
+        return
+    if stretches[0][0] < -_TINY or stretches[-1][1] > length + _TINY:
+        outside = stretches[0] if stretches[0][0] < -_TINY else stretches[-1]
+        why = f"a piece would run from {outside[0]:g} to {outside[1]:g} m, and the line from 0 to"
+        yield refusal(scene.origin, f"{key}.{which}", given_of(table, which), f"{why} {length:g} m")
+        return
+    for one, other in zip(stretches, stretches[1:], strict=False):
+        if other[0] < one[1] + _TINY:
+            why = f"pieces would overlap from {other[0]:g} to {one[1]:g} m"
+            yield refusal(scene.origin, f"{key}.{which}", given_of(table, which), why)
+            return
+    for side in ("start", "end"):
+        yield from _end(scene, f"{key}.{side}", table, getattr(table, side), wires)
+    needs = table.role != "contact" and not {table.start, table.end} & wires.keys()
+    half = table.role != "contact" and not {table.start, table.end} <= wires.keys()
+    if (needs or half) and table.height_m is None and table.course_m is None:
+        yield Fault(
+            f"{key}.height_m",
+            f"{key}.height_m ({table.name}) is missing {scene.origin.of(key)}: nothing else says "
+            "how high its ends are held; give height_m or course_m",
+        )
+
+
+def given_of(table: FreeWireTable, key: str) -> object:
+    """What a table says under a key."""
+    return getattr(table, key)
+
+
+def _end(
+    scene: Scene, key: str, table: FreeWireTable, given: str | None, wires: dict[str, FreeWireTable]
+) -> Iterator[Fault]:
+    if given is None or given in (TENSIONER, FIXED):
+        return
+    if given == table.name:
+        yield refusal(scene.origin, key, given, "a wire cannot be clamped to itself")
+    elif given not in wires:
+        near = difflib.get_close_matches(given, [*wires, TENSIONER, FIXED], n=1)
+        meant = f"did you mean {near[0]}? " if near else ""
+        why = f"{meant}it must be {TENSIONER}, {FIXED} or a wire of {', '.join(wires)}"
+        yield refusal(scene.origin, key, given, why)
+    elif {table.start, table.end} <= wires.keys() and table.start != table.end:
+        if key.endswith("end"):
+            why = (
+                f"it starts on {table.start}: both ends must be clamped to one wire, or one be "
+                f"{TENSIONER} or {FIXED}, for it to be known whose tension the wire takes"
+            )
+            yield refusal(scene.origin, key, given, why)
+
+
+def _numbers(
+    scene: Scene,
+    key: str,
+    link: FreeDroppersTable | FreeClampsTable | FreeSupportsTable | FreeArmsTable,
+) -> Iterator[Fault]:
+    """Numbers of spans and supports that the line does not have."""
+    n = scene.line.n_spans
+    for name, first, what in (("spans", 1, "spans"), ("supports", 0, "supports")):
+        beyond = [number for number in getattr(link, name, None) or [] if number > n]
+        if beyond:
+            yield refusal(
+                scene.origin, f"{key}.{name}", beyond[0], f"the line has the {what} {first} to {n}"
+            )
+
+
+def _circles(scene: Scene) -> Iterator[Fault]:
+    """Wires that are clamped to each other, or hang from each other, in a circle."""
+    wires = scene.line.wires or []
+    names = {wire.name for wire in wires}
+    ends = {wire.name: [e for e in (wire.start, wire.end) if e in names] for wire in wires}
+    hanging: dict[str, list[str]] = {wire.name: [] for wire in wires}
+    for link in scene.line.links or []:
+        if isinstance(link, FreeDroppersTable | FreeClampsTable) and link.upper in names:
+            hanging[link.upper].append(link.lower)
+    for key, what, after in (
+        ("line.wires", "clamped to", ends),
+        ("line.links", "hanging from", hanging),
+    ):
+        if any(name in others for name, others in after.items()):
+            continue  # reported as a link to itself
+        try:
+            in_order(after.items())
+        except InputError as circle:
+            yield Fault(key, f"{key} {scene.origin.of(key)} has wires {what} each other: {circle}")
+
+
+def _slack(scene: Scene) -> Iterator[Fault]:
+    """Droppers that would do different things when slack, of which there is one for the line."""
+    links = [
+        (i, link)
+        for i, link in enumerate(scene.line.links or [])
+        if isinstance(link, FreeDroppersTable)
+    ]
+    for i, link in links[1:]:
+        for name in ("residual_stiffness_ratio", "slack_damping"):
+            first = getattr(links[0][1], name)
+            if getattr(link, name) != first:
+                why = f"it must be the {first} of line.links.{links[0][0]}, as for all droppers"
+                yield refusal(scene.origin, f"line.links.{i}.{name}", getattr(link, name), why)
+
+
+def _many(scene: Scene) -> Iterator[Fault]:
+    """More droppers than any line of so many spans has."""
+    n = 0
+    for i, link in enumerate(scene.line.links or []):
+        if isinstance(link, FreeDroppersTable):
+            spans = len(link.spans) if link.spans is not None else scene.line.n_spans
+            patterns = [len(pattern.positions_m) for pattern in link.patterns or []]
+            each = max([len(link.positions_m or []), link.count or 0, *patterns])
+            n += len(link.at_m) if link.at_m is not None else spans * each
+            if n > MOST_DROPPERS:
+                key = f"line.links.{i}"
+                yield Fault(
+                    key,
+                    f"{key} ({link.name}) {scene.origin.of(key)} and the links before it have {n} "
+                    f"droppers, but at most {MOST_DROPPERS} are allowed",
+                )
+                return
