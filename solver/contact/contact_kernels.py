@@ -402,18 +402,18 @@ def superpose(force, answers, touches, motion, gains):
 
 
 @in_line
-def compensate(numbers, compensation, start, offset, data, motion, gains):
+def compensate(numbers, compensation, start, at, width, data, motion, gains):
     """Add the answers to compensations of some links to the state.
 
-    ``data[offset[d] : offset[d + 1]]`` is the column of link d from the local unknown ``start[d]``
+    ``data[at[d] : at[d] + width[d]]`` is the column of link d from the local unknown ``start[d]``
     on; the rest as for ``superpose``.
     """
     x, y, z, _ = motion
     for k in range(numbers.size):
         d, f = numbers[k], compensation[k]
-        begin = start[d] - offset[d]
+        begin = start[d] - at[d]
         if f != 0.0:
-            for j in range(offset[d], offset[d + 1]):
+            for j in range(at[d], at[d] + width[d]):
                 change = f * data[j]
                 z[begin + j] -= gains[2] * change
                 x[begin + j] -= gains[0] * change

@@ -13,7 +13,7 @@ from catenary.solver.contact.contact_kernels import Followed
 from catenary.solver.contact.line_response import Coupled
 from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.linear import unit_responses
+from catenary.solver.linear.unit_responses import ShortColumns
 from catenary.solver.model.switching_links import LinkArrays, LinkTable
 
 
@@ -27,6 +27,7 @@ class FollowedLinks:
     Attributes
     ----------
     table : LinkTable of the whole line
+    local : LinkArrays of the whole table, with local unknowns, of which other ranks own some
     numbers : (n,) numbers in the table of those that may carry
     links : LinkArrays of these, with local unknowns
     reserve : (n,) what was found last, here or by a free step of the line [N]
@@ -38,9 +39,9 @@ class FollowedLinks:
         self.table = table
         mine = line.ownership.owned(table.arrays.unknowns[:, 0])
         self._mine = mine
-        self._local = table.arrays._replace(unknowns=table.arrays.unknowns - line.ownership.first)
+        self.local = table.arrays._replace(unknowns=table.arrays.unknowns - line.ownership.first)
         self.numbers = np.flatnonzero(mine & ~table.broken)
-        self.links = self._local.of(self.numbers)
+        self.links = self.local.of(self.numbers)
         self._released = self.links.law["released"].copy()
         self.reserve = np.zeros(self.numbers.size)
         self.moving = np.array([0, self.numbers.size], dtype=np.int64)
@@ -60,7 +61,7 @@ class FollowedLinks:
         broken ones included."""
         numbers = self.table.of_component(component)
         numbers = numbers[self._mine[numbers]]
-        return self.table.index[numbers], self._local.of(numbers)
+        return self.table.index[numbers], self.local.of(numbers)
 
     def find_reserve(self) -> np.ndarray:
         """Reserve in the line's present motion [N], shape (n,), overwritten by the next call."""
@@ -92,17 +93,11 @@ class FollowedLinks:
         return [(self.links.unknowns[acting].ravel(), forces.ravel())]
 
 
-def link_columns(comm: Any, table: LinkTable, line: LineIntegrator) -> unit_responses.ShortColumns:
+def link_columns(table: LinkTable, line: LineIntegrator) -> ShortColumns:
     """Columns of A^-1 for unit compensations of all links. Collective."""
-    return unit_responses.compute(
-        comm,
-        line.operators.solve_for,
-        line.ownership,
-        line.windows,
-        table.arrays.unknowns,
-        table.arrays.weights,
-        table.arrays.law["place"],
-        table.half_length,
+    unknowns, weights, law = table.arrays
+    return line.responses.columns(
+        unknowns[:, None], weights[:, None], law["place"], table.half_length
     )
 
 
@@ -126,36 +121,32 @@ class LinkCoupling:
         self,
         comm: Any,
         followed: FollowedLinks,
-        columns: unit_responses.ShortColumns,
+        columns: ShortColumns,
         line: LineIntegrator,
     ) -> None:
         self.coupled = no_links()
-        table, links = followed.table, followed.links
-        x = table.arrays.law["place"]
+        table = followed.table
+        unknowns, weights, law = followed.local
+        x = law["place"]
         distance = line.windows.reach + 2.0 * table.half_length.max(initial=0.0)
         n = x.size
         far = np.searchsorted(x, x + distance, side="right") - 1 - np.arange(n)
         half = int(far.max(initial=0))
         band = np.zeros((n, 2 * half + 1))
-        scratch = np.zeros(line.ownership.n_local)
-        law = links.law
-        per_acceleration = law["stiffness"] * line.position_factor
-        per_acceleration += law["damping"] * line.velocity_factor
-        own_x = law["place"]
-        for e in range(n):
-            values = columns.values[e]
-            if values.size == 0:
-                continue
-            filled = slice(int(columns.start[e]), int(columns.start[e]) + values.size)
-            scratch[filled] = values
-            low, high = own_x.searchsorted([x[e] - distance, x[e] + distance])
-            near = slice(int(low), int(high))
-            unknowns, weights, _ = links.of(near)
-            spread = (weights * scratch[unknowns]).sum(axis=1)
-            offset = followed.numbers[near] - e + half
-            inside = (offset >= 0) & (offset < band.shape[1])
-            band[e, offset[inside]] = (per_acceleration[near] * spread)[inside]
-            scratch[filled] = 0.0
+        per_acceleration = np.zeros(n)
+        own = law[followed.numbers]
+        per_acceleration[followed.numbers] = own["stiffness"] * line.position_factor
+        per_acceleration[followed.numbers] += own["damping"] * line.velocity_factor
+        for apart in range(-half, half + 1):
+            # Links e whose compensation acts on the link that is so many further.
+            e = slice(max(0, -apart), n - max(0, apart))
+            d = slice(e.start + apart, e.stop + apart)
+            seen = unknowns[d] - columns.start[e, None]
+            inside = (seen >= 0) & (seen < columns.width[e, None])
+            at = np.where(inside, columns.at[e, None] + seen, 0)
+            answer = np.where(inside, columns.data[at] if columns.data.size else 0.0, 0.0)
+            near = per_acceleration[d] * (np.abs(x[d] - x[e]) <= distance)
+            band[e, apart + half] = near * (weights[d] * answer).sum(axis=1)
         if comm.size > 1:
             band = comm.reduce(band, root=0)
         if band is not None:

@@ -15,7 +15,7 @@ from catenary.solver.contact.contact_wire import Candidates, ContactWires
 from catenary.solver.contact.followed_links import FollowedLinks, LinkCoupling, link_columns
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.linear import unit_responses
+from catenary.solver.linear.unit_responses import NO_COLUMNS
 from catenary.solver.model.model import Model
 from catenary.solver.model.switching_links import LinkTable
 from catenary.solver.statics.equilibrium import Equilibrium
@@ -60,11 +60,11 @@ class ForcesOnLine:
         free = np.ones(model.n_dofs)
         free[model.constrained] = 0.0
         self._free = free[line.ownership.first : line.ownership.last]
-        node_columns = self._columns_of_nodes(comm, range_of_run, free)
-        columns = unit_responses.ShortColumns(np.zeros(0, np.int64), [])
+        node_columns = self._columns_of_nodes(range_of_run, free)
+        columns = NO_COLUMNS
         self.link_coupling: LinkCoupling | None = None
         if table.switches:
-            columns = link_columns(comm, table, line)
+            columns = link_columns(table, line)
             self.link_coupling = LinkCoupling(comm, self.links, columns, line)
         n, n_local = candidates.place.size, line.ownership.n_local
         self._contact_place = candidates.place
@@ -80,7 +80,7 @@ class ForcesOnLine:
         self._force = np.zeros(n)
         self.superposing = self._answers, self._touches, *motion
         self._superpose = bound(contact_kernels.superpose, self._force, *self.superposing)
-        self.compensating = (*columns.packed(), *motion)
+        self.compensating = (*columns, *motion)
         self._speed = float(train_speed)
 
     def place(self) -> None:
@@ -148,23 +148,16 @@ class ForcesOnLine:
         pushed = contact_force[:, None] * value * self._free[local]
         return [(local.ravel(), pushed.ravel()), *self.links.loads(compensation)]
 
-    def _columns_of_nodes(
-        self, comm: Any, range_of_run: tuple[float, float], free: np.ndarray
-    ) -> np.ndarray:
+    def _columns_of_nodes(self, range_of_run: tuple[float, float], free: np.ndarray) -> np.ndarray:
         """Columns of A^-1 for the nodes in a stretch of the wires, each with the place of its own.
 
         Collective; ``free`` (n_dofs,) is zero for the unknowns that are held.
         """
-        line = self.line
         ranges = (self.wires.nodes_between(*range_of_run, k) for k in range(self.wires.n_wires))
         chosen = np.concatenate([np.arange(first, last) for first, last in ranges])
-        dofs = self.wires.dofs[chosen].reshape(-1, 1)
-        at = np.repeat(self.wires.x[chosen], 2)
-        packed = unit_responses.compute(
-            comm, line.operators.solve_for, line.ownership, line.windows, dofs, free[dofs], at
-        ).packed()
-        # Both unknowns of a node share a window; their columns stand one after the other.
-        nodes, offset = self.wires.nodes, packed.offset[0::2]
-        nodes["begin"][chosen], nodes["at"][chosen] = packed.start[0::2], offset[:-1]
-        nodes["width"][chosen] = np.diff(offset) // 2
-        return packed.data
+        dofs = self.wires.dofs[chosen][:, :, None]
+        found = self.line.responses.columns(dofs, free[dofs], self.wires.x[chosen])
+        nodes = self.wires.nodes
+        nodes["begin"][chosen], nodes["at"][chosen] = found.start, found.at
+        nodes["width"][chosen] = found.width
+        return found.data

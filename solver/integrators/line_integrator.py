@@ -24,7 +24,7 @@ from catenary.solver.integrators.line_state import AlphaSteps, LineState, Predic
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.step_operators import LineOperators, Loads
-from catenary.solver.linear.unit_responses import Windows
+from catenary.solver.linear.unit_responses import UnitResponses, Windows
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
@@ -43,6 +43,7 @@ class LineIntegrator(ABC):
     motion : LineState, the state as it is kept
     position_factor, velocity_factor : sigma [s2] and tau [s]
     operators : LineOperators
+    responses : UnitResponses of the step operator
     loads : LineLoads, None if there are none
     solution : the displacement as a PETSc vector, once ``fill_solution`` has filled it
     detour : why ``keep_ahead`` could not, None if it could; the same on all ranks
@@ -64,6 +65,7 @@ class LineIntegrator(ABC):
         coefficients = (1.0, self.position_factor, self.velocity_factor)
         self.windows = Windows(model.numbering, reach(model, coefficients))
         self.operators = LineOperators(comm, model, ownership, coefficients, self.windows)
+        self.responses = UnitResponses(comm, model, ownership, coefficients, self.windows)
         self._proportional = model.damping_is_proportional
         # What is folded into the product with K, and what is left to do after the solve.
         self._alpha_share = self._beta_share = 0.0

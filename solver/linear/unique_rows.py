@@ -13,7 +13,7 @@ def kinds_of(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Kinds are numbered as they are met, so that rows read theirs from memory mostly in order.
     """
-    _, first, kinds = np.unique(_digests(rows), return_index=True, return_inverse=True)
+    _, first, kinds = np.unique(digests(rows), return_index=True, return_inverse=True)
     order = np.argsort(first)
     first, kinds = first[order], np.argsort(order)[kinds]
     if not (rows == rows[first][kinds]).all():
@@ -22,8 +22,8 @@ def kinds_of(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return first, kinds.astype(np.int32)
 
 
-def _digests(rows: np.ndarray) -> np.ndarray:
-    """A number for each row, the same for the same rows, shape (n,)."""
+def digests(rows: np.ndarray) -> np.ndarray:
+    """A number (n,) uint64 for each of ``rows`` (n, k), the same for the same rows."""
     factors = np.random.default_rng(0).integers(0, 2**63, 64, dtype=np.uint64) * np.uint64(2) + 1
     result = np.zeros(rows.shape[0], dtype=np.uint64)
     for number, column in enumerate((rows + 0.0).view(np.uint64).T):

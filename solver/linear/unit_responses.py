@@ -1,24 +1,34 @@
 """Short columns of A^-1: the line's answer within one step to unit forces on wire and droppers.
 
-A column vanishes beyond the reach of the operator, so only a window of it is stored. Forces far
-enough apart do not see each other, so many columns come from one solve.
+A column vanishes beyond the reach of the operator, so only a window of it is stored, and nothing
+beyond that reach has a part in it: a banded solve on a stretch of the line gives all columns there.
+Columns at places with like surroundings are the same, and are stored once.
 """
 
 from __future__ import annotations
 
-import heapq
-from collections.abc import Callable
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
+from scipy import linalg
 
+from catenary.solver.base.compiled import compiled
 from catenary.solver.base.errors import RunBroken
+from catenary.solver.linear.like_stations import LikeStations
+from catenary.solver.linear.unique_rows import kinds_of
+from catenary.solver.model.entries import iterate_entries
+from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.unknowns.registry import Unknowns
 
 # What may stand outside the windows, relative to the peak: round-off of one solve.
 _LEAK = 1e-13
+# How much further than windows a stretch reaches, of the reach, to see whether columns leak.
+_SEEN = 0.25
+# Length of the places that are solved for on one stretch [m]: about a span.
+_STRETCH = 60.0
 
 
 class Windows(NamedTuple):
@@ -38,90 +48,224 @@ class Windows(NamedTuple):
         return self.numbering.within(x_low - self.reach, x_high + self.reach)
 
 
-class ShortColumns:
-    """Owned parts of the columns A^-1 b_j for sparse right-hand sides b_j.
+class ShortColumns(NamedTuple):
+    """Owned parts of columns of A^-1, of each of n places one or several, one after the other.
+
+    Column k of place i is ``data[at[i] + k width[i] :][: width[i]]`` for the local unknowns from
+    ``start[i]`` on. Places with like columns share them.
 
     Attributes
     ----------
-    start : (n,) local number of the first unknown of each column's owned window
-    values : list of n arrays, the owned window of each column, possibly empty
-    """
-
-    def __init__(self, start: np.ndarray, values: list[np.ndarray]) -> None:
-        self.start = start
-        self.values = values
-
-    def packed(self) -> PackedColumns:
-        """The same in one array."""
-        sizes = np.array([values.size for values in self.values], dtype=np.int64)
-        offset = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
-        return PackedColumns(self.start, offset, np.concatenate([*self.values, np.zeros(0)]))
-
-
-class PackedColumns(NamedTuple):
-    """Columns one after the other: that of number i is ``data[offset[i] : offset[i + 1]]``.
-
-    ``start`` (n,) holds the local number of the first unknown of each.
+    start, at, width : (n,) int
+    data : numbers of all columns in a row
     """
 
     start: np.ndarray
-    offset: np.ndarray
+    at: np.ndarray
+    width: np.ndarray
     data: np.ndarray
 
 
-def compute(
-    comm: Any,
-    solve_for: Callable[[np.ndarray, np.ndarray], np.ndarray],
-    ownership: Ownership,
-    windows: Windows,
-    dofs: np.ndarray,
-    coefficients: np.ndarray,
-    x: np.ndarray,
-    half_length: np.ndarray | None = None,
-) -> ShortColumns:
-    """Columns for the right-hand sides with ``coefficients`` on ``dofs``, both (n, m). Collective.
+NO_COLUMNS = ShortColumns(*(np.zeros(0, dtype=np.int64),) * 3, np.zeros(0))
 
-    ``x`` (n,) [m] is where each of them stands, ``half_length`` (n,) [m] how far they reach to both
-    sides of it, zero if left out; ``solve_for`` that of ``LineOperators``.
+
+class UnitResponses:
+    """Answers of a line's step operator A to unit forces. Not collective but for ``columns``.
+
+    Attributes
+    ----------
+    windows : Windows, whose reach is that of A^-1
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+    model, ownership : of the line
+    coefficients : of M, K and C in A
     """
-    n = x.size
-    start = np.zeros(n, dtype=np.int64)
-    values: list[np.ndarray] = [np.zeros(0)] * n
-    half = np.zeros(n) if half_length is None else half_length
-    groups = _groups_apart(x, 2.0 * (windows.reach + half.max(initial=0.0)))
-    largest = np.zeros((2, len(groups)))
-    for number, group in enumerate(groups):
-        array = solve_for(dofs[group].ravel(), coefficients[group].ravel())
-        largest[0, number] = np.abs(array).max(initial=0.0)
-        for column in group:
-            low, high = windows.around(x[column] - half[column], x[column] + half[column])
-            low = min(max(low, ownership.first), ownership.last) - ownership.first
-            high = min(max(high, ownership.first), ownership.last) - ownership.first
-            start[column] = low
-            values[column] = array[low:high].copy()
-            array[low:high] = 0.0
-        largest[1, number] = np.abs(array).max(initial=0.0)
-        array[:] = 0.0
-    comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
-    peak, leak = largest
-    if (leak > _LEAK * peak).any():
-        raise RunBroken(
-            "the response to a point load does not decay within "
-            f"{windows.reach:.0f} m; give the scene a smaller numerics.dt_s"
+
+    def __init__(
+        self,
+        comm: Any,
+        model: Model,
+        ownership: Ownership,
+        coefficients: tuple[float, float, float],
+        windows: Windows,
+    ) -> None:
+        self._comm, self._model, self._ownership = comm, model, ownership
+        self._coefficients, self.windows = coefficients, windows
+
+    def columns(
+        self,
+        dofs: np.ndarray,
+        weights: np.ndarray,
+        x: np.ndarray,
+        half_length: np.ndarray | None = None,
+    ) -> ShortColumns:
+        """Columns for right-hand sides with ``weights`` on ``dofs``, both (n, k, m). Collective.
+
+        Parameters
+        ----------
+        x : (n,) where each place is [m]
+        half_length : (n,) how far its unknowns reach to both sides of it [m], zero if left out
+
+        Raises
+        ------
+        RunBroken
+            On all ranks, if a column does not vanish outside of its window.
+        """
+        half = np.zeros(x.size) if half_length is None else half_length
+        places = _Places.of(self.windows, self._ownership, dofs, weights, x, half)
+        chosen, kinds = self._kinds(places)
+        size = places.width[chosen] * dofs.shape[1]
+        at = np.concatenate([np.zeros(1, np.int64), np.cumsum(size)])
+        data = np.zeros(at[-1])
+        leak = 0.0
+        for stretch in _stretches(x, chosen):
+            leak = max(leak, self._solve(places, chosen[stretch], at[stretch], data))
+        if self._comm.allreduce(leak, op=MPI.MAX) > _LEAK:
+            raise RunBroken(
+                "the response to a point load does not decay within "
+                f"{self.windows.reach:.0f} m; give the scene a smaller numerics.dt_s"
+            )
+        return ShortColumns(places.begin, at[kinds], places.width, data)
+
+    @cached_property
+    def _like(self) -> LikeStations:
+        return LikeStations(self._model)
+
+    def _kinds(self, places: _Places) -> tuple[np.ndarray, np.ndarray]:
+        """Places of which each has columns of its own, and which of these each place shares."""
+        starts = self.windows.numbering.starts
+        marks = self._like.fingerprints(places.first, places.last)
+        low, n = starts[places.first], places.x.size
+        rows = [
+            marks >> np.uint64(32),
+            marks & np.uint64(2**32 - 1),
+            places.begin + self._ownership.first - low,
+            places.width,
+            *(places.dofs.reshape(n, -1) - low[:, None]).T,
+            *places.weights.reshape(n, -1).T,
+        ]
+        return kinds_of(np.stack([row.astype(float) for row in rows], axis=1))
+
+    def _solve(
+        self, places: _Places, chosen: np.ndarray, at: np.ndarray, data: np.ndarray
+    ) -> float:
+        """Fill in the columns of ``chosen`` places; how much of one is outside of its window,
+        relative to its peak."""
+        owned = chosen[places.width[chosen] > 0]
+        if not owned.size:
+            return 0.0
+        numbering, more = self.windows.numbering, (1.0 + _SEEN) * self.windows.reach
+        half = float(places.half[owned].max())
+        first, last = numbering.within(
+            float(places.x[owned].min()) - half - more, float(places.x[owned].max()) + half + more
         )
-    return ShortColumns(start, values)
+        dofs, weights = places.dofs[owned], places.weights[owned]
+        n, each = dofs.shape[:2]
+        right = np.zeros((n * each, last - first))
+        column = np.repeat(np.arange(n * each), dofs.shape[2])
+        np.add.at(right, (column, dofs.ravel() - first), weights.ravel())
+        try:
+            bands = self._banded(first, last)
+            answers = linalg.solveh_banded(bands, right.T, lower=True, check_finite=False).T
+        except linalg.LinAlgError as error:
+            raise RunBroken("the step operator cannot be factored: it is not positive") from error
+        begin = places.begin[owned] + self._ownership.first - first
+        starts = numbering.starts
+        window = np.stack([starts[places.first[owned]], starts[places.last[owned]]]) - first
+        return float(
+            cut_out(
+                np.ascontiguousarray(answers),
+                window,
+                begin,
+                places.width[owned],
+                at[places.width[chosen] > 0],
+                data,
+            )
+        )
+
+    def _banded(self, first: int, last: int) -> np.ndarray:
+        """Lower bands of A for the unknowns from ``first`` to before ``last``."""
+        parts = list(iterate_entries(self._model, first, last, *self._coefficients))
+        held = self._model.constrained
+        held = held[np.searchsorted(held, first) : np.searchsorted(held, last)]
+        parts.append((held, held, np.ones(held.size)))
+        rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+        lower = (columns <= rows) & (columns >= first)
+        rows, columns, values = rows[lower], columns[lower], values[lower]
+        apart, n = rows - columns, last - first
+        bands = int(apart.max(initial=0)) + 1
+        flat = np.bincount(n * apart + columns - first, weights=values, minlength=n * bands)
+        return np.asarray(flat).reshape(bands, n)
 
 
-def _groups_apart(x: np.ndarray, distance: float) -> list[np.ndarray]:
-    """Split positions into few groups in each of which all are further apart than ``distance``."""
-    groups: list[list[int]] = []
-    ends: list[tuple[float, int]] = []
-    for i in np.argsort(x, kind="stable"):
-        if ends and x[i] - ends[0][0] > distance + 1e-6:
-            _, group = heapq.heappop(ends)
-        else:
-            group = len(groups)
-            groups.append([])
-        groups[group].append(int(i))
-        heapq.heappush(ends, (float(x[i]), group))
-    return [np.array(group) for group in groups]
+class _Places(NamedTuple):
+    """Where columns are wanted, and their windows.
+
+    ``first`` and ``last`` (n,) are stations of the windows; ``begin`` and ``width`` (n,) the local
+    unknowns in them that this rank owns.
+    """
+
+    dofs: np.ndarray
+    weights: np.ndarray
+    x: np.ndarray
+    half: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
+    begin: np.ndarray
+    width: np.ndarray
+
+    @classmethod
+    def of(
+        cls,
+        windows: Windows,
+        ownership: Ownership,
+        dofs: np.ndarray,
+        weights: np.ndarray,
+        x: np.ndarray,
+        half: np.ndarray,
+    ) -> _Places:
+        numbering, to_side = windows.numbering, half + windows.reach
+        first, last = numbering.stations_within(x - to_side, x + to_side)
+        low, high = (
+            np.clip(numbering.starts[station], ownership.first, ownership.last)
+            for station in (first, last)
+        )
+        return cls(dofs, weights, x, half, first, last, low - ownership.first, high - low)
+
+
+def _stretches(x: np.ndarray, chosen: np.ndarray) -> list[np.ndarray]:
+    """Numbers of the ``chosen`` places by stretches of the line, each of them short."""
+    order = np.argsort(x[chosen], kind="stable")
+    at = x[chosen][order]
+    ends = [0]
+    while ends[-1] < at.size:
+        ends.append(int(np.searchsorted(at, at[ends[-1]] + _STRETCH, side="right")))
+    return [order[begin:end] for begin, end in zip(ends[:-1], ends[1:], strict=True)]
+
+
+@compiled
+def cut_out(answers, window, begin, width, at, data):
+    """Put the part of each answer that is wanted into ``data``; what is outside of the ``window``
+    relative to the peak, at most.
+
+    Of each of n places ``answers`` (n k, m) has k rows; ``window`` (2, n) is where it is to be
+    zero outside of, ``begin`` and ``width`` (n,) what is wanted, and ``at`` (n,) where that goes.
+    """
+    each = answers.shape[0] // width.size
+    worst = 0.0
+    for i in range(width.size):
+        for k in range(each):
+            row = answers[i * each + k]
+            peak = leak = 0.0
+            for j in range(row.size):
+                here = abs(row[j])
+                peak = max(peak, here)
+                if j < window[0, i] or j >= window[1, i]:
+                    leak = max(leak, here)
+            if leak > worst * peak:
+                worst = leak / peak
+            for j in range(width[i]):
+                data[at[i] + k * width[i] + j] = row[begin[i] + j]
+    return worst

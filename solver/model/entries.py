@@ -20,10 +20,10 @@ def iterate_entries(
     free[model.constrained] = False
     for block in model.blocks:
         alpha, beta = model.damping_of(block.component)
-        near = ((block.dofs >= first) & (block.dofs < last)).any(axis=1)
-        if not near.any():
-            continue
+        near = block.near(first, last)
         dofs, kind = block.dofs[near], block.kind[near]
+        if not kind.size:
+            continue
         matrix = np.zeros((dofs.shape[0], dofs.shape[1], dofs.shape[1]))
         if block.mass is not None:
             matrix += (mass + damping * beta) * block.mass[kind]

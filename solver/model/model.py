@@ -7,6 +7,7 @@ by the effects, each of which adds its own through a ``ModelBuilder``.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,6 +45,20 @@ class Block:
     stiffness: np.ndarray | None
     damping: np.ndarray | None = None
     of_shape: bool = False
+
+    def near(self, first: int, last: int) -> slice | np.ndarray:
+        """Elements among which are all with unknowns from ``first`` to before ``last``."""
+        lowest, highest, ascend = self._ranges
+        if ascend:
+            return slice(int(np.searchsorted(highest, first)), int(np.searchsorted(lowest, last)))
+        return np.flatnonzero((highest >= first) & (lowest < last))
+
+    @cached_property
+    def _ranges(self) -> tuple[np.ndarray, np.ndarray, bool]:
+        """Lowest and highest unknown of each element, and whether both ascend."""
+        lowest, highest = self.dofs.min(axis=1), self.dofs.max(axis=1)
+        ascend = all((np.diff(ends) >= 0).all() for ends in (lowest, highest))
+        return lowest, highest, ascend
 
 
 @dataclass

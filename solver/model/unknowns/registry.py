@@ -140,9 +140,16 @@ class Unknowns:
 
     def within(self, x_low: float, x_high: float) -> tuple[int, int]:
         """Range of numbers with all unknowns in [``x_low``, ``x_high``] [m]."""
-        first = int(np.searchsorted(self.high, x_low - 1e-9))
-        last = int(np.searchsorted(self.low, x_high + 1e-9))
-        return int(self.starts[first]), int(self.starts[max(first, last)])
+        first, last = self.stations_within(np.array(x_low), np.array(x_high))
+        return int(self.starts[first]), int(self.starts[last])
+
+    def stations_within(
+        self, x_low: np.ndarray, x_high: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """First stations, and the ones after the last, that hold all unknowns in each of
+        [``x_low``, ``x_high``] [m], shapes as these."""
+        first = np.searchsorted(self.high, x_low - 1e-9)
+        return first, np.maximum(first, np.searchsorted(self.low, x_high + 1e-9))
 
 
 def number_unknowns(mesh: LineMesh, groups: Iterable[Group], padded: bool = False) -> Unknowns:

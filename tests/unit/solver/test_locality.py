@@ -24,9 +24,8 @@ from small_lines import (
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.effects.build_model import build
 from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.linear import unit_responses
 from catenary.solver.linear.decay_length import DECAY, reach
-from catenary.solver.linear.unit_responses import Windows
+from catenary.solver.linear.unit_responses import UnitResponses, Windows
 from catenary.solver.model.model import Model
 from catenary.solver.model.unknowns.registry import Unknowns
 from catenary.solver.problem.problem import Damping
@@ -105,27 +104,22 @@ def stepper() -> Iterator[LineIntegrator]:
 
 
 def test_short_columns_are_the_columns_of_full_solves(stepper: LineIntegrator) -> None:
-    """Many columns come from one solve, and only windows are stored: nothing is lost by that."""
+    """Solves are of stretches, and only windows are stored, like ones once: nothing is lost."""
     model = line_model(2.75e-3, n_spans=6)
     ends = model.dofs(model.mesh.droppers)
     x = model.mesh.x(model.mesh.droppers[:, 1])
     pair = np.broadcast_to(np.array([1.0, -1.0]), ends.shape)
-    found = unit_responses.compute(
-        COMM, stepper.operators.solve_for, stepper.ownership, stepper.windows, ends, pair, x
-    )
+    found = stepper.responses.columns(ends[:, None], pair[:, None], x)
     coefficients = (1.0, stepper.position_factor, stepper.velocity_factor)
     exact = inverse_columns(model, coefficients, ends[:, 0])
     exact -= inverse_columns(model, coefficients, ends[:, 1])
     short = np.zeros_like(exact)
     for column in range(x.size):
-        begin, values = found.start[column], found.values[column]
-        short[begin : begin + values.size, column] = values
-        packed = found.packed()
-        ends_of = packed.offset[column : column + 2]
-        assert np.array_equal(packed.data[slice(*ends_of)], values)
+        begin, at, width = found.start[column], found.at[column], found.width[column]
+        short[begin : begin + width, column] = found.data[at : at + width]
     peak = np.abs(exact).max(axis=0)
     worst = (np.abs(short - exact).max(axis=0) / peak).max()
-    stored = sum(values.size for values in found.values) / exact.size
+    stored = found.data.size / exact.size
     # Two factorisations of a matrix with a condition number of about 1e3.
     print(f"largest difference {worst:.1e} of the peak; {stored:.0%} of the entries stored")
     assert worst < 1e3 * np.finfo(float).eps
@@ -137,9 +131,11 @@ def test_columns_that_leak_are_refused(stepper: LineIntegrator) -> None:
     nodes = model.mesh.wires["contact_wire"][40:44]
     dofs, x = model.dofs(nodes)[:, None], model.mesh.x(nodes)
     too_short = Windows(model.numbering, 4.0)
-    solve_for, ones = stepper.operators.solve_for, np.ones(dofs.shape)
+    ones = np.ones((*dofs.shape, 1))
+    coefficients = (1.0, stepper.position_factor, stepper.velocity_factor)
+    responses = UnitResponses(COMM, model, stepper.ownership, coefficients, too_short)
     with pytest.raises(RunBroken, match=r"does not decay within 4 m.*numerics\.dt_s"):
-        unit_responses.compute(COMM, solve_for, stepper.ownership, too_short, dofs, ones, x)
+        responses.columns(dofs[:, None], ones, x)
 
 
 def test_windows_hold_all_unknowns_within_reach() -> None:

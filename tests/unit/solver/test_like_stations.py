@@ -1,0 +1,121 @@
+"""Like stretches of a line are found before there are matrices, and their columns stored once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from measuring import COMM, matrix_of
+from small_lines import HANGING, ac_simple_line, mesh_of, problem_of
+
+from catenary.solver.linear.decay_length import reach
+from catenary.solver.linear.like_stations import LikeStations
+from catenary.solver.linear.unit_responses import ShortColumns, UnitResponses, Windows
+from catenary.solver.model.model import Model
+from catenary.solver.model.partition import distribute
+from catenary.solver.problem.problem import Damping
+from catenary.solver.statics.equilibrium import find_form
+
+DAMPED = HANGING | {"structural_damping"}
+# M, K and C in A for steps of 0.2 ms: columns reach less than a span.
+COEFFICIENTS = (1.0, 1e-8, 1e-4)
+
+
+def model_of(n_spans: int) -> Model:
+    line = ac_simple_line(n_spans)
+    problem = problem_of(line, DAMPED, damping=Damping(2.75e-4, 0.0))
+    return find_form(problem, mesh_of(line, 5))[0]
+
+
+@pytest.fixture(scope="module")
+def long_line() -> Model:
+    return model_of(12)
+
+
+def columns_of(model: Model) -> tuple[ShortColumns, np.ndarray]:
+    """Columns of both unknowns of all nodes of the contact wire, and these unknowns."""
+    windows = Windows(model.numbering, reach(model, COEFFICIENTS))
+    responses = UnitResponses(COMM, model, distribute(model, 1, 0), COEFFICIENTS, windows)
+    nodes = model.contact_nodes
+    dofs = np.stack([model.dofs(nodes), model.dofs(nodes, "theta_y")], axis=1)
+    free = np.ones(model.n_dofs)
+    free[model.constrained] = 0.0
+    return responses.columns(dofs[:, :, None], free[dofs][:, :, None], model.mesh.x(nodes)), dofs
+
+
+def rows_of_stations(model: Model) -> list[bytes]:
+    """All that stands in the rows of a station: M, K and C from the station before to the next."""
+    starts, width = model.numbering.starts, model.numbering.width
+    parts = [matrix_of(model, *np.eye(3)[k]).tocsr() for k in range(3)]
+    found = []
+    for i, (first, last) in enumerate(zip(starts[:-1], starts[1:], strict=True)):
+        low, high = max(0, first - width), min(starts[-1], last + width)
+        rows = [part[first:last, low:high].toarray() + 0.0 for part in parts]
+        found.append(bytes([i == 0, i == starts.size - 2]) + b"".join(r.tobytes() for r in rows))
+    return found
+
+
+def test_stations_of_one_mark_have_the_same_rows(long_line: Model) -> None:
+    """Terms of a row are added in one order, so that the same rows are the same bit for bit."""
+    marks, rows = LikeStations(long_line).marks, rows_of_stations(long_line)
+    of_mark: dict[int, set[bytes]] = {}
+    of_row = set(rows)
+    for mark, row in zip(marks.tolist(), rows, strict=True):
+        of_mark.setdefault(mark, set()).add(row)
+    print(f"{marks.size} stations, {len(of_mark)} marks, {len(of_row)} kinds of rows")
+    assert all(len(found) == 1 for found in of_mark.values())
+    assert len(of_mark) < 0.7 * marks.size
+    # Terms that differ in their last digit may add up to the same.
+    assert len(of_row) > 0.8 * len(of_mark)
+
+
+def test_one_spring_that_differs_parts_what_is_within_its_stretch(long_line: Model) -> None:
+    like = LikeStations(long_line)
+    blocks = list(long_line.blocks)
+    number = next(i for i, block in enumerate(blocks) if block.component == "droppers")
+    stiffness = blocks[number].stiffness
+    assert stiffness is not None
+    changed = stiffness.copy()
+    changed[40] *= 1.0 + 1e-15
+    blocks[number] = replace(blocks[number], stiffness=changed)
+    other = LikeStations(replace(long_line, blocks=blocks))
+    unknown = blocks[number].dofs[blocks[number].kind == 40]
+    station = np.searchsorted(long_line.numbering.starts, unknown.min(), side="right") - 1
+    differing = np.flatnonzero(like.marks != other.marks)
+    assert differing.tolist() == [station]
+    ends = np.array([station, station + 1])
+    before = like.fingerprints(ends - 5, ends)
+    after = other.fingerprints(ends - 5, ends)
+    assert before[0] == after[0]
+    assert before[1] != after[1]
+
+
+def test_columns_that_places_share_are_those_of_each(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Shared and apart they differ by what lies beyond the reach, and by the round-off of
+    factorisations with a condition number of about 1e3."""
+    model = model_of(30)
+    shared, dofs = columns_of(model)
+    monkeypatch.setattr(
+        LikeStations,
+        "fingerprints",
+        lambda self, first, last: np.arange(first.size, dtype=np.uint64),
+    )
+    apart, _ = columns_of(model)
+    assert np.array_equal(shared.start, apart.start)
+    assert np.array_equal(shared.width, apart.width)
+    assert np.unique(apart.at).size == len(dofs) > 1.5 * np.unique(shared.at).size
+    worst = 0.0
+    for i in range(len(dofs)):
+        n = 2 * shared.width[i]
+        one, other = shared.data[shared.at[i] :][:n], apart.data[apart.at[i] :][:n]
+        worst = max(worst, np.abs(one - other).max() / np.abs(other).max(initial=1e-300))
+    print(f"largest difference {worst:.1e} of the peak")
+    assert worst < 1e3 * np.finfo(float).eps
+
+
+def test_columns_of_a_longer_line_take_hardly_more_room() -> None:
+    """Lengths of droppers differ in their last digits from span to span, less and less."""
+    sizes = {n: columns_of(model_of(n))[0].data.nbytes for n in (30, 60)}
+    print({n: f"{size / 1e6:.2f} MB" for n, size in sizes.items()})
+    assert sizes[60] < 1.3 * sizes[30]
