@@ -9,6 +9,7 @@ import typer
 
 from catenary.cases.cli.app import RunFolder, app
 from catenary.cases.terminal import console
+from catenary.postproc.film.view import View
 from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:
@@ -57,8 +58,8 @@ def compare(
 
 @app.command(
     "animate",
-    help="Make a film of a run, film.mp4 and film.gif: the line and its pantographs from the side, "
-    "the contact force beneath. Each picture is a snapshot of fields.h5.",
+    help="Make a film of a run, film.mp4 and film.gif: the line and its pantographs, the contact "
+    "force beneath. Each picture is a snapshot of fields.h5.",
     epilog="Example: catenary animate results/en300 --from 2 --to 6",
 )
 @console.guarded
@@ -89,6 +90,9 @@ def animate(
             help="Factor by which motions are drawn larger than heights.",
         ),
     ] = None,
+    view: Annotated[
+        View, typer.Option(help="From the side, from above, or from behind the train.")
+    ] = View.SIDE,
 ) -> None:
     """Serial."""
     from catenary.postproc.film.animate import Wish
@@ -97,7 +101,7 @@ def animate(
 
     if not folder.is_dir():
         raise InputError(f"{folder} is no folder; name the folder of a run")
-    wish = Wish(start, end, rate, width, motion)
+    wish = Wish(start, end, rate, width, motion, view)
     records = examined(folder)
     shapes = _shapes(folder, records)
     film = make_film(folder, wish, records, not console.is_quiet(), shapes)
@@ -124,6 +128,9 @@ def paraview(
         float | None,
         typer.Option("--motion", min=1, max=1e5, help="Factor by which motions are drawn larger."),
     ] = None,
+    view: Annotated[
+        View, typer.Option(help="From the side, from above, or from behind the train.")
+    ] = View.SIDE,
     state: Annotated[
         bool,
         typer.Option(help="Let ParaView write view.pvsm, which opens the same without Python."),
@@ -139,7 +146,7 @@ def paraview(
     if not folder.is_dir():
         raise InputError(f"{folder} is no folder; name the folder of a run")
     records = examined(folder)
-    script, *others = write_script(folder, records, motion, _shapes(folder, records))
+    script, *others = write_script(folder, records, motion, _shapes(folder, records), view)
     made, why = write_state(script) if state else (None, "")
     console.say("\n".join(map(str, (script, *others, *([made] if made else [])))))
     if why and shutil.which("paraview") is not None:

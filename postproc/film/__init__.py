@@ -1,1 +1,1 @@
-"""A film of a run: the moving line and its pantographs from the side, the contact force beneath."""
+"""A film of a run: the moving line and its pantographs, the contact force beneath."""

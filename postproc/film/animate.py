@@ -16,8 +16,10 @@ from tqdm import tqdm
 from catenary.mbs.shape import Shape
 from catenary.postproc.film.film_data import FilmData, film_data
 from catenary.postproc.film.pantograph_shape import MovingPantographs
-from catenary.postproc.film.scale import Scale, scale_for
+from catenary.postproc.film.projection import Projection
+from catenary.postproc.film.scale import Picture, Scale
 from catenary.postproc.film.snapshots import Snapshots
+from catenary.postproc.film.view import View
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 from catenary.solver.base.errors import InputError
@@ -29,6 +31,9 @@ SIZE = (1280, 720)
 _SHARES = (0.62, 0.38)
 # Length of line in a picture beside one pantograph [m].
 _WIDTH = 110.0
+_LEAST_WIDTH = 5.0
+# Share of a picture that is behind the train.
+_BEHIND = 0.55
 # How far a picture may reach beyond what the snapshots have [m].
 _NEAR = 3.0
 
@@ -43,6 +48,7 @@ class Wish:
     rate : pictures a second, each a snapshot
     width : length of line in a picture [m]
     motion : by what factor motions are drawn larger
+    view : where the line is looked at from
     """
 
     start: float | None = None
@@ -50,6 +56,7 @@ class Wish:
     rate: float = 25.0
     width: float | None = None
     motion: float | None = None
+    view: View = View.SIDE
 
 
 @dataclass(frozen=True)
@@ -162,21 +169,21 @@ def _pictures(
     import pyvista
 
     from catenary.postproc.film.force_curve import ForceCurve
-    from catenary.postproc.film.side_view import SideView
+    from catenary.postproc.film.line_view import LineView
 
     times = snapshots.times[numbers]
     rows = data.row_at(float(times[0])), data.row_at(float(times[-1])) + 1
-    spread = float(np.ptp(data.position[0]))
-    width = wish.width or _WIDTH + 1.1 * spread
+    width = wish.width or _fitting(data, snapshots, numbers)
     _check_width(data, snapshots, numbers, width)
-    largest = snapshots.largest_uplift(numbers)
+    picture = _picture(data, pantographs, width, wish.view)
+    scale, largest = picture.scale(data, snapshots, numbers, wish.motion)
     plotter = pyvista.Plotter(
         shape=(2, 1), row_weights=_SHARES, window_size=SIZE, off_screen=True, border=False
     )
     plotter.set_background("white")
     plotter.subplot(0, 0)
-    scale = _scale(data, width, largest, wish)
-    view = SideView(plotter, data, scale, largest, pantographs, snapshots.parts)
+    projection = Projection(wish.view, scale)
+    view = LineView(plotter, data, projection, largest, pantographs, snapshots)
     plotter.enable_parallel_projection()
     words = plotter.add_text(" ", position=(12, 12), font_size=10, color="black")
     plotter.subplot(1, 0)
@@ -189,12 +196,12 @@ def _pictures(
         for number, time in zip(numbers.tolist(), times.tolist(), strict=True):
             row = data.row_at(time)
             middle = float(data.position[row].mean())
-            low, high = middle - 0.55 * width, middle + 0.45 * width
+            low, high = middle - _BEHIND * width, middle + (1.0 - _BEHIND) * width
             curve.update(row, low, high)
             slack = _slack(results, slack_times, time)
-            view.update(row, snapshots.uplift(number), slack, pantographs.poses(number))
-            words.input = _words(data, scale, row)
-            _aim(plotter.camera, curve.sides(), low, high, float(scale.drawn(np.array(view.top))))
+            view.update(row, snapshots.displacement(number), slack, pantographs.poses(number))
+            words.input = _words(data, projection, row)
+            _aim(plotter.camera, curve.sides(), (low, high), picture, scale)
             plotter.render()
             yield np.asarray(plotter.image)[..., :3]
     finally:
@@ -207,7 +214,8 @@ def _check_width(data: FilmData, snapshots: Snapshots, numbers: np.ndarray, widt
     for number in numbers[[0, -1]].tolist():
         middle = float(data.position[data.row_at(float(snapshots.times[number]))].mean())
         begin, end = snapshots.shown(number)
-        low, high = max(middle - 0.55 * width, x[0]), min(middle + 0.45 * width, x[-1])
+        low = max(middle - _BEHIND * width, x[0])
+        high = min(middle + (1.0 - _BEHIND) * width, x[-1])
         if begin > low + _NEAR or end < high - _NEAR:
             raise InputError(
                 f"a picture of {width:g} m shows the line from {low:.0f} to {high:.0f} m at "
@@ -216,13 +224,29 @@ def _check_width(data: FilmData, snapshots: Snapshots, numbers: np.ndarray, widt
             )
 
 
-def _scale(data: FilmData, width: float, largest: float, wish: Wish) -> Scale:
-    nodes = data.wires[data.contact]
-    contact = data.points[nodes, 2]
-    between = float(data.points[:, 2].max() - np.median(contact))
-    room = data.points[:, 2].max() - contact.min() + 3.0
+def _fitting(data: FilmData, snapshots: Snapshots, numbers: np.ndarray) -> float:
+    """Length of line that pictures show if none is asked for: less where snapshots have less."""
+    width = _WIDTH + 1.1 * float(np.ptp(data.position[0]))
+    x = data.points[:, 0]
+    for number in numbers[[0, numbers.size // 2, -1]].tolist():
+        middle = float(data.position[data.row_at(float(snapshots.times[number]))].mean())
+        begin, end = snapshots.shown(number)
+        if begin > x.min() + _NEAR:
+            width = min(width, (middle - begin) / _BEHIND)
+        if end < x.max() - _NEAR:
+            width = min(width, (end - middle) / (1.0 - _BEHIND))
+    return max(width, _LEAST_WIDTH)
+
+
+def _picture(data: FilmData, pantographs: MovingPantographs, width: float, view: View) -> Picture:
+    """What pictures hold. From behind, and from above, the train's roof is their lower end."""
     aspect = SIZE[0] / (_SHARES[0] * SIZE[1])
-    return scale_for(width, float(room), aspect, between, largest, wish.motion)
+    high = float(data.points[:, 2].max()) + 0.6
+    low = pantographs.roof - 1.2
+    if view is View.ALONG:
+        # Lengths are not seen: one metre of height is one metre of the picture.
+        width = aspect * (high - low)
+    return Picture(view, width, aspect, low, high)
 
 
 def _slack(results: Results, times: np.ndarray, time: float) -> np.ndarray | None:
@@ -234,28 +258,40 @@ def _slack(results: Results, times: np.ndarray, time: float) -> np.ndarray | Non
     return np.asarray(force[0] <= 0.0)
 
 
-def _words(data: FilmData, scale: Scale, row: int) -> str:
+def _words(data: FilmData, projection: Projection, row: int) -> str:
+    scale = projection.scale
+    stretched = "widths" if projection.view is View.PLAN else "heights"
     forces = ", ".join(f"{force:.0f} N" for force in data.force[row])
     return (
         f"t = {data.time[row]:.2f} s   {3.6 * data.speed:.0f} km/h   {forces}   "
-        f"heights x {scale.height:g}, motion x {scale.motion:g}"
+        f"{stretched} x {scale.size:g}, motion x {scale.motion:g}"
     )
 
 
-def _aim(camera: Any, sides: tuple[float, float], low: float, high: float, top: float) -> None:
+def _aim(
+    camera: Any,
+    sides: tuple[float, float],
+    shown: tuple[float, float],
+    picture: Picture,
+    scale: Scale,
+) -> None:
     """Point the camera so that places along the track stand above those of the chart.
 
     Parameters
     ----------
-    sides : columns of the picture between which the chart reaches from ``low`` to ``high`` [px]
-    low, high : places along the track [m]
-    top : of the drawing, which is to be in the picture
+    sides : columns of the picture between which the chart reaches along ``shown`` [px]
+    shown : places along the track, from and to [m]
     """
-    left, right = sides
-    metres_a_pixel = (high - low) / max(right - left, 1.0)
+    (left, right), (low, high) = sides, shown
     height = _SHARES[0] * SIZE[1]
-    x = low + (0.5 * SIZE[0] - left) * metres_a_pixel
-    z = top - 0.42 * height * metres_a_pixel
+    if picture.view is View.ALONG:
+        metres_a_pixel, x = scale.size * (picture.high - picture.low) / height, 0.0
+    else:
+        metres_a_pixel = (high - low) / max(right - left, 1.0)
+        x = low + (0.5 * SIZE[0] - left) * metres_a_pixel
+    z = 0.5 * scale.size * (picture.low + picture.high)
+    if picture.view is View.PLAN:
+        z = 0.0
     camera.position, camera.focal_point = (x, -1000.0, z), (x, 0.0, z)
     camera.up, camera.parallel_scale = (0.0, 0.0, 1.0), 0.5 * height * metres_a_pixel
     camera.clipping_range = (1.0, 3000.0)

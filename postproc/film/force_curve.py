@@ -7,7 +7,7 @@ from typing import Any
 import pyvista
 
 from catenary.postproc.film.film_data import FilmData
-from catenary.postproc.film.side_view import PANTOGRAPHS
+from catenary.postproc.film.line_view import PANTOGRAPHS
 
 # Points of a curve at most, far more than a picture has columns of.
 _MOST_POINTS = 4000

@@ -14,8 +14,8 @@ from catenary.mbs.shape import BELOW_HEAD, BODY, HEAD, Pose, Shape
 from catenary.postproc.film.film_data import FilmData
 from catenary.postproc.film.snapshots import Snapshots
 
-# Lower and upper arm, and half the length of a head along the track [m].
-LOWER_ARM, UPPER_ARM, HALF_HEAD = 1.55, 1.95, 0.45
+# Lower and upper arm, and half the length of a head along and across the track [m].
+LOWER_ARM, UPPER_ARM, HALF_HEAD, HALF_STRIP = 1.55, 1.95, 0.45, 0.8
 # How far the foot stands ahead of the head, towards the knee [m].
 _FOOT_AHEAD = 0.6
 
@@ -28,8 +28,8 @@ class Schematic:
     foot : height of the foot of the arms [m]
     """
 
-    cells = np.array([[0, 1], [1, 2], [3, 4]])
-    kinds = np.array([BODY, BODY, HEAD])
+    cells = np.array([[0, 1], [1, 2], [3, 4], [5, 6]])
+    kinds = np.array([BODY, BODY, HEAD, HEAD])
     below = BELOW_HEAD
 
     def __init__(self, foot: float) -> None:
@@ -38,10 +38,11 @@ class Schematic:
     def pose(self, places: np.ndarray, base: float, head: float, wire: float) -> Pose:
         """Where the points are; foot and knee move by none and half of what the head does."""
         arms, ends = shape(wire, self._foot)
-        xz = np.concatenate([arms, ends])
-        rest = np.column_stack([xz[:, 0], np.zeros(len(xz)), xz[:, 1]])
+        xz = np.concatenate([arms, ends, [[0.0, wire], [0.0, wire]]])
+        aside = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -HALF_STRIP, HALF_STRIP])
+        rest = np.column_stack([xz[:, 0], aside, xz[:, 1]])
         now = rest.copy()
-        now[:, 2] += np.array([0.0, 0.5, 1.0, 1.0, 1.0]) * (head - wire)
+        now[:, 2] += np.array([0.0, 0.5, 1.0, 1.0, 1.0, 1.0, 1.0]) * (head - wire)
         return Pose(rest, now)
 
 

@@ -1,7 +1,7 @@
-"""How places and motions of a line become places in a drawing from the side.
+"""How places and motions of a line become places in a drawing.
 
-A line is a thousand times longer than it moves. Heights are drawn taller than they are, and what
-moves from rest is drawn larger still; both factors stand in the picture.
+A line is a thousand times longer than it moves. Heights and widths are drawn larger than lengths,
+and what moves from rest is drawn larger still; both factors stand in the picture.
 """
 
 from __future__ import annotations
@@ -10,28 +10,86 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Share of the room between the wires that the largest uplift fills in a drawing.
+from catenary.postproc.film.film_data import FilmData
+from catenary.postproc.film.snapshots import Snapshots
+from catenary.postproc.film.view import View
+
+# Share of the room between the wires that the largest motion fills in a drawing.
 _SHARE = 0.4
+# Room beside the track in a picture from above that motions are compared with [m], and how far it
+# reaches at least to either side, and beyond the wires [m].
+_BESIDE, _LEAST, _BEYOND = 1.0, 1.3, 0.6
+# Motions smaller than this are drawn as if they were that large [m].
+_SMALLEST = 1e-4
 
 
 @dataclass(frozen=True)
 class Scale:
-    """Factors of a drawing: of heights at rest, and of motions from there [-]."""
+    """Factors of a drawing: of heights and widths at rest, and of motions from there [-]."""
 
-    height: float
+    size: float
     motion: float
 
-    def drawn(self, rest: np.ndarray, uplift: np.ndarray | float = 0.0) -> np.ndarray:
-        """Height in the drawing of what rests at a height [m] and is lifted by ``uplift`` [m]."""
-        return np.asarray(self.height * rest + self.motion * uplift)
+    def drawn(self, rest: np.ndarray, moved: np.ndarray | float = 0.0) -> np.ndarray:
+        """Height or width in the drawing of what rests at one [m] and has moved [m]."""
+        return np.asarray(self.size * rest + self.motion * moved)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What a drawing of a run has to hold.
+
+    Attributes
+    ----------
+    view : where it is looked at from
+    width : length of line in the picture [m]
+    aspect : width of the picture over its height
+    low, high : heights of the lowest and the highest thing drawn [m]
+    """
+
+    view: View
+    width: float
+    aspect: float
+    low: float
+    high: float
+
+    def scale(
+        self, data: FilmData, snapshots: Snapshots, numbers: np.ndarray, motion: float | None
+    ) -> tuple[Scale, float]:
+        """The scale that fills it, and the largest motion that is seen in some snapshots [m].
+
+        Parameters
+        ----------
+        numbers : of the snapshots
+        motion : the factor of motions if it is given
+        """
+        axes = {View.SIDE: (2,), View.PLAN: (1,), View.ALONG: (1, 2)}[self.view]
+        largest = max(snapshots.largest(numbers, axis) for axis in axes)
+        if self.view is View.PLAN:
+            between, room = _BESIDE, 2.0 * self.half_width(data)
+        else:
+            between, room = room_between(data), self.high - self.low
+        scale = scale_for(self.width, room, self.aspect, between, largest, motion)
+        return scale, max(largest, _SMALLEST)
+
+    @staticmethod
+    def half_width(data: FilmData) -> float:
+        """How far a picture from above reaches to either side [m]."""
+        return max(_LEAST, float(np.abs(data.points[:, 1]).max()) + _BEYOND)
+
+
+def room_between(data: FilmData) -> float:
+    """Height from the contact wire to what hangs above it at a support [m]."""
+    heights = data.points[:, 2]
+    return float(heights.max() - np.median(heights[data.wires[data.contact]]))
 
 
 def scale_for(
     width_m: float,
     room_m: float,
     aspect: float,
-    between_wires_m: float,
-    largest_uplift_m: float,
+    between_m: float,
+    largest_m: float,
     motion: float | None = None,
 ) -> Scale:
     """The scale that fills a picture.
@@ -39,17 +97,17 @@ def scale_for(
     Parameters
     ----------
     width_m : length of line in the picture
-    room_m : heights from the lowest to the highest thing drawn
+    room_m : from the lowest to the highest thing drawn, or from side to side
     aspect : width of the picture over its height
-    between_wires_m : height from the contact wire to what hangs above it at a support
-    largest_uplift_m : that is drawn
+    between_m : room that motions are compared with
+    largest_m : motion that is drawn; nothing moves if it is smaller than a tenth of a millimetre
     motion : the factor of motions if it is given, at least that of heights otherwise
     """
-    height = round_down(width_m / aspect / room_m)
+    size = round_down(width_m / aspect / room_m)
     if motion is None:
-        wanted = _SHARE * between_wires_m * height / max(largest_uplift_m, 1e-6)
-        motion = max(round_down(wanted), height)
-    return Scale(height, motion)
+        wanted = _SHARE * between_m * size / max(largest_m, _SMALLEST)
+        motion = max(round_down(wanted), size) if largest_m >= _SMALLEST else size
+    return Scale(size, motion)
 
 
 def round_down(value: float) -> float:

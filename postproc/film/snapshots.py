@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,13 +12,14 @@ import numpy as np
 
 from catenary.postproc.files.checked import text_of
 from catenary.postproc.read.guard import survives
-from catenary.postproc.record.snapshots.blocks import OTHER_PARTS
+from catenary.postproc.record.snapshots.blocks import ARMS, OTHER_PARTS
 from catenary.postproc.record.snapshots.fields_file import FORMAT, PLACES, SIZES
 from catenary.solver.base.errors import InputError
 
 FIELDS_FILE = "fields.h5"
 # Snapshots that are looked through for the largest uplift.
 _SAMPLED = 400
+_UP = 2
 
 
 @dataclass(frozen=True)
@@ -30,10 +32,16 @@ class _Wire:
     count: np.ndarray
     start: np.ndarray
     values: h5py.Dataset
+    vectors: h5py.Dataset | None
+
+    def rows(self, number: int, first: int, count: int) -> slice:
+        """Rows of its tables with ``count`` points from number ``first`` on in a snapshot."""
+        begin = int(self.start[number]) + first - int(self.first[number])
+        return slice(begin, begin + count)
 
 
 class Snapshots:
-    """Uplift of the nodes at the times of the snapshots. A context manager; not collective.
+    """Motion of the nodes at the times of the snapshots. A context manager; not collective.
 
     Attributes
     ----------
@@ -41,6 +49,7 @@ class Snapshots:
     parts : names of the wires and other parts of the line that are shown
     field : name of the field that lifts points, as ParaView's calculator has it
     whole : whether each snapshot shows all nodes
+    has_vectors : whether motions along the track and sideways are there, zero as they may be
 
     Parameters
     ----------
@@ -96,6 +105,7 @@ class Snapshots:
             self._wires = [_wire(group) for group in wires]
             scalar = all("uplift" in wire for wire in wires)
             self.field = "uplift" if scalar else "displacement_Z"
+            self.has_vectors = all(wire.vectors is not None for wire in self._wires)
             self._sizes = np.asarray(file[SIZES][...], dtype=int)
             if file[PLACES].shape != (times.size, self._sizes.size + int(self._sizes.sum())):
                 raise ValueError(f"{PLACES} has another size")
@@ -109,6 +119,13 @@ class Snapshots:
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         self._file.close()
+
+    def arms(self) -> tuple[np.ndarray, np.ndarray]:
+        """Hinges of the steady arms that are shown, (k, 3) [m], and nodes that they hold, (k,)."""
+        if ARMS not in self.parts:
+            return np.zeros((0, 3)), np.zeros(0, dtype=int)
+        group = self._file[ARMS]
+        return group["points"][0::2], group["nodes"][1::2]
 
     def shown(self, number: int) -> tuple[float, float]:
         """From and to of the wires in a snapshot, as far as each reaches [m]."""
@@ -141,11 +158,17 @@ class Snapshots:
                 "the scene again without output.field_window_m, field_spans and field_parts"
             )
 
-    def largest_uplift(self, numbers: np.ndarray) -> float:
-        """Largest uplift in some snapshots, of many in so many of them that it is not far from
-        that, and not zero [m]."""
+    def largest(self, numbers: np.ndarray, axis: int) -> float:
+        """Largest motion along an axis (0, 1, 2 of x, y, z) in some snapshots, of many in so many
+        of them that it is not far from that [m]; zero where nothing moves along it."""
         some = numbers[:: max(1, numbers.size // _SAMPLED)].tolist()
-        return max(1e-4, *(float(np.nanmax(np.abs(self.uplift(number)))) for number in some))
+        if axis == _UP:
+            return max(0.0, *(float(np.nanmax(np.abs(self.uplift(one)))) for one in some))
+        if not self.has_vectors:
+            return 0.0
+        return max(
+            0.0, *(float(np.nanmax(np.abs(self.displacement(one)[:, axis]))) for one in some)
+        )
 
     def uplift(self, number: int) -> np.ndarray:
         """Uplift of the nodes in a snapshot, NaN where it shows none, (n_nodes,) [m].
@@ -156,16 +179,51 @@ class Snapshots:
             If it is not of this line, or not finite.
         """
         uplift = np.full(self._n_nodes, np.nan)
+        for nodes, values in self._shown(number, vectors=False):
+            uplift[nodes] = values if values.ndim == 1 else values[:, _UP]
+        return uplift
+
+    def displacement(self, number: int) -> np.ndarray:
+        """Displacement of the nodes in a snapshot, NaN where it shows none, (n_nodes, 3) [m].
+
+        Where the snapshots have the uplift alone, nothing moves along the track and sideways.
+
+        Raises
+        ------
+        InputError
+            If it is not of this line, or not finite.
+        """
+        moved = np.full((self._n_nodes, 3), np.nan)
+        for nodes, values in self._shown(number, vectors=self.has_vectors):
+            if values.ndim == 1:
+                moved[nodes, :_UP], moved[nodes, _UP] = 0.0, values
+            else:
+                moved[nodes] = values
+        return moved
+
+    def aside_at(self, number: int, name: str, x: float) -> float:
+        """How far a wire has moved to the left at a place along the track in a snapshot [m]."""
+        if not self.has_vectors or name not in self.parts:
+            return 0.0
+        wire = self._wires[[part for part in self.parts if part not in OTHER_PARTS].index(name)]
+        assert wire.vectors is not None
+        first = int(wire.first[number])
+        last = first + int(wire.count[number]) - 2
+        at = int(np.clip(wire.x.searchsorted(x) - 1, first, max(first, last)))
+        values = np.asarray(wire.vectors[wire.rows(number, at, 2), 1], dtype=float)
+        return float(np.interp(x, wire.x[at : at + 2], values))
+
+    def _shown(self, number: int, vectors: bool) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Nodes of each wire that a snapshot shows, and their values, which are finite."""
         sound = self._of_this_line
         try:
             for wire in self._wires if sound else ():
                 first, count = int(wire.first[number]), int(wire.count[number])
-                rows = slice(int(wire.start[number]), int(wire.start[number]) + count)
-                values = np.asarray(wire.values[rows], dtype=float)
-                if values.ndim > 1:
-                    values = values[:, 2]
-                uplift[wire.nodes[first : first + count]] = values
+                table = wire.vectors if vectors and wire.vectors is not None else wire.values
+                values = np.asarray(table[wire.rows(number, first, count)], dtype=float)
                 sound = sound and bool(np.isfinite(values).all())
+                if sound:
+                    yield wire.nodes[first : first + count], values
         except (IndexError, KeyError, OSError, TypeError, ValueError) as error:
             raise InputError(
                 f"{self._path} is damaged at t = {self.times[number]:g} s: {error}"
@@ -175,7 +233,6 @@ class Snapshots:
                 f"{self._path} does not belong to the run.h5 beside it, or is damaged at "
                 f"t = {self.times[number]:g} s"
             )
-        return uplift
 
 
 def _wire(group: h5py.Group) -> _Wire:
@@ -184,4 +241,5 @@ def _wire(group: h5py.Group) -> _Wire:
     values = group["uplift" if "uplift" in group else "displacement"]
     if values.shape[0] != int(count.sum()):
         raise ValueError(f"{values.name} is too short")
-    return _Wire(group["nodes"][...], group["points"][:, 0], first, count, start, values)
+    nodes, x = group["nodes"][...], group["points"][:, 0]
+    return _Wire(nodes, x, first, count, start, values, group.get("displacement"))

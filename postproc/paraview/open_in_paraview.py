@@ -13,8 +13,9 @@ import numpy as np
 from catenary.mbs.shape import BODY, HEAD, SPRING, Shape
 from catenary.postproc.film.film_data import FilmData, film_data
 from catenary.postproc.film.pantograph_shape import MovingPantographs
-from catenary.postproc.film.scale import scale_for
+from catenary.postproc.film.scale import Picture, room_between
 from catenary.postproc.film.snapshots import FIELDS_FILE, Snapshots
+from catenary.postproc.film.view import View
 from catenary.postproc.paraview import scenery
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
@@ -34,6 +35,7 @@ def write_script(
     records: Records | None,
     motion: float | None = None,
     shapes: Sequence[Shape] | None = None,
+    look: View = View.SIDE,
 ) -> list[Path]:
     """Write ``paraview/view.py`` and its data into the folder of a run. Not collective.
 
@@ -42,6 +44,7 @@ def write_script(
     records : what ``guard.examined`` found in the result file
     motion : factor by which motions are drawn larger, None for one that fits
     shapes : of the pantographs, None for a schematic
+    look : where it is looked at from
 
     Raises
     ------
@@ -53,11 +56,11 @@ def write_script(
         data = film_data(results)
         with Snapshots(folder, len(data.points)) as snapshots:
             pantographs = MovingPantographs(data, snapshots, shapes)
-            settings = _settings(folder, data, snapshots, motion, pantographs)
+            settings = _settings(folder, data, snapshots, motion, pantographs, look)
             try:
                 target.mkdir(exist_ok=True)
                 vtkhdf = write_vtkhdf(folder / FIELDS_FILE)
-                files = scenery.write(data, pantographs, snapshots.times, target)
+                files = scenery.write(data, pantographs, snapshots, target)
                 script = _script(settings)
                 part = target / f".{SCRIPT}.{os.getpid()}"
                 part.write_text(script, encoding="utf-8")
@@ -80,16 +83,16 @@ def _settings(
     snapshots: Snapshots,
     motion: float | None,
     pantographs: MovingPantographs,
+    look: View,
 ) -> dict[str, object]:
     """All numbers of the script."""
     times = snapshots.times
     width = _WIDTH + 1.1 * float(np.ptp(data.position[0]))
-    heights = data.points[:, 2]
-    contact = heights[data.wires[data.contact]]
-    low, high = pantographs.roof - 0.4, float(heights.max()) + 0.6
-    largest = snapshots.largest_uplift(np.arange(times.size))
-    between = float(heights.max() - np.median(contact))
-    scale = scale_for(width, high - low, _ASPECT, between, largest, motion)
+    low, high = pantographs.roof - 0.4, float(data.points[:, 2].max()) + 0.6
+    picture = Picture(look, width, _ASPECT, low, high)
+    scale, largest = picture.scale(data, snapshots, np.arange(times.size), motion)
+    arrow = _ARROW * scale.size * room_between(data) / max(float(data.force.mean()), 1.0)
+    sideways = look is View.PLAN and snapshots.has_vectors
     first = data.row_at(float(times[0]))
     kinds = {int(kind) for shape in pantographs.shapes for kind in shape.kinds}
     return {
@@ -99,18 +102,29 @@ def _settings(
         "forces": scenery.FORCES,
         "train": scenery.TRAIN,
         "track": scenery.TRACK,
-        "blocks": [[name, "wire" if name in data.wires else name] for name in snapshots.parts],
+        "blocks": [[name, _kind(name, data)] for name in snapshots.parts],
         "names": data.names,
         "kinds": [[kind, thick] for kind, thick in _THICK if kind in kinds],
-        "uplift": snapshots.field,
-        "height": scale.height,
+        "lift": snapshots.field,
+        "vector": int(snapshots.has_vectors),
+        "view": str(look),
+        "component": "Y" if sideways else ("" if snapshots.field == "uplift" else "Z"),
+        "coloured": "sideways [m]" if sideways else "uplift [m]",
+        "size": scale.size,
         "motion": scale.motion,
-        "largest_uplift_m": largest,
+        "largest_m": float(f"{largest:.2g}"),
         "radius": 0.0018 * width,
-        "metres_a_newton": _ARROW * scale.height * between / max(float(data.force.mean()), 1.0),
+        "metres_a_newton": arrow,
         "width_m": width,
-        "middle_m": 0.5 * scale.height * (low + high),
+        "middle_m": 0.5 * scale.size * (low + high),
         "start_m": float(data.position[first].mean()) - data.speed * float(times[0]),
         "speed": data.speed,
         "times": [float(times[0]), float(times[-1])],
     }
+
+
+def _kind(name: str, data: FilmData) -> str:
+    """What a block is drawn as."""
+    if name in data.contacts:
+        return "contact"
+    return "wire" if name in data.wires else name

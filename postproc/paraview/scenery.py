@@ -14,6 +14,7 @@ import numpy as np
 
 from catenary.postproc.film.film_data import FilmData
 from catenary.postproc.film.pantograph_shape import MovingPantographs
+from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.film.train import FACES, boxes
 
 NUMBERS, PANTOGRAPHS, FORCES, TRAIN, TRACK = (
@@ -34,14 +35,14 @@ class Scenery:
 
 
 def write(
-    data: FilmData, pantographs: MovingPantographs, times: np.ndarray, folder: Path
+    data: FilmData, pantographs: MovingPantographs, snapshots: Snapshots, folder: Path
 ) -> Scenery:
     """Write the scenery of a run at some times. Not collective.
 
     Parameters
     ----------
     pantographs : where their points are
-    times : (n,) of the snapshots of the line [s]
+    snapshots : of the line
     folder : where the files go, which exists
 
     Raises
@@ -49,7 +50,7 @@ def write(
     OSError
         If they cannot be written.
     """
-    p = data.n_pantographs
+    p, times = data.n_pantographs, snapshots.times
     rails, lines_of_rails = track(data)
     cells, number, kind = _lines_of(pantographs)
     n_points = sum(int(shape.cells.max()) + 1 for shape in pantographs.shapes)
@@ -67,12 +68,7 @@ def write(
             moved = np.concatenate([pose.now for pose in poses]) - rest
             file[f"pantographs/points/{name}"] = rest
             file[f"pantographs/displacement/{name}"] = moved.astype("<f4")
-            heads = np.zeros((2, p, 3))
-            heads[0, :, 0], heads[0, :, 2] = (
-                data.position[row],
-                data.rest_height(data.position[row]),
-            )
-            heads[1, :, 2] = data.head_height[row] - heads[0, :, 2]
+            heads = _contacts(data, snapshots, k, row)
             file[f"forces/points/{name}"] = heads[0]
             file[f"forces/displacement/{name}"] = heads[1].astype("<f4")
             force = np.zeros((p, 3), dtype="<f4")
@@ -101,6 +97,21 @@ def write(
     standing = _cells("Polyline", "track/cells", 2, 2)
     _write_text(files.track, [(None, standing, _points("track/points", 4), "")])
     return files
+
+
+def _contacts(data: FilmData, snapshots: Snapshots, number: int, row: int) -> np.ndarray:
+    """Where the wires above the heads rest, and how far the heads, and sideways the wires, have
+    moved from there, (2, p, 3) [m]."""
+    heads = np.zeros((2, data.n_pantographs, 3))
+    heads[0, :, 0] = data.position[row]
+    heads[0, :, 2] = data.rest_height(data.position[row])
+    heads[1, :, 2] = data.head_height[row] - heads[0, :, 2]
+    for p, x in enumerate(data.position[row].tolist()):
+        wire = data.touched(x)
+        at = data.points[data.wires[wire]]
+        heads[0, p, 1] = np.interp(x, at[:, 0], at[:, 1])
+        heads[1, p, 1] = snapshots.aside_at(number, wire, x)
+    return heads
 
 
 def _lines_of(pantographs: MovingPantographs) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -13,6 +13,8 @@ STATE = "view.pvsm"
 _PROGRAM, _SCREEN = "pvpython", "xvfb-run"
 # Longest that ParaView may take [s].
 _PATIENCE = 300.0
+# Two that begin at one time may take one screen, which the first to end takes from the other.
+_ATTEMPTS, _LOST = 3, "X server connection"
 
 
 def write_state(script: Path) -> tuple[Path | None, str]:
@@ -28,18 +30,23 @@ def write_state(script: Path) -> tuple[Path | None, str]:
     state = script.with_name(STATE)
     part = script.with_name(f".{script.stem}.{os.getpid()}{state.suffix}")
     try:
-        done = subprocess.run(
-            [*command, str(script), "--state", str(part)],
-            capture_output=True,
-            text=True,
-            timeout=_PATIENCE,
-            check=False,
-        )
-        if done.returncode == 0 and part.is_file():
-            os.replace(part, state)
-            return state, ""
-        words = (done.stderr.strip() or "it wrote nothing").splitlines()[-1]
-        why = f"{_PROGRAM} failed: {words}"
+        for _ in range(_ATTEMPTS):
+            done = subprocess.run(
+                [*command, str(script), "--state", str(part)],
+                capture_output=True,
+                text=True,
+                timeout=_PATIENCE,
+                check=False,
+            )
+            if done.returncode == 0 and part.is_file():
+                os.replace(part, state)
+                return state, ""
+            if _LOST not in done.stderr:
+                break
+        lines = [line for line in done.stderr.splitlines() if line.strip()]
+        # The program that makes the screen complains last, about what it cannot clean up.
+        own = [line for line in lines if not line.startswith(_SCREEN)]
+        why = f"{_PROGRAM} failed: {(own or lines or ['it wrote nothing'])[-1]}"
     except (OSError, subprocess.TimeoutExpired) as error:
         why = f"{_PROGRAM} failed: {error}"
     finally:
@@ -51,9 +58,11 @@ def _command() -> tuple[Sequence[str], str]:
     """How ParaView's Python is started here, or why it cannot be."""
     if shutil.which(_PROGRAM) is None:
         return (), f"no state is written: {_PROGRAM} is not on this machine"
-    if os.environ.get("DISPLAY") or not sys.platform.startswith("linux"):
+    if not sys.platform.startswith("linux"):
         return (_PROGRAM,), ""
-    # Debian's draws on a screen only.
-    if shutil.which(_SCREEN) is None:
-        return (), f"no state is written: {_PROGRAM} needs a screen, or {_SCREEN}"
-    return (_SCREEN, "-a", "-s", "-screen 0 1600x900x24", _PROGRAM), ""
+    # Debian's draws on a screen only. One of its own is there whatever DISPLAY says.
+    if shutil.which(_SCREEN) is not None:
+        return (_SCREEN, "-a", "-s", "-screen 0 1600x900x24", _PROGRAM), ""
+    if os.environ.get("DISPLAY"):
+        return (_PROGRAM,), ""
+    return (), f"no state is written: {_PROGRAM} needs a screen, or {_SCREEN}"

@@ -133,6 +133,8 @@ class Showing:
         mesh = self._model.mesh
         points = mesh.points.copy()
         points[:, 2] = self._form.height
+        if self._form.lateral is not None:
+            points[:, 1] = self._form.lateral.y
         return Stage(
             n_pantographs=self._pantographs.n,
             dt=dt,

@@ -21,7 +21,7 @@ OTHER_PARTS = (DROPPERS, CLAMPS, ARMS, MASTS)
 FIXED = -1
 # Masts stand beside the track, a little higher than the highest wire; arms come down to the wire
 # from there [m].
-_BESIDE, _ABOVE, _ARM_RISE = 3.0, 0.4, 0.3
+BESIDE, _ABOVE, _ARM_RISE = 3.0, 0.4, 0.3
 _NONE = np.zeros(0, dtype=np.int64)
 _NO_PAIRS = np.zeros((0, 2), dtype=np.int64)
 
@@ -149,7 +149,7 @@ def blocks_of(line: RecordedLine, points: np.ndarray) -> list[Block]:
 def _arms(line: RecordedLine, points: np.ndarray) -> Block:
     """Steady arms, from their masts down to the wire."""
     wire = points[line.steady_arms]
-    hinge = np.column_stack([wire[:, 0], np.full(len(wire), _BESIDE), wire[:, 2] + _ARM_RISE])
+    hinge = np.column_stack([wire[:, 0], np.full(len(wire), BESIDE), wire[:, 2] + _ARM_RISE])
     nodes = np.column_stack([np.full(len(wire), FIXED), line.steady_arms]).ravel()
     return Block(ARMS, nodes, np.stack([hinge, wire], axis=1).reshape(-1, 3), True)
 
@@ -159,6 +159,6 @@ def _masts(line: RecordedLine, points: np.ndarray) -> Block:
     n = line.masts.size
     top = float(points[:, 2].max()) + _ABOVE
     ends = np.zeros((n, 2, 3))
-    ends[:, :, 0], ends[:, :, 1] = line.masts[:, None], _BESIDE
+    ends[:, :, 0], ends[:, :, 1] = line.masts[:, None], BESIDE
     ends[:, 0, 2] = top
     return Block(MASTS, np.full(2 * n, FIXED), ends.reshape(-1, 3), True)

@@ -15,7 +15,9 @@ from catenary.postproc.film import animate, pantograph_shape, scale, train
 from catenary.postproc.film.animate import SIZE, Wish
 from catenary.postproc.film.film_data import film_data
 from catenary.postproc.film.pantograph_shape import LOWER_ARM, UPPER_ARM, MovingPantographs
+from catenary.postproc.film.projection import Projection
 from catenary.postproc.film.snapshots import Snapshots
+from catenary.postproc.film.view import View
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
@@ -49,7 +51,7 @@ def test_a_drawing_lifts_by_the_factor_of_motions() -> None:
 
 def test_the_largest_uplift_stays_between_the_wires() -> None:
     found = scale.scale_for(110.0, 6.0, 2.5, 1.2, 0.1)
-    assert 0.2 * 1.2 * found.height < found.motion * 0.1 < 0.5 * 1.2 * found.height
+    assert 0.2 * 1.2 * found.size < found.motion * 0.1 < 0.5 * 1.2 * found.size
 
 
 @pytest.mark.parametrize("head", [4.2, 5.0, 5.6, 6.4])
@@ -75,6 +77,55 @@ def test_snapshots_are_those_of_the_fields(folder: Path, make_march: Any) -> Non
         np.testing.assert_allclose(snapshots.times, 0.05 * np.arange(21))
         expected = march.wave(0.35, points[:, 0])
         np.testing.assert_allclose(snapshots.uplift(7), expected, atol=1e-8)
+
+
+def test_what_does_not_move_is_not_drawn_larger() -> None:
+    found = scale.scale_for(110.0, 6.0, 2.5, 1.2, 0.0)
+    assert found.motion == found.size
+
+
+def test_each_view_shows_its_two_directions() -> None:
+    rest, moved = np.array([[7.0, 0.2, 5.0]]), np.array([[0.5, -0.01, 0.02]])
+    drawing = scale.Scale(10.0, 50.0)
+    seen = {view: Projection(view, drawing).seen(rest, moved, 3.0)[0] for view in View}
+    np.testing.assert_allclose(seen[View.SIDE], [7.5, 3.0, 51.0])
+    # To the left is up from above, and left from behind the train.
+    np.testing.assert_allclose(seen[View.PLAN], [7.5, 3.0, 1.5])
+    np.testing.assert_allclose(seen[View.ALONG], [-1.5, 3.0, 51.0])
+
+
+def _blown(folder: Path, aside: float) -> None:
+    """Let the contact wire of all snapshots stand aside by so much [m]."""
+    with h5py.File(folder / "fields.h5", "r+") as file:
+        file["contact_wire/displacement"][:, 1] = aside
+
+
+def test_motions_sideways_are_read_and_seen_from_above(folder: Path) -> None:
+    _blown(folder, 0.125)
+    with Results(folder) as results:
+        data = film_data(results)
+        nodes = data.wires["contact_wire"]
+        with Snapshots(folder, len(data.points)) as snapshots:
+            moved = snapshots.displacement(7)
+            np.testing.assert_array_equal(moved[nodes, 1], 0.125)
+            np.testing.assert_allclose(moved[:, 2], snapshots.uplift(7))
+            assert snapshots.aside_at(7, "contact_wire", 61.3) == 0.125
+            assert snapshots.aside_at(7, "messenger_wire", 61.3) == 0.0
+            assert snapshots.largest(np.arange(3), 1) == 0.125
+            assert snapshots.largest(np.arange(3), 0) == 0.0
+            schematic = MovingPantographs(data, snapshots, None)
+            numbers = np.array([10, 11])
+            reach = {}
+            for view in (View.PLAN, View.ALONG):
+                wish = Wish(width=60.0, view=view)
+                films = animate._pictures(data, results, snapshots, numbers, wish, schematic)
+                line = list(films)[0][:440]
+                if view is View.PLAN:
+                    line = np.swapaxes(line, 0, 1)
+                reach[view] = np.ptp(columns_of(line, (0xB2, 0x18, 0x2B), slice(None)))
+    # The head is seen across its length of 1.6 m, of 2.6 m from above and some 6 m of height.
+    assert 200 < reach[View.PLAN] < 300
+    assert 90 < reach[View.ALONG] < 160
 
 
 def _cut_times(file: h5py.File) -> None:
@@ -204,7 +255,7 @@ def test_the_pantograph_stands_above_its_force_and_the_masts_where_they_are(fold
 
 def masts_of(picture: np.ndarray) -> np.ndarray:
     """Middles of the masts in a picture [columns]."""
-    columns = columns_of(picture, (0xB8, 0xBC, 0xC2), slice(285, 315))
+    columns = columns_of(picture, (0xB8, 0xBC, 0xC2), slice(240, 290))
     groups = np.split(columns, np.flatnonzero(np.diff(columns) > 20) + 1)
     return np.array([group.mean() for group in groups])
 

@@ -6,11 +6,13 @@ import json
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import pyvista
 
 from catenary.postproc.film.film_data import film_data
+from catenary.postproc.film.view import View
 from catenary.postproc.paraview import open_in_paraview
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.fields import FieldRecorder
@@ -30,6 +32,9 @@ def folder(tmp_path: Path, make_march: Any, record_run: Any) -> Path:
 
 
 def test_heads_arms_and_forces_are_where_the_record_has_them(folder: Path) -> None:
+    aside = 0.125
+    with h5py.File(folder / "fields.h5", "r+") as file:
+        file["contact_wire/displacement"][:, 1] = aside
     script, *files = open_in_paraview.write_script(folder, None)
     assert script == folder / "paraview" / "view.py"
     with Results(folder) as results:
@@ -42,13 +47,16 @@ def test_heads_arms_and_forces_are_where_the_record_has_them(folder: Path) -> No
         grid = arms.read()
         moved = grid.point_data["displacement"]
         height = grid.points[:, 2] + moved[:, 2]
-        # Foot, knee, hinge and both ends of the head of each; the hinge is where the head is.
-        np.testing.assert_allclose(height[2::5], data.head_height[row], atol=1e-7)
-        np.testing.assert_allclose(grid.points[2::5, 0], data.position[row])
-        np.testing.assert_array_equal(grid.cell_data["number"], np.repeat([0, 1], 3))
-        np.testing.assert_array_equal(moved[0::5], 0.0)
+        # Foot, knee, hinge and ends of the head along and across the track, of each; the hinge is
+        # where the head is.
+        np.testing.assert_allclose(height[2::7], data.head_height[row], atol=1e-7)
+        np.testing.assert_allclose(grid.points[2::7, 0], data.position[row])
+        np.testing.assert_array_equal(grid.cell_data["number"], np.repeat([0, 1], 4))
+        np.testing.assert_array_equal(moved[0::7], 0.0)
         forces.set_active_time_value(time)
-        vectors = forces.read().point_data["force"]
+        found = forces.read()
+        vectors = found.point_data["force"]
+        np.testing.assert_allclose(found.point_data["displacement"][:, 1], aside, rtol=1e-6)
         np.testing.assert_allclose(vectors[:, 2], data.force[row], rtol=1e-6)
         np.testing.assert_array_equal(vectors[:, :2], 0.0)
 
@@ -64,11 +72,31 @@ def test_the_script_is_python_and_keeps_strangers_words_as_text(
     settings = json.JSONDecoder().raw_decode(text[begin:])[0]
     assert settings["names"] == [name, "trailing"] and settings["motion"] == 70.0
     assert settings["blocks"] == [
-        ["contact_wire", "wire"], ["messenger_wire", "wire"], ["droppers", "droppers"],
+        ["contact_wire", "contact"], ["messenger_wire", "wire"], ["droppers", "droppers"],
         ["steady_arms", "steady_arms"], ["masts", "masts"],
     ]  # fmt: skip
     assert settings["times"] == [0.0, pytest.approx(0.5)]
     assert "@" not in text
+
+
+@pytest.mark.parametrize(
+    ("view", "component", "coloured"),
+    [
+        (View.SIDE, "", "uplift [m]"),
+        (View.PLAN, "Y", "sideways [m]"),
+        (View.ALONG, "", "uplift [m]"),
+    ],
+)
+def test_each_view_is_coloured_by_what_it_shows(
+    folder: Path, view: View, component: str, coloured: str
+) -> None:
+    text = open_in_paraview.write_script(folder, None, look=view)[0].read_text(encoding="utf-8")
+    begin = text.index("SETTINGS = ") + len("SETTINGS = ")
+    settings = json.JSONDecoder().raw_decode(text[begin:])[0]
+    assert (settings["component"], settings["coloured"]) == (component, coloured)
+    assert settings["view"] == view and settings["vector"] == 1
+    # Nothing moves sideways in this run: widths and motions are drawn alike from above.
+    assert (settings["motion"] == settings["size"]) == (view is View.PLAN)
 
 
 def test_a_folder_that_cannot_be_written_is_named(folder: Path) -> None:
