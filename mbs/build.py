@@ -10,7 +10,7 @@ import numpy as np
 from catenary.mbs.air.air_forces import AirForces, SteadyForces
 from catenary.mbs.air.airflow import Airflow
 from catenary.mbs.control.regulation import Regulator
-from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
+from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph, Lowering
 from catenary.mbs.lumped import LumpedPantograph
@@ -50,7 +50,7 @@ class Operation(NamedTuple):
     dt: float
     beta: float
     gamma: float
-    lateral: LateralPath | SeveralPaths | None = None
+    lateral: CrossingPath | None = None
     base: BaseMotion | None = None
     air: Airflow | None = None
     lowering: Lowering | None = None

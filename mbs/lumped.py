@@ -26,7 +26,7 @@ from catenary.mbs.head.head_kernels import (
 from catenary.mbs.head.head_records import LAWFUL, LUMPED
 from catenary.mbs.head.laws import LawsInPlace, in_place
 from catenary.mbs.head.newmark_head import Raising, SteppedHead, parts_of
-from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
+from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import HeadState
 from catenary.mbs.lumped_data import LumpedData, chain_matrix
 from catenary.mbs.vehicle.base_motion import BaseMotion
@@ -63,7 +63,7 @@ class LumpedPantograph(SteppedHead):
         dt: float,
         beta: float = 0.25,
         gamma: float = 0.5,
-        lateral: LateralPath | SeveralPaths | None = None,
+        lateral: CrossingPath | None = None,
         base: BaseMotion | None = None,
         air: AirForces | None = None,
         steady_air: float = 0.0,

@@ -125,7 +125,8 @@ def _tables(problem: Problem, recording: Recording) -> dict[str, tuple[Channel, 
     places = problem.train.placements
     strips = tuple(len(place.data.strip_offsets) for place in places)
     joints = any(has_joints(place.data) for place in places)
-    train = channels.Train(strips, joints, len(problem.line.wires_of(Role.CONTACT)))
+    lateral = "lateral_motion" in problem.effects
+    train = channels.Train(strips, joints, len(problem.line.wires_of(Role.CONTACT)), lateral)
     table = {"time": (channels.TIME, 0), "line_channels/time": (channels.TIME, 0)}
     for channel in channels.train_channels(train):
         table[f"channels/{channel.name}"] = (channel, channel.n_columns(train))

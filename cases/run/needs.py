@@ -40,7 +40,7 @@ STATE_PER_UNKNOWN, STATE_SHARE = 1e-7, 0.05
 LEAST_FLUSH = 256
 
 _BYTES = 8
-_PER_PANTOGRAPH = 6  # channels of a pantograph at most
+_PER_PANTOGRAPH = 8  # channels of a pantograph, mostly at most
 
 
 @dataclass(frozen=True)

@@ -51,6 +51,7 @@ from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.snapshots.blocks import RecordedLine
 from catenary.postproc.record.snapshots.fields import FieldRecorder
+from catenary.postproc.record.strip_watch import StripWatch
 from catenary.solver.base.errors import CatenaryError, RunBroken
 from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.problem import Problem
@@ -303,6 +304,9 @@ def _observers(
         on_begun=begun,
     )
     first: list[Observer] = [] if fields is None else [fields]
+    half_lengths = [place.data.strips.half_length for place in problem.train.placements]
+    if "lateral_motion" in problem.effects and np.isfinite(half_lengths).any():
+        first.append(StripWatch(half_lengths))
     return [*first, progress, recorder], recorder
 
 

@@ -113,6 +113,18 @@ def control_of(head):
 
 
 @in_line
+def cross(head, drive, across, touches, place):
+    """Add to a row ``drive`` what ``across`` (3, n) says of where wires are at n contacts, and note
+    in ``place`` (n,) where they are on the strips then, NaN where none is ``present``."""
+    s = head.s
+    for j in range(s):
+        contact = head.first + j
+        drive[N_DRIVE + j] += across[0, contact]
+        drive[N_DRIVE + s + j] += across[1, contact]
+        place[contact] = drive[N_DRIVE + j] if touches[contact].present != 0.0 else np.nan
+
+
+@in_line
 def predict(head, drive, numbers, n_contacts):
     """Predict a head from a row ``drive`` of numbers: its strips' part of ``numbers``.
 

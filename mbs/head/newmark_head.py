@@ -16,7 +16,7 @@ from catenary.mbs.head import head_kernels
 from catenary.mbs.head.head_kernels import N_DRIVE, HeadArrays, NewmarkFactors
 from catenary.mbs.head.laws import LawsInPlace, in_place
 from catenary.mbs.head.strips import HeadParts
-from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
+from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import HeadState
 from catenary.solver.base.bound import bound
 
@@ -39,7 +39,7 @@ class SteppedHead(ABC):
         dt: float,
         beta: float,
         gamma: float,
-        lateral: LateralPath | SeveralPaths | None,
+        lateral: CrossingPath | None,
     ) -> None:
         s = len(head.offsets)
         self.strip_offsets = head.offsets
@@ -165,14 +165,10 @@ class SteppedHead(ABC):
         }
 
     def _fill_lateral(self, times: Sequence[float], drives: np.ndarray) -> None:
-        """Fill in where the wire crosses the strips, if the head rolls."""
-        if self._lateral is None:
-            return
-        s = len(self.strip_offsets)
-        for row, time in zip(drives, times, strict=True):
-            self._lateral.move_to(time)
-            row[N_DRIVE : N_DRIVE + s] = self._lateral.place
-            row[N_DRIVE + s : N_DRIVE + 2 * s] = self._lateral.rate
+        """Fill in what is known of where wires cross the strips of a head that rolls or bends."""
+        if self._lateral is not None:
+            s = len(self.strip_offsets)
+            self._lateral.fill_ahead(times, drives[:, N_DRIVE : N_DRIVE + 2 * s])
 
     def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Heights and velocities (s,) of the strips by Newmark's predictor (paper eq. 2.5)."""

@@ -69,6 +69,11 @@ class Strips:
         return (0.5 * self.spacing, -0.5 * self.spacing)
 
     @property
+    def half_length(self) -> float:
+        """Half length of a strip [m], infinite if it is not known."""
+        return float("inf") if self.length is None else 0.5 * self.length
+
+    @property
     def contact_offsets(self) -> tuple[float, ...]:
         """The same for each contact that may be: strip by strip, those of all wires together."""
         return tuple(x for x in self.offsets for _ in range(self.wires))

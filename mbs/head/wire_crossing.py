@@ -1,7 +1,8 @@
-"""Where the wire crosses a pantograph's strips under way: the stagger less the vehicle's sway."""
+"""Where the wire crosses a pantograph's strips under way: where it is less the vehicle's sway."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,7 +11,34 @@ from catenary.mbs.vehicle import curves
 from catenary.mbs.vehicle.base_motion import BaseMotion
 
 
-class LateralPath:
+class CrossingPath(ABC):
+    """Lateral places of wires on the strips of a pantograph.
+
+    Attributes
+    ----------
+    place, rate : (s,) of the contacts [m] and [m/s], to the left of the strips' middle
+    """
+
+    place: np.ndarray
+    rate: np.ndarray
+
+    @abstractmethod
+    def move_to(self, time: float) -> None:
+        """Put ``place`` and ``rate`` to ``time`` [s]."""
+
+    def ahead(self, time: float) -> None:
+        """Put into both what is known of ``time`` [s] ahead of its step: mostly all."""
+        self.move_to(time)
+
+    def fill_ahead(self, times: Sequence[float], rows: np.ndarray) -> None:
+        """Fill in the same for ``times`` [s]: ``rows`` (len(times), 2 s), places then rates."""
+        s = self.place.size
+        for row, time in zip(rows, times, strict=True):
+            self.ahead(time)
+            row[:s], row[s:] = self.place, self.rate
+
+
+class LateralPath(CrossingPath):
     """Lateral places of the wire on the strips of a pantograph as functions of time.
 
     The wire runs straight from support to support.
@@ -56,7 +84,7 @@ class LateralPath:
             self.rate -= sway.velocity
 
 
-class SeveralPaths:
+class SeveralPaths(CrossingPath):
     """Lateral places of several contact wires on the strips of a pantograph.
 
     ``place`` and ``rate`` (s w,) are those of `LateralPath` for w wires, strip by strip.
@@ -73,3 +101,39 @@ class SeveralPaths:
         for number, path in enumerate(self._paths):
             path.move_to(time)
             self._by_strip[:, :, number] = path.place, path.rate
+
+
+class FollowedPath(CrossingPath):
+    """Lateral places of wires that move sideways, whose motion each step finds.
+
+    Parameters
+    ----------
+    across : (2, s) where the wires are across the track [m] and how fast that changes where the
+        strips are [m/s]; kept by reference
+    base : how the vehicle moves, None if it does not
+    """
+
+    def __init__(self, across: np.ndarray, base: BaseMotion | None = None) -> None:
+        self._across, self._base = across, base
+        self.place, self.rate = np.zeros((2, across.shape[1]))
+
+    def move_to(self, time: float) -> None:
+        """Put ``place`` and ``rate`` to ``time`` [s]."""
+        self.ahead(time)
+        self.place += self._across[0]
+        self.rate += self._across[1]
+
+    def ahead(self, time: float) -> None:
+        """Put into both what the vehicle's sway makes of them at ``time`` [s]."""
+        self.place[:] = self.rate[:] = 0.0
+        if self._base is not None:
+            sway = self._base.lateral(time)
+            self.place -= sway.place
+            self.rate -= sway.velocity
+
+    def fill_ahead(self, times: Sequence[float], rows: np.ndarray) -> None:
+        """See ``CrossingPath``: zeros, mostly."""
+        if self._base is None:
+            rows[:] = 0.0
+        else:
+            super().fill_ahead(times, rows)

@@ -15,7 +15,7 @@ import numpy as np
 
 from catenary.mbs.air.air_forces import ON_FRAME, ON_HEAD, SQUARE, AirForces
 from catenary.mbs.head.newmark_head import Raising
-from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
+from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.pantograph_data import MultibodyData, stand
 from catenary.mbs.rigid import kernels
@@ -142,7 +142,7 @@ class FullPantograph:
         dt: float,
         beta: float = 0.25,
         gamma: float = 0.5,
-        lateral: LateralPath | SeveralPaths | None = None,
+        lateral: CrossingPath | None = None,
         base: BaseMotion | None = None,
         air: AirForces | None = None,
         handling: StepSolver | str = "coordinate_partitioning",

@@ -38,7 +38,7 @@ from catenary.mbs.head.head_records import REDUCED
 from catenary.mbs.head.laws import Law, in_place
 from catenary.mbs.head.newmark_head import Raising, SteppedHead, parts_of
 from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning, head_parts
-from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
+from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.vehicle.base_motion import BaseMotion
@@ -96,7 +96,7 @@ class RaisingPantograph(SteppedHead):
         dt: float,
         beta: float = 0.25,
         gamma: float = 0.5,
-        lateral: LateralPath | SeveralPaths | None = None,
+        lateral: CrossingPath | None = None,
         base: BaseMotion | None = None,
         air: AirForces | None = None,
     ) -> None:

@@ -154,6 +154,11 @@ def _actuator_forces(source: Derivation) -> list[float]:
     return [_or_none(actuator_force(place.data)) for place in source.problem.train.placements]
 
 
+def _strip_half_lengths(source: Derivation) -> list[float]:
+    own = (place.data.strips.half_length for place in source.problem.train.placements)
+    return [half if math.isfinite(half) else NONE for half in own]
+
+
 FACTS: dict[str, Fact] = {
     "time_step": Fact(
         "s",
@@ -301,6 +306,13 @@ FACTS: dict[str, Fact] = {
         per=PANTOGRAPH,
         low=1e-9,
         earlier="touching_mass_kg",
+    ),
+    "strip_half_length": Fact(
+        "m",
+        "half length of the strips of a pantograph, NaN if it is not known",
+        _strip_half_lengths,
+        per=PANTOGRAPH,
+        may_be_nan=True,
     ),
     "contact_stiffness": Fact(
         "N/m",

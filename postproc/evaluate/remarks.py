@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.postproc.evaluate.lateral_places import lateral_ranges, sentence
 from catenary.postproc.read.results import Results
 
 # Share of a gust's load that linear drag may leave out.
@@ -43,6 +44,7 @@ def remarks(results: Results) -> list[str]:
     """
     return [
         *results.attributes.get("arrivals", {}).get("warnings", []),
+        *(sentence(p) for p in lateral_ranges(results) if p.left),
         *_about_incidents(results),
         *_about_contact(results),
         *_about_droppers(results),

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from catenary.postproc.evaluate import filters
+from catenary.postproc.evaluate.lateral_places import LateralRange, lateral_ranges
 from catenary.postproc.read.results import Results
 from catenary.solver.base.errors import InputError
 
@@ -105,6 +106,7 @@ class RunStatistics:
     pantographs: Sequence[PantographStatistics]
     supports: SupportStatistics
     droppers: DropperStatistics
+    lateral: Sequence[LateralRange] = ()
 
     @property
     def complaints(self) -> list[str]:
@@ -116,7 +118,8 @@ def evaluate(results: Results) -> RunStatistics:
     """Statistics of a run, as far as its record goes. Not collective."""
     names = results.pantograph_names()
     pantographs = [_pantograph(name, p, results) for p, name in enumerate(names)]
-    return RunStatistics(pantographs, _supports(results), _droppers(results))
+    lateral = lateral_ranges(results)
+    return RunStatistics(pantographs, _supports(results), _droppers(results), lateral)
 
 
 def covers(position: np.ndarray, evaluation: tuple[float, float]) -> bool:

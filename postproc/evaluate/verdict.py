@@ -13,6 +13,9 @@ from catenary.postproc.standards.en50367 import (
     mean_force_limit,
 )
 
+# Where the limit of lateral places comes from, which no edition has.
+_STRIPS_END = "strips.length_m"
+
 
 @dataclass(frozen=True)
 class Criterion:
@@ -61,6 +64,19 @@ def judge(
     for pantograph in statistics.pantographs:
         suffix = f", {pantograph.name}" if several else ""
         judged += _of_pantograph(pantograph, suffix, speed, system, edition)
+    for lateral in statistics.lateral:
+        if not math.isnan(lateral.half_length):
+            judged.append(
+                _criterion(
+                    "lateral place of the contact wire on the strips"
+                    + (f", {lateral.name}" if several else ""),
+                    1e3 * abs(lateral.place),
+                    1e3 * lateral.half_length,
+                    "mm",
+                    "<=",
+                    _STRIPS_END,
+                )
+            )
     uplift = statistics.supports.maximum
     judged.append(
         _criterion(

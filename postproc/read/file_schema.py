@@ -241,6 +241,7 @@ _LETTERS = {
     channels.PANTOGRAPH: "P",
     channels.STRIP: "S",
     channels.WIRE: "F",
+    channels.CONTACT: "K",
     channels.ARM: "a",
     channels.DROPPER: "d",
 }

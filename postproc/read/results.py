@@ -286,6 +286,24 @@ class Results(LineOfRun):
         numbers = itertools.count()
         return [{name: next(numbers) for name in names} for _ in range(self.n_pantographs)]
 
+    def contact_columns(self) -> list[slice]:
+        """Columns of ``lateral_place`` of each pantograph: its strips, each with all wires."""
+        n = len(self.wires_of(Role.CONTACT))
+        return [slice(n * own.start, n * own.stop) for own in self.strip_columns()]
+
+    def contact_names(self) -> list[list[str]]:
+        """What the same columns are called: "strip 1 contact wire", without what there is one of;
+        empty words where there is one of both."""
+        wires, found = self.wires_of(Role.CONTACT), []
+        for strips in self.strip_columns():
+            parts = [
+                [*([f"strip {n + 1}"] if len(strips) > 1 else ()), *([w] if len(wires) > 1 else ())]
+                for n in range(len(strips))
+                for w in wires
+            ]
+            found.append([" ".join(words) for words in parts])
+        return found
+
     @property
     def has_violations(self) -> bool:
         """Whether a pantograph has joints in the time loop."""

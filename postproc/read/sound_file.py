@@ -213,7 +213,15 @@ class SoundFile:
         path = "channels/strip_force"
         if strips > n and self._sizes.get("S") != strips:
             return [f"{path} does not have {strips} columns"]
+        contacts = strips * len(self._contact_wires())
+        if self._sizes.get("K", contacts) != contacts:
+            return [f"channels/lateral_place does not have {contacts} columns"]
         return []
+
+    def _contact_wires(self) -> list[str]:
+        """Names of the contact wires."""
+        roles = self.attrs["wires"]
+        return [name for name, role in roles.items() if role == Role.CONTACT.value]
 
     def _wire_faults(self) -> list[str]:
         """What does not fit the wires and their roles."""
@@ -221,7 +229,7 @@ class SoundFile:
         for name in roles:
             if name not in nodes:
                 return [f"line/wires has no {name}, whose role is {roles[name]}"]
-        contact = [name for name, role in roles.items() if role == Role.CONTACT.value]
+        contact = self._contact_wires()
         if not contact:
             return ["no wire has the role of a contact wire"]
         sizes = [nodes[name].size for name in contact]

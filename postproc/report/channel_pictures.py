@@ -9,7 +9,15 @@ from catenary.postproc.read.results import Results
 from catenary.postproc.report.envelope import thinned
 from catenary.postproc.report.figures import COLOURS, colour, legend_above, stacked, tidy
 from catenary.postproc.report.plots import mark_line, travelled
-from catenary.solver.time_loop.channels import ARM, CHANNELS, ENERGIES, STRIP, WIRE, Channel
+from catenary.solver.time_loop.channels import (
+    ARM,
+    CHANNELS,
+    CONTACT,
+    ENERGIES,
+    STRIP,
+    WIRE,
+    Channel,
+)
 
 
 def channel_pictures(results: Results) -> list[tuple[str, str, Figure]]:
@@ -55,6 +63,9 @@ def _of_train(results: Results, channel: Channel) -> Figure:
         by_wire = results.wire_columns()
         columns = [range(min(own.values()), max(own.values()) + 1) for own in by_wire]
         labels = [list(own) for own in by_wire]
+    elif channel.per == CONTACT:
+        columns = [range(own.start, own.stop) for own in results.contact_columns()]
+        labels = [[word or labels[0][0] for word in own] for own in results.contact_names()]
     start, end = travelled(results)
     figure, panels = stacked(0.7 + 2.7 * len(names), len(names), shared=True)
     for p, axes in enumerate(panels):

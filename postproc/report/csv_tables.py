@@ -90,6 +90,10 @@ def write_pantographs_csv(results: Results, stream: TextIO) -> None:
     by_wire = [c for c in there if c.per == channels.WIRE]
     for prefix, wires in zip(prefixes, results.wire_columns(), strict=True):
         heads += [f"{prefix}{name} {c.label}" for c in by_wire for name in wires]
+    by_contact = [c for c in there if c.per == channels.CONTACT]
+    contacts = list(zip(prefixes, results.contact_columns(), results.contact_names(), strict=True))
+    for prefix, _, own in contacts:
+        heads += [f"{prefix}{n} {c.label}".strip() for c in by_contact for n in own]
     stream.write(csv_text(heads, ()))
     for start in range(0, results.n_rows("time"), _ROWS):
         part = slice(start, min(start + _ROWS, results.n_rows("time")))
@@ -98,6 +102,8 @@ def write_pantographs_csv(results: Results, stream: TextIO) -> None:
         rows = [results.rows(channel.name, part) for channel in by_strip]
         blocks += [values[:, own] for own in strips for values in rows]
         blocks += _by_pantograph([results.rows(c.name, part) for c in by_wire], len(prefixes))
+        rows = [results.rows(channel.name, part) for channel in by_contact]
+        blocks += [values[:, columns] for _, columns, _ in contacts for values in rows]
         np.savetxt(stream, np.hstack(blocks), fmt="%.9g", delimiter=",")
 
 

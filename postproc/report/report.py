@@ -139,7 +139,7 @@ def judge(results: Results, statistics: RunStatistics) -> list[Criterion]:
 
 def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
     # A summary alone does without Matplotlib.
-    from catenary.postproc.report import channel_pictures, figures, plots
+    from catenary.postproc.report import channel_pictures, figures, lateral_picture, plots
 
     drawn: list[tuple[str, str, Figure | None]] = []
     if results.n_rows("time") > 1:
@@ -152,6 +152,9 @@ def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
         if results.has("contact_wire_force"):
             caption = "Shares of the contact wires in the contact force, below 20 Hz."
             drawn.append(("wire_forces", caption, plots.wire_forces(results)))
+        if results.has("lateral_place"):
+            caption = "Lateral place of the contact wires on the strips."
+            drawn.append(("lateral_place", caption, lateral_picture.lateral_places(results)))
         if len(statistics.complaints) < len(statistics.pantographs):
             drawn += [
                 (

@@ -13,6 +13,7 @@ import numpy as np
 
 from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate.error_indicators import Indicators, as_table, indicate
+from catenary.postproc.evaluate.lateral_places import as_table as as_lateral_table
 from catenary.postproc.evaluate.statistics import PantographStatistics, RunStatistics
 from catenary.postproc.evaluate.verdict import Criterion, verdict
 from catenary.postproc.files.disk import plain
@@ -60,6 +61,7 @@ def summarise(
                 strict=True,
             )
         ],
+        "lateral": as_lateral_table(list(statistics.lateral)),
         "supports": _supports(statistics),
         "defects": attributes.get("defects", []),
         "incidents": attributes.get("incidents", []),

@@ -37,6 +37,7 @@ class ContactWires:
     ----------
     x : (n_nodes,) positions of their nodes [m], ascending in each wire, wire by wire
     ranges : (n_wires, 2) first node of each wire, and the one after its last
+    mesh_nodes : (n_nodes,) their numbers in the mesh
     dofs : (n_nodes, 2) unknowns (w, theta_y) of its nodes
     nodes : (n_nodes,) records of ``NODE``, of no columns until a ``ForcesOnLine`` has some
     shapes : WireShapes, these nodes and the wires' running surfaces
@@ -49,7 +50,7 @@ class ContactWires:
         self.ranges = np.stack([ends[:-1], ends[1:]], axis=1)
         self._pieces = [wire.pieces for wire in model.problem.line.wires_of(Role.CONTACT)]
         self._at_rest = form.lateral is not None
-        nodes = np.concatenate(chains)
+        self.mesh_nodes = nodes = np.concatenate(chains)
         self.x = model.mesh.x(nodes)
         self.dofs = np.stack([model.dofs(nodes), model.dofs(nodes, "theta_y")], axis=1)
         mine = ownership.owned(self.dofs)

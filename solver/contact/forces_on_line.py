@@ -12,8 +12,10 @@ from catenary.solver.base.bound import bound
 from catenary.solver.contact import contact_kernels
 from catenary.solver.contact.contact_kernels import Answers, Gains
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
+from catenary.solver.contact.crossing_kernels import no_sideways
 from catenary.solver.contact.followed_links import FollowedLinks, LinkCoupling, link_columns
 from catenary.solver.contact.line_response import LineResponse
+from catenary.solver.contact.wires_across import WiresAcross
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.linear.unit_responses import NO_COLUMNS
 from catenary.solver.model.model import Model
@@ -31,6 +33,7 @@ class ForcesOnLine:
     reach : how far from a force the line moves within a step [m]
     placing : arguments of ``contact_kernels.place``
     superposing, compensating : of ``superpose`` and ``compensate`` after the forces
+    crossing : of ``wires_across.find_across``
 
     Parameters
     ----------
@@ -39,6 +42,7 @@ class ForcesOnLine:
     train_speed : V of the convective part of the gap rate [m/s]
     uses_rate : whether the contact law needs the gap rate
     table : the links of the line that are followed
+    across : (3, n) what ``find_across`` fills in, without columns if wires do not move sideways
     """
 
     def __init__(
@@ -52,6 +56,7 @@ class ForcesOnLine:
         train_speed: float,
         uses_rate: bool,
         table: LinkTable,
+        across: np.ndarray,
     ) -> None:
         self.line = line
         self.wires = ContactWires(model, form, line.ownership)
@@ -82,6 +87,13 @@ class ForcesOnLine:
         self._superpose = bound(contact_kernels.superpose, self._force, *self.superposing)
         self.compensating = (*columns, *motion)
         self._speed = float(train_speed)
+        self._across: WiresAcross | None = None
+        self.crossing: tuple[Any, ...]
+        self.crossing = line.motion.read, self._touches, no_sideways(), self._speed, across
+        if across.size:
+            place = self._touches, self._speed
+            self._across = WiresAcross(comm, model, form, self.wires, line, *place, across)
+            self.crossing = self._across.finding
 
     def place(self) -> None:
         """Look where the contacts are now, and work out the line's answer to a unit force at
@@ -95,6 +107,20 @@ class ForcesOnLine:
     def present(self) -> np.ndarray:
         """Whether the wire of each contact is on its strip, (n,) bool, where they were located."""
         return np.asarray(self._touches["present"] > 0.0)
+
+    @property
+    def presence(self) -> np.ndarray:
+        """(n,) 1 where the wire of a contact is on its strip, else 0; the records' own."""
+        presence: np.ndarray = self._touches["present"]
+        return presence
+
+    def find_across(self) -> None:
+        """Find where wires are across the track, and how that changes, where contacts were located.
+
+        Collective; does nothing if wires do not move sideways.
+        """
+        if self._across is not None:
+            self._across.find()
 
     def heights(self, height: np.ndarray, rate: np.ndarray) -> None:
         """Fill in this rank's share of wire height [m] and its total rate [m/s] at each contact.

@@ -11,9 +11,10 @@ import numpy as np
 from scipy import integrate
 
 from catenary.mbs.build import Operation, has_joints, make_pantograph, steady_forces
+from catenary.mbs.head.head_kernels import N_DRIVE
 from catenary.mbs.head.head_records import HEAD, fill_head
 from catenary.mbs.head.newmark_head import SteppedHead
-from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
+from catenary.mbs.head.wire_crossing import CrossingPath, FollowedPath, LateralPath, SeveralPaths
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
@@ -56,6 +57,11 @@ class Pantographs:
     joints_in_loop : whether a pantograph has joints that may open, all ranks
     constraint_violation : (n,) largest open joint after the latest step [m], NaN for pantographs
         without joints in the loop, rank 0 only
+    across : (3, n_contacts) where lateral motion is simulated: where the wires are across the track
+        [m], how fast that changes at the contacts [m/s] and how far they are from rest [m], rank 0
+    lateral_place, lateral_motion : (n_contacts,) then, else (0,): where wires are on the strips, to
+        the left of their middle [m], NaN where a wire is not on its strip; and the last of
+        ``across``, rank 0
     outputs : ``position`` and all these of the latest step one after another; ``of_step`` is the
         part that a step fills after its forces are known
     speed : of the train [m/s]
@@ -88,7 +94,7 @@ class Pantographs:
             slice(int(a), int(b)) for a, b in itertools.pairwise(n_wires * of_pantograph)
         ]
         strip_start = np.repeat(self._start, counts) + np.concatenate(offsets)
-        half_length = [_half_length(placement) for placement in train.placements]
+        half_length = [placement.data.strips.half_length for placement in train.placements]
         # Places of contacts and of pantographs move together, in one sum.
         self.n_contacts = n_wires * strip_start.size
         self._all_start = np.concatenate([np.repeat(strip_start, n_wires), self._start])
@@ -113,9 +119,13 @@ class Pantographs:
         self.wire_height[:] = wires.rest_height(self._start)
         self.head_height[:] = self.wire_height - train.start_below
         self._heads = Heads(self.n_contacts)
+        self.across = np.zeros((3, self.n_contacts if simulated.lateral else 0))
+        self.lateral_motion = self.across[2]
+        self.lateral_place = np.zeros(self.lateral_motion.size)
         self.joints_in_loop = any(has_joints(placement.data) for placement in train.placements)
         self.constraint_violation[:] = np.nan
         self.models: list[Pantograph] = []
+        self._followed: list[FollowedPath] = []
         on_root(comm, lambda: self._make_all(problem, simulated, nominal_height), takes_long=True)
 
     @property
@@ -127,6 +137,11 @@ class Pantographs:
     def n_wires(self) -> int:
         """Number of contact wires."""
         return self._wires.n_wires
+
+    @property
+    def lateral(self) -> bool:
+        """Whether the wires move across the track."""
+        return self.across.size > 0
 
     @property
     def n_strips(self) -> tuple[int, ...]:
@@ -148,6 +163,17 @@ class Pantographs:
         for model, strips in self._models_with_contacts:
             height[strips], velocity[strips] = model.extrapolate(time)
         return height, velocity
+
+    def cross(self, time: float, present: np.ndarray) -> None:
+        """Note where wires cross the strips at ``time`` [s], from ``across``.
+
+        ``present`` (n_contacts,) is 0 where a wire is not on its strip. Does nothing where there
+        are no models, or no lateral motion.
+        """
+        for path, contacts in zip(self._followed, self._contacts, strict=False):
+            path.move_to(time)
+            self.lateral_place[contacts] = path.place
+        self.lateral_place[present[: self.lateral_place.size] == 0.0] = np.nan
 
     def predict(self, time: float) -> Heads:
         """Strips at ``time`` as functions of the contact forces. Rank 0 only."""
@@ -199,6 +225,9 @@ class Pantographs:
         for number, model in enumerate(self.models):
             assert isinstance(model, SteppedHead)
             model.fill_drives(times, drives[:, number])
+            if self._followed:
+                path = self._followed[number]
+                path.fill_ahead(times, drives[:, number, N_DRIVE : N_DRIVE + 2 * path.place.size])
 
     def look_at_joints(self) -> None:
         """Note by how much joints are open now. Does nothing where there are no models."""
@@ -210,6 +239,7 @@ class Pantographs:
     def take_over(self, other: Pantographs) -> None:
         """Go on from where ``other`` are, the same train made for another step. Not collective."""
         self.outputs[:] = other.outputs
+        self.across[:], self.lateral_place[:] = other.across, other.lateral_place
         for mine, theirs in zip(self.models, other.models, strict=True):
             mine.restore(theirs.state())
 
@@ -225,17 +255,20 @@ class Pantographs:
             velocity = self.speed * self._wires.rest_slope(self._start)
         for number, placement in enumerate(problem.train.placements):
             height = nominal_height(placement)
-            model = _make(problem, simulated, placement, height, self._wires)
+            base = _base(problem, simulated, placement)
+            path: CrossingPath | None = None
+            if self.lateral:
+                path = FollowedPath(self.across[:2, self._contacts[number]], base)
+                self._followed.append(path)
+            if not _depends_on_place(placement, simulated):
+                path = None
+            elif path is None:
+                path = _lateral_path(problem, placement, base, self._wires)
+            model = _make(problem, simulated, placement, height, self.n_wires, base, path)
             model.place(float(self.head_height[number]), float(velocity[number]))
             self.models.append(model)
         self._models_with_contacts = list(zip(self.models, self._contacts, strict=True))
         self.look_at_joints()
-
-
-def _half_length(placement: Placement) -> float:
-    """Half length of the strips of a pantograph [m], infinite if it is not known."""
-    length = placement.data.strips.length
-    return np.inf if length is None else 0.5 * length
 
 
 def _make(
@@ -243,13 +276,11 @@ def _make(
     simulated: Simulated,
     placement: Placement,
     nominal_height: float,
-    wires: ContactWires,
+    n_wires: int,
+    base: BaseMotion | None,
+    path: CrossingPath | None,
 ) -> Pantograph:
     numerics, train = problem.numerics, problem.train
-    start, base = train.start - placement.behind, None
-    if simulated.vehicle is not None:
-        vehicle = replace(simulated.vehicle, suspension=simulated.suspension)
-        base = BaseMotion(vehicle, start, train.speed)
     operation = Operation(
         placement.static_force,
         nominal_height,
@@ -257,7 +288,7 @@ def _make(
         numerics.dt,
         numerics.beta,
         numerics.gamma,
-        _lateral_path(problem, placement, base, simulated, wires),
+        path,
         base,
         airflow(problem, simulated, placement),
         placement.lowering if simulated.lowering else None,
@@ -267,22 +298,30 @@ def _make(
     data = placement.data
     laws = data.laws if simulated.pantograph_laws else ()
     flexure = data.strips.flexure if simulated.flexible_strips else None
-    strips = replace(data.strips, wires=wires.n_wires, flexure=flexure)
+    strips = replace(data.strips, wires=n_wires, flexure=flexure)
     data = replace(data, strips=strips, laws=laws)
     return make_pantograph(data, operation)
 
 
-def _lateral_path(
-    problem: Problem,
-    placement: Placement,
-    base: BaseMotion | None,
-    simulated: Simulated,
-    wires: ContactWires,
-) -> LateralPath | SeveralPaths | None:
-    """Where the wires cross the strips, None if its head neither rolls nor bends."""
-    bends = simulated.flexible_strips and placement.data.strips.flexure is not None
-    if not bends and (not simulated.head_roll or roll_of(placement.data) is None):
+def _base(problem: Problem, simulated: Simulated, placement: Placement) -> BaseMotion | None:
+    """How the vehicle moves a pantograph, None if it does not."""
+    if simulated.vehicle is None:
         return None
+    vehicle = replace(simulated.vehicle, suspension=simulated.suspension)
+    train = problem.train
+    return BaseMotion(vehicle, train.start - placement.behind, train.speed)
+
+
+def _depends_on_place(placement: Placement, simulated: Simulated) -> bool:
+    """Whether it matters where wires cross the strips: to a head that rolls or bends."""
+    bends = simulated.flexible_strips and placement.data.strips.flexure is not None
+    return bends or (simulated.head_roll and roll_of(placement.data) is not None)
+
+
+def _lateral_path(
+    problem: Problem, placement: Placement, base: BaseMotion | None, wires: ContactWires
+) -> CrossingPath:
+    """Where wires that do not move sideways cross the strips."""
     train = problem.train
     paths = [
         LateralPath(

@@ -17,7 +17,12 @@ from catenary.solver.contact_problem.complementarity_kernels import NOWHERE
 from catenary.solver.contact_problem.coupling import DIVERGED
 from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.problem.problem import Numerics
-from catenary.solver.schemes.scheme import Counters, StepController, StepRejected
+from catenary.solver.schemes.scheme import (
+    Counters,
+    StepController,
+    StepRejected,
+    look_across,
+)
 
 # A correction that moves any of the line by more than this [m] will not come back.
 _FAR = 10.0
@@ -65,6 +70,8 @@ class FixedPoint:
         self.pantographs.move_to(time)
         self.interaction.locate()
         self._nowhere = ~self.interaction.present()
+        if self.pantographs.lateral:
+            look_across(self.interaction, self.pantographs, time)
         heads = self._heads_everywhere(time)
         force = self._force
         fixed = self.numerics.iterations

@@ -85,6 +85,7 @@ class SchemeFactory:
             train.speed,
             uses_rate,
             switching_links(model, self.form.dropper_force),
+            pantographs.across,
         )
         if problem.window.moves:
             self._open_window(problem, model, line, interaction, pantographs)

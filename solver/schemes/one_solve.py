@@ -17,7 +17,12 @@ from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.contact_problem.complementarity import NOT_FINITE, InnerSolution
 from catenary.solver.contact_problem.coupling import Coupling
 from catenary.solver.contact_problem.force_exchange import Exchange, Reply, Verdict
-from catenary.solver.schemes.scheme import Counters, StepController, StepRejected
+from catenary.solver.schemes.scheme import (
+    Counters,
+    StepController,
+    StepRejected,
+    look_across,
+)
 
 # First guesses of what reserves elsewhere may lose [N] and of contact forces [N]; both grow when a
 # step shows that they were too small, and that step is repeated.
@@ -134,6 +139,8 @@ class OneSolve:
 
     def _solve_inner(self, time: float, stop: bool) -> Reply:
         exchange, interaction, events = self._exchange, self.interaction, self._events
+        if self.pantographs.lateral:
+            look_across(interaction, self.pantographs, time)
         events["ContactInner"].begin()
         heads = self._heads(time) if self.comm.rank == 0 else None
         events["ContactInner"].end()

@@ -19,7 +19,7 @@ from catenary.solver.linear.petsc_solvers import PREFIX
 from catenary.solver.problem.integrator_parameters import GENERALIZED_ALPHA, NEWMARK, integration_of
 from catenary.solver.problem.problem import Numerics
 from catenary.solver.schemes.monolithic_system import WholeSystem
-from catenary.solver.schemes.scheme import Counters
+from catenary.solver.schemes.scheme import Counters, look_across
 
 # Norm of what may be left of the forces [N], and what short steps add to it by round-off of
 # inertia forces, some ten times eps of masses below 100 kg and ways below 0.1 m [N s2].
@@ -183,6 +183,9 @@ class TSAlpha2:
         pantographs.strip_force[:] = force
         pantographs.head_height[:] = system.level + self._u[system.heads]
         pantographs.wire_height[:] = pantographs.head_height - depth
+        if pantographs.lateral:
+            self.interaction.locate()
+            look_across(self.interaction, pantographs, time)
         self.counters.steps += 1
         self.counters.rounds = self.counters.solves
         self.counters.slack_dropper_steps += system.n_slack(self._u, self._v)

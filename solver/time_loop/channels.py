@@ -23,6 +23,7 @@ ARM = "steady arm"
 DROPPER = "dropper"
 STRIP = "strip"
 WIRE = "contact wire"
+CONTACT = "contact"
 RUN = "run"
 
 
@@ -51,11 +52,13 @@ class Energies(NamedTuple):
 
 class Train(NamedTuple):
     """What decides which channels a run has: strips of each pantograph in running order, whether a
-    pantograph has joints that may open, and the number of contact wires."""
+    pantograph has joints that may open, the number of contact wires, and whether these move
+    sideways."""
 
     n_strips: tuple[int, ...]
     joints_in_loop: bool
     n_wires: int = 1
+    lateral: bool = False
 
     @property
     def several_strips(self) -> bool:
@@ -73,7 +76,8 @@ class Channel:
     unit : SI unit, "-" if none
     meaning : what it is and which sign it has, in words
     per : what a column stands for: ``PANTOGRAPH``, ``STRIP``, ``ARM`` or ``DROPPER``; ``WIRE`` for
-        each contact wire under each pantograph; ``RUN`` for one value a row
+        each contact wire under each pantograph; ``CONTACT`` for each contact wire on each strip,
+        strip by strip; ``RUN`` for one value a row
     values : which array (columns,) of contiguous doubles holds the values after a step. Of arms and
         droppers these are the rank's own; of pantographs and strips rank 0 has them, and the array
         may be empty elsewhere. A function () -> (columns,) is called after each step, which then
@@ -111,8 +115,9 @@ class Channel:
 
     def n_columns(self, train: Train) -> int:
         """Columns of a channel of pantographs, strips or contact wires."""
-        n = len(train.n_strips)
-        return {STRIP: sum(train.n_strips), WIRE: n * train.n_wires}.get(self.per, n)
+        n, n_strips = len(train.n_strips), sum(train.n_strips)
+        several = {STRIP: n_strips, WIRE: n * train.n_wires, CONTACT: n_strips * train.n_wires}
+        return several.get(self.per, n)
 
 
 TIME = Channel("time", "s", "time since the start of the run", RUN)
@@ -175,6 +180,25 @@ CHANNELS: dict[str, Channel] = {
             lambda sources: sources.pantographs.contact_wire_force,
             when=lambda train: train.n_wires > 1,
             own_picture=True,
+        ),
+        Channel(
+            "lateral_place",
+            "m",
+            "lateral place of a contact wire on a strip, to the left of the strip's middle, strip "
+            "by strip in the order of the wires; NaN where it is not on the strip",
+            CONTACT,
+            lambda sources: sources.pantographs.lateral_place,
+            when=lambda train: train.lateral,
+            may_be_nan=True,
+            own_picture=True,
+        ),
+        Channel(
+            "lateral_motion",
+            "m",
+            "lateral displacement of a contact wire from rest where a strip meets it, to the left",
+            CONTACT,
+            lambda sources: sources.pantographs.lateral_motion,
+            when=lambda train: train.lateral,
         ),
         Channel(
             "constraint_violation",

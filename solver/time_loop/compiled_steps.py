@@ -235,6 +235,8 @@ class CompiledSteps:
             law=self._law,
             superposing=interaction.superposing,
             compensating=interaction.compensating,
+            crossing=interaction.crossing,
+            lateral_place=pantographs.lateral_place,
             switched=np.zeros(problem.unknowns.right.size, dtype=np.int64),
             ends=pantographs.ends,
             of_step=pantographs.of_step,

@@ -128,6 +128,7 @@ class March:
         self._set_ups = SchemeFactory(comm, form, self.ownership, self._nominal_height)
         self._set_up(unchanged(model))
         self._set_off(model)
+        self._showing.cross(0.0)
         give_back()
         self._first_step = 0
         self._happened: tuple[LineIncident, ...] = ()
@@ -250,8 +251,10 @@ class March:
             changed = changed_line(self._first, self._form, incidents)
             self._set_up(changed if incidents else unchanged(self._first))
         self._happened, self._ahead = incidents, happening[len(past) :]
-        self._pantographs.move_to(self._first_step * self._problem.numerics.dt)
+        time = self._first_step * self._problem.numerics.dt
+        self._pantographs.move_to(time)
         self._showing.restore(checkpoint)
+        self._showing.cross(time, found=True)
 
     def run(
         self,

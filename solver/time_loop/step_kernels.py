@@ -14,6 +14,7 @@ from catenary.mbs.head import head_records
 from catenary.solver.base.compiled import compiled, in_line
 from catenary.solver.base.pointers import borrowed, call_held, numbers_at
 from catenary.solver.contact import contact_kernels
+from catenary.solver.contact.crossing_kernels import find_across
 from catenary.solver.contact_problem import complementarity_kernels
 from catenary.solver.contact_problem.complementarity_kernels import SmallProblem
 from catenary.solver.contact_problem.law_tangents import ReportedForces
@@ -63,6 +64,8 @@ class Steps(NamedTuple):
     placing, responding : arguments of ``place`` and ``respond``
     problem : SmallProblem of a step's forces
     superposing, compensating : of ``superpose`` and ``compensate`` after the forces
+    crossing : arguments of ``wires_across.find_across``
+    lateral_place : (n,) where wires that move sideways are on the strips [m]
     shown : of the line, see ``state_kernels.show``
     free : address of the line's free step, see ``pointers.call_held``
     loading : address of what finds loads that change with time, zeros if there are none
@@ -89,6 +92,8 @@ class Steps(NamedTuple):
     law: ReportedForces
     superposing: tuple[Any, ...]
     compensating: tuple[Any, ...]
+    crossing: tuple[Any, ...]
+    lateral_place: np.ndarray
     switched: np.ndarray
     ends: contact_kernels.Ends
     of_step: np.ndarray
@@ -189,6 +194,7 @@ def take(steps, times, drives, rows, moved, kept_motions, counts, shows, first, 
     clock, free, placing, responding = steps.clock, steps.free, steps.placing, steps.responding
     superposing, compensating = steps.superposing, steps.compensating
     ends, of_step = steps.ends, steps.of_step
+    crossing, lateral_place = steps.crossing, steps.lateral_place
     solution, depth, motion = problem.unknowns.solution, problem.found[0], shown.motion
     pressed = problem.heads
     n, n_outputs = problem.gap.place.size, outputs.size
@@ -206,6 +212,11 @@ def take(steps, times, drives, rows, moved, kept_motions, counts, shows, first, 
         take_in(now, shown.columns.ends)
         take_in(kept.moved, shown.columns.ends)
         within = True
+        if lateral_place.size:
+            find_across(*crossing)
+            touches, across = crossing[1], crossing[4]
+            for h in range(records.size):
+                head_records.cross(records[h], drives[i, h], across, touches, lateral_place)
         for h in range(records.size):
             within &= head_records.predict(records[h], drives[i, h], heads, n)
         m = TOO_SMALL if within else LEFT

@@ -37,7 +37,7 @@ _MOTION = ("displacement", "velocity", "acceleration")
 _OF_PANTOGRAPHS = ("contact_force", "head_height", "wire_height", "strip_force")
 # Channels of the first tables of ``Shown.columns``.
 _OF_COLUMNS = ("arm_uplift", "dropper_force")
-_ON_WIRES = "contact_wire_force"
+_ON_WIRES, _ACROSS = "contact_wire_force", "across"
 
 
 class Showing:
@@ -151,6 +151,7 @@ class Showing:
             n_places=tuple(places.size for places in self._pantographs.places()),
             joints_in_loop=self._pantographs.joints_in_loop,
             n_wires=self._pantographs.n_wires,
+            lateral=self._pantographs.lateral,
             moving=self._moving,
         )
 
@@ -169,6 +170,19 @@ class Showing:
         view.row[: self._shown.size] = self._shown
         self.layout.fill(view.row)
         return view
+
+    def cross(self, time: float, *, found: bool = False) -> None:
+        """Note where wires that move sideways cross the strips at ``time`` [s], if any do.
+
+        ``found`` says whether what they do there is known, of a state that was restored.
+        Collective.
+        """
+        if not self._pantographs.lateral:
+            return
+        self._interaction.locate()
+        if not found:
+            self._interaction.find_across()
+        self._pantographs.cross(time, self._interaction.presence)
 
     def follow(self, stations: np.ndarray) -> None:
         """Say that only ``stations`` (2,), from and to, have moved since the latest rows."""
@@ -227,7 +241,9 @@ class Showing:
             if name in checkpoint or name in _MOTION:
                 by_row = np.reshape(_like(checkpoint, name, np.empty(n_nodes * names)), (-1, names))
                 states[name] = model.numbering.as_vector(by_row[row_of_node])[owned]
-        names_of_outputs = (*_OF_PANTOGRAPHS, *((_ON_WIRES,) if pantographs.n_wires > 1 else ()))
+        names_of_outputs = [*_OF_PANTOGRAPHS]
+        names_of_outputs += [_ON_WIRES] if pantographs.n_wires > 1 else []
+        names_of_outputs += [_ACROSS] if pantographs.lateral else []
         outputs = {
             name: _like(checkpoint, name, getattr(pantographs, name)) for name in names_of_outputs
         }
@@ -344,6 +360,8 @@ class Showing:
         result["strip_force"] = pantographs.strip_force.copy()
         if pantographs.n_wires > 1:
             result[_ON_WIRES] = pantographs.contact_wire_force.copy()
+        if pantographs.lateral:
+            result[_ACROSS] = pantographs.across.copy()
         result["contacts"] = self._scheme.state()
         if line.window is not None:
             result["window"] = line.window.state()
