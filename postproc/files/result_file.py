@@ -331,7 +331,8 @@ def _create_growing(
 
 def _rows(tables: Mapping[str, h5py.Dataset]) -> list[int]:
     """Rows of the channels, of the energies and of the line's channels."""
-    return [tables[name].shape[0] if name in tables else 0 for name in _CLOCKS]
+    # Of damaged files one may be a single value.
+    return [(*tables[name].shape, 0)[0] if name in tables else 0 for name in _CLOCKS]
 
 
 def complete_rows(file: h5py.File) -> list[int]:

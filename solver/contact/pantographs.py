@@ -59,9 +59,9 @@ class Pantographs:
         without joints in the loop, rank 0 only
     across : (3, n_contacts) where lateral motion is simulated: where the wires are across the track
         [m], how fast that changes at the contacts [m/s] and how far they are from rest [m], rank 0
-    lateral_place, lateral_motion : (n_contacts,) then, else (0,): where wires are on the strips, to
-        the left of their middle [m], NaN where a wire is not on its strip; and the last of
-        ``across``, rank 0
+    lateral_place : (n_contacts,) then, else (0,): where wires are on the strips, to the left of
+        their middle [m], NaN where a wire is not on its strip; rank 0
+    lateral_displacement : the last of ``across``
     outputs : ``position`` and all these of the latest step one after another; ``of_step`` is the
         part that a step fills after its forces are known
     speed : of the train [m/s]
@@ -120,8 +120,8 @@ class Pantographs:
         self.head_height[:] = self.wire_height - train.start_below
         self._heads = Heads(self.n_contacts)
         self.across = np.zeros((3, self.n_contacts if simulated.lateral else 0))
-        self.lateral_motion = self.across[2]
-        self.lateral_place = np.zeros(self.lateral_motion.size)
+        self.lateral_displacement = self.across[2]
+        self.lateral_place = np.zeros(self.lateral_displacement.size)
         self.joints_in_loop = any(has_joints(placement.data) for placement in train.placements)
         self.constraint_violation[:] = np.nan
         self.models: list[Pantograph] = []

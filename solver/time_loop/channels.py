@@ -193,11 +193,11 @@ CHANNELS: dict[str, Channel] = {
             own_picture=True,
         ),
         Channel(
-            "lateral_motion",
+            "lateral_displacement",
             "m",
             "lateral displacement of a contact wire from rest where a strip meets it, to the left",
             CONTACT,
-            lambda sources: sources.pantographs.lateral_motion,
+            lambda sources: sources.pantographs.lateral_displacement,
             when=lambda train: train.lateral,
         ),
         Channel(

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
-from small_lines import WHOLE, ac_simple_line, mesh_of, problem_of, train
+from small_lines import EN_PANTOGRAPH, WHOLE, ac_simple_line, mesh_of, problem_of, train
 
+from catenary.mbs.head.strips import Turning
 from catenary.meshgen.curve import Curve
 from catenary.solver.statics.line_at_rest import line_at_rest_on_all
 from catenary.solver.time_loop.march import March
@@ -17,7 +18,7 @@ COMM = MPI.COMM_WORLD
 
 
 class Seen:
-    """Keeps contact forces, on rank 0, and this rank's columns of arm uplifts."""
+    """Keeps contact forces and lateral places, on rank 0, and this rank's arm uplifts."""
 
     def __init__(self) -> None:
         self.rows: list[tuple[np.ndarray, np.ndarray]] = []
@@ -26,7 +27,8 @@ class Seen:
         self.owned = stage.owned_arms
 
     def observe(self, view: StepView) -> None:
-        self.rows.append((view.contact_force.copy(), view.arm_uplift.copy()))
+        here = np.append(view.contact_force, 1e3 * view.lateral_place)
+        self.rows.append((here, view.arm_uplift.copy()))
 
     def finish(self, outcome: str) -> None:
         assert outcome == "done"
@@ -36,8 +38,9 @@ def run(comm: MPI.Comm) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     line = ac_simple_line(4)
     arm = replace(line.steady_arm, inclination=np.deg2rad(10.0))
     line = replace(line, steady_arm=arm, curve=Curve(1 / 3000, 0.05))
-    going = train(80.0, 70.0, 125.0, static_force=250.0, raise_time=0.1)
-    problem = problem_of(line, WHOLE | {"lateral_motion"}, train=going)
+    data = replace(EN_PANTOGRAPH, roll=Turning(2.0, 470.0, 60.0))
+    going = train(80.0, 70.0, 125.0, static_force=250.0, raise_time=0.1, data=data)
+    problem = problem_of(line, WHOLE | {"lateral_motion", "head_roll"}, train=going)
     seen = Seen()
     with March(comm, *line_at_rest_on_all(problem, mesh_of(line, 3), comm)) as march:
         march.run([seen])

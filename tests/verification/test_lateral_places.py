@@ -79,7 +79,7 @@ def test_places_are_stagger_and_motion_of_the_wire_less_the_sway() -> None:
             moved[model.dofs(nodes, name)] = view.node_motion(name, False)
             rest[model.dofs(nodes, name)] = at_rest
         places = [(own.weights * of[own.unknowns]).sum(axis=1) for of in (moved, rest)]
-        return np.concatenate([*places, view.lateral_motion, view.lateral_place])
+        return np.concatenate([*places, view.lateral_displacement, view.lateral_place])
 
     history = History(look)
     run, _ = start_march(swaying, mesh)
@@ -96,12 +96,12 @@ def test_places_are_stagger_and_motion_of_the_wire_less_the_sway() -> None:
 def test_blocks_of_steps_show_the_same_places_as_single_ones() -> None:
     rolling = problem(rolls=True, sways=True)
     mesh, single, block = mesh_of(rolling.line, 3), History(), Rows()
-    single.watch = lambda view: np.append(view.lateral_place, view.lateral_motion)
+    single.watch = lambda view: np.append(view.lateral_place, view.lateral_displacement)
     for observer in (single, block):
         run, _ = start_march(rolling, mesh)
         run.run([observer])
         run.destroy()
-    both = np.hstack([block["lateral_place"], block["lateral_motion"]])
+    both = np.hstack([block["lateral_place"], block["lateral_displacement"]])
     assert np.array_equal(both, np.array(single.watched))
     assert np.array_equal(block["contact_force"], single["contact_force"])
     assert len(block.rows) > 400
@@ -148,7 +148,7 @@ def test_lines_without_lateral_motion_have_none_of_it() -> None:
     rows = Rows()
     run.run([rows])
     run.destroy()
-    assert rows["lateral_place"].shape[1] == rows["lateral_motion"].shape[1] == 0
+    assert rows["lateral_place"].shape[1] == rows["lateral_displacement"].shape[1] == 0
     assert not rows.stage.train.lateral
 
 
