@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from catenary.solver.base.parallel import on_root
 class ColumnGather:
     """Gathers (rows, owned columns) blocks of all ranks into one (rows, all columns) on rank 0.
 
-    Collective. All buffers are made here, so that a gather allocates nothing that grows with the
+    Collective. Buffers are made once, so that a later gather allocates nothing that grows with the
     line.
 
     Parameters
@@ -36,18 +37,31 @@ class ColumnGather:
         on_root(comm, lambda: _check_partition(self._parts, n_columns))
         self.n_owned = int(owned.size)
         self.n_columns = n_columns
-        # One rank's columns need no putting together.
+        # One rank's columns need no putting together, if they are all there.
         self._in_order = comm.size == 1 and np.array_equal(owned, np.arange(n_columns))
-        if comm.rank == 0 and not self._in_order:
-            self._received = np.empty(max_rows * n_columns)
-            self._whole = np.empty((max_rows, n_columns))
+        self._max_rows, self._has_room = max_rows, False
 
-    def __call__(self, block: np.ndarray) -> np.ndarray:
+    def twin(self) -> ColumnGather:
+        """Another one of the same columns, with room of its own. Not collective."""
+        twin = copy.copy(self)
+        twin._has_room = False
+        return twin
+
+    def _make_room(self) -> None:
+        """Room for what is received, at the first gather that needs it."""
+        self._has_room = True
+        self._received = np.empty(self._max_rows * self.n_columns)
+        self._whole = np.zeros((self._max_rows, self.n_columns))
+
+    def __call__(self, block: np.ndarray, among: np.ndarray | None = None) -> np.ndarray:
         """All columns of the ranks' blocks on rank 0, an empty array elsewhere. Collective.
 
         Parameters
         ----------
-        block : (rows, n_owned) float64, C-contiguous, the same number of rows on all ranks
+        block : (rows, n_owned) float64, C-contiguous, the same number of rows on all ranks; with
+            ``among`` the rank's columns of these alone
+        among : (n_columns,) bool, which columns are gathered, the same on all ranks; what the
+            others hold means nothing. None for all
 
         Returns
         -------
@@ -57,13 +71,16 @@ class ColumnGather:
         if self._comm.rank != 0:
             self._comm.Gatherv(block, None, root=0)
             return np.empty((rows, 0))
-        if self._in_order:
+        if self._in_order and among is None:
             return block
+        if not self._has_room:
+            self._make_room()
         whole = self._whole[:rows]
-        counts = [rows * part.size for part in self._parts]
-        self._comm.Gatherv(block, [self._received, counts], root=0)
+        parts = self._parts if among is None else [part[among[part]] for part in self._parts]
+        counts = [rows * part.size for part in parts]
+        self._comm.Gatherv(block, [self._received[: sum(counts)], counts], root=0)
         start = 0
-        for part, count in zip(self._parts, counts, strict=True):
+        for part, count in zip(parts, counts, strict=True):
             whole[:, part] = self._received[start : start + count].reshape(rows, part.size)
             start += count
         return whole

@@ -74,7 +74,8 @@ class StepView:
     row : (n,) the values of all channels one after another
     columns : where in the row each channel is, by name
     node_uplift : () -> (n owned nodes,) vertical displacement [m]; not collective
-    node_motion : (name of an unknown, whether its rate is meant) -> (n owned nodes,) [m], [m/s] or
+    node_motion : (name of an unknown, whether its rate is meant, which of the owned nodes, all if
+        that is left out) -> (n nodes,) [m], [m/s] or
         [-], [1/s], zero for nodes without it; not collective
     wire_tension : () -> (n_nodes,) tension of the wires ahead of all nodes [N], the same array as
         long as it does not change; not collective
@@ -92,7 +93,7 @@ class StepView:
     row: np.ndarray
     columns: dict[str, slice]
     node_uplift: Callable[[], np.ndarray]
-    node_motion: Callable[[str, bool], np.ndarray]
+    node_motion: NodeMotion
     wire_tension: Callable[[], np.ndarray]
     pantograph_places: Callable[[], np.ndarray]
     line_state: Callable[[], Mapping[str, np.ndarray]]
@@ -115,6 +116,13 @@ def row_of(values: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict[str, slic
         name: slice(*part) for name, part in zip(values, itertools.pairwise(ends), strict=True)
     }
     return np.concatenate([np.zeros(0), *values.values()]), columns
+
+
+class NodeMotion(Protocol):
+    """One unknown of a rank's nodes, or its rate. Not collective."""
+
+    def __call__(self, name: str, rate: bool, among: np.ndarray | None = None, /) -> np.ndarray:
+        """The values of those owned nodes whose numbers among them are given, of all if not."""
 
 
 class Observer(Protocol):

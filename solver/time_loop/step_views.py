@@ -271,7 +271,7 @@ class Showing:
         for i, pantograph in enumerate(self._pantographs.models):
             _like(checkpoint, f"pantograph_{i}", pantograph.state())
 
-    def _node_motion(self, name: str, rate: bool) -> np.ndarray:
+    def _node_motion(self, name: str, rate: bool, among: np.ndarray | None = None, /) -> np.ndarray:
         """One unknown of the rank's nodes, or its rate, zero for nodes without it."""
         if name not in self._rows_of_unknown:
             numbering = self._model.numbering
@@ -281,10 +281,10 @@ class Showing:
         there, own = self._rows_of_unknown[name]
         motion = self.motion.velocity if rate else self.motion.displacement
         if there.size == self._owned_nodes.size:
-            return np.take(motion, own)
+            return np.take(motion, own if among is None else own[among])
         result = np.zeros(self._owned_nodes.size)
         result[there] = motion[own]
-        return result
+        return result if among is None else result[among]
 
     def _pantograph_places(self) -> np.ndarray:
         """Heights of the bases, then places of masses and bodies, on rank 0."""

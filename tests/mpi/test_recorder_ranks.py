@@ -24,10 +24,10 @@ from catenary.postproc.files.disk import NoRoom
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.snapshots.blocks import RecordedLine
-from catenary.postproc.record.snapshots.field_layout import FieldRecord
+from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.base.errors import RunBroken
-from catenary.solver.time_loop.observers import Stage, StepView, row_of
+from catenary.solver.time_loop.observers import NodeMotion, Stage, StepView, row_of
 
 COMM = MPI.COMM_WORLD
 N_STEPS, DT = 130, 1e-3
@@ -106,7 +106,9 @@ def make_view(step: int, share: Share) -> StepView:
         row=row,
         columns=columns,
         node_uplift=lambda: 1e-3 * step + share(N_NODES),
-        node_motion=lambda name, rate: 1e-3 * step + (2.0 if rate else 1.0) * share(N_NODES),
+        node_motion=lambda name, rate, among=slice(None): (
+            1e-3 * step + (2.0 if rate else 1.0) * share(N_NODES)[among]
+        ),
         wire_tension=lambda: 10.0 * step + np.arange(N_NODES),
         pantograph_places=lambda: np.zeros(0),
         line_state=dict,
@@ -215,6 +217,49 @@ def test_fields_reach_the_file(folder: Path, share: Share) -> None:
             np.testing.assert_allclose(uplift, 0.02 * number + nodes, rtol=1e-6)
             np.testing.assert_allclose(velocity[..., 2], 0.02 * number + 2 * nodes, rtol=1e-6)
             np.testing.assert_allclose(tension, 200.0 * number + nodes, rtol=1e-6)
+
+
+@pytest.mark.parametrize("share", SHARES)
+def test_a_window_gathers_what_it_shows(folder: Path, share: Share) -> None:
+    """It moves on by a fifth of the wire; what no snapshot of a flush shows is not asked for."""
+    nodes, asked = np.arange(30), 0
+    x = MARCH.mesh.points[nodes, 0]
+    course = Course(x[5], x[5], (x[11] - x[5]) / (N_STEPS * DT))
+    recorder = FieldRecorder(
+        COMM,
+        folder / "fields.xdmf",
+        RecordedLine({"contact_wire": nodes}),
+        every=20,
+        record=FieldRecord(("uplift", "velocity"), window=(4.0, 6.0), course=course),
+        snapshots_per_flush=3,
+    )
+    recorder.start(make_stage(share))
+    for step in range(N_STEPS + 1):
+        view = make_view(step, share)
+        motion = view.node_motion
+
+        def counted(*what: object, motion: NodeMotion = motion) -> np.ndarray:
+            nonlocal asked
+            found = motion(*what)  # type: ignore[arg-type]
+            asked += found.size
+            return found
+
+        view.node_motion = counted
+        recorder.observe(view)
+    recorder.finish("done")
+    asked = COMM.allreduce(asked)
+    if COMM.rank:
+        return
+    with h5py.File(folder / "fields.h5") as file:
+        group = file["contact_wire"]
+        first, count = group["first"][:], group["count"][:]
+        uplift = np.split(group["uplift"][:], np.cumsum(count)[:-1])
+        for number, values in enumerate(uplift):
+            shown = np.arange(first[number], first[number] + count[number])
+            np.testing.assert_allclose(values, 0.02 * number + shown, rtol=1e-6)
+    assert first[-1] > first[0]
+    # Two motions of seven snapshots, of far fewer nodes than the line has.
+    assert 2 * count.sum() <= asked < 2 * 7 * 25
 
 
 def test_a_full_disk_on_rank_0_breaks_the_run_on_all_ranks_at_the_same_step(

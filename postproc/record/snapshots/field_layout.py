@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.postproc.record.snapshots.blocks import Block
+from catenary.postproc.record.snapshots.blocks import FIXED, Block
 from catenary.postproc.record.snapshots.field_kinds import USUAL_FIELDS, FieldKind, kinds_of
 
 # More than HDF5's tables take for a dataset or a group with its attributes [bytes].
@@ -57,6 +57,30 @@ class FieldRecord:
         if self.stretch is not None:
             chosen = [block.between(*self.stretch) for block in chosen]
         return chosen
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all of the line is recorded."""
+        return self.parts is None and self.stretch is None and self.window is None
+
+    def needed(self, blocks: list[Block], times: np.ndarray, n_nodes: int) -> np.ndarray:
+        """Nodes without which snapshots cannot be made, (n_nodes,) bool.
+
+        Parameters
+        ----------
+        blocks : that are recorded, see ``chosen``
+        times : of snapshots that follow one another, the first and the last are enough [s]
+        n_nodes : of the line
+        """
+        needed = np.zeros(n_nodes, dtype=bool)
+        for block in blocks:
+            first, count = block.range_over(*self.edges(times))
+            # What is made of slopes takes the neighbours of a wire's point as well.
+            more = int(block.is_wire)
+            begin = max(int(first.min()) - more, 0)
+            nodes = block.nodes[begin : int((first + count).max()) + more]
+            needed[nodes[nodes != FIXED]] = True
+        return needed
 
     def edges(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """From and to of the window at times [s], shapes as those [m]."""

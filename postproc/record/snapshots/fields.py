@@ -13,7 +13,7 @@ import numpy as np
 
 from catenary.postproc.files.disk import broken_write
 from catenary.postproc.record.column_gather import ColumnGather, next_flush
-from catenary.postproc.record.snapshots.blocks import RecordedLine, blocks_of
+from catenary.postproc.record.snapshots.blocks import Block, RecordedLine, blocks_of
 from catenary.postproc.record.snapshots.field_layout import FieldRecord
 from catenary.postproc.record.snapshots.field_values import FieldValues, Gathered
 from catenary.postproc.record.snapshots.fields_file import FieldsFile, LineSize
@@ -88,10 +88,22 @@ class FieldRecorder:
         n_nodes = int(stage.node_points.shape[0])
         n_bytes = 8 * n_nodes * max(1, len(motions))
         self._capacity = max(1, min(self._capacity, _MAX_BUFFER // n_bytes))
-        gather = ColumnGather(self._comm, stage.owned_nodes, n_nodes, self._capacity)
-        # One after another they share what is received; each is put aside before the next one.
+        self._owned_nodes, self._apart = stage.owned_nodes, self._every * stage.dt
+        # Of a part of the line its nodes alone are kept; a window's change from flush to flush.
+        self._among: np.ndarray | None = None
+        self._own: np.ndarray | None = None
+        self._blocks: list[Block] = []
+        if not self._record.is_whole:
+            self._blocks = self._record.chosen(blocks_of(self._line, stage.node_points))
+        self._n_nodes = n_nodes
+        gathers = [ColumnGather(self._comm, stage.owned_nodes, n_nodes, self._capacity)]
+        if self._blocks:
+            # What nobody shows of their rooms is neither touched nor copied.
+            gathers = [gathers[0].twin() for _ in motions]
+        # All of a line's share what is received; each is put aside before the next one.
         self._motions = {
-            motion: (gather, np.zeros((self._capacity, gather.n_owned))) for motion in motions
+            motion: (gather, np.zeros((self._capacity, gather.n_owned)))
+            for motion, gather in zip(motions, gathers * len(motions), strict=False)
         }
         if self._wants_droppers:
             owned, n = stage.owned_droppers, int(stage.dropper_x.size)
@@ -140,8 +152,15 @@ class FieldRecorder:
             self._file.publish()
 
     def _keep(self, view: StepView, row: int) -> None:
+        if row == 0 and self._blocks:
+            span = np.array([view.time, view.time + self._capacity * self._apart])
+            self._among = self._record.needed(self._blocks, span, self._n_nodes)
+            self._own = np.flatnonzero(self._among[self._owned_nodes])
         for (name, rate), (_, kept) in self._motions.items():
-            kept[row] = view.node_motion(name, rate)
+            if self._own is None:
+                kept[row] = view.node_motion(name, rate)
+            else:
+                kept[row, : self._own.size] = view.node_motion(name, rate, self._own)
         if self._wants_droppers:
             self._force[row] = view.dropper_force
         if self._wants_tension:
@@ -153,8 +172,11 @@ class FieldRecorder:
         times, rows = list(self._buffered), len(self._buffered)
         motions = {}
         for motion, (gather, kept) in self._motions.items():
-            whole = gather(kept[:rows])
-            motions[motion] = whole.copy() if len(self._motions) > 1 else whole
+            if self._own is not None:
+                kept = np.ascontiguousarray(kept[:rows, : self._own.size])
+            whole = gather(kept[:rows], self._among)
+            shared = len(self._motions) > 1 and self._own is None
+            motions[motion] = whole.copy() if shared else whole
         force = self._droppers(self._force[:rows]) if self._wants_droppers else np.zeros((rows, 0))
         places = np.array(self._pantographs)
         known = Gathered(motions, force, self._tension, places)

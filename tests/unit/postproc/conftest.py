@@ -249,7 +249,9 @@ class March:
             row=row,
             columns=columns,
             node_uplift=lambda: self.wave(t, nodes),
-            node_motion=lambda name, rate: self.motion(t, nodes, name, rate),
+            node_motion=lambda name, rate, among=None: self.motion(
+                t, nodes if among is None else nodes[among], name, rate
+            ),
             wire_tension=lambda: self.tension,
             pantograph_places=lambda: self.places(t),
             line_state=dict,
