@@ -90,13 +90,23 @@ def run(
 
 @app.command(
     "restart",
-    help="Continue an interrupted or broken run from the last state in its result file.",
-    epilog="Example: catenary restart results/en300",
+    help="Continue an interrupted or broken run from the last state in its result file, or let one "
+    "that is done go on to a later end.",
+    epilog="Example: catenary restart results/en300; catenary restart results/en300 --until-m 900 "
+    "--evaluate 600:840",
 )
 @console.guarded
 def restart(
     folder: RunFolder,
     extras: PetscOptions = None,
+    until_m: Annotated[
+        float | None,
+        typer.Option("--until-m", help="Go on until the leading pantograph is there."),
+    ] = None,
+    evaluate: Annotated[
+        str | None,
+        typer.Option(metavar="FROM:TO", help="With --until-m: the stretch to evaluate [m]."),
+    ] = None,
     strict: Strict = False,
     force: Annotated[
         bool, typer.Option("--force", help="Continue even without room for all results.")
@@ -105,8 +115,7 @@ def restart(
 ) -> int:
     """Collective."""
     from catenary.cases.process.petsc_options import split_extras
-    from catenary.cases.scene.input.origin import Origin
-    from catenary.cases.scene.load import scene_from
+    from catenary.cases.run.extending import EVALUATED, UNTIL, extended_scene
 
     def read() -> tuple[Scene, list[str]]:
         from catenary.postproc.read.guard import examined
@@ -118,15 +127,23 @@ def restart(
         refuse_impossible(folder)
         if not folder.is_dir():
             raise InputError(f"{folder} is no folder; name the folder of a run")
+        if evaluate is not None and until_m is None:
+            raise InputError(f"{EVALUATED} belongs to {UNTIL}")
         with Results(folder, examined(folder)) as results:
             config = results.attributes["config"]
-        return scene_from(config, Origin(str(results.path))), options
+        return extended_scene(config, str(results.path), until_m, evaluate), options
 
     comm, scene, arguments = begin(read, verbose, lambda scene: scene)
     from catenary.cases.run.runner import restart_case
 
     result = restart_case(
-        scene, folder, comm, petsc_options=arguments, tell=_teller(folder), force=force
+        scene,
+        folder,
+        comm,
+        petsc_options=arguments,
+        tell=_teller(folder),
+        force=force,
+        extends=until_m is not None,
     )
     return _end(result, folder, strict)
 

@@ -21,8 +21,10 @@ _SAME_FACTS = ("time_step", "speed", "wave_speed")
 _RELATIVE, _ABSOLUTE = 1e-6, 1e-6
 
 
-def state_to_continue(result: Path) -> dict[str, Any]:
+def state_to_continue(result: Path, beyond_end: bool = False) -> dict[str, Any]:
     """The latest sound state of an unfinished run. Not collective.
+
+    ``beyond_end`` is whether it may have come to its end.
 
     Raises
     ------
@@ -32,8 +34,11 @@ def state_to_continue(result: Path) -> dict[str, Any]:
     if not result.exists():
         raise InputError(f"there is no {result} to continue; start the case with `catenary run`")
     with Results(result) as results:
-        if results.complete:
-            raise InputError(f"the run in {result} is done; there is nothing to continue")
+        if results.complete and not beyond_end:
+            raise InputError(
+                f"the run in {result} is done; there is nothing to continue, unless --until-m says "
+                "where it is to end"
+            )
         state = results.checkpoint
         half_before = (state["step"] - 0.5) * results.dt
     # A table that is written to may be damaged where the report does not read it.
@@ -45,13 +50,16 @@ def state_to_continue(result: Path) -> dict[str, Any]:
     return state
 
 
-def refuse_other_run(result: Path, header: Header, n_strips: tuple[int, ...]) -> None:
+def refuse_other_run(
+    result: Path, header: Header, n_strips: tuple[int, ...], may_change: tuple[str, ...] = ()
+) -> None:
     """Raise InputError unless a result file is of the run that its scene makes. Not collective.
 
     Parameters
     ----------
     header : of the scene in the file, made anew
     n_strips : strips of each pantograph
+    may_change : datasets that may be others
     """
     with Results(result) as results:
         about = results.attributes
@@ -62,7 +70,8 @@ def refuse_other_run(result: Path, header: Header, n_strips: tuple[int, ...]) ->
                 raise _refusal(result, f"{name} is {found}, its scene makes {value}")
         if results.n_strips() != list(n_strips):
             raise _refusal(result, f"its pantographs have {results.n_strips()} strips")
-        _refuse_other_line(result, results, header.datasets)
+        datasets = {k: v for k, v in header.datasets.items() if k not in may_change}
+        _refuse_other_line(result, results, datasets)
 
 
 def _refuse_other_line(result: Path, results: Results, datasets: Mapping[str, np.ndarray]) -> None:

@@ -46,7 +46,9 @@ from catenary.cases.scene.scene import Scene
 from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
+from catenary.postproc.files.later_end import BEGUN_FOR, CHANGED, let_go_on
 from catenary.postproc.files.own_files import remove_stale
+from catenary.postproc.read.results import Results
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.snapshots.blocks import RecordedLine
@@ -127,10 +129,12 @@ def restart_case(
     petsc_options: Sequence[str] = (),
     tell: Callable[[str], None] = lambda outcome: None,
     force: bool = False,
+    extends: bool = False,
 ) -> RunOutcome:
     """Continue an interrupted or broken run from its last checkpoint. Collective.
 
     ``scene`` must be the one that the run was started with; any number of ranks may continue.
+    With ``extends`` it may have a later end and another evaluated stretch, and the run may be done.
     ``petsc_options`` and ``tell`` are those of ``run_case``; with ``force`` the room on the disk
     is not looked at.
 
@@ -141,8 +145,8 @@ def restart_case(
         no room for the rest.
     """
     with held(out_dir, comm, f"catenary restart {out_dir}"):
-        state = on_root(comm, lambda: state_to_continue(out_dir / RESULT))
-        order = _Order(scene, out_dir, comm, petsc_options, tell, state, False)
+        state = on_root(comm, lambda: state_to_continue(out_dir / RESULT, extends))
+        order = _Order(scene, out_dir, comm, petsc_options, tell, state, False, extends=extends)
         return _run(order, lambda size: check_room_to_continue(out_dir, size, force))
 
 
@@ -175,6 +179,7 @@ class _Order:
     state: dict[str, Any] | None
     only_summary: bool
     ready: Callable[[], None] = lambda: None
+    extends: bool = False
 
     @property
     def resume(self) -> bool:
@@ -203,12 +208,14 @@ def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
             at_rest = _at_rest(scene, problem, comm, phases, phase, judge)
             header = _header(order, problem, at_rest) if comm.rank == 0 else None
             if order.resume:
-                on_root(comm, lambda: _refuse_other_run(order.out_dir, header, problem))
+                on_root(comm, lambda: _refuse_other_run(order, header, problem))
             phase.next("the line was distributed")
             with phases("distribute"):
                 march = stack.enter_context(March(comm, *at_rest))
                 if order.state is not None:
                     march.restore(order.state)
+                if order.extends:
+                    on_root(comm, lambda: _let_go_on(order, header, march.n_steps), takes_long=True)
             observers, recorder = _observers(
                 order, problem, at_rest, header, phases.progress, march.n_steps
             )
@@ -269,7 +276,8 @@ def _observers(
     those of the whole run, ``header`` is needed on rank 0.
     """
     comm, dt, output = order.comm, problem.numerics.dt, order.scene.output
-    recording = recording_of(output, problem, extent_of(at_rest.mesh), n_steps)
+    begun_for = comm.bcast(_begun_for(order) if comm.rank == 0 else None) or n_steps
+    recording = recording_of(output, problem, extent_of(at_rest.mesh), begun_for)
     for sentence in recording.told(dt):
         logger.info(sentence)
     flush_every = output.flush_every_steps or flush_cadence(
@@ -377,7 +385,20 @@ def _header(order: _Order, problem: Problem, at_rest: LineAtRest) -> Header:
     )
 
 
-def _refuse_other_run(out_dir: Path, header: Header | None, problem: Problem) -> None:
+def _refuse_other_run(order: _Order, header: Header | None, problem: Problem) -> None:
     assert header is not None
     n_strips = tuple(len(place.data.strip_offsets) for place in problem.train.placements)
-    refuse_other_run(out_dir / RESULT, header, n_strips)
+    refuse_other_run(order.result, header, n_strips, CHANGED if order.extends else ())
+
+
+def _let_go_on(order: _Order, header: Header | None, n_steps: int) -> None:
+    assert header is not None
+    let_go_on(order.result, header, n_steps)
+
+
+def _begun_for(order: _Order) -> int | None:
+    """Steps for which a run was begun that got a later end, None if it did not."""
+    if not order.resume:
+        return None
+    with Results(order.result) as results:
+        return results.attributes.get(BEGUN_FOR)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import h5py
@@ -59,9 +59,10 @@ def text_of(value: Any) -> Any:
     return value
 
 
-def seal_attributes(place: h5py.HLObject) -> None:
-    """Store the checksums of all attributes that ``place`` has now."""
-    sums = {name: _sum_of_value(value) for name, value in place.attrs.items()}
+def seal_attributes(place: h5py.HLObject, names: Iterable[str] | None = None) -> None:
+    """Store the checksums of attributes of ``place``, of all that it has now if none are named."""
+    chosen = list(place.attrs) if names is None else names
+    sums = {name: _sum_of_value(place.attrs[name]) for name in chosen}
     set_attribute(place, ATTRIBUTE_SUMS, json.dumps(sums))
 
 

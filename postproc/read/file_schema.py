@@ -183,6 +183,7 @@ ATTRIBUTES: dict[str, Attribute] = {
     "system": _one_of(SYSTEMS),
     "edition": _one_of(EDITIONS),
     "n_steps_planned": _whole(1),
+    "n_steps_begun_for": _whole(1, None),
     "n_ranks": _whole(1, 1),
     "created": _text("unknown"),
     "outcome": Attribute("text", lambda v: isinstance(v, str) and bool(v), fallback="running"),

@@ -17,7 +17,7 @@ from catenary.solver.contact.followed_links import FollowedLinks, LinkCoupling, 
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact.wires_across import WiresAcross
 from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.linear.unit_responses import NO_COLUMNS
+from catenary.solver.linear.unit_responses import NO_COLUMNS, STRETCH
 from catenary.solver.model.model import Model
 from catenary.solver.model.switching_links import LinkTable
 from catenary.solver.statics.equilibrium import Equilibrium
@@ -179,7 +179,10 @@ class ForcesOnLine:
 
         Collective; ``free`` (n_dofs,) is zero for the unknowns that are held.
         """
-        ranges = (self.wires.nodes_between(*range_of_run, k) for k in range(self.wires.n_wires))
+        # Places that are solved for together share their round-off. With the next ones, columns at
+        # the end of a run are to the last bit those of one that goes further.
+        begin, end = range_of_run[0], range_of_run[1] + STRETCH
+        ranges = (self.wires.nodes_between(begin, end, k) for k in range(self.wires.n_wires))
         chosen = np.concatenate([np.arange(first, last) for first, last in ranges])
         dofs = self.wires.dofs[chosen][:, :, None]
         found = self.line.responses.columns(dofs, free[dofs], self.wires.x[chosen])

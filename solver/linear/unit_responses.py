@@ -28,7 +28,7 @@ _LEAK = 1e-13
 # How much further than windows a stretch reaches, of the reach, to see whether columns leak.
 _SEEN = 0.25
 # Length of the places that are solved for on one stretch [m]: about a span.
-_STRETCH = 60.0
+STRETCH = 60.0
 
 
 class Windows(NamedTuple):
@@ -241,7 +241,7 @@ def _stretches(x: np.ndarray, chosen: np.ndarray) -> list[np.ndarray]:
     at = x[chosen][order]
     ends = [0]
     while ends[-1] < at.size:
-        ends.append(int(np.searchsorted(at, at[ends[-1]] + _STRETCH, side="right")))
+        ends.append(int(np.searchsorted(at, at[ends[-1]] + STRETCH, side="right")))
     return [order[begin:end] for begin, end in zip(ends[:-1], ends[1:], strict=True)]
 
 

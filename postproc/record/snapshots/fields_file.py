@@ -35,6 +35,8 @@ logger = logging.getLogger("catenary.fields")
 FORMAT = "catenary-fields-2"
 # Where the bases, masses and bodies of the pantographs are, and how many numbers each has of it.
 PLACES, SIZES = "pantograph_places", "pantograph_sizes"
+# Rows of a table that are copied at once.
+_ROWS_OF_COPY = 1 << 16
 # Tables of a block beside its fields.
 AT_REST = ("points", "nodes", "cells", "first", "count", "cell_first", "cell_count")
 
@@ -132,11 +134,15 @@ class FieldsFile:
                 kept = times[...]
                 kept = kept[kept < start_time - 0.01 * self._every]
                 begin = round(float(kept[0]) / self._every) if kept.size else int(numbers[0])
-                self._plan(np.arange(begin, numbers[-1] + 1))
+                planned = np.arange(begin, numbers[-1] + 1)
+                self._plan(planned[: times.size])
                 self._find_places(file)
                 self._check(file, kept)
                 times[kept.size :] = np.full(times.size - kept.size, np.nan)
                 self._written = kept.tolist()
+            if planned.size > len(self._planned):
+                self._lengthen(planned)
+                return True
         except (OSError, KeyError, RuntimeError, TypeError, ValueError):
             logger.warning(
                 "%s cannot be continued, it is damaged or of another version: its snapshots now "
@@ -150,6 +156,21 @@ class FieldsFile:
         self._published = True
         self._describe()
         return True
+
+    def _lengthen(self, numbers: np.ndarray) -> None:
+        """Put a file with room for more snapshots in place of this one, with those that it has."""
+        self.make(numbers)
+        with opened(self.path, "r") as old, opened(self._made_as, "r+") as new:
+            new["times"][: len(self._written)] = self._written
+            tables = [PLACES]
+            tables += [
+                f"{slots.name}/{kind.name}" for slots in self._layout for kind in slots.kinds
+            ]
+            for table in tables:
+                for first in range(0, len(old[table]), _ROWS_OF_COPY):
+                    rows = slice(first, min(first + _ROWS_OF_COPY, len(old[table])))
+                    new[table][rows] = old[table][rows]
+        self.publish()
 
     def publish(self) -> None:
         """Give a new file its name, in place of an earlier one; OSError if that fails."""

@@ -1,0 +1,79 @@
+"""The head of a result file whose run is to go on beyond its end. Not collective.
+
+The file is changed in a copy, which takes its place when it is whole: what breaks leaves the run
+as it was.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import h5py
+
+from catenary.postproc.channels.header import Header
+from catenary.postproc.files.array_writes import put_array
+from catenary.postproc.files.checked import (
+    ATTRIBUTE_SUMS,
+    FORMAT_BOUNDS,
+    seal_arrays,
+    seal_attributes,
+    set_attribute,
+    text_of,
+)
+from catenary.postproc.files.disk import as_attribute
+from catenary.postproc.files.disk_errors import reason
+from catenary.postproc.files.own_files import part_of
+from catenary.postproc.files.result_file import INTERRUPTED
+from catenary.solver.base.errors import RunBroken
+
+# Steps of the run as it was begun: what is recorded follows from them.
+BEGUN_FOR = "n_steps_begun_for"
+# What a later end leaves: who wrote the rows that are there, how, and whose choice effects were.
+_KEPT = ("versions", "petsc_options", "effects_on", "effects_off")
+# What it changes beside attributes and facts.
+CHANGED = ("line/evaluation_range",)
+
+
+def let_go_on(path: Path, header: Header, n_steps: int) -> None:
+    """Let a result file be one of a run of ``n_steps`` that was interrupted where it has ended.
+
+    Parameters
+    ----------
+    header : of the run with its later end
+
+    Raises
+    ------
+    RunBroken
+        If the file cannot be written; it is as it was.
+    """
+    made_as = part_of(path, os.getpid())
+    try:
+        shutil.copyfile(path, made_as)
+        with h5py.File(made_as, "r+", libver=FORMAT_BOUNDS) as file:
+            _change(file, header, n_steps)
+        os.replace(made_as, path)
+    except (OSError, RuntimeError) as error:
+        made_as.unlink(missing_ok=True)
+        raise RunBroken(
+            f"{path} cannot be given a later end ({reason(error)}); it is as it was"
+        ) from error
+
+
+def _change(file: h5py.File, header: Header, n_steps: int) -> None:
+    sealed = list(json.loads(text_of(file.attrs[ATTRIBUTE_SUMS])))
+    if BEGUN_FOR not in file.attrs:
+        set_attribute(file, BEGUN_FOR, file.attrs["n_steps_planned"])
+        sealed.append(BEGUN_FOR)
+    known = {name: value for name, value in header.attributes.items() if name not in _KEPT}
+    for name, value in {**known, "n_steps_planned": n_steps}.items():
+        set_attribute(file, name, as_attribute(value))
+    seal_attributes(file, sealed)
+    set_attribute(file, "outcome", INTERRUPTED)
+    for name in CHANGED:
+        file[name][...] = header.datasets[name]
+    for name, value in header.facts.items():
+        put_array(file["facts"], name, value)
+    seal_arrays(file["facts"], header.facts)

@@ -1,0 +1,106 @@
+"""A run that is done and goes on to a later end is the run that had that end from the start."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from program import MPIRUN, assert_same_histories, assert_sound, catenary, short_run
+
+from catenary.cases.run.extending import extended_scene
+from catenary.cases.scene.convert.course import resolved
+from catenary.cases.scene.load import load_scene
+from catenary.postproc.read.results import Results
+from catenary.solver.base.errors import InputError
+
+# Where the run ends at first, and where the long one and what goes on do [m].
+FIRST, LAST = "train.end_m=170", 200.0
+SCENE = ("evaluation.from_m=140", "evaluation.to_m=155")
+# Of the whole run, the later stretch is evaluated.
+LONG = (f"train.end_m={LAST:g}", "evaluation.from_m=150", "evaluation.to_m=190")
+LATER = ("--until-m", f"{LAST:g}", "--evaluate", "150:190")
+GROWING = ("time", "channels", "line_channels", "energy")
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("whole")
+    done = catenary(*short_run(folder / "run", *SCENE, *LONG), cwd=folder)
+    assert done.code == 0, done.stderr
+    return folder / "run"
+
+
+@pytest.fixture(scope="module")
+def begun(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("begun")
+    done = catenary(*short_run(folder / "run", *SCENE, FIRST), cwd=folder)
+    assert done.code == 0, done.stderr
+    return folder / "run"
+
+
+def test_a_run_goes_on_to_a_later_end(whole: Path, begun: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    shutil.copytree(begun, out)
+    refused = catenary("restart", str(out), cwd=tmp_path)
+    assert refused.code == 2 and "unless --until-m says where" in refused.stderr
+    done = catenary("restart", str(out), *LATER, cwd=tmp_path)
+    assert done.code == 0, done.stderr
+    assert_same_histories(out, whole)
+    with Results(out) as found, Results(whole) as expected:
+        assert found.attributes["config"]["train"] == expected.attributes["config"]["train"]
+        for name in ("n_steps_planned", "arrivals", "effects_on", "effects_off", "n_steps"):
+            assert found.attributes[name] == expected.attributes[name], name
+    assert_same_tables(out, whole)
+
+
+@pytest.mark.skipif(MPIRUN is None, reason="needs mpirun")
+def test_one_that_is_interrupted_after_that_goes_on_on_other_ranks(
+    whole: Path, begun: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "run"
+    shutil.copytree(begun, out)
+    done = catenary(
+        "restart", str(out), *LATER, "--", "-march_ts_max_steps", "900", cwd=tmp_path, ranks=2
+    )
+    assert done.code == 1, done.stderr
+    assert_sound(out / "run.h5")
+    done = catenary("restart", str(out), cwd=tmp_path)
+    assert done.code == 0, done.stderr
+    assert_same_histories(out, whole)
+
+
+def assert_same_tables(out: Path, whole: Path) -> None:
+    """Fail unless what grows with time is the same to the last bit, and so are snapshots."""
+    with h5py.File(out / "run.h5") as found, h5py.File(whole / "run.h5") as expected:
+        names: list[str] = []
+        expected.visit(names.append)
+        compared = 0
+        for name in names:
+            if name.split("/")[0] in GROWING and isinstance(expected[name], h5py.Dataset):
+                np.testing.assert_array_equal(found[name][...], expected[name][...], name)
+                compared += 1
+        assert compared > 8
+        assert found["line/evaluation_range"][...].tolist() == [150.0, 190.0]
+    with h5py.File(out / "fields.h5") as found, h5py.File(whole / "fields.h5") as expected:
+        for name in ("times", "pantograph_places", "contact_wire/uplift"):
+            # Far from the train there is what is left of 1e-38 m.
+            np.testing.assert_allclose(found[name][...], expected[name][...], rtol=0, atol=1e-30)
+
+
+@pytest.mark.parametrize(
+    ("until", "evaluated", "says"),
+    [
+        (600.0, None, "--until-m is 600, but must be greater than 660"),
+        (float("nan"), None, "--until-m is nan"),
+        (1e5, None, r"train.end_m is 100000.* on the command line \(--until-m\).*inside the line"),
+        (700.0, "600", "--evaluate is 600, but must be two places"),
+        (700.0, "680:640", r"on the command line \(--evaluate\).*must end after it starts"),
+    ],
+)
+def test_an_end_that_cannot_be_is_refused(until: float, evaluated: str | None, says: str) -> None:
+    config = resolved(load_scene("en50318_2002"))
+    with pytest.raises(InputError, match=says):
+        extended_scene(config, "run.h5", until, evaluated)
