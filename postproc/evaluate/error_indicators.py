@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import linalg, optimize, signal
+from scipy import linalg, optimize
 
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.facts import FACTS, WIRE
@@ -131,10 +131,7 @@ def step_error(force: np.ndarray, dt: float, method: Method) -> float:
     deviation = float(force.std())
     # What is filtered needs few samples; a long record has more than a spectrum has use for.
     every = max(1, min(force.size // _SPECTRUM, int(1.0 / (_SAMPLED_HZ * dt))))
-    frequency, power = signal.periodogram(
-        force[::every], 1.0 / (every * dt), window="hann", detrend="constant", scaling="spectrum"
-    )
-    omega, power = 2.0 * np.pi * frequency[1:], power[1:]
+    omega, power = _spectrum(force[::every], every * dt)
     if deviation == 0.0 or power.sum() == 0.0:
         return 0.0
     power = power * deviation**2 / power.sum()
@@ -147,6 +144,17 @@ def step_error(force: np.ndarray, dt: float, method: Method) -> float:
     phase = memory(omega, method.alpha, method.beta) * np.hypot(shift, decay)
     phase = np.minimum(phase, _LARGEST_PHASE)
     return float(np.sqrt(np.sum(power * (2.0 - 2.0 * np.cos(phase)))))
+
+
+def _spectrum(values: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
+    """Angular frequencies [rad/s], without zero, and what each has of the power of values
+    (n,) about their mean, under a Hann window and but for a common factor."""
+    n = values.size
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(n) / n)
+    spectrum = np.fft.rfft((values - values.mean()) * window)
+    power = spectrum.real**2 + spectrum.imag**2
+    power[1 : (n + 1) // 2] *= 2.0  # the half below zero; the highest one of an even n has none
+    return 2.0 * np.pi * np.fft.rfftfreq(n, dt)[1:], power[1:]
 
 
 def memory(omega: np.ndarray, alpha: float, beta: float) -> np.ndarray:

@@ -17,7 +17,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from catenary.postproc.files.array_writes import put_attribute
+from catenary.postproc.files.array_writes import put_attribute, put_text
 
 # The oldest format of HDF5 whose object headers, links and attributes carry checksums. The next
 # one marks a file as open for writing: after a kill nobody could open it.
@@ -37,9 +37,7 @@ def set_attribute(place: h5py.HLObject, name: str, value: Any) -> None:
     value : text or a number
     """
     if isinstance(value, str):
-        encoded = value.encode()
-        kind = h5py.string_dtype("utf-8", max(1, len(encoded)))
-        put_attribute(place, name, np.array(encoded, dtype=kind))
+        put_text(place, name, value)
     else:
         put_attribute(place, name, np.asarray(value))
 

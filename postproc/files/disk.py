@@ -17,6 +17,7 @@ import numpy as np
 from catenary.postproc.files.checked import FORMAT_BOUNDS
 from catenary.postproc.files.disk_errors import reason, remedy
 from catenary.postproc.files.own_files import part_of
+from catenary.postproc.files.trimming import trimmed
 from catenary.solver.base.errors import RunBroken
 
 # Room for HDF5's own tables and for the last words of a run that has filled the disk [bytes].
@@ -133,7 +134,10 @@ def abandon(file: h5py.File) -> None:
 
 @contextlib.contextmanager
 def opened(path: Path, mode: str) -> Iterator[h5py.File]:
-    """An HDF5 file for writing, abandoned if something fails. A context manager."""
+    """An HDF5 file for writing, cut to what it holds at the end. A context manager.
+
+    It is abandoned if something fails.
+    """
     file = h5py.File(path, mode, libver=FORMAT_BOUNDS)
     try:
         yield file
@@ -141,7 +145,8 @@ def opened(path: Path, mode: str) -> Iterator[h5py.File]:
     except Exception:
         abandon(file)
         raise
-    file.close()
+    with trimmed(file):
+        file.close()
 
 
 def broken_write(

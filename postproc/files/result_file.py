@@ -295,8 +295,7 @@ def _write_head(
         create_checked(file, name, array)
     facts = file.create_group("facts")
     for name, value in header.facts.items():
-        put_array(facts, name, value)
-        dataset = facts[name]
+        dataset = h5py.Dataset(put_array(facts, name, value))
         set_attribute(dataset, "unit", FACTS[name].unit)
         set_attribute(dataset, "meaning", FACTS[name].meaning)
     seal_arrays(facts, header.facts)

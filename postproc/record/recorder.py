@@ -103,6 +103,7 @@ class Recorder:
         rows = self._flush_every
         self._last_time, self._moving = stage.start_time, stage.moving
         self._line = LineGather(self._comm, stage, self._record, rows)
+        self._energies_follow_motion = channels.energies_follow_motion()
         self._time = np.zeros(rows)
         self._names = [channel.name for channel in channels.train_channels(stage.train)]
         self._guarded(lambda: self._open(stage))
@@ -124,20 +125,24 @@ class Recorder:
         self._take_line(view)
         self._view = view
         self._last_time = view.time
-        if self._energy_every and view.step % self._energy_every == 0:
-            self._energies.append((view.time, *view.energies()))
+        self.observe_motion(view)
         # The first step is written at once: it makes room for the state to continue from. After it
         # each flush ends with a chunk of the file: a chunk is written once, so that a kill in the
         # midst of writing one spoils no checksum of earlier rows.
         if (view.step + 1) % self._flush_every == 0 or not self._flushed_once:
             self._flush(view)
 
+    def observe_motion(self, view: StepView) -> None:
+        """Keep the energies of a step, if they are due. Collective."""
+        if self._energy_every and view.step % self._energy_every == 0:
+            self._energies.append((view.time, *view.energies()))
+
     def next_state(self, step: int) -> int:
         """The step of the next flush, or record of energies that need more than the motion."""
         if not self._flushed_once:
             return step + 1
         following = next_flush(step, self._flush_every)
-        if not channels.energies_follow_motion():
+        if not self._energies_follow_motion:
             following = min(following, self._next_energies(step))
         return following
 

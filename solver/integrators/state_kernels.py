@@ -80,32 +80,49 @@ def velocities(motion, result):
         result[i] = velocity_at(i, motion)
 
 
+@in_line
+def reserve_of_pair(vectors, shares, unknowns, weights, law, link):
+    """Reserve of a link between two unknowns, in terms of these vectors with ``shares``."""
+    x, y, z = vectors
+    i, j = np.uint64(unknowns[link, 0]), np.uint64(unknowns[link, 1])
+    u, v = weights[link, 0], weights[link, 1]
+    of_x, of_y, of_z = u * x[i] + v * x[j], u * y[i] + v * y[j], u * z[i] + v * z[j]
+    stretch = shares[0] * of_x + shares[1] * of_y + shares[2] * of_z
+    speed = shares[3] * of_y + shares[4] * of_z
+    return law.rest + law.stiffness * stretch + law.damping * speed
+
+
+@in_line
+def reserve_of_many(vectors, shares, unknowns, weights, law, link):
+    """The same of a link between any number of unknowns."""
+    x, y, z = vectors
+    of_x, of_y, of_z = 0.0, 0.0, 0.0
+    for k in range(unknowns.shape[1]):
+        at, u = unknowns[link, k], weights[link, k]
+        of_x, of_y, of_z = of_x + u * x[at], of_y + u * y[at], of_z + u * z[at]
+    stretch = shares[0] * of_x + shares[1] * of_y + shares[2] * of_z
+    speed = shares[3] * of_y + shares[4] * of_z
+    return law.rest + law.stiffness * stretch + law.damping * speed
+
+
 @compiled
 def reserves_within(motion, links, begin, end, result):
     """Reserves of the links from ``begin`` to ``end``, as ``reserves``."""
     x, y, z, shares = motion
     unknowns, weights, laws = links
-    s0, s1, s2, s3, s4 = shares[0], shares[1], shares[2], shares[3], shares[4]
+    known = shares[0], shares[1], shares[2], shares[3], shares[4]
     if unknowns.shape[1] == 2:
         # Droppers alone, mostly: without a loop over unknowns this takes half the time.
         for number in range(begin, end):
             # Unsigned, so that no index is checked for counting from the end.
             link = np.uint64(number)
-            i, j = np.uint64(unknowns[link, 0]), np.uint64(unknowns[link, 1])
-            u, v = weights[link, 0], weights[link, 1]
-            of_x, of_y, of_z = u * x[i] + v * x[j], u * y[i] + v * y[j], u * z[i] + v * z[j]
             law = laws[link]
-            stretch, speed = s0 * of_x + s1 * of_y + s2 * of_z, s3 * of_y + s4 * of_z
-            result[link] = law.rest + law.stiffness * stretch + law.damping * speed
+            result[link] = reserve_of_pair((x, y, z), known, unknowns, weights, law, link)
         return
-    for one in range(begin, end):
-        of_x, of_y, of_z = 0.0, 0.0, 0.0
-        for k in range(unknowns.shape[1]):
-            at, u = unknowns[one, k], weights[one, k]
-            of_x, of_y, of_z = of_x + u * x[at], of_y + u * y[at], of_z + u * z[at]
-        law = laws[one]
-        stretch, speed = s0 * of_x + s1 * of_y + s2 * of_z, s3 * of_y + s4 * of_z
-        result[one] = law.rest + law.stiffness * stretch + law.damping * speed
+    for number in range(begin, end):
+        link = np.uint64(number)
+        law = laws[link]
+        result[link] = reserve_of_many((x, y, z), known, unknowns, weights, law, link)
 
 
 @compiled
@@ -144,17 +161,30 @@ def energy_of_switching(displacement, links, begin, end):
     return energy
 
 
+@in_line
+def share_of(law, reserve):
+    """Share of its reserve with which a link pulls."""
+    return law.carried - law.released if reserve < 0.0 else law.carried
+
+
 @compiled
 def forces_within(motion, links, begin, end, result):
     """Force of each of the links from ``begin`` to ``end`` [N], positive where it pulls."""
-    reserves_within(motion, links, begin, end, result)
-    laws = links.law
-    for link in range(begin, end):
+    x, y, z, shares = motion
+    unknowns, weights, laws = links
+    known = shares[0], shares[1], shares[2], shares[3], shares[4]
+    if unknowns.shape[1] == 2:
+        for number in range(begin, end):
+            link = np.uint64(number)
+            law = laws[link]
+            reserve = reserve_of_pair((x, y, z), known, unknowns, weights, law, link)
+            result[link] = reserve * share_of(law, reserve)
+        return
+    for number in range(begin, end):
+        link = np.uint64(number)
         law = laws[link]
-        share = law.carried
-        if result[link] < 0.0:
-            share -= law.released
-        result[link] *= share
+        reserve = reserve_of_many((x, y, z), known, unknowns, weights, law, link)
+        result[link] = reserve * share_of(law, reserve)
 
 
 class Shown(NamedTuple):

@@ -32,7 +32,6 @@ class Audience:
         self._observers = observers
         self._blockwise = [one for one in observers if isinstance(one, BlockObserver)]
         self._of_motion = [one for one in self._blockwise if isinstance(one, MotionObserver)]
-        self._of_rows = [one for one in self._blockwise if not isinstance(one, MotionObserver)]
         self._after = after
         self._event = event("Show")
 
@@ -85,14 +84,12 @@ class Audience:
         finally:
             self._event.end()
 
-    def show_motion(self, view: StepView, times: np.ndarray, rows: np.ndarray) -> None:
-        """Show a step of which the motion was kept, to others its row: the only one of ``rows``."""
+    def show_motion(self, view: StepView) -> None:
+        """Show what was kept of a step whose row is shown."""
         self._event.begin()
         try:
             for observer in self._of_motion:
-                observer.observe(view)
-            for other in self._of_rows:
-                other.observe_rows(view.step, times, rows)
+                observer.observe_motion(view)
         finally:
             self._event.end()
 

@@ -83,6 +83,11 @@ class LineEnergy:
         end: int,
     ) -> None:
         assert self._products is not None
+        if self._edges.size == 2:
+            for row, product in enumerate(self._products[:2]):
+                product.multiply_rows(0, int(self._rows[1]), padded[1 - row], self._force)
+                self._sums[row, 0] = self._force @ motion[1 - row]
+            return
         first, last = begin // self._size, -(-end // self._size)
         begin, end = self._rows[[first, last]].tolist()
         own = slice(*self._starts[[first, last]].tolist())

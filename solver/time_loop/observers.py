@@ -145,19 +145,25 @@ class MotionObserver(Observer, Protocol):
 
     The places of pantographs are kept as well.
 
-    A block goes on behind them. It is shown these steps by ``observe``; what else a view has, the
-    row excepted, is refused.
+    A block goes on behind them: these steps are shown by ``observe_motion`` when the rows of the
+    block are shown. Where a block ends at such a step, there is ``observe`` alone.
     """
 
     def next_motion(self, step: int) -> int:
         """The next step after ``step`` of which that is needed; asked for any step."""
+
+    def observe_motion(self, view: StepView) -> None:
+        """After a step whose motion was kept, for this observer or another one. Not collective.
+
+        What else a view has, the row excepted, is refused.
+        """
 
 
 @runtime_checkable
 class BlockObserver(Observer, Protocol):
     """An observer to whom the rows of many steps may be shown at once, which costs little a step.
 
-    Steps are shown to it in order: by ``observe_rows``, or by ``observe``.
+    Each step is shown to it once, in order: by ``observe_rows``, or by ``observe``.
     """
 
     def next_state(self, step: int) -> int:

@@ -56,7 +56,8 @@ class ShownMotion:
         stations : what had moved since the look before, see ``moved``
         numbers : displacements, then velocities, of these stations' unknowns
         """
-        own = slice(*self._columns.starts[list(stations)].tolist())
+        starts = self._columns.starts
+        own = slice(int(starts[stations[0]]), int(starts[stations[1]]))
         size = own.stop - own.start
         self._displacement[own] = numbers[:size]
         self._velocity[own] = numbers[size:]
@@ -80,7 +81,7 @@ class ShownMotion:
         the first is not before the last if none has."""
         self._look()
         begin, end = self.changed.tolist()
-        self.changed[:] = self._columns.n_stations, 0
+        self.changed[0], self.changed[1] = self._columns.n_stations, 0
         return begin, end
 
     def _look(self) -> None:

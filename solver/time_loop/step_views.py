@@ -90,7 +90,7 @@ class Showing:
         others, other_force, by_name = _further_links(interaction.links)
         self._sources = Sources(pantographs, interaction, scheme, uplift, tension, by_name)
         self.layout = RowLayout(self._sources, self._shown)
-        self._is_kept = False
+        self._is_kept, self._energies_follow_motion = False, energies_follow_motion()
         self._rows_of_unknown: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self._kept_places = np.zeros(0)
         self._row = np.zeros(self.layout.width)
@@ -320,7 +320,7 @@ class Showing:
 
     def _energies(self) -> tuple[float, ...]:
         """The energies that are recorded, in the order of their table. Collective."""
-        if not energies_follow_motion():
+        if not self._energies_follow_motion:
             self._shown[:] = self._view.row[: self._shown.size]
         return energies_of(Energies(*self._line_energies(), self._sources))
 

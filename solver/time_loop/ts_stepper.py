@@ -136,15 +136,11 @@ class Stepper:
 
     def _show_passed(self, blocks: CompiledSteps, first: int, passed: int, kept: list[int]) -> None:
         """Show the first ``passed`` steps of a block, behind which the line has gone."""
-        begin, audience = 0, self._audience
+        self._audience.show_rows(first + 1, blocks.times[:passed], blocks.rows[:passed])
         for number, at in enumerate(kept):
             if at >= passed:
                 break
-            audience.show_rows(first + 1 + begin, blocks.times[begin:at], blocks.rows[begin:at])
-            view, begin = blocks.motion_view(first + 1 + at, at, number), at + 1
-            audience.show_motion(view, blocks.times[at:begin], blocks.rows[at:begin])
-        times, rows = blocks.times[begin:passed], blocks.rows[begin:passed]
-        audience.show_rows(first + 1 + begin, times, rows)
+            self._audience.show_motion(blocks.motion_view(first + 1 + at, at, number))
 
     def _told(self, error: RunBroken) -> RunBroken:
         """The error of the next step with its time and place."""

@@ -120,6 +120,8 @@ class MovedStations:
 
     def end(self, step: int, filled: int) -> None:
         """After a block up to step ``step``, of which the first rows were ``filled``."""
+        if self._columns.n_stations == 1:
+            return  # all of a row is filled each time
         self.behind[:filled] = self.now
         np.minimum(self.behind[filled:, 0], self.now[0], out=self.behind[filled:, 0])
         np.maximum(self.behind[filled:, 1], self.now[1], out=self.behind[filled:, 1])

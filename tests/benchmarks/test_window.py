@@ -48,6 +48,9 @@ class Energies(Rows):
         return step - step % ENERGY_EVERY + ENERGY_EVERY
 
     def observe(self, view: StepView) -> None:
+        self.observe_motion(view)
+
+    def observe_motion(self, view: StepView) -> None:
         if view.step % ENERGY_EVERY == 0:
             view.energies()
 

@@ -160,7 +160,11 @@ class _Watch:
         """Channels are of no interest."""
 
     def observe(self, view: StepView) -> None:
-        """Hand over."""
+        """Hand over, if it is time."""
+        self.observe_motion(view)
+
+    def observe_motion(self, view: StepView) -> None:
+        """Hand over, if it is time."""
         if view.step % self._every == 0:
             uplift = np.empty(self._nodes.size)
             uplift[self._nodes] = view.node_uplift()

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.postproc.record.snapshots.blocks import FIXED, Block, RecordedLine
+from catenary.postproc.record.snapshots.blocks import Block, RecordedLine
 from catenary.postproc.record.snapshots.field_kinds import ALONG, ASIDE, SLOPE, UP, FieldKind
 from catenary.postproc.record.snapshots.field_layout import Slots
 from catenary.solver.model.axial_elements import slope_rows
+from catenary.solver.time_loop.row_kernels import take_points
 
 
 @dataclass(frozen=True)
@@ -53,29 +54,32 @@ class FieldValues:
         -------
         ndarray, as its type in the file, (n,) or (n, components)
         """
-        if kind.of_droppers:
-            values = self._of_droppers(kind, slots.block, known)
-        elif kind.name == "tension":
-            values = self._tension(slots.block, known)
-        elif kind.name == "bending_moment":
-            values = self._bending_moment(slots.block, known)
-        else:
-            values = _motion(kind, slots.block, known)
-        rows = values.shape[0]
-        shown = [slots.shown(first + row) for row in range(rows)]
-        if kind.of_droppers:
-            shown = [slice(part.start // 2, part.stop // 2) for part in shown]
-        whole = slice(0, values.shape[1])
-        if any(part != whole for part in shown):
-            values = np.concatenate([values[row, part] for row, part in enumerate(shown)])
-        else:
-            values = values.reshape(-1, *values.shape[2:])
-        return np.ascontiguousarray(values, dtype=kind.number)
+        rows = slice(first, first + len(known.dropper_force))
+        shown = [kind.values_of(points[rows]) for points in (slots.first, slots.count)]
+        result = np.empty((int(shown[1].sum()), kind.components), dtype=kind.number)
+        for component, (values, columns) in enumerate(self._components(kind, slots.block, known)):
+            if values is None:
+                result[:, component] = 0.0
+            else:
+                take_points(values, columns.astype(np.int64), *shown, result, component)
+        return result if kind.components > 1 else result[:, 0]
 
-    def _of_droppers(self, kind: FieldKind, block: Block, known: Gathered) -> np.ndarray:
-        own = slice(block.first, block.first + len(block.points) // 2)
-        force = known.dropper_force[:, own]
-        return force if kind.name == "dropper_force" else np.sign(force)
+    def _components(
+        self, kind: FieldKind, block: Block, known: Gathered
+    ) -> list[tuple[np.ndarray | None, np.ndarray]]:
+        """Of each component its values (rows, k), None where it is zero, and which of these the
+        points of a block take, see ``take_points``."""
+        if kind.of_droppers:
+            force = known.dropper_force
+            values = force if kind.name == "dropper_force" else np.sign(force)
+            return [(values, np.arange(block.first, block.first + len(block.points) // 2))]
+        if kind.name == "tension":
+            return [(self._tension(block, known), np.arange(block.nodes.size))]
+        if kind.name == "bending_moment":
+            return [(self._bending_moment(block, known), np.arange(block.nodes.size))]
+        rate = kind.motions[0][1]
+        names = (ALONG, ASIDE, UP) if kind.components > 1 else (UP,)
+        return [(known.motions.get((name, rate)), block.nodes) for name in names]
 
     def _tension(self, block: Block, known: Gathered) -> np.ndarray:
         """Tension ahead of the points of a wire, (rows, n) [N]."""
@@ -133,24 +137,3 @@ def curvature(x: np.ndarray, w: np.ndarray, slope: np.ndarray, breaks: np.ndarra
     result[:, 1:] += joined * (2.0 * left + 4.0 * right - rise) / length
     beside = np.append(joined, 0.0) + np.append(0.0, joined)
     return np.asarray(result / np.maximum(beside, 1.0))
-
-
-def _motion(kind: FieldKind, block: Block, known: Gathered) -> np.ndarray:
-    """Displacement or velocity of a block's points, (rows, n) or (rows, n, 3)."""
-    rate = kind.motions[0][1]
-    up = _at_points(known.motions[UP, rate], block)
-    if kind.components == 1:
-        return up
-    result = np.zeros((*up.shape, 3))
-    result[..., 2] = up
-    for axis, name in ((0, ALONG), (1, ASIDE)):
-        if (name, rate) in known.motions:
-            result[..., axis] = _at_points(known.motions[name, rate], block)
-    return result
-
-
-def _at_points(by_node: np.ndarray, block: Block) -> np.ndarray:
-    values = by_node[:, block.nodes]
-    if block.pairs:
-        values[:, block.nodes == FIXED] = 0.0
-    return values

@@ -124,13 +124,19 @@ class FieldRecorder:
 
     def observe(self, view: StepView) -> None:
         """Keep a snapshot if one is due; collective when the buffer is to be written."""
+        self.observe_motion(view)
+        # The first snapshot is written at once, so that ParaView can open the files.
+        due = view.step == self._first_step or (view.step + 1) % self._flush_every == 0
+        if due and self._buffered:
+            self._flush()
+
+    def observe_motion(self, view: StepView) -> None:
+        """Keep a snapshot if one is due; collective when the buffer is full."""
         if view.step % self._every == 0:
             self._keep(view, len(self._buffered))
             self._buffered.append(view.time)
-        # The first snapshot is written at once, so that ParaView can open the files.
-        due = view.step == self._first_step or (view.step + 1) % self._flush_every == 0
-        if len(self._buffered) == self._capacity or (due and self._buffered):
-            self._flush()
+            if len(self._buffered) == self._capacity:
+                self._flush()
 
     def finish(self, outcome: str) -> None:
         """Write what is left. Collective."""
@@ -175,8 +181,10 @@ class FieldRecorder:
             if self._own is not None:
                 kept = np.ascontiguousarray(kept[:rows, : self._own.size])
             whole = gather(kept[:rows], self._among)
+            # What several of them are gathered into is the same for all of a whole line.
             shared = len(self._motions) > 1 and self._own is None
-            motions[motion] = whole.copy() if shared else whole
+            is_room = not np.may_share_memory(whole, kept)
+            motions[motion] = whole.copy() if shared and is_room else whole
         force = self._droppers(self._force[:rows]) if self._wants_droppers else np.zeros((rows, 0))
         places = np.array(self._pantographs)
         known = Gathered(motions, force, self._tension, places)

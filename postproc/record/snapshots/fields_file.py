@@ -18,10 +18,10 @@ import h5py
 import numpy as np
 from h5py import h5d, h5p, h5s, h5t
 
+from catenary.postproc.files.array_writes import put_array
 from catenary.postproc.files.checked import set_attribute, text_of
 from catenary.postproc.files.disk import MARGIN, check_in_place, opened, reserve, write_at
 from catenary.postproc.files.own_files import part_of
-from catenary.postproc.files.trimming import trimmed
 from catenary.postproc.read.guard import survives
 from catenary.postproc.record.snapshots.blocks import Block
 from catenary.postproc.record.snapshots.field_layout import FieldRecord, Slots, layout_of
@@ -108,10 +108,7 @@ class FieldsFile:
             with opened(self._made_as, "w") as file:
                 reserve(file.id.get_vfd_handle(), 0, self._n_bytes())
                 self._write_tables(file)
-            file = h5py.File(self._made_as, "r+")
-            self._find_places(file)
-            with trimmed(file):
-                file.close()
+                self._find_places(file)
         except BaseException:
             self._made_as.unlink(missing_ok=True)
             raise
@@ -229,32 +226,32 @@ class FieldsFile:
         set_attribute(file, "format", FORMAT)
         set_attribute(file, "n_nodes", self._size.n_nodes)
         set_attribute(file, "parts", json.dumps([slots.name for slots in self._layout]))
-        file["times"] = np.full(len(self._planned), np.nan)
+        put_array(file, "times", np.full(len(self._planned), np.nan))
         # Room in the file now, and no zeros written into it.
         how = h5p.create(h5p.DATASET_CREATE)
         how.set_alloc_time(h5d.ALLOC_TIME_EARLY)
         how.set_fill_time(h5d.FILL_TIME_NEVER)
         _create(file, PLACES, (len(self._planned), self._size.n_numbers), "<f8", how)
-        file[SIZES] = np.array(self._size.n_places, dtype="<i8")
+        put_array(file, SIZES, np.array(self._size.n_places, dtype="<i8"))
         for slots in self._layout:
             group = file.create_group(slots.name)
             for name, table in _at_rest(slots).items():
-                group[name] = table
+                put_array(group, name, table)
             for kind in slots.kinds:
                 shape = (slots.rows(kind), kind.components)[: 1 + (kind.components > 1)]
-                _create(group, kind.name, shape, kind.number, how)
-                set_attribute(group[kind.name], "unit", kind.unit)
-                set_attribute(group[kind.name], "meaning", kind.meaning)
+                made = _create(group, kind.name, shape, kind.number, how)
+                set_attribute(made, "unit", kind.unit)
+                set_attribute(made, "meaning", kind.meaning)
 
     def _find_places(self, file: h5py.File) -> None:
         """Where in the file the times and the tables begin [B]; KeyError without one."""
-        self._times_at = file["times"].id.get_offset()
-        self._places_at = file[PLACES].id.get_offset() or 0
+        self._times_at = _place_of(file, "times")
+        self._places_at = _place_of(file, PLACES)
         self._places: list[dict[str, int]] = []
         for slots in self._layout:
             names = "points", "cells", *(kind.name for kind in slots.kinds)
             group = file[slots.name]
-            self._places.append({name: group[name].id.get_offset() or 0 for name in names})
+            self._places.append({name: _place_of(group, name) for name in names})
 
     def _check(self, file: h5py.File, times: np.ndarray) -> None:
         """Raise ValueError if a file that is to be continued is not of this run and these places.
@@ -306,10 +303,15 @@ class FieldsFile:
 
 def _create(
     group: h5py.Group, name: str, shape: tuple[int, ...], number: str, how: h5p.PropDCID
-) -> None:
+) -> h5py.Dataset:
     """A table as ``how`` says."""
     kind = h5t.py_create(np.dtype(number))
-    h5d.create(group.id, name.encode(), kind, h5s.create_simple(shape), how)
+    return h5py.Dataset(h5d.create(group.id, name.encode(), kind, h5s.create_simple(shape), how))
+
+
+def _place_of(group: h5py.Group, name: str) -> int:
+    """Where in the file a table begins [B], 0 if it has no numbers; KeyError without one."""
+    return h5d.open(group.id, name.encode()).get_offset() or 0
 
 
 def _at_rest(slots: Slots) -> dict[str, np.ndarray]:

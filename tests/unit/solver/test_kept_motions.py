@@ -49,7 +49,22 @@ class Looking:
 
     def observe(self, view: StepView) -> None:
         assert view.step == len(self.rows)
+        assert view.checkpoint() is not None
         self.rows.append(view.row.copy())
+        self.take(view)
+
+    def observe_motion(self, view: StepView) -> None:
+        assert view.step < len(self.rows) and np.array_equal(
+            view.row, self.rows[view.step], equal_nan=True
+        )
+        self.refused += 1
+        with pytest.raises(RuntimeError, match="only the motion"):
+            view.line_state()
+        with pytest.raises(RuntimeError, match="only the motion"):
+            view.checkpoint()
+        self.take(view)
+
+    def take(self, view: StepView) -> None:
         if view.step % EVERY == 0:
             self.energies.append(view.energies())
             self.uplift.append(view.node_uplift().copy())
@@ -57,12 +72,6 @@ class Looking:
             self.motion.append(np.array(motion))
             self.places.append(view.pantograph_places())
             np.testing.assert_array_equal(self.motion[-1][0], self.uplift[-1])
-        try:
-            view.checkpoint()
-        except RuntimeError:
-            self.refused += 1
-            with pytest.raises(RuntimeError, match="only the motion"):
-                view.line_state()
 
     def finish(self, outcome: str) -> None:
         assert outcome == "done"
