@@ -10,6 +10,7 @@ import typer
 from catenary.cases.cli.app import Assignments, Case, Force, MoreAssignments, Shortened, app, load
 from catenary.cases.terminal import console
 from catenary.postproc.evaluate.wording import counted
+from catenary.solver.base.errors import InputError
 
 
 @app.command(
@@ -97,7 +98,7 @@ def mesh(
 
 @app.command(
     "static",
-    help="Print the dropper table, the sag and the elasticity of a case at rest.",
+    help="Print the dropper table, registration, sag and elasticity of a case at rest.",
     epilog="Example: catenary static ac_simple -o droppers.csv",
 )
 @console.guarded
@@ -116,6 +117,10 @@ def static(
         ),
     ] = None,
     force: Force = False,
+    registration: Annotated[
+        bool,
+        typer.Option("--registration", help="Write the table of the steady arms as *.csv."),
+    ] = False,
     over: Annotated[
         str | None,
         typer.Option(
@@ -130,8 +135,11 @@ def static(
     from catenary.cases.result_folder.output_files import new_file, write_static
     from catenary.cases.terminal import terminal_text
 
+    if registration and (out is None or over is not None):
+        raise InputError("--registration takes -o with the name of a *.csv file to write")
     if out is not None:
-        new_file(out, (".csv", ".json") if over is None else (".png", ".svg"), force)
+        tables = (".csv",) if registration else (".csv", ".json")
+        new_file(out, tables if over is None else (".png", ".svg"), force)
     if over is not None:
         from catenary.cases.run.temperatures import range_of, temperatures
 
@@ -145,10 +153,13 @@ def static(
 
     table, problem = static_table(scene), problem_of(scene)
     if out is not None:
-        write_static(out, table)
+        write_static(out, table, registration)
     for fact in defect_facts(scene, problem):
         console.say(fact["says"])
-    console.say(terminal_text.static_text(table, problem.line))
+    lengths = [scene.pantographs[place.name].strips.length_m for place in scene.train.pantographs]
+    half_heads = [0.5 * length for length in lengths if length is not None]
+    shortest = min(half_heads, default=None)
+    console.say(terminal_text.static_text(table, problem.line, shortest))
     warmer = problem.along.warmer
     if warmer and {"axial_motion", "temperature"} <= problem.effects:
         from catenary.cases.run.temperatures import temperatures

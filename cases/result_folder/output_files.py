@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from catenary.postproc.files.csv_text import csv_text
+from catenary.postproc.read.registration import Registration
 from catenary.solver.base.errors import InputError, RunBroken
 
 DROPPER_COLUMNS = ("dropper_span", "dropper_x", "dropper_length", "dropper_force")
@@ -32,14 +33,21 @@ def new_file(path: Path, suffixes: tuple[str, ...], force: bool) -> None:
         raise InputError(f"-o {path} cannot be written: permission denied")
 
 
-def write_static(path: Path, table: Mapping[str, Any]) -> None:
-    """Write the static table: the droppers as CSV, or everything as JSON, by the file's suffix."""
+def write_static(path: Path, table: Mapping[str, Any], registration: bool = False) -> None:
+    """Write the static table: the droppers as CSV, or the ``registration`` instead, or everything
+    as JSON, by the file's suffix."""
+    arms = Registration.of(table) if registration else None
+    if registration and arms is None:
+        raise InputError("--registration: no steady arm pulls a wire sideways; give line.stagger_m")
     try:
         with path.open("w", encoding="utf-8", newline="") as stream:
             if path.suffix == ".json":
                 plain = {name: np.asarray(value).tolist() for name, value in table.items()}
                 json.dump(plain, stream, indent=1)
                 stream.write("\n")
+                return
+            if arms is not None:
+                stream.write(arms.csv())
                 return
             columns = [np.asarray(table[name]) for name in (*DROPPER_COLUMNS, *DROPPER_WIRES)]
             rows = (

@@ -162,6 +162,7 @@ def static_table(scene: Scene) -> dict[str, np.ndarray]:
         **line_datasets(problem.line, mesh, problem.evaluation),
         **static_datasets(problem.line, mesh, rest.form, rest.lift),
         "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
+        "line/arm_x": mesh.x(mesh.steady_arms),
         **installed(problem.line, mesh, rest.form.height),
     }
     return {name.split("/", 1)[1]: values for name, values in data.items()}

@@ -13,6 +13,7 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role, Wire
 from catenary.postproc.evaluate.comparing import decimals_that_tell
 from catenary.postproc.evaluate.wording import counted, fixed
+from catenary.postproc.read.registration import Registration
 
 
 def case_table(cases: Sequence[CaseEntry]) -> str:
@@ -96,8 +97,8 @@ def _number(value: float | None, digits: int = 1) -> str:
     return "-" if value is None else fixed(value, digits)
 
 
-def static_text(table: Mapping[str, Any], line: Line) -> str:
-    """Dropper table, sag and elasticity of a line at rest.
+def static_text(table: Mapping[str, Any], line: Line, half_head: float | None = None) -> str:
+    """Dropper table, registration, sag and elasticity of a line at rest.
 
     Parameters
     ----------
@@ -106,6 +107,7 @@ def static_text(table: Mapping[str, Any], line: Line) -> str:
         ``contact_height``, ``elasticity_x``, ``elasticity``, ``wires/NAME``, and what
         `cases.run.installed` adds
     line : for supports and contact wires
+    half_head : half of the length of the shortest strip, None if no scene says it [m]
     """
     data = {name: np.asarray(value) for name, value in table.items()}
     masts = line.support_positions
@@ -139,20 +141,50 @@ def static_text(table: Mapping[str, Any], line: Line) -> str:
     lines += ["", *(_wire_text(wire, data.get(f"lengths/{wire.name}")) for wire in line.wires)]
     wires = [wire.name for wire in line.wires_of(Role.CONTACT)]
     ends = np.cumsum([data[f"wires/{name}"].size for name in wires])[:-1]
-    chains = (np.split(data[f"contact_{own}"], ends) for own in ("x", "height"))
-    for name, at, height in zip(wires, *chains, strict=True):
+    chains_x, heights = (np.split(data[f"contact_{own}"], ends) for own in ("x", "height"))
+    for name, at, height in zip(wires, chains_x, heights, strict=True):
         running = height[(at >= first) & (at <= last)]
         wire = "Contact wire" if len(wires) == 1 else name
         lines.append(
             f"{wire} at rest: {running.max():.4f} m at its highest and {running.min():.4f} m at "
             f"its lowest in the running spans; sag {1e3 * (running.max() - running.min()):.1f} mm"
         )
+    if "contact_y" in data:
+        for name, at, y in zip(wires, chains_x, np.split(data["contact_y"], ends), strict=True):
+            own = y[(at >= first) & (at <= last)]
+            wire = "Contact wire" if len(wires) == 1 else name
+            text = f"{wire} at rest: {own.min():.4f} to {own.max():.4f} m to the left"
+            if half_head is not None:
+                within = "within" if np.abs(own).max() <= half_head else "BEYOND"
+                text += f", {within} the {half_head:g} m of the shortest strip to either side"
+            lines.append(text)
+    lines += _registration_text(data)
     lines += [
         f"Elasticity from {place.min():g} to {place.max():g} m: {lift.min():.3f} to "
         f"{lift.max():.3f} mm/N, mean {lift.mean():.3f} mm/N, unevenness "
         f"{100 * (lift.max() - lift.min()) / (lift.max() + lift.min()):.1f} %",
     ]
     return "\n".join(lines)
+
+
+def _registration_text(data: Mapping[str, np.ndarray]) -> list[str]:
+    """Steady arms at rest, those that are alike once; none of a straight wire."""
+    table = Registration.of(data)
+    if table is None:
+        return []
+    head = ("arm at [m]", "stagger [m]", "radial [N]", "lift [N]", "slope [deg]", "along [N]")
+    lines = ["", "".join(f"{name:>12}" for name in (*head, "slew [deg]"))]
+    shown: dict[tuple[str, ...], str] = {}
+    for place, *figures in table.rows():
+        if tuple(figures) in shown:
+            lines.append(f"{place:>12} as {shown[tuple(figures)]}")
+            continue
+        shown[tuple(figures)] = place
+        lines.append("".join(f"{figure:>12}" for figure in (place, *figures)))
+    if table.pushed.any():
+        places = counted(int(table.pushed.sum()), "steady arm")
+        lines.append(f"  {places} pushed by the wire: an arm that only pulls would fall away")
+    return [*lines, ""]
 
 
 def _wire_text(wire: Wire, lengths: np.ndarray | None) -> str:

@@ -88,7 +88,8 @@ def line_datasets(
 def static_datasets(
     line: Line, mesh: LineMesh, equilibrium: Equilibrium, elasticity: Elasticity
 ) -> dict[str, np.ndarray]:
-    """Datasets of ``/static``: droppers, profiles and elasticity at rest. Not collective."""
+    """Datasets of ``/static``: droppers, profiles, registration and elasticity at rest. Not
+    collective."""
     contact = np.concatenate([mesh.wires[wire.name] for wire in line.wires_of(Role.CONTACT)])
     return {
         "static/dropper_length": equilibrium.dropper_length,
@@ -98,4 +99,35 @@ def static_datasets(
         "static/elasticity_x": elasticity.x,
         "static/elasticity": elasticity.lift,
         "static/elasticity_of_wires": elasticity.of_wires,
+        **_registration(line, mesh, equilibrium),
+    }
+
+
+def _registration(line: Line, mesh: LineMesh, form: Equilibrium) -> dict[str, np.ndarray]:
+    """What steady arms do at rest, and lateral places of the contact wires where they move so.
+
+    Without lateral motion arms carry the radial force of the stagger; nothing for straight wires.
+    """
+    if form.lateral is not None:
+        contact = np.concatenate([mesh.wires[wire.name] for wire in line.wires_of(Role.CONTACT)])
+        return {
+            "static/arm_stagger": form.lateral.y[mesh.steady_arms],
+            "static/arm_force": form.lateral.arm_force,
+            "static/arm_tension": form.lateral.arm_tension,
+            "static/contact_y": form.lateral.y[contact],
+        }
+    stagger, force = np.zeros(mesh.steady_arms.size), np.zeros((mesh.steady_arms.size, 3))
+    for number, arms in enumerate(line.steady_arms):
+        mine = mesh.arm_group == number
+        x, wire = mesh.x(mesh.steady_arms[mine]), line.wire(arms.wire)
+        stagger[mine], force[mine, 0] = wire.points(x)[:, 1], wire.radial_force(x)
+    if not force.any():
+        return {}
+    if form.arm_lift.size:
+        force[:, 1] = form.arm_lift
+    tension = np.linalg.norm(force, axis=1)
+    return {
+        "static/arm_stagger": stagger,
+        "static/arm_force": force,
+        "static/arm_tension": tension,
     }

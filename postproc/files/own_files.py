@@ -29,6 +29,8 @@ REPORT_FILES = (
     "uplift.png",
     "droppers.png",
     "static.png",
+    "plan_view.png",
+    "registration.csv",
     "energy.png",
     *(
         f"channel_{channel.name}.png"

@@ -235,6 +235,10 @@ CONSTANTS: dict[str, Constant] = {
     "static/elasticity_x": Constant("E"),
     "static/elasticity": Constant("E"),
     "static/elasticity_of_wires": Constant("EW", may_be_nan=True, later=True),
+    "static/arm_stagger": Constant("A", later=True),
+    "static/arm_force": Constant("A3", -LARGEST["N"], LARGEST["N"], later=True),
+    "static/arm_tension": Constant("A", -LARGEST["N"], LARGEST["N"], later=True),
+    "static/contact_y": Constant("C", later=True),
 }
 
 # Letters of the columns of a channel: those that are recorded, and all that there are.

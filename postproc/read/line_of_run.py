@@ -8,6 +8,7 @@ import numpy as np
 
 from catenary.meshgen.mesh import elements_of
 from catenary.meshgen.wires import Role
+from catenary.postproc.read.registration import Registration
 from catenary.postproc.read.sound_file import SoundFile
 
 
@@ -63,6 +64,18 @@ class LineOfRun:
         if name == "elasticity_of_wires" and f"static/{name}" not in self._file:
             return self.static("elasticity")[:, None]
         return np.asarray(self._file[f"static/{name}"][...])
+
+    def has_static(self, name: str) -> bool:
+        """Whether ``/static`` has a dataset, which lines or earlier files may be without."""
+        return f"static/{name}" in self._file
+
+    def registration(self) -> Registration | None:
+        """Steady arms at rest; None of straight wires, and in files of earlier versions."""
+        if not self.has_static("arm_force"):
+            return None
+        names = ("arm_stagger", "arm_force", "arm_tension")
+        table = {name: self.static(name) for name in names}
+        return Registration.of({**table, "arm_x": self.line("arm_x")})
 
     @cached_property
     def evaluation(self) -> tuple[float, float]:

@@ -102,6 +102,9 @@ def write_report(
         content: dict[str, bytes | str] = {f"{p.name}.png": p.data for p in pictures}
         content["droppers.csv"] = csv_tables.droppers_csv(results)
         found = indicate(results)
+        registration = results.registration()
+        if registration is not None:
+            content["registration.csv"] = registration.csv()
         content["report.html"] = _html(results, statistics, criteria, found, pictures)
         content["summary.json"] = as_json(summarise(results, statistics, criteria, found))
         verdict = acceptance.verdict(criteria) if results.complete else None
@@ -139,7 +142,13 @@ def judge(results: Results, statistics: RunStatistics) -> list[Criterion]:
 
 def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
     # A summary alone does without Matplotlib.
-    from catenary.postproc.report import channel_pictures, figures, lateral_picture, plots
+    from catenary.postproc.report import (
+        channel_pictures,
+        figures,
+        lateral_picture,
+        plan_view,
+        plots,
+    )
 
     drawn: list[tuple[str, str, Figure | None]] = []
     if results.n_rows("time") > 1:
@@ -181,6 +190,8 @@ def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
             drawn.append(("droppers", "Dropper forces.", plots.dropper_force(results, statistics)))
     drawn += channel_pictures.channel_pictures(results)
     drawn.append(("static", "Profile and elasticity of the line.", plots.static_line(results)))
+    caption = "The line at rest from above, and its steady arms."
+    drawn.append(("plan_view", caption, plan_view.plan_view(results)))
     drawn.append(("energy", "Energies of the line.", plots.energies(results)))
     return [_Picture(name, text, figures.png(f)) for name, text, f in drawn if f is not None]
 
@@ -219,6 +230,8 @@ def _html(
         speed_km_h=KMH * results.fact("speed"),
         wave_speed_km_h=KMH * results.fact("wave_speed"),
         droppers=csv_tables.dropper_table(results),
+        registration=results.registration(),
+        lateral=_lateral_places(results),
         reference_span=results.reference_span + 1,
         elasticity=1e3 * results.static("elasticity"),
         remarks=[*results.damage, *indicators.warnings, *remarks(results)],
@@ -227,6 +240,22 @@ def _html(
         config=json.dumps(about["config"], indent=2, ensure_ascii=False),
         pictures={p.name: p for p in pictures},
     )
+
+
+def _lateral_places(results: Results) -> list[tuple[str, float, float]]:
+    """Names of contact wires that move sideways, and from where to where they are at rest in the
+    running spans, to the left [m]."""
+    if not results.has_static("contact_y"):
+        return []
+    profiles = results.contact_profiles()
+    ends = np.cumsum([x.size for x, _ in profiles.values()])[:-1]
+    first, last = results.line("running_range")
+    found = []
+    places = np.split(results.static("contact_y"), ends)
+    for (name, (x, _)), y in zip(profiles.items(), places, strict=True):
+        own = y[(x >= first) & (x <= last)]
+        found.append((name, float(own.min()), float(own.max())))
+    return found
 
 
 def _statistics_rows(statistics: RunStatistics) -> list[tuple[str, str, list[str]]]:

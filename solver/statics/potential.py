@@ -70,13 +70,16 @@ class Potential:
             form = replace(form, along=along, gained_tension=gained)
         if known.lateral is not None:
             force = known.lateral.arm_force.copy()
+            pushed = np.zeros(len(force), dtype=bool)
             for arm in self._arms:
                 force[arm.mine] = arm.force(moved)
+                pushed[arm.mine] = arm.tension(moved)[0] < 0.0
             lateral = replace(
                 known.lateral,
                 y=known.lateral.y + moved[model.dofs(every, "v")],
                 slope=known.lateral.slope + moved[model.dofs(every, "theta_z")],
                 arm_force=force,
+                arm_pushed=pushed,
             )
             form = replace(form, lateral=lateral)
         return replace(form, dropper_force=self.reserve(form))
@@ -201,13 +204,17 @@ class _Arms:
         self._hinge = length * known.lateral.arm_direction[self.mine]
         self.was = self.force(np.zeros(model.n_dofs))[:, : len(names)]
 
-    def force(self, moved: np.ndarray) -> np.ndarray:
-        """On the wire: lateral, upward, and along the track, (n, 3) [N]."""
+    def tension(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of each, (n,) [N], and the unit vectors from clamps to hinges, (n, 3)."""
         to_hinge = self._hinge.copy()
         to_hinge[:, : self.unknowns.shape[1]] -= moved[self.unknowns]
         length = np.linalg.norm(to_hinge, axis=1)
-        tension = BAR_STIFFNESS * (length - self._cut)
-        return np.asarray((tension / length)[:, None] * to_hinge)
+        return BAR_STIFFNESS * (length - self._cut), to_hinge / length[:, None]
+
+    def force(self, moved: np.ndarray) -> np.ndarray:
+        """On the wire: lateral, upward, and along the track, (n, 3) [N]."""
+        tension, unit = self.tension(moved)
+        return np.asarray(tension[:, None] * unit)
 
 
 def _arms(model: Model, known: Equilibrium) -> list[_Arms]:

@@ -56,7 +56,8 @@ def as_hung(problem: Problem) -> tuple[Model, Equilibrium, Equilibrium, SpatialL
     if problem.wind is not None:
         for wire in problem.line.wires:
             pressure = 0.5 * problem.wind.density * problem.wind.mean**2
-            blown[wire.name] = pressure * 1.2 * (wire.diameter or 0.0)
+            side = np.sign(problem.wind.direction)
+            blown[wire.name] = side * pressure * 1.2 * (wire.diameter or 0.0)
     return model, form, first, SpatialLine(model, first, lengths, blown)
 
 
@@ -72,6 +73,12 @@ CASES = {
         None,
     ),
     "blown by the wind": (AlongTrack(end=True), None, None, Wind(20.0, height=10.0)),
+    "pushed by a storm": (
+        AlongTrack(end=True),
+        None,
+        None,
+        Wind(45.0, height=10.0, direction=-0.5 * np.pi),
+    ),
 }
 
 
@@ -93,6 +100,9 @@ def test_the_rest_in_three_planes_is_where_the_energy_is_least(name: str) -> Non
     found = shape(form)
     moved = np.abs(expected - shape(first)).max()
     assert moved > 2e-3
+    # An arm that its wire pushes has a tension below zero, and so has its geometric stiffness.
+    assert form.lateral is not None
+    assert (form.lateral.arm_tension < 0.0).any() == (name == "pushed by a storm")
     # Of forces of 2e4 N, whose sum is zero to the rounding of finite differences.
     check("shape [m]", found, expected, within=1e-8)
     left = energy.gradient(found)[~held]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,26 +19,30 @@ class LateralShape:
     y, slope : (n_nodes,) lateral position [m] and dy/dx [-] of every mesh node
     arm_force : (n_arms, 3) of each steady arm on its wire: lateral, upward and along the track [N];
         an arm without length has one as well
+    arm_pushed : (n_arms,) bool, arms that their wire pushes, as wind may do; empty if none is
     """
 
     y: np.ndarray
     slope: np.ndarray
     arm_force: np.ndarray
+    arm_pushed: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     @property
     def arm_tension(self) -> np.ndarray:
-        """Tension of each steady arm as a bar between hinge and clamp, (n_arms,) [N]."""
-        return np.asarray(np.linalg.norm(self.arm_force, axis=1))
+        """Tension of each steady arm as a bar between hinge and clamp, (n_arms,) [N]; negative of
+        those that are pushed."""
+        tension = np.asarray(np.linalg.norm(self.arm_force, axis=1))
+        return np.where(self.arm_pushed, -tension, tension) if self.arm_pushed.any() else tension
 
     @property
     def arm_direction(self) -> np.ndarray:
         """Unit vectors from clamps to hinges, (n_arms, 3): lateral, upward and along [-].
 
-        A bar can only pull along itself; without a force it lies level.
+        A bar pulls or pushes along itself only; without a force it lies level.
         """
         tension = self.arm_tension
         level = np.broadcast_to(np.array([1.0, 0.0, 0.0]), self.arm_force.shape)
-        pulled = tension > _NO_FORCE
+        pulled = np.abs(tension) > _NO_FORCE
         return np.where(
             pulled[:, None], self.arm_force / np.where(pulled, tension, 1.0)[:, None], level
         )

@@ -178,7 +178,9 @@ def test_a_reports_files_are_all_declared(tmp_path: Path, make_march: Any, recor
     written = {one.name for one in write_report(path, tmp_path).files}
     assert written <= set(REPORT_FILES)
     # Pictures of parts that not every run has.
-    assert set(REPORT_FILES) - written <= {"strip_forces.png", "wire_forces.png"}
+    assert set(REPORT_FILES) - written <= {
+        *("strip_forces.png", "wire_forces.png", "plan_view.png", "registration.csv"),
+    }
 
 
 def test_a_report_that_cannot_be_written_is_a_sentence(

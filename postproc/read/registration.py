@@ -1,0 +1,95 @@
+"""Registration at rest: where steady arms hold the contact wires, and by what forces."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from catenary.postproc.files.csv_text import csv_text
+
+_HEADS = (
+    "position [m]",
+    "stagger [m]",
+    "radial force [N]",
+    "lift [N]",
+    "slope [deg]",
+    "force along the track [N]",
+    "slew [deg]",
+)
+
+
+class Registration(NamedTuple):
+    """Steady arms in order along the track.
+
+    Attributes
+    ----------
+    x : (n,) place along the track [m]
+    stagger : (n,) lateral position of the wire there, to the left [m]
+    force : (n, 3) of each arm on its wire: to the left, upwards and along the track [N]
+    tension : (n,) of each as a bar, negative if its wire pushes it [N]
+    """
+
+    x: np.ndarray
+    stagger: np.ndarray
+    force: np.ndarray
+    tension: np.ndarray
+
+    @classmethod
+    def of(cls, table: Mapping[str, np.ndarray]) -> Registration | None:
+        """Of datasets ``arm_x``, ``arm_stagger`` and so on; None if one is missing."""
+        names = ("arm_x", "arm_stagger", "arm_force", "arm_tension")
+        if any(name not in table for name in names):
+            return None
+        x, stagger, force, tension = (np.asarray(table[name], dtype=float) for name in names)
+        order = np.argsort(x, kind="stable")
+        return cls(x[order], stagger[order], force.reshape(-1, 3)[order], tension[order])
+
+    @property
+    def pushed(self) -> np.ndarray:
+        """Which arms their wires push, (n,) bool."""
+        return self.tension < 0.0
+
+    @property
+    def _towards_hinge(self) -> np.ndarray:
+        return np.where(self.pushed, -1.0, 1.0)[:, None] * self.force
+
+    @property
+    def slope(self) -> np.ndarray:
+        """By how much arms rise from their wire to their hinge, (n,) [rad]; zero without force."""
+        sideways, up, along = self._towards_hinge.T
+        return np.arctan2(up, np.hypot(sideways, along))
+
+    @property
+    def slew(self) -> np.ndarray:
+        """By how much hinges are ahead of wires along the track, seen from above, (n,) [rad]."""
+        sideways, _, along = self._towards_hinge.T
+        return np.arctan2(along, np.abs(sideways))
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """The columns of the table as text: place, stagger, radial force, lift, slope, and what the
+        arm pulls along the track by how much it is slewed."""
+        columns = (
+            (self.x, 3),
+            (self.stagger, 4),
+            (self.force[:, 0], 1),
+            (self.force[:, 1], 1),
+            (np.rad2deg(self.slope), 2),
+            (self.force[:, 2], 1),
+            (np.rad2deg(self.slew), 2),
+        )
+        texts = [[_fixed(value, digits) for value in values] for values, digits in columns]
+        return list(zip(*texts, strict=True))
+
+    def csv(self) -> str:
+        """The table as CSV text."""
+        stream = io.StringIO()
+        stream.write(csv_text(_HEADS, self.rows()))
+        return stream.getvalue()
+
+
+def _fixed(value: float, digits: int) -> str:
+    """A number with so many decimals, without the sign of a zero."""
+    return f"{round(float(value), digits) + 0.0:.{digits}f}"
