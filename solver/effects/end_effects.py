@@ -51,7 +51,8 @@ def _lines_beyond(builder: ModelBuilder) -> None:
     sums, ends = StepSums(numerics.dt, integration), []
     for side, goes_on in enumerate(model.simulated.goes_on):
         if goes_on:
-            beyond = line_beyond(model, side)
+            beyond = line_beyond(model, side, builder.held)
+            builder.hold_unknowns(beyond.held)
             ends.append(periodic_end(beyond, side, damping, sums))
     for end in ends:  # once both are found, as these are no part of what goes on
         kind = np.zeros(1, dtype=np.int64)

@@ -1,7 +1,8 @@
 """The periodic line beyond an end of a model: spans of one kind, and where they begin.
 
 The line beyond is that of the span next to the last one, over and over: on both sides of it stands
-a span. The last span of the model must be of its kind.
+a span. The last span of the model must be of its kind, or its mirror image, as spans of a zig-zag
+are: with lateral unknowns of every second span the other way round all are alike then.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ _TINY = 1e-6  # [m]
 # Unknowns that an element may join, twice a station's: four in lateral motion of six wires.
 _MOST_WIDE = 47
 
+# Unknowns that have the other sign in a mirror image.
+_LATERAL = ("v", "theta_z")
+
 START, END = 0, 1
 SIDES = ("start", "end")
 
@@ -34,17 +38,21 @@ class LineBeyond(NamedTuple):
     unknowns : (m,) of the model, where it ends
     here : (3, m, m) M, C and K that the model has there without the line beyond
     span : of the line beyond, from the start of the line on
+    held : of the model, where it ends: what is held at masts of the line beyond
     """
 
     unknowns: np.ndarray
     here: np.ndarray
     span: SpanMatrices
+    held: np.ndarray
 
 
-def line_beyond(model: Model, side: int) -> LineBeyond:
+def line_beyond(model: Model, side: int, held: np.ndarray) -> LineBeyond:
     """The line that goes on beyond the ``START`` or ``END`` of a model. Not collective.
 
-    What effects hold at the end is not left out.
+    Parameters
+    ----------
+    held : (n,) unknowns that are held between the ends; of the ends themselves none are left out
 
     Raises
     ------
@@ -74,19 +82,28 @@ def line_beyond(model: Model, side: int) -> LineBeyond:
         # Rows of the repeated span, and columns up to the next cross-section.
         start = begins[0] if side == END else begins[1]
         whole = _matrices(model, start, start + size, start, start + 2 * size)
-        own, joined = whole[:, :, :size], whole[:, :, size:]
+        joins = np.flatnonzero(whole[:, :, size:].any(axis=(0, 1)))
+        own, joined = _without(whole, start, held, (size, 2 * size))
         shared = np.flatnonzero(joined.any(axis=(0, 1)))
         other = begins[1] if side == END else begins[0]
         beside = _matrices(model, other, other + size, other, other + size)
-        _refuse_unlike(own, beside, shared)
+        beside, _ = _without(beside, other, held, (size, size))
+        sideways = _sideways(model, start, size)
+        if _mirrored(own, beside, joins, sideways):
+            # Counted from the end of the model, every second cross-section is the other way round.
+            if side == START:
+                own, joined = own * sideways[:, None] * sideways, joined * sideways[:, None]
+            else:
+                joined = joined * sideways
         span = span_matrices(own, joined, shared, _MOST_WIDE)
-        unknowns = at_end + shared
-        if unknowns[-1] >= last or not _same_places(model, unknowns, start + shared):
+        unknowns, everything = at_end + shared, at_end + joins
+        if everything[-1] >= last or not _same_places(model, everything, start + joins):
             raise InputError("wires end elsewhere than at its masts")
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
     here = _matrices(model, at_end, int(unknowns[-1]) + 1, at_end, int(unknowns[-1]) + 1)
-    return LineBeyond(unknowns, here[:, shared][:, :, shared], span)
+    here = here[:, shared][:, :, shared]
+    return LineBeyond(unknowns, here, span, np.setdiff1d(everything, unknowns))
 
 
 def span_between(model: Model, mast: float, following: float) -> tuple[np.ndarray, SpanMatrices]:
@@ -119,13 +136,53 @@ def shared_at(model: Model, unknowns: np.ndarray) -> np.ndarray:
     return _matrices(model, low, high, low, high)[:, at][:, :, at]
 
 
-def _refuse_unlike(own: np.ndarray, beside: np.ndarray, shared: np.ndarray) -> None:
-    """Raise InputError unless spans are of one kind, the cross-section at the mast left out."""
-    inner = np.setdiff1d(np.arange(own.shape[1]), shared)
-    for ours, theirs in zip(own, beside, strict=True):
-        ours, theirs = ours[np.ix_(inner, inner)], theirs[np.ix_(inner, inner)]
-        if np.abs(ours - theirs).max() > _ALIKE * np.abs(ours).max():
-            raise InputError("the last one is of another kind")
+def _without(
+    whole: np.ndarray, first: int, held: np.ndarray, sizes: tuple[int, int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Matrices of unknowns from ``first`` on without held ones, whose rows and columns are empty:
+    those of the span itself, and what joins it with the next one, if ``sizes`` has that."""
+    size, n = sizes
+    free = ~np.isin(first + np.arange(n), held)
+    whole = whole * free[:size, None] * free
+    return whole[:, :, :size], whole[:, :, size:]
+
+
+def _sideways(model: Model, first: int, size: int) -> np.ndarray:
+    """-1 for lateral unknowns from ``first`` on, 1 for others, (size,)."""
+    names = [name for name in _LATERAL if name in model.unknowns]
+    every = np.arange(model.mesh.n_nodes)
+    lateral = [model.dofs(every[model.numbering.has(every, name)], name) for name in names]
+    found = np.isin(first + np.arange(size), np.concatenate([np.zeros(0, int), *lateral]))
+    return np.where(found, -1.0, 1.0)
+
+
+def _mirrored(
+    own: np.ndarray, beside: np.ndarray, at_mast: np.ndarray, sideways: np.ndarray
+) -> bool:
+    """Whether a span is the mirror image of the one beside it, the cross-section at the mast left
+    out.
+
+    Raises
+    ------
+    InputError
+        If it is neither that nor of the same kind.
+    """
+    inner = np.setdiff1d(np.arange(own.shape[1]), at_mast)
+    image = own * sideways[:, None] * sideways
+    differences = []
+    for ours in (own, image):
+        pairs = zip(ours[:, inner][:, :, inner], beside[:, inner][:, :, inner], strict=True)
+        differences.append(max(_difference(one, other) for one, other in pairs))
+    same, mirrored = differences
+    if min(same, mirrored) > _ALIKE:
+        raise InputError("the last one is of another kind")
+    return mirrored < same
+
+
+def _difference(one: np.ndarray, other: np.ndarray) -> float:
+    """Largest difference of two matrices over the largest entry of the first."""
+    largest = float(np.abs(one).max())
+    return float(np.abs(one - other).max()) / largest if largest else float((other != 0.0).any())
 
 
 def _same_places(model: Model, unknowns: np.ndarray, others: np.ndarray) -> bool:

@@ -163,7 +163,16 @@ class ModelBuilder:
 
     def hold(self, nodes: np.ndarray, unknown: str) -> None:
         """Hold an unknown of some nodes at its equilibrium value."""
-        self._constrained.append(self.model.dofs(nodes, unknown))
+        self.hold_unknowns(self.model.dofs(nodes, unknown))
+
+    def hold_unknowns(self, unknowns: np.ndarray) -> None:
+        """The same by their numbers."""
+        self._constrained.append(unknowns)
+
+    @property
+    def held(self) -> np.ndarray:
+        """Numbers of the unknowns that are held so far."""
+        return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *self._constrained]))
 
     def take_count(self) -> int:
         """Terms added since the last call."""

@@ -56,12 +56,16 @@ def test_a_messenger_wire_has_a_stagger_of_its_own() -> None:
             r"to_m \(200\) must be greater than 220 m",
         ),
         ([ON, "line.messenger_stagger_m=[0.1, 0.2]"], "must give messenger_stagger_m as one"),
-        ([ON, 'line.ends.end.kind="periodic"'], "with effects.lateral_motion it must be fixed"),
     ],
 )
 def test_keys_that_do_not_fit_are_refused(changes: list[str], sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
         load_scene("ac_simple", changes)
+
+
+def test_lateral_motion_goes_with_ends_that_go_on() -> None:
+    problem = problem_of(load_scene("ac_simple", [ON, 'line.ends.end.kind="periodic"']))
+    assert {"lateral_motion", "periodic_ends"} <= {effect.name for effect in active(problem)}
 
 
 def test_lateral_motion_goes_with_another_temperature() -> None:

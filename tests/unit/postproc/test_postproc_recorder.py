@@ -112,7 +112,7 @@ def test_a_line_without_arms_or_droppers_is_recorded(tmp_path: Path, make_march:
     march = make_march(n_steps=30)
     march.arm_x = march.dropper_x = np.zeros(0)
     full = march.header()
-    bare = {p: a[:0] if "dropper" in p else a for p, a in full.datasets.items()}
+    bare = {p: a[:0] if "dropper" in p or "arm_" in p else a for p, a in full.datasets.items()}
     header = Header(full.attributes, bare, full.facts)
     watcher = Recorder(march.comm, tmp_path / "run.h5", header, flush_every=8)
     march.drive(watcher)

@@ -1,4 +1,4 @@
-"""Whether what only lateral motion reads is given without it, and what does not go with it."""
+"""Whether what only lateral motion reads is given without it."""
 
 from __future__ import annotations
 
@@ -15,17 +15,9 @@ _EFFECT = "lateral_motion"
 
 
 def check_lateral(scene: Scene) -> Iterator[Fault]:
-    """Keys of lateral motion without it, and ends that it has not."""
+    """Keys of lateral motion without it."""
     line = scene.line
     if scene.switches()[_EFFECT]:
-        for side, end in (("start", line.ends.start), ("end", line.ends.end)):
-            if end.kind == "periodic":
-                key = f"line.ends.{side}.kind"
-                why = (
-                    f"with effects.{_EFFECT} it must be fixed or absorbing_layer, because a "
-                    "staggered line does not repeat itself from span to span"
-                )
-                yield refusal(scene.origin, key, end.kind, why)
         return
     given = {
         "line.steady_arm.inclination_deg": line.steady_arm.inclination_deg,
