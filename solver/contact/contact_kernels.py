@@ -11,13 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.integrators.state_kernels import (
-    displacement_at,
-    in_line,
-    velocity_at,
-)
+from catenary.solver.base.compiled import in_line
+from catenary.solver.contact.link_kernels import watch
+from catenary.solver.integrators.state_kernels import displacement_at, velocity_at
 from catenary.solver.model.elements.shape_functions import shape_slopes, shape_values
-from catenary.solver.model.switching_links import LinkArrays
 
 # Far more than the round-off of a position, far less than an element [m].
 SLIP = 1e-6
@@ -93,14 +90,6 @@ class Answers(NamedTuple):
     slope: np.ndarray
 
 
-class Ends(NamedTuple):
-    """Which contacts a strip has, and which strips a pantograph: numbers of the first ones, and of
-    all; ``of_strip`` (n_strips + 1,), ``of_pantograph`` (n_pantographs + 1,)."""
-
-    of_strip: np.ndarray
-    of_pantograph: np.ndarray
-
-
 class Gains(NamedTuple):
     """What answers are worth within a step: of an acceleration ``position`` [s2] and ``velocity``
     [s]; the ``train_speed`` [m/s] of the convective part of rates; how far off links answer to a
@@ -110,16 +99,6 @@ class Gains(NamedTuple):
     position: float
     velocity: float
     reach: float
-
-
-class Followed(NamedTuple):
-    """Links that a rank follows: their ``numbers`` (n,) in the line, ``links`` (``LinkArrays``) and
-    ``reserve`` (n,) [N], as a free step leaves it; which of them may switch, ``moving`` (2,)."""
-
-    numbers: np.ndarray
-    links: LinkArrays
-    reserve: np.ndarray
-    moving: np.ndarray
 
 
 @in_line
@@ -288,84 +267,6 @@ def meet(motion, touches, gains, answers, line):
 
 
 @in_line
-def n_beyond(reserve, moving, margin):
-    """How many reserves of ``moving`` links are below a margin, or not finite."""
-    count = 0
-    for d in range(moving[0], moving[1]):
-        count += not (margin <= reserve[d] < np.inf)
-    return count
-
-
-@in_line
-def spread(link, links, answer):
-    """Stretch of a link in an answer (n_local,)."""
-    unknowns, weights, _ = links
-    link = np.uint64(link)
-    total = weights[link, 0] * answer[np.uint64(unknowns[link, 0])]
-    total += weights[link, 1] * answer[np.uint64(unknowns[link, 1])]
-    for k in range(2, unknowns.shape[1]):
-        total += weights[link, k] * answer[unknowns[link, k]]
-    return total
-
-
-@in_line
-def watch(followed, bounds, touches, answers, gains, rows):
-    """Number of links that may switch within ``bounds``; a row each, as far as they fit.
-
-    ``followed`` links stand in the order along the track, with their reserve without contact
-    forces. Contacts touch those within reach. -1 if a reserve is not finite.
-    """
-    numbers, links, reserve, moving = followed
-    by_force, by_slope = answers
-    laws, limits, margin = links.law, bounds.force, bounds.loss[0]
-    count, n, uses_rate = 0, touches.size, by_slope.shape[1] > 0
-    low, high = touches[0].x, touches[0].x
-    for i in range(1, n):
-        low, high = min(low, touches[i].x), max(high, touches[i].x)
-    first = np.searchsorted(laws.place, low - gains.reach)
-    last = np.searchsorted(laws.place, high + gains.reach, side="right")
-    first, last = max(first, moving[0]), min(last, moving[1])
-    # Mostly none is near its margin by itself: then those beyond reach are not looked at.
-    begin, end = first, last
-    if n_beyond(reserve, moving, margin):
-        begin, end = moving[0], moving[1]
-    for d in range(begin, end):
-        # Also true for NaN.
-        candidate = not (margin <= reserve[d] < np.inf)
-        if not (candidate or first <= d < last):
-            continue
-        if not np.isfinite(reserve[d]):
-            return -1
-        law = laws[d]
-        if law.released == 0.0:
-            continue
-        per_acceleration = law.stiffness * gains.position + law.damping * gains.velocity
-        if not candidate:
-            for i in range(n):
-                if touches[i].present != 0.0 and abs(law.place - touches[i].x) <= gains.reach:
-                    change = per_acceleration * spread(d, links, by_force[i])
-                    if reserve[d] + change * limits[i] < margin:
-                        candidate = True
-                        break
-        if not candidate:
-            continue
-        if count < rows.number.size:
-            rows.number[count], rows.reserve[count] = numbers[d], reserve[d]
-            for i in range(n):
-                apart = spread(d, links, by_force[i])
-                rows.reaction[count, i] = per_acceleration * apart
-                rows.lift[count, i] = gains.position * apart
-                rows.rise[count, i] = 0.0
-                if uses_rate:
-                    along = spread(d, links, by_slope[i])
-                    rows.rise[count, i] = (
-                        gains.velocity * apart + gains.train_speed * gains.position * along
-                    )
-        count += 1
-    return count
-
-
-@in_line
 def respond(motion, touches, gains, answers, bounds, followed, share):
     """A rank's share of the small problem; links as for ``watch``."""
     for i in range(touches.size):
@@ -418,42 +319,3 @@ def compensate(numbers, compensation, start, at, width, data, motion, gains):
                 z[begin + j] -= gains[2] * change
                 x[begin + j] -= gains[0] * change
                 y[begin + j] -= gains[1] * change
-
-
-@in_line
-def write_outputs(force, reported, heads, depth, ends, outputs):
-    """Contact force, head height and wire height of each pantograph, then the force of each strip,
-    and, of several contact wires, that on each wire from each pantograph.
-
-    These are the 3 n_pantographs + n_strips numbers of ``outputs``, and the n_pantographs n_wires
-    behind them; ``heads`` are those of the contacts, ``ends`` are ``Ends``. A pantograph's force is
-    the sum over its contacts, heights are means over its strips; of several wires over a strip the
-    lowest counts.
-    """
-    n = ends.of_pantograph.size - 1
-    shares = 3 * n + ends.of_strip.size - 1
-    for share in range(shares, outputs.size):
-        outputs[share] = 0.0
-    several = outputs.size > shares
-    for p in range(n):
-        total, mean, mean_of_wire = 0.0, 0.0, 0.0
-        first, last = ends.of_pantograph[p], ends.of_pantograph[p + 1]
-        begin, end = ends.of_strip[first], ends.of_strip[last]
-        for strip in range(first, last):
-            own, height_of_strip, lowest = 0.0, 0.0, np.inf
-            for i in range(ends.of_strip[strip], ends.of_strip[strip + 1]):
-                height = heads.place[i]
-                for j in range(begin, end):
-                    height -= heads.by_force[i, j] * force[j]
-                own += reported[i]
-                if several:
-                    n_wires = ends.of_strip[strip + 1] - ends.of_strip[strip]
-                    outputs[shares + p * n_wires + i - ends.of_strip[strip]] += reported[i]
-                height_of_strip += height
-                lowest = min(lowest, height - depth[i])
-            total += own
-            mean += height_of_strip / (ends.of_strip[strip + 1] - ends.of_strip[strip])
-            mean_of_wire += lowest
-            outputs[3 * n + strip] = own
-        strips = last - first
-        outputs[p], outputs[n + p], outputs[2 * n + p] = total, mean / strips, mean_of_wire / strips

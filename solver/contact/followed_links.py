@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from catenary.solver.base.bound import bound
-from catenary.solver.contact.contact_kernels import Followed
 from catenary.solver.contact.line_response import Coupled
+from catenary.solver.contact.link_kernels import Followed
 from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.linear.unit_responses import ShortColumns

@@ -22,11 +22,11 @@ from catenary.mbs.roll import roll_of
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.base.bound import bound
 from catenary.solver.base.parallel import on_root
-from catenary.solver.contact import contact_kernels
+from catenary.solver.contact import output_kernels
 from catenary.solver.contact.air_around import airflow
-from catenary.solver.contact.contact_kernels import Ends
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
 from catenary.solver.contact.head_states import Heads
+from catenary.solver.contact.output_kernels import Ends
 from catenary.solver.integrators import state_kernels
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.problem import Placement, Problem
@@ -196,7 +196,7 @@ class Pantographs:
                 model.advance(contact_force[strips])
         if self.joints_in_loop:
             self.look_at_joints()
-        contact_kernels.write_outputs(
+        output_kernels.write_outputs(
             contact_force, reported, self._heads.affine, depth, self.ends, self.of_step
         )
 

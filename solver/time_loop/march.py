@@ -28,12 +28,7 @@ from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.integrators.detour import Detour, tell
-from catenary.solver.linear.petsc_solvers import (
-    PREFIX,
-    refused_options,
-    wants_single_steps,
-    wants_solution,
-)
+from catenary.solver.linear.petsc_solvers import wants_single_steps, wants_solution
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import Happened, LineIncident, in_steps
@@ -53,6 +48,7 @@ from catenary.solver.statics.equilibrium import Equilibrium
 from catenary.solver.time_loop.audience import Audience
 from catenary.solver.time_loop.compiled_steps import compiled_steps
 from catenary.solver.time_loop.observers import Observer
+from catenary.solver.time_loop.petsc_ts import ts_of
 from catenary.solver.time_loop.single_steps import single_steps_of
 from catenary.solver.time_loop.step_views import Showing
 from catenary.solver.time_loop.ts_stepper import Stepper
@@ -374,43 +370,4 @@ class March:
         self._stepper = Stepper(
             self._scheme, self._showing, audience, stop_requested, dt, (first, end), blocks
         )
-        ts = PETSc.TS().create(self._comm)
-        ts.setOptionsPrefix(PREFIX)
-        ts.setProblemType(PETSc.TS.ProblemType.NONLINEAR)
-        ts.createPython(self._stepper, comm=self._comm)
-        ts.setOptionsPrefix(PREFIX)
-        ts.setTime(first * dt)
-        ts.setTimeStep(dt)
-        ts.setStepNumber(first)
-        ts.setMaxSteps(self.n_steps)
-        ts.setMaxTime(2.0 * self.n_steps * dt)
-        ts.setExactFinalTime(PETSc.TS.ExactFinalTime.STEPOVER)
-        with refused_options():
-            ts.setFromOptions()
-        self._refuse_what_the_scene_says(ts, first * dt)
-        if end < self.n_steps:
-            ts.setMaxSteps(min(end, ts.getMaxSteps()))
-        return ts
-
-    def _refuse_what_the_scene_says(self, ts: PETSc.TS, start_time: float) -> None:
-        dt = self._problem.numerics.dt
-        found = ""
-        if abs(ts.getTimeStep() - dt) > 1e-12 * dt:
-            found = (
-                f"_dt is {ts.getTimeStep():g}; the time step is part of the scene: give "
-                f"numerics.dt_s instead, which is {dt:g} s"
-            )
-        elif ts.getTime() != start_time:
-            found = (
-                f"_init_time is {ts.getTime():g}, but the run starts at {start_time:g} s; "
-                "give train.start_m instead"
-            )
-        elif ts.getType() != PETSc.TS.Type.PYTHON:
-            found = (
-                f"_type is {ts.getType()}; the method is part of the scene: give "
-                "numerics.scheme, numerics.integrator, numerics.newmark_beta or "
-                "numerics.newmark_gamma instead"
-            )
-        if found:
-            ts.destroy()
-            raise InputError(f"the PETSc option -{PREFIX}ts{found}")
+        return ts_of(self._comm, self._stepper, dt, (first, end), self.n_steps)

@@ -13,7 +13,7 @@ import numpy as np
 from catenary.mbs.head import head_records
 from catenary.solver.base.compiled import compiled, in_line
 from catenary.solver.base.pointers import borrowed, call_held, numbers_at
-from catenary.solver.contact import contact_kernels
+from catenary.solver.contact import contact_kernels, output_kernels
 from catenary.solver.contact.crossing_kernels import find_across
 from catenary.solver.contact_problem import complementarity_kernels
 from catenary.solver.contact_problem.complementarity_kernels import SmallProblem
@@ -95,7 +95,7 @@ class Steps(NamedTuple):
     crossing: tuple[Any, ...]
     lateral_place: np.ndarray
     switched: np.ndarray
-    ends: contact_kernels.Ends
+    ends: output_kernels.Ends
     of_step: np.ndarray
     outputs: np.ndarray
     shown: state_kernels.Shown
@@ -234,7 +234,7 @@ def take(steps, times, drives, rows, moved, kept_motions, counts, shows, first, 
             contact_kernels.compensate(switched[:m], slack, *compensating)
         for h in range(records.size):
             head_records.move(records[h], force)
-        contact_kernels.write_outputs(force, law.reported, pressed, depth, ends, of_step)
+        output_kernels.write_outputs(force, law.reported, pressed, depth, ends, of_step)
         if shows:
             row = rows[i]
             for j in range(n_outputs):

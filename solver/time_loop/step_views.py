@@ -26,6 +26,7 @@ from catenary.solver.time_loop.channels import (
     energies_follow_motion,
     energies_of,
 )
+from catenary.solver.time_loop.checkpoints import impossible, like
 from catenary.solver.time_loop.line_energy import LineEnergy
 from catenary.solver.time_loop.observers import Stage, StepView
 from catenary.solver.time_loop.row_layout import RowLayout
@@ -231,30 +232,30 @@ class Showing:
                 "this one cannot continue; start the run anew"
             )
         n_nodes = model.mesh.n_nodes
-        row_of_node = _like(checkpoint, "row_of_node", model.row_of_node)
+        row_of_node = like(checkpoint, "row_of_node", model.row_of_node)
         if not np.array_equal(np.sort(row_of_node), np.arange(n_nodes)):
-            raise _impossible("row_of_node does not number the nodes of this line")
+            raise impossible("row_of_node does not number the nodes of this line")
         names = len(model.unknowns)
         owned = slice(line.ownership.first, line.ownership.last)
         states = {}
         for name in line.exact_state():
             if name in checkpoint or name in _MOTION:
-                by_row = np.reshape(_like(checkpoint, name, np.empty(n_nodes * names)), (-1, names))
+                by_row = np.reshape(like(checkpoint, name, np.empty(n_nodes * names)), (-1, names))
                 states[name] = model.numbering.as_vector(by_row[row_of_node])[owned]
         names_of_outputs = [*_OF_PANTOGRAPHS]
         names_of_outputs += [_ON_WIRES] if pantographs.n_wires > 1 else []
         names_of_outputs += [_ACROSS] if pantographs.lateral else []
         outputs = {
-            name: _like(checkpoint, name, getattr(pantographs, name)) for name in names_of_outputs
+            name: like(checkpoint, name, getattr(pantographs, name)) for name in names_of_outputs
         }
         on_root(self._comm, lambda: self._refuse_other_states(checkpoint))
         if line.remembers:
             if "line_past" not in checkpoint:
-                raise _impossible("line_past is missing")
+                raise impossible("line_past is missing")
             line.recall(np.asarray(checkpoint["line_past"]), int(checkpoint["step"]))
         line.restore(states)
         if line.window is not None and "window" in checkpoint:
-            line.window.restore(_like(checkpoint, "window", line.window.state()))
+            line.window.restore(like(checkpoint, "window", line.window.state()))
         for name, values in outputs.items():
             getattr(pantographs, name)[:] = values
         self._scheme.restore(checkpoint["contacts"])
@@ -267,9 +268,9 @@ class Showing:
 
         On rank 0, which has them.
         """
-        _like(checkpoint, "contacts", self._scheme.state())
+        like(checkpoint, "contacts", self._scheme.state())
         for i, pantograph in enumerate(self._pantographs.models):
-            _like(checkpoint, f"pantograph_{i}", pantograph.state())
+            like(checkpoint, f"pantograph_{i}", pantograph.state())
 
     def _node_motion(self, name: str, rate: bool, among: np.ndarray | None = None, /) -> np.ndarray:
         """One unknown of the rank's nodes, or its rate, zero for nodes without it."""
@@ -382,21 +383,3 @@ def _further_links(
     force = np.zeros(ends[-1])
     by_name = dict(zip(names, np.split(force, ends[:-1]), strict=True))
     return LinkArrays(*map(np.concatenate, zip(*parts, strict=True))), force, by_name
-
-
-def _like(checkpoint: dict[str, Any], name: str, wanted: np.ndarray) -> np.ndarray:
-    """The finite array of a checkpoint that is to have the shape of ``wanted``."""
-    if name not in checkpoint:
-        raise _impossible(f"{name} is missing")
-    values, shape = np.asarray(checkpoint[name]), np.shape(wanted)
-    if values.dtype.kind not in "fiub" or values.shape != shape:
-        raise _impossible(f"{name} has the shape {values.shape} in place of {shape}")
-    if not np.isfinite(values).all():
-        raise _impossible(f"{name} holds NaN or infinity")
-    return values
-
-
-def _impossible(what: str) -> InputError:
-    return InputError(
-        f"the state to continue from does not belong to this scene: {what}; start the run anew"
-    )

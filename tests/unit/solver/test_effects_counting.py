@@ -3,108 +3,37 @@
 from __future__ import annotations
 
 import ast
-from collections import Counter
-from collections.abc import Set
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from small_lines import BARE, EN_PANTOGRAPH, ac_simple_line, mesh_of, problem_of, train
+from counted_effects import (
+    N_SPANS,
+    WIND,
+    contents,
+    counts,
+    full_line,
+    full_problem,
+    model_with,
+    with_arm,
+    with_dropper,
+    with_line,
+)
+from small_lines import BARE, EN_PANTOGRAPH, mesh_of, train
 
-from catenary.mbs.air.uplift import Polynomial, Uplift
 from catenary.mbs.build import Operation, make_pantograph
-from catenary.mbs.control.regulation import Regulation
-from catenary.mbs.head.flexure import Flexure
-from catenary.mbs.head.laws import Law
-from catenary.mbs.head.strips import Strips, Suspension, Turning
+from catenary.mbs.head.strips import Turning
 from catenary.mbs.head.wire_crossing import LateralPath
-from catenary.mbs.lowering import Lowering
-from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
-from catenary.mbs.vehicle.suspension import Vehicle
-from catenary.meshgen.hardware import Fittings
-from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
-from catenary.meshgen.topologies.all_topologies import make_line
-from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.mesh import LineMesh
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
 from catenary.solver.effects.effect import Limit
 from catenary.solver.model.model import Model
 from catenary.solver.problem.contact_laws import LinearLaw
-from catenary.solver.problem.defects import (
-    HardSpot,
-    Kink,
-    LooseClamp,
-    MissingDropper,
-    WornWire,
-    WrongTension,
-)
-from catenary.solver.problem.incidents import DropperBreak, TensionLoss
-from catenary.solver.problem.irregularities import Heights, Irregularities, LengthErrors
-from catenary.solver.problem.problem import Damping, Problem
-from catenary.solver.problem.wind import Gusts, Wind
-from catenary.solver.statics.equilibrium import find_form
-
-N_SPANS = 4
-WIND = Wind(25.0, gusts=Gusts(2.0))
-CAR = Vehicle(3e4, 2e6, 9e5, 4e4, 19.0, 2.5)
-INSULATORS = Fittings("section_insulator", CONTACT_WIRE, (100.3, 101.7), (5.0, 5.0))
-DEFECTS = (
-    MissingDropper(88.25),
-    LooseClamp(137.5),
-    WornWire(CONTACT_WIRE, 60.0, 80.0, 0.2),
-    WrongTension(CONTACT_WIRE, 1.05),
-    HardSpot(CONTACT_WIRE, 120.2, 5.0, 300.0),
-    Kink(CONTACT_WIRE, 130.0, 0.01),
-)
-
-
-def full_line() -> LineData:
-    """A line on which every shipped effect finds something to act on."""
-    line = ac_simple_line(N_SPANS)
-    return replace(
-        line,
-        steady_arm=replace(line.steady_arm, stiffness=300.0),
-        contact_wire=replace(line.contact_wire, diameter=0.0144),
-        messenger_wire=replace(line.messenger_wire, diameter=0.014),
-        n_transition=(1, 1),
-        transition_rise=0.2,
-    )
-
-
-def full_problem(names: frozenset[str]) -> Problem:
-    line = full_line()
-    uplift = Uplift(Polynomial((0.0, 0.0, 0.01)))
-    limiter = Law(1, 2, False, (-1.0, 0.1, 1.0), (0.0, 0.0, 9e3), from_rest=True)
-    rolling = replace(EN_PANTOGRAPH, roll=Turning(2.0, 470.0, 1.0), uplift=uplift, laws=(limiter,))
-    bending = Strips(
-        length=1.6, suspension=Suspension(1.0, 8e3, 10.0), flexure=Flexure(600.0, 0.9, 2)
-    )
-    rolling = replace(rolling, strips=bending)
-    speed = 1.1 * line.contact_wire.wave_speed
-    ours = train(speed, 60.0, 160.0, data=rolling, behind=(0.0, 31.0))
-    lowered = replace(
-        ours.placements[0],
-        lowering=Lowering(0.5, -50.0, 0.2, 0.4),
-        regulator=Regulation(False, 120.0, ((0.0, 0.1, 1.0, 0.0),), -50.0, 50.0, 0.01),
-    )
-    heights = Heights((0.0, 220.0), None, ((90.0, 0.0), (100.0, 0.005), (110.0, 0.0)))
-    return problem_of(
-        replace(make_line(line), fittings=(INSULATORS,)),
-        names,
-        damping=Damping(1e-4, 0.0125),
-        contact=LinearLaw(5e4, 50.0),
-        train=replace(
-            ours,
-            vehicle=VehicleMotion((Harmonic(0.01, 1.0),), suspension=CAR),
-            placements=(lowered, *ours.placements[1:]),
-        ),
-        residual_stiffness_ratio=0.01,
-        incidents=(DropperBreak(0.5, 80.0), TensionLoss(0.6, MESSENGER_WIRE, 0.9)),
-        irregularities=Irregularities(heights, heights, LengthErrors(0.001, 2.0, 1)),
-        defects=DEFECTS,
-        wind=WIND,
-    )
+from catenary.solver.problem.incidents import TensionLoss
+from catenary.solver.problem.irregularities import Irregularities
+from catenary.solver.problem.problem import Damping
 
 
 def expected_terms(terms: object, n: dict[str, int]) -> int:
@@ -117,32 +46,6 @@ def expected_terms(terms: object, n: dict[str, int]) -> int:
 @pytest.fixture(scope="module")
 def mesh() -> LineMesh:
     return mesh_of(full_line(), 2)
-
-
-def model_with(names: Set[str], mesh: LineMesh) -> Model:
-    lengths = np.full(mesh.droppers.shape[0], 1.0)
-    return build(full_problem(BARE | names), mesh, lengths)
-
-
-def contents(model: Model) -> Counter[tuple[str, int, bool, bool]]:
-    """Every block as component, number of elements, and which matrices it has."""
-    return Counter(
-        (block.component, block.dofs.shape[0], block.mass is not None, block.stiffness is not None)
-        for block in model.blocks
-    )
-
-
-def counts(mesh: LineMesh) -> dict[str, int]:
-    return {
-        "elements": mesh.n_nodes - 2,
-        "droppers": mesh.droppers.shape[0],
-        "arms": mesh.steady_arms.size,
-        "supports": mesh.supports.size,
-        "fittings": 2,
-        "one wire": (mesh.n_nodes - 2) // 2,
-        "unknowns": 2 * mesh.n_nodes,
-        "spots": 1,
-    }
 
 
 def test_a_bare_line_is_wires_droppers_and_supports(mesh: LineMesh) -> None:
@@ -261,13 +164,6 @@ def test_an_effect_sets_its_own_laws_and_no_others(name: str, mesh: LineMesh) ->
     assert effects.registry()[name].lifts == LIFTED.get(name, ())
 
 
-def test_a_slack_dropper_keeps_a_share_only_if_droppers_slacken(mesh: LineMesh) -> None:
-    residual = {"residual_dropper_stiffness"}
-    assert model_with(residual, mesh).simulated.kept_ratio == 1.0
-    both = model_with(residual | {"dropper_slackening"}, mesh).simulated
-    assert (both.slackening, both.kept_ratio) == (True, 0.01)
-
-
 def test_incidents_are_simulated_in_their_order(mesh: LineMesh) -> None:
     both = model_with({"tension_loss", "dropper_break"}, mesh)
     assert both.simulated.incidents == both.problem.incidents
@@ -292,34 +188,6 @@ def test_the_table_names_every_shipped_effect() -> None:
     elsewhere = {"absorbing_layers", "periodic_ends", "axial_motion", "tensioners", "temperature"}
     elsewhere.add("lateral_motion")
     assert set(effects.registry()) == {"vertical", *elsewhere, *BLOCKS}
-
-
-def test_lateral_motion_adds_a_plane_that_no_other_scene_has(mesh: LineMesh) -> None:
-    """Unknowns of all nodes, wires, pendulums, bars, masses; of a scene without it no trace."""
-    hanging = frozenset({"gravity", "dropper_mass", "clamp_mass", "arm_inertia", "arm_stiffness"})
-    names, n = BARE | hanging, counts(mesh)
-    without, _ = find_form(full_problem(names), mesh)
-    model, form = find_form(full_problem(names | {"lateral_motion"}), mesh)
-    assert without.unknowns == ("w", "theta_y") and without.simulated.lateral is False
-    assert model.unknowns == ("w", "theta_y", "v", "theta_z") and model.form is form
-    assert model.n_dofs == 2 * without.n_dofs
-    half = n["elements"] // 2
-    assert contents(model) - contents(without) == {
-        ("messenger_wire", half, True, True): 1,
-        ("contact_wire", half, True, True): 1,
-        # Geometric stiffness of droppers and of bars, and the bars themselves.
-        ("droppers", n["droppers"], False, True): 1,
-        ("steady_arms", n["arms"], False, True): 1,
-        # Masses that move sideways.
-        ("droppers", n["droppers"], True, False): 2,
-        ("messenger_wire", n["droppers"], True, False): 1,
-        ("contact_wire", n["droppers"], True, False): 1,
-        ("steady_arms", n["arms"], True, False): 1,
-    }
-    # An arm that is a bar has no further stiffness.
-    assert "arm_stiffness" in without.terms_of and "arm_stiffness" not in model.terms_of
-    held = 2 * n["supports"] - n["supports"] + mesh.anchors.size
-    assert model.constrained.size == without.constrained.size + held
 
 
 @pytest.mark.parametrize("name", BLOCKS)
@@ -416,60 +284,6 @@ def test_an_effect_with_nothing_to_act_on_does_not_exist(
     assert name not in build(change(problem), mesh, lengths).terms_of
 
 
-def with_line(problem: Problem, **changes: object) -> Problem:
-    return replace(problem, line=make_line(replace(full_line(), **changes)))
-
-
-def with_dropper(problem: Problem, **changes: float) -> Problem:
-    return with_line(problem, dropper=replace(full_line().dropper, **changes))
-
-
-def with_arm(problem: Problem, **changes: float) -> Problem:
-    return with_line(problem, steady_arm=replace(full_line().steady_arm, **changes))
-
-
-def test_weights_are_those_of_the_masses_that_exist(mesh: LineMesh) -> None:
-    """Gravity acts on what the other effects hang on the line, half of a hinged arm included."""
-    line, n = full_line(), counts(mesh)
-    gravity = 9.81
-    wires = line.support_positions[-1] * (
-        line.contact_wire.mass_per_length + line.messenger_wire.mass_per_length
-    )
-    clamps = n["droppers"] * (line.dropper.upper_clamp_mass + line.dropper.lower_clamp_mass)
-    droppers = n["droppers"] * line.dropper.mass_per_length * 1.0  # all 1 m long here
-    arm = line.steady_arm
-    arms = n["arms"] * (0.5 * arm.mass_per_length * arm.length + arm.clamp_mass)
-    hanging = {
-        frozenset(): wires,
-        frozenset({"clamp_mass"}): wires + clamps,
-        frozenset({"dropper_mass"}): wires + droppers,
-        frozenset({"arm_inertia"}): wires + arms,
-        frozenset({"clamp_mass", "dropper_mass", "arm_inertia"}): wires + clamps + droppers + arms,
-    }
-    for names, mass in hanging.items():
-        model = model_with(names | {"gravity"}, mesh)
-        vertical = model.weight[model.dofs(np.arange(mesh.n_nodes))]
-        assert vertical.sum() == pytest.approx(-gravity * mass, rel=1e-13)
-
-
-def test_form_finding_knows_pre_sag_and_transitions_only_if_asked(mesh: LineMesh) -> None:
-    whole = BARE | {"gravity", "pre_sag", "transition_spans"}
-    lower = mesh.droppers[:, 1]
-    level, line = 5.08, full_line()
-    sag = np.concatenate([np.asarray(span) for span in line.pre_sag])
-    rise = line.target_height(mesh.x(lower)) - level
-    for names, expected in (
-        (whole, level + rise - sag),
-        (whole - {"pre_sag"}, level + rise),
-        (whole - {"transition_spans"}, level - sag),
-        (BARE | {"gravity"}, np.full(lower.size, level)),
-    ):
-        _, form = find_form(full_problem(names), mesh)
-        assert form.height[lower] == pytest.approx(expected, abs=1e-14)
-    _, form = find_form(full_problem(BARE), mesh)
-    assert not form.dropper_force.any()
-
-
 def test_point_masses_are_those_of_the_parts(mesh: LineMesh) -> None:
     """Half a dropper at either end, clamps, and a third of an arm that is hinged at its far end."""
     line, n = full_line(), counts(mesh)
@@ -495,33 +309,6 @@ def test_point_masses_are_those_of_the_parts(mesh: LineMesh) -> None:
     # Kinetic energy of a hinged rod: its moment of inertia m l^2 / 3 turned into a mass at its end.
     expected[mesh.steady_arms] += arm.mass_per_length * arm.length / 3 + arm.clamp_mass
     assert masses(whole) - masses(bare) == pytest.approx(expected, abs=1e-13)
-
-
-def test_droppers_are_springs_of_their_stiffness_or_of_their_length(mesh: LineMesh) -> None:
-    lengths = np.linspace(0.8, 1.2, mesh.droppers.shape[0])
-    given = full_problem(BARE)
-    by_length = with_dropper(given, stiffness=None, axial_stiffness=8e4)
-    assert build(given, mesh, lengths).dropper_stiffness == pytest.approx(1e5)
-    model = build(by_length, mesh, lengths)
-    assert model.dropper_stiffness == pytest.approx(8e4 / lengths, rel=1e-15)
-    (links,) = [block for block in model.blocks if block.component == "droppers"]
-    assert links.stiffness[3, 0, 1] == pytest.approx(-8e4 / lengths[3], rel=1e-15)
-    damped = replace(given, effects=BARE | {"structural_damping"})
-    alpha = given.damping.alpha
-    assert build(damped, mesh, lengths).dropper_damping == pytest.approx(alpha * 1e5, rel=1e-15)
-
-
-def test_damping_may_differ_from_component_to_component(mesh: LineMesh) -> None:
-    lengths = np.ones(mesh.droppers.shape[0])
-    damping = Damping(1e-4, 0.01, {"droppers": (1e-3, 0.0)})
-    on = replace(full_problem(BARE | {"structural_damping"}), damping=damping)
-    model = build(on, mesh, lengths)
-    assert model.damping_of("droppers") == (1e-3, 0.0)
-    assert model.damping_of("contact_wire") == (1e-4, 0.01)
-    assert not model.damping_is_proportional
-    off = build(replace(on, effects=BARE), mesh, lengths)
-    assert off.damping_of("droppers") == (0.0, 0.0)
-    assert off.damping_is_proportional
 
 
 def test_a_head_has_a_roll_only_if_asked() -> None:

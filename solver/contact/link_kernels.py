@@ -1,0 +1,101 @@
+"""The compiled loops of links near the train: which of them may switch within a step.
+
+Not collective; see `base.compiled` for how loops are compiled.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from catenary.solver.base.compiled import in_line
+from catenary.solver.model.switching_links import LinkArrays
+
+
+class Followed(NamedTuple):
+    """Links that a rank follows: their ``numbers`` (n,) in the line, ``links`` (``LinkArrays``) and
+    ``reserve`` (n,) [N], as a free step leaves it; which of them may switch, ``moving`` (2,)."""
+
+    numbers: np.ndarray
+    links: LinkArrays
+    reserve: np.ndarray
+    moving: np.ndarray
+
+
+@in_line
+def n_beyond(reserve, moving, margin):
+    """How many reserves of ``moving`` links are below a margin, or not finite."""
+    count = 0
+    for d in range(moving[0], moving[1]):
+        count += not (margin <= reserve[d] < np.inf)
+    return count
+
+
+@in_line
+def spread(link, links, answer):
+    """Stretch of a link in an answer (n_local,)."""
+    unknowns, weights, _ = links
+    link = np.uint64(link)
+    total = weights[link, 0] * answer[np.uint64(unknowns[link, 0])]
+    total += weights[link, 1] * answer[np.uint64(unknowns[link, 1])]
+    for k in range(2, unknowns.shape[1]):
+        total += weights[link, k] * answer[unknowns[link, k]]
+    return total
+
+
+@in_line
+def watch(followed, bounds, touches, answers, gains, rows):
+    """Number of links that may switch within ``bounds``; a row each, as far as they fit.
+
+    ``followed`` links stand in the order along the track, with their reserve without contact
+    forces. Contacts touch those within reach. -1 if a reserve is not finite.
+    """
+    numbers, links, reserve, moving = followed
+    by_force, by_slope = answers
+    laws, limits, margin = links.law, bounds.force, bounds.loss[0]
+    count, n, uses_rate = 0, touches.size, by_slope.shape[1] > 0
+    low, high = touches[0].x, touches[0].x
+    for i in range(1, n):
+        low, high = min(low, touches[i].x), max(high, touches[i].x)
+    first = np.searchsorted(laws.place, low - gains.reach)
+    last = np.searchsorted(laws.place, high + gains.reach, side="right")
+    first, last = max(first, moving[0]), min(last, moving[1])
+    # Mostly none is near its margin by itself: then those beyond reach are not looked at.
+    begin, end = first, last
+    if n_beyond(reserve, moving, margin):
+        begin, end = moving[0], moving[1]
+    for d in range(begin, end):
+        # Also true for NaN.
+        candidate = not (margin <= reserve[d] < np.inf)
+        if not (candidate or first <= d < last):
+            continue
+        if not np.isfinite(reserve[d]):
+            return -1
+        law = laws[d]
+        if law.released == 0.0:
+            continue
+        per_acceleration = law.stiffness * gains.position + law.damping * gains.velocity
+        if not candidate:
+            for i in range(n):
+                if touches[i].present != 0.0 and abs(law.place - touches[i].x) <= gains.reach:
+                    change = per_acceleration * spread(d, links, by_force[i])
+                    if reserve[d] + change * limits[i] < margin:
+                        candidate = True
+                        break
+        if not candidate:
+            continue
+        if count < rows.number.size:
+            rows.number[count], rows.reserve[count] = numbers[d], reserve[d]
+            for i in range(n):
+                apart = spread(d, links, by_force[i])
+                rows.reaction[count, i] = per_acceleration * apart
+                rows.lift[count, i] = gains.position * apart
+                rows.rise[count, i] = 0.0
+                if uses_rate:
+                    along = spread(d, links, by_slope[i])
+                    rows.rise[count, i] = (
+                        gains.velocity * apart + gains.train_speed * gains.position * along
+                    )
+        count += 1
+    return count
