@@ -77,6 +77,8 @@ class SteadyArm:
     there; otherwise the wire hangs freely between the droppers next to the arm.
     ``inclination``: by how much it rises from the wire to its hinge at rest, with lateral motion
     [rad]; None if it is what the weight that hangs at the arm makes of it.
+    ``uplift_stop``: lift of the wire at which the arm meets a stop of ``stop_stiffness`` [m],
+    [N/m]; None without one.
     """
 
     length: float
@@ -85,6 +87,8 @@ class SteadyArm:
     stiffness: float
     holds_height: bool = False
     inclination: float | None = None
+    uplift_stop: float | None = None
+    stop_stiffness: float = 1e5
 
 
 @dataclass(frozen=True)

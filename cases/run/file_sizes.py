@@ -18,10 +18,9 @@ from catenary.cases.run.recording import (
     Recording,
     shown_share,
     snapshot_bytes,
+    train_of,
 )
 from catenary.cases.scene.convert.course import resolved
-from catenary.mbs.build import has_joints
-from catenary.meshgen.wires import Role
 from catenary.postproc.channels.line_record import GZIP
 from catenary.postproc.files.chunk_shapes import Chunk, chunks_of
 from catenary.solver.problem.problem import Problem
@@ -122,11 +121,7 @@ def _film_bytes(problem: Problem, recording: Recording, n_snapshots: int) -> flo
 
 def _tables(problem: Problem, recording: Recording) -> dict[str, tuple[Channel, int]]:
     """The growing tables of the result file: path -> channel and columns."""
-    places = problem.train.placements
-    strips = tuple(len(place.data.strip_offsets) for place in places)
-    joints = any(has_joints(place.data) for place in places)
-    lateral = "lateral_motion" in problem.effects
-    train = channels.Train(strips, joints, len(problem.line.wires_of(Role.CONTACT)), lateral)
+    train = train_of(problem)
     table = {"time": (channels.TIME, 0), "line_channels/time": (channels.TIME, 0)}
     for channel in channels.train_channels(train):
         table[f"channels/{channel.name}"] = (channel, channel.n_columns(train))

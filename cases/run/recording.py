@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from catenary.mbs.build import has_joints
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.wires import Role
 from catenary.postproc.channels.line_record import GZIP, NONE, LineRecord, says
 from catenary.postproc.record.snapshots.field_kinds import USUAL_FIELDS
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
+from catenary.solver.effects.all_effects import simulated
 from catenary.solver.problem.problem import Problem
 from catenary.solver.time_loop import channels
 
@@ -112,15 +115,29 @@ def recording_of(output: OutputTable, problem: Problem, extent: Extent, n_steps:
     fields = _field_record(output, problem)
     field_every, by_size = _field_every(output, problem, fields, extent, n_steps)
     places = {channels.ARM: extent.arm_x.size, channels.DROPPER: extent.dropper_x.size}
-    n_columns = sum(places[channels.CHANNELS[name].per] for name in channels.line_channels())
+    train = train_of(problem)
+    names = channels.line_channels(train)
+    n_columns = sum(places[channels.CHANNELS[name].per] for name in names)
     return Recording(
-        _line_record(output, problem, n_columns, n_steps),
+        _line_record(output, problem, n_columns, n_steps).of(train),
         fields,
         field_every,
         cadence(output.energy_every_s, problem.numerics.dt),
         by_size,
         *extent,
         n_steps,
+    )
+
+
+def train_of(problem: Problem) -> channels.Train:
+    """What decides which channels a run of a problem has. Not collective."""
+    places, laws = problem.train.placements, simulated(problem)
+    return channels.Train(
+        tuple(len(place.data.strip_offsets) for place in places),
+        any(has_joints(place.data) for place in places),
+        len(problem.line.wires_of(Role.CONTACT)),
+        laws.lateral,
+        laws.uplift_stops,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -44,8 +44,13 @@ class LineRecord:
             self.every == 1
             and self.window is None
             and self.stretch is None
-            and set(self.names) == set(channels.line_channels())
+            and set(self.names) >= set(channels.line_channels_of_all())
         )
+
+    def of(self, train: channels.Train) -> LineRecord:
+        """The same of a run with this train, which may lack some of the channels."""
+        there = channels.line_channels(train)
+        return replace(self, names=tuple(name for name in self.names if name in there))
 
     def columns(self, x: np.ndarray) -> np.ndarray:
         """Indices of the columns at positions ``x`` [m] that are recorded, ascending."""
@@ -105,7 +110,7 @@ def says(record: LineRecord, dt: float) -> str:
             told += f" within {behind:g} m behind and {ahead:g} m ahead of the train"
         if record.stretch is not None:
             told += f" from {record.stretch[0]:g} to {record.stretch[1]:g} m"
-        if set(record.names) != set(channels.line_channels()):
+        if not set(record.names) >= set(channels.line_channels_of_all()):
             told = f"of these {', '.join(record.names)} {told}"
         told += "; extremes are kept of every step"
     if record.compression != NONE:

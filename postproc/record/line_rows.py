@@ -63,7 +63,7 @@ class LineGather:
         self._parts: dict[str, _Part] = {}
         self._chosen: list[np.ndarray] = []
         self._n_taken = 0
-        for name in channels.line_channels():
+        for name in channels.line_channels(stage.train):
             x, owned = places[channels.CHANNELS[name].per]
             owned = np.asarray(owned, dtype=np.int64)
             recorded = record.columns(x)

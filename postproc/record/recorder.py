@@ -102,6 +102,7 @@ class Recorder:
         """
         rows = self._flush_every
         self._last_time, self._moving = stage.start_time, stage.moving
+        self._record = self._record.of(stage.train)
         self._line = LineGather(self._comm, stage, self._record, rows)
         self._energies_follow_motion = channels.energies_follow_motion()
         self._time = np.zeros(rows)

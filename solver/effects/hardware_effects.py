@@ -1,17 +1,22 @@
-"""Effects of line hardware: insulators, splices and anchor clamps as masses on wires."""
+"""Effects of line hardware: fittings as masses on wires, stops above steady arms."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from catenary.solver.effects import vertical_effects  # noqa: F401  (built before)
 from catenary.solver.effects.effect import Effect, register
-from catenary.solver.model.links.links import at_places
+from catenary.solver.model.links.links import PULLS, UPLIFT_STOPS, at_nodes, at_places, law
 
 if TYPE_CHECKING:
     from catenary.solver.model.builder import ModelBuilder
+
+
+# Lift that no wire gets to [m].
+_OUT_OF_REACH = 1e3
 
 
 def _fittings(builder: ModelBuilder) -> None:
@@ -20,6 +25,31 @@ def _fittings(builder: ModelBuilder) -> None:
         builder.add_masses_at(fittings.wire, place, np.array(fittings.mass))
 
 
+def _stops(builder: ModelBuilder) -> None:
+    """Open links to the ground; an arm without a stop has one that it does not reach."""
+    mesh, model = builder.mesh, builder.model
+    gap, stiffness = np.full(mesh.steady_arms.size, _OUT_OF_REACH), np.ones(mesh.steady_arms.size)
+    for number, arms in enumerate(builder.problem.line.steady_arms):
+        if arms.kind.uplift_stop is not None:
+            own = mesh.arm_group == number
+            gap[own], stiffness[own] = arms.kind.uplift_stop, arms.kind.stop_stiffness
+    laws = law(mesh.x(mesh.steady_arms), stiffness, acts=PULLS, gap=gap)
+    builder.add_links(UPLIFT_STOPS, at_nodes(model, mesh.steady_arms), laws)
+
+
+register(
+    Effect(
+        "uplift_stops",
+        "stops that end the uplift at steady arms",
+        "a link for each arm that pushes its wire down beyond a lift",
+        "linear complementarity with a gap, one way",
+        default=True,
+        data="line.steady_arm.uplift_stop_m",
+        applies=lambda p: any(arms.kind.uplift_stop is not None for arms in p.line.steady_arms),
+        build=_stops,
+        law=lambda laws, p: replace(laws, uplift_stops=True),
+    )
+)
 register(
     Effect(
         "fittings",

@@ -51,6 +51,7 @@ class Simulated:
     warmer : temperature less that of the installation [K]
     goes_on : whether the line goes on beyond its start and beyond its end
     lateral : whether wires move sideways
+    uplift_stops : whether stops end the uplift at steady arms
     irregular_heights : what contact wires are to be higher at rest where they are held
     length_errors : of the droppers, None if all are cut to length
     missing, loose : places of droppers that are not there, and of those that carry nothing [m]
@@ -78,6 +79,7 @@ class Simulated:
     warmer: float = 0.0
     goes_on: tuple[bool, bool] = (False, False)
     lateral: bool = False
+    uplift_stops: bool = False
     irregular_heights: Heights | None = None
     length_errors: LengthErrors | None = None
     missing: tuple[float, ...] = ()

@@ -11,9 +11,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-if TYPE_CHECKING:
-    import numpy as np
+import numpy as np
 
+from catenary.solver.model.links.links import UPLIFT_STOPS
+
+if TYPE_CHECKING:
     from catenary.solver.contact.forces_on_line import ForcesOnLine
     from catenary.solver.contact.pantographs import Pantographs
     from catenary.solver.schemes.scheme import Scheme
@@ -52,13 +54,14 @@ class Energies(NamedTuple):
 
 class Train(NamedTuple):
     """What decides which channels a run has: strips of each pantograph in running order, whether a
-    pantograph has joints that may open, the number of contact wires, and whether these move
-    sideways."""
+    pantograph has joints that may open, the number of contact wires, whether these move sideways,
+    and whether steady arms have stops."""
 
     n_strips: tuple[int, ...]
     joints_in_loop: bool
     n_wires: int = 1
     lateral: bool = False
+    uplift_stops: bool = False
 
     @property
     def several_strips(self) -> bool:
@@ -85,7 +88,7 @@ class Channel:
     energy : for one of ``ENERGIES``: the value of this rank's, collective
     of_motion : whether an energy follows from ``kinetic`` and ``elastic`` alone, not from the
         sources: a compiled loop then does not end its block for it
-    when : whether a run with this train has it
+    when : whether a run with this train on its line has it
     essential : whether a result file without it, or from its first damaged row on, is of no use
     may_be_nan : whether NaN is a value
     own_picture : whether the report draws it in a picture made for it; others get one of their own
@@ -119,6 +122,8 @@ class Channel:
         several = {STRIP: n_strips, WIRE: n * train.n_wires, CONTACT: n_strips * train.n_wires}
         return several.get(self.per, n)
 
+
+_NOTHING = np.zeros(0)
 
 TIME = Channel("time", "s", "time since the start of the run", RUN)
 
@@ -227,6 +232,14 @@ CHANNELS: dict[str, Channel] = {
             lambda sources: sources.dropper_force,
             own_picture=True,
         ),
+        Channel(
+            "stop_force",
+            "N",
+            "force of the stop above a steady arm on the contact wire, downward",
+            ARM,
+            lambda sources: sources.link_force.get(UPLIFT_STOPS, _NOTHING),
+            when=lambda train: train.uplift_stops,
+        ),
     )
 }
 
@@ -258,9 +271,16 @@ ENERGIES: dict[str, Channel] = {
 }
 
 
-def line_channels() -> tuple[str, ...]:
-    """Names of the channels with a column for each place on the line."""
-    return tuple(channel.name for channel in CHANNELS.values() if channel.of_line)
+def line_channels(train: Train | None = None) -> tuple[str, ...]:
+    """Names of the channels with a column for each place on the line: all, or those that a run with
+    this train has."""
+    own = (channel for channel in CHANNELS.values() if channel.of_line)
+    return tuple(c.name for c in own if train is None or c.when(train))
+
+
+def line_channels_of_all() -> tuple[str, ...]:
+    """Names of those that every run has."""
+    return line_channels(Train((), joints_in_loop=False))
 
 
 def train_channels(train: Train | None = None) -> tuple[Channel, ...]:

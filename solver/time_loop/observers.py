@@ -23,7 +23,7 @@ class Stage:
     n_strips : of each pantograph in running order
     joints_in_loop : whether a pantograph has joints that may open, all its bodies being moved
     n_wires : number of contact wires
-    lateral : whether wires move sideways
+    lateral, uplift_stops : whether wires move sideways, and whether steady arms have stops
     dt, start_time : time step and time of the initial state [s]
     n_steps : steps planned
     arm_x, dropper_x : positions of steady arms and droppers [m]
@@ -52,13 +52,15 @@ class Stage:
     joints_in_loop: bool = False
     n_wires: int = 1
     lateral: bool = False
+    uplift_stops: bool = False
     moving: MovingColumns = field(default_factory=MovingColumns)
 
     @property
     def train(self) -> Train:
         """What decides which channels are recorded."""
         strips = self.n_strips or (1,) * self.n_pantographs
-        return Train(strips, self.joints_in_loop, self.n_wires, self.lateral)
+        laws = self.lateral, self.uplift_stops
+        return Train(strips, self.joints_in_loop, self.n_wires, *laws)
 
 
 @dataclass

@@ -131,7 +131,7 @@ class Showing:
 
     def stage(self, dt: float, start_time: float, n_steps: int) -> Stage:
         """What stays the same for the whole run."""
-        mesh = self._model.mesh
+        mesh, model_laws = self._model.mesh, self._model.simulated
         points = mesh.points.copy()
         points[:, 2] = self._form.height
         if self._form.lateral is not None:
@@ -153,6 +153,7 @@ class Showing:
             joints_in_loop=self._pantographs.joints_in_loop,
             n_wires=self._pantographs.n_wires,
             lateral=self._pantographs.lateral,
+            uplift_stops=model_laws.uplift_stops,
             moving=self._moving,
         )
 

@@ -56,7 +56,7 @@ def full_line() -> LineData:
     line = ac_simple_line(N_SPANS)
     return replace(
         line,
-        steady_arm=replace(line.steady_arm, stiffness=300.0),
+        steady_arm=replace(line.steady_arm, stiffness=300.0, uplift_stop=0.1),
         contact_wire=replace(line.contact_wire, diameter=0.0144),
         messenger_wire=replace(line.messenger_wire, diameter=0.014),
         n_transition=(1, 1),

@@ -103,6 +103,9 @@ def _arms(rng: random.Random, words: Words, span: float) -> None:
     words["line.steady_arm.mass_kg_per_m"] = rng.uniform(0.1, 2.0)
     words["line.steady_arm.clamp_kg"] = rng.uniform(0.0, 0.5)
     words["line.steady_arm.holds_height"] = rng.choice(["true", "false"])
+    if rng.random() < 0.3:
+        words["line.steady_arm.uplift_stop_m"] = rng.uniform(0.005, 0.15)
+        words["line.steady_arm.uplift_stop_stiffness_N_per_m"] = 10 ** rng.uniform(3.0, 6.0)
     words["line.stagger_m"] = rng.uniform(-0.3, 0.3)
 
 

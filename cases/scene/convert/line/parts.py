@@ -116,4 +116,6 @@ def steady_arm(table: SteadyArmTable) -> SteadyArm:
         stiffness=table.stiffness_N_per_m,
         holds_height=table.holds_height,
         inclination=None if tilt is None else angle_from_deg(tilt),
+        uplift_stop=table.uplift_stop_m,
+        stop_stiffness=table.uplift_stop_stiffness_N_per_m,
     )

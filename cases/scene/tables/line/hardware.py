@@ -35,6 +35,26 @@ class SteadyArmTable(Table):
         "if absent, what the weight that hangs at the arm makes of it",
     )
 
+    uplift_stop_m: float | None = Field(
+        None,
+        gt=0,
+        le=1,
+        description="by how much the contact wire may be lifted at the arm before that meets a "
+        "stop; if absent, there is none",
+    )
+    uplift_stop_stiffness_N_per_m: float = Field(
+        1e5, ge=1e3, le=1e8, description="stiffness of the stop"
+    )
+
+    @model_validator(mode="after")
+    def _one_stop(self) -> SteadyArmTable:
+        given = "uplift_stop_stiffness_N_per_m" in self.model_fields_set
+        if given and self.uplift_stop_m is None:
+            raise ValueError(
+                "has an uplift_stop_stiffness_N_per_m, but no uplift_stop_m; give both, or neither"
+            )
+        return self
+
     @model_validator(mode="after")
     def _one_height(self) -> SteadyArmTable:
         if self.holds_height and self.inclination_deg is not None:
