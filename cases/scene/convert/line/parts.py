@@ -106,6 +106,10 @@ def conductor(table: WireTable) -> Conductor:
     )
 
 
+# Of a stop above a steady arm whose stiffness no scene gives [N/m].
+_STOP_STIFFNESS = 1e5
+
+
 def steady_arm(table: SteadyArmTable) -> SteadyArm:
     """A steady arm."""
     tilt = table.inclination_deg
@@ -117,5 +121,5 @@ def steady_arm(table: SteadyArmTable) -> SteadyArm:
         holds_height=table.holds_height,
         inclination=None if tilt is None else angle_from_deg(tilt),
         uplift_stop=table.uplift_stop_m,
-        stop_stiffness=table.uplift_stop_stiffness_N_per_m,
+        stop_stiffness=table.uplift_stop_stiffness_N_per_m or _STOP_STIFFNESS,
     )

@@ -42,14 +42,13 @@ class SteadyArmTable(Table):
         description="by how much the contact wire may be lifted at the arm before that meets a "
         "stop; if absent, there is none",
     )
-    uplift_stop_stiffness_N_per_m: float = Field(
-        1e5, ge=1e3, le=1e8, description="stiffness of the stop"
+    uplift_stop_stiffness_N_per_m: float | None = Field(
+        None, ge=1e3, le=1e8, description="stiffness of the stop; if absent, 1e5 N/m"
     )
 
     @model_validator(mode="after")
     def _one_stop(self) -> SteadyArmTable:
-        given = "uplift_stop_stiffness_N_per_m" in self.model_fields_set
-        if given and self.uplift_stop_m is None:
+        if self.uplift_stop_stiffness_N_per_m is not None and self.uplift_stop_m is None:
             raise ValueError(
                 "has an uplift_stop_stiffness_N_per_m, but no uplift_stop_m; give both, or neither"
             )
