@@ -42,6 +42,8 @@ class LikeStations:
         self.marks = _mixed(numbering.make_up.astype(np.uint64))
         self.marks += _sums(station[model.constrained], _mixed(name[model.constrained]), n)
         for number, block in enumerate(model.blocks):
+            if not block.dofs.size:
+                continue  # of no element, as droppers that a line does not have
             # Which terms there are follows from the number of the block.
             terms = (block.mass, block.stiffness, block.damping)
             parts = [term.reshape(len(term), -1) for term in terms if term is not None]
