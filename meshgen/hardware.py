@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from catenary.meshgen.wires import Wire
+
 
 @dataclass(frozen=True)
 class DropperKind:
@@ -79,6 +81,8 @@ class SteadyArm:
     [rad]; None if it is what the weight that hangs at the arm makes of it.
     ``uplift_stop``: lift of the wire at which the arm meets a stop of ``stop_stiffness`` [m],
     [N/m]; None without one.
+    ``by_radial_force``: whether its vertical stiffness is its radial force over its length, in
+    place of ``stiffness``.
     """
 
     length: float
@@ -89,6 +93,7 @@ class SteadyArm:
     inclination: float | None = None
     uplift_stop: float | None = None
     stop_stiffness: float = 1e5
+    by_radial_force: bool = False
 
 
 @dataclass(frozen=True)
@@ -99,6 +104,12 @@ class SteadyArms:
     kind: SteadyArm
     wire: str
     x: tuple[float, ...]
+
+    def vertical_stiffness(self, wire: Wire) -> np.ndarray:
+        """Of each at ``wire``, which they hold, where nothing moves sideways, (n,) [N/m]."""
+        if not self.kind.by_radial_force:
+            return np.full(len(self.x), self.kind.stiffness)
+        return np.abs(wire.radial_force(np.array(self.x))) / self.kind.length
 
 
 @dataclass(frozen=True)

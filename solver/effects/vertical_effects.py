@@ -73,7 +73,8 @@ def _arm_stiffness(builder: ModelBuilder) -> None:
         if arms.kind.length > 0.0 and builder.model.simulated.lateral:
             continue  # a bar, whose stiffness follows from its radial force
         nodes = mesh.steady_arms[mesh.arm_group == number]
-        builder.add_springs(arms.name, nodes, "w", arms.kind.stiffness)
+        stiffness = arms.vertical_stiffness(builder.problem.line.wire(arms.wire))
+        builder.add_springs(arms.name, nodes, "w", stiffness)
 
 
 def _shaped(laws: Simulated, by: TargetHeight) -> Simulated:
@@ -190,12 +191,12 @@ register(
         "EN 50318:2002 reference model",
         default=True,
         applies=lambda p: any(
-            group.kind.stiffness > 0
+            bool(group.vertical_stiffness(p.line.wire(group.wire)).any())
             and not (group.kind.length > 0 and "lateral_motion" in p.effects)
             for group in p.line.steady_arms
         ),
         build=_arm_stiffness,
-        data="line.steady_arm.stiffness_N_per_m above 0",
+        data="line.steady_arm.stiffness_N_per_m above 0, or stiffness_by_radial_force",
     )
 )
 register(

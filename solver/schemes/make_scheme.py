@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from catenary.solver.contact.followed_links import no_links
@@ -66,7 +66,8 @@ class SchemeFactory:
         ``pantographs`` are those of the problem, made for the same numerics.
         """
         comm, model, train = self.comm, changed.model, problem.train
-        numerics = problem.numerics
+        # Droppers may have another tension in the first rest than they had then.
+        own, numerics = replace(self, form=changed.form), problem.numerics
         in_parts = numerics.scheme != "one_solve" or numerics.coupling == "explicit"
         line = make_line(comm, model, self.ownership, numerics, not in_parts)
         laws = model.simulated
@@ -78,21 +79,21 @@ class SchemeFactory:
         interaction = ForcesOnLine(
             comm,
             model,
-            self.form,
+            own.form,
             line,
             (train.start - trailing - reach[0], train.end + reach[1]),
             pantographs.candidates,
             train.speed,
             uses_rate,
-            switching_links(model, self.form.dropper_force),
+            switching_links(model, own.form.dropper_force),
             pantographs.across,
         )
         if problem.window.moves:
             self._open_window(problem, model, line, interaction, pantographs)
         scheme_of: dict[str, Callable[[Problem, Model, ForcesOnLine, Pantographs], Scheme]] = {
-            "one_solve": self._one_solve,
-            "fixed_point": self._fixed_point,
-            "ts_alpha2": self._ts_alpha2,
+            "one_solve": own._one_solve,
+            "fixed_point": own._fixed_point,
+            "ts_alpha2": own._ts_alpha2,
         }
         scheme = scheme_of[problem.numerics.scheme](problem, model, interaction, pantographs)
         return Parts(line, interaction, pantographs, scheme)

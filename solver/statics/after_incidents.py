@@ -6,19 +6,28 @@ matrices M, C', K' of the changed line
     M a + C' v + K' d = f + g,      g = -(K' - K) z + sum_b l_b N0_b
 
 where K' - K is the part of the wires whose tension changed, and N0_b the force at rest of the
-droppers b that broke. Steady arms and droppers keep the geometric stiffness of the first rest.
-Displacement and velocity go through an incident unchanged; forces jump, and
-with them the acceleration:
+droppers b that broke. Where matrices depend on the shape (droppers that lean, steady arms as bars,
+wires that stretch) K' is that about the rest z + d* that the changed line comes to, found by the
+energy of `potential`, and
 
-    M (a+ - a-) = g' - g - (K' - K) d - (C' - C) v + sum_b l_b s_b
+    g = K' d* - sum_d l_d R_d*
 
-with the compensations s of slack droppers among those that broke just now. Newmark's predictor uses
-the acceleration at the start of a step: with a- instead of a+ the step would begin with an error of
-velocity of order dt.
+with R* < 0 of droppers that are slack there: it rests at d* exactly, with the tension of its wires,
+the forces of its arms and the directions of its links as they are there.
+
+Displacement and velocity go through an incident unchanged; forces jump, and with them the
+acceleration:
+
+    M (a+ - a-) = g' - g - (K' - K) d - (C' - C) v + sum (l' s') - sum (l s)
+
+with what slack droppers compensate before and after. Newmark's predictor uses the acceleration at
+the start of a step: with a- instead of a+ the step would begin with an error of velocity of order
+dt.
 
 The energy of the changed line is that of what it still consists of, counted from the first rest as
 before: 1/2 d K' d - g d + e0. At an incident it falls by what left the line, T^2 / 2k of a dropper
-and 1/2 (1 - share) T integral of z'^2 of a wire.
+and 1/2 (1 - share) T integral of z'^2 of a wire; where K' is about another rest, by what that makes
+of d besides.
 """
 
 from __future__ import annotations
@@ -29,6 +38,8 @@ from typing import Any
 
 import numpy as np
 
+from catenary.solver.base.errors import InputError, RunBroken
+from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
 from catenary.solver.linear.decay_length import reach
 from catenary.solver.linear.step_operators import LineOperators
@@ -37,10 +48,15 @@ from catenary.solver.model.elements import beam
 from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.links.links import Direction
 from catenary.solver.model.loads import ShapeLoad
+from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model, wire_elements
 from catenary.solver.model.partition import Ownership
+from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.wire_ends import tensioned_ends
 from catenary.solver.problem.incidents import DropperBreak, LineIncident
-from catenary.solver.statics.equilibrium import Equilibrium
+from catenary.solver.statics.potential import Potential
+from catenary.solver.statics.rest_loads import dead_loads
+from catenary.solver.statics.rest_nearby import RestNearby
 
 
 @dataclass(frozen=True)
@@ -50,22 +66,30 @@ class ChangedLine:
     Attributes
     ----------
     model : of the line as it is now; displacements count from the first rest
+    form : the first rest, with the tension that droppers of the model have there
     load : (n_dofs,) balance lost [N], [N m], zero at held unknowns
     energy : what the line's energy at the first rest has changed by [J]
     """
 
     model: Model
+    form: Equilibrium
     load: np.ndarray
     energy: float
 
 
-def unchanged(model: Model) -> ChangedLine:
+def unchanged(model: Model, form: Equilibrium) -> ChangedLine:
     """The line before anything has happened."""
-    return ChangedLine(model, np.zeros(model.n_dofs), 0.0)
+    return ChangedLine(model, form, np.zeros(model.n_dofs), 0.0)
 
 
 def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncident]) -> ChangedLine:
-    """The line after ``incidents``, in order of time, which began as ``first``. Not collective."""
+    """The line after ``incidents``, in order of time, which began as ``first``. Not collective.
+
+    Raises
+    ------
+    RunBroken
+        If it comes to no rest any more.
+    """
     mesh, problem = first.mesh, first.problem
     broken = np.zeros(mesh.droppers.shape[0], dtype=bool)
     shares: dict[str, float] = {}
@@ -97,11 +121,44 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
     stiffness[first.dropper_gap[broken] > 0.0] *= first.simulated.kept_ratio
     carried = rest != 0.0
     energy -= float((rest[carried] ** 2 / (2.0 * stiffness[carried])).sum())
+    if effects.needs_form(problem):
+        model, form, load = _about_rest(first, model, form)
     load[model.constrained] = 0.0
     unbalanced = np.flatnonzero(load)
     if unbalanced.size:
         model.loads.append(ShapeLoad(unbalanced, load[unbalanced]))
-    return ChangedLine(model, load, energy)
+    return ChangedLine(model, form, load, energy)
+
+
+def _about_rest(
+    first: Model, changed: Model, form: Equilibrium
+) -> tuple[Model, Equilibrium, np.ndarray]:
+    """The changed line about the rest that it comes to, the first rest with the tension that its
+    droppers have there, and its load (n_dofs,)."""
+    potential = Potential(first, changed, form, form.dropper_length)
+    loads = dead_loads(changed) - dead_loads(first)
+    try:
+        rest = RestNearby(potential, loads, ends_stay=True).find()
+    except InputError as error:
+        raise RunBroken(f"after an incident {error}") from None
+    about = rest.form
+    if changed.simulated.tensioner is not None and about.along.size:
+        # Stops are where they were: displacements count from the first rest.
+        ends, along = [end.node for end in tensioned_ends(first)], about.along.copy()
+        along[ends] = form.along[ends] if form.along.size else 0.0
+        about = replace(about, along=along)
+    lengths, gap = first.dropper_lengths, first.dropper_gap
+    model = build(changed.problem, changed.mesh, lengths, changed.broken, about, gap)
+    assert model.droppers is not None
+    unknowns, weights = model.droppers.direction
+    k, moved = model.dropper_stiffness, rest.moved
+    stretched = k * (weights * moved[unknowns]).sum(axis=1)
+    tension = np.where(changed.broken, 0.0, rest.reserve - stretched)
+    now = replace(form, dropper_force=tension)
+    load = whole_matrix(model, stiffness=1.0) @ moved
+    there = ChangedLine(model, now, load, 0.0)
+    push = _compensation(there, moved, np.zeros(moved.size), model.simulated.kept_ratio)
+    return model, now, load - push
 
 
 def dropper_at(model: Model, x: float) -> int:
@@ -115,7 +172,6 @@ def acceleration_jump(
     ownership: Ownership,
     before: ChangedLine,
     after: ChangedLine,
-    form: Equilibrium,
     state: tuple[np.ndarray, np.ndarray],
     pushed_share: float,
 ) -> np.ndarray:
@@ -133,27 +189,36 @@ def acceleration_jump(
     displacement, velocity = (np.concatenate(comm.allgather(part)) for part in state)
     first, last = ownership.first, ownership.last
     force = (after.load - before.load)[first:last]
-    force -= _times(after.model, ownership, 1.0, 0.0, displacement)
-    force += _times(before.model, ownership, 1.0, 0.0, displacement)
-    force -= _times(after.model, ownership, 0.0, 1.0, velocity)
-    force += _times(before.model, ownership, 0.0, 1.0, velocity)
-    new = after.model.broken & ~before.model.broken
-    unknowns, weights = _droppers(after.model, new)
-    stretch, rate = (
-        (weights * values[unknowns]).sum(axis=1) for values in (displacement, velocity)
-    )
-    rest = np.where(before.model.dropper_gap[new] > 0.0, 0.0, form.dropper_force[new])
-    tension = rest + before.model.dropper_stiffness[new] * stretch
-    tension += before.model.released_damping[new] * rate
-    # One that was slack at rest is no part of K: what it pulls is all compensation.
-    gap = before.model.dropper_gap[new]
-    tension = np.where(gap > 0.0, before.model.dropper_stiffness[new] * gap - tension, tension)
-    compensation = (1.0 - pushed_share) * np.maximum(0.0, -tension)
-    mine = ownership.owned(unknowns[:, 0])
-    np.add.at(force, unknowns[mine] - first, compensation[mine, None] * weights[mine])
+    for line, sign in ((after, 1.0), (before, -1.0)):
+        force -= sign * _times(line.model, ownership, 1.0, 0.0, displacement)
+        force -= sign * _times(line.model, ownership, 0.0, 1.0, velocity)
+        push = _compensation(line, displacement, velocity, pushed_share)
+        force += sign * push[first:last]
     held = after.model.constrained[ownership.owned(after.model.constrained)] - first
     force[held] = 0.0
     return divided_by_mass(comm, ownership, after.model, force)
+
+
+def _compensation(
+    line: ChangedLine, displacement: np.ndarray, velocity: np.ndarray, pushed_share: float
+) -> np.ndarray:
+    """Forces on the line beside those of K and C, of droppers that are slack and of those that were
+    so at rest and are taut, (n_dofs,) [N]."""
+    model = line.model
+    assert model.droppers is not None
+    unknowns, weights = model.droppers.direction
+    stretch, rate = (
+        (weights * values[unknowns]).sum(axis=1) for values in (displacement, velocity)
+    )
+    tension = np.where(model.dropper_gap > 0.0, 0.0, line.form.dropper_force)
+    tension += model.dropper_stiffness * (stretch - model.dropper_gap)
+    tension += model.released_damping * rate
+    # One that was slack at rest is no part of K: what it pulls is all compensation.
+    other = np.where(model.dropper_gap > 0.0, -np.maximum(tension, 0.0), np.minimum(tension, 0.0))
+    other[model.broken] = 0.0
+    total = np.zeros(model.n_dofs)
+    np.add.at(total, unknowns, ((1.0 - pushed_share) * other)[:, None] * weights)
+    return total
 
 
 def _droppers(model: Model, which: np.ndarray) -> Direction:

@@ -40,9 +40,9 @@ def hang(problem: Problem, cut: Model, form: Equilibrium) -> tuple[Model, Equili
         )
     model = build(problem, mesh, length, form=form)
     potential = Potential(cut, model, form, form.dropper_length + errors)
-    hung, gap = RestNearby(potential, dead_loads(model) - dead_loads(cut)).find()
-    _refuse_slack_wires(model, hung)
-    return build(problem, mesh, length, form=hung, gap=gap), hung
+    rest = RestNearby(potential, dead_loads(model) - dead_loads(cut)).find()
+    _refuse_slack_wires(model, rest.form)
+    return build(problem, mesh, length, form=rest.form, gap=rest.gap), rest.form
 
 
 def _errors_of_length(problem: Problem, cut: Model) -> np.ndarray:

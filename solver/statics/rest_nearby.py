@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -29,10 +30,29 @@ from catenary.solver.statics.tensioned_end import TensionedEnd
 # Displacements change by less than this where Newton's method ends [m].
 _SETTLED = 1e-9
 _MOST_STEPS = 40
+# Steps at first in which droppers switch as they are, where matrices depend on the shape.
+_SWITCHING = 12
 # Passes in which all switch at once, before one at a time does, and the most after these.
 _ALL_AT_ONCE = 40
 # Forces below this are none [N]: what a dropper of 1e6 N/m pulls when it stretches by 1e-13 m.
 _NO_FORCE = 1e-7
+
+
+class Rest(NamedTuple):
+    """A rest that was found.
+
+    Attributes
+    ----------
+    form : the shape, with what droppers carry in it
+    moved : (n_dofs,) displacement from the known rest
+    reserve : (n_droppers,) what droppers would carry if they could push [N]
+    gap : (n_droppers,) what those that are slack lack to be taut [m]
+    """
+
+    form: Equilibrium
+    moved: np.ndarray
+    reserve: np.ndarray
+    gap: np.ndarray
 
 
 class RestNearby:
@@ -42,20 +62,22 @@ class RestNearby:
     ----------
     potential : of the line as it is now about the known rest
     load : (n_dofs,) what it has to carry beside the former line's loads [N], [N m]
+    ends_stay : whether ends that are held along the track at the known rest stay so
     """
 
-    def __init__(self, potential: Potential, load: np.ndarray) -> None:
+    def __init__(self, potential: Potential, load: np.ndarray, ends_stay: bool = False) -> None:
         self._potential, self._load = potential, load
         self._model = model = potential.model
         self._ends: list[TensionedEnd] = []
-        if model.simulated.tensioner is not None:
+        if model.simulated.tensioner is not None and not ends_stay:
             self._ends = [TensionedEnd(model, end) for end in tensioned_ends(model)]
         self._bends = effects.needs_form(model.problem)
         self._matrix: sparse.csc_matrix | None = None
         self._lost = 1.0 - model.simulated.kept_ratio if model.simulated.slackening else 0.0
+        self._switches = ~model.broken & (self._lost > 0.0)
 
-    def find(self) -> tuple[Equilibrium, np.ndarray]:
-        """The rest, and what droppers that are slack there lack to be taut, (n_droppers,) [m].
+    def find(self) -> Rest:
+        """The rest.
 
         Raises
         ------
@@ -64,11 +86,11 @@ class RestNearby:
         """
         model, potential = self._model, self._potential
         k = model.dropper_stiffness
-        switches = ~model.broken & (self._lost > 0.0)
+        switches = self._switches
         slack = switches & (potential.reserve(potential.known) < -_NO_FORCE)
         moved = np.zeros(model.n_dofs)
         for again in itertools.count():
-            moved, form = self._newton(moved, slack)
+            moved, form, slack = self._newton(moved, slack)
             reserve = form.dropper_force
             wrong = switches & np.where(slack, reserve > _NO_FORCE, reserve < -_NO_FORCE)
             # All ends are looked at: each goes over to the state that follows.
@@ -85,13 +107,20 @@ class RestNearby:
         gap = np.zeros(k.size)
         gap[slack] = -reserve[slack] / k[slack]
         force = np.where(np.abs(reserve) < _NO_FORCE, 0.0, reserve)
-        return replace(form, dropper_force=self._carried(force, slack)), gap
+        rest = replace(form, dropper_force=self._carried(force, slack))
+        return Rest(rest, moved, reserve, gap)
 
     def _carried(self, reserve: np.ndarray, slack: np.ndarray) -> np.ndarray:
         return np.where(slack, (1.0 - self._lost) * reserve, reserve)
 
-    def _newton(self, moved: np.ndarray, slack: np.ndarray) -> tuple[np.ndarray, Equilibrium]:
-        """Displacement and shape at rest with some droppers slack, from a displacement nearby."""
+    def _newton(
+        self, moved: np.ndarray, slack: np.ndarray
+    ) -> tuple[np.ndarray, Equilibrium, np.ndarray]:
+        """Displacement and shape at rest with some droppers slack, from a displacement nearby.
+
+        Where shapes bend matrices, droppers go slack under way at first: one that pushes would
+        buckle sideways.
+        """
         model, potential, moved = self._model, self._potential, moved.copy()
         free = [end.unknown for end in self._ends if end.pull is not None]
         held = [end.unknown for end in self._ends if end.pull is None]
@@ -104,14 +133,17 @@ class RestNearby:
                 tension = model.problem.line.wire(end.end.wire).tension
                 load[end.unknown] += end.end.outwards * (end.pull - tension)
         change, form = np.inf, potential.form(moved)
-        for _ in range(_MOST_STEPS):
+        for again in range(_MOST_STEPS):
+            if self._bends and again < _SWITCHING:
+                slack = self._switches & (form.dropper_force < -_NO_FORCE)
             carried = self._carried(form.dropper_force, slack)
             lacks = load - potential.pull(moved, form, carried)
             lacks[constrained] = 0.0
             about = model
             if self._bends:
                 shape = replace(form, dropper_force=carried)
-                about = build(model.problem, model.mesh, model.dropper_lengths, form=shape)
+                lengths = model.dropper_lengths
+                about = build(model.problem, model.mesh, lengths, model.broken, shape)
                 about.constrained = constrained
             step = self._solved(about, slack, lacks)
             if not np.isfinite(step).all():
@@ -120,7 +152,7 @@ class RestNearby:
             form = potential.form(moved)
             change = float(np.abs(step).max())
             if change < _SETTLED or not self._bends:
-                return moved, form
+                return moved, form, slack
         raise InputError(
             f"the line finds no rest{where(model)}: it still moves by {change:.2g} m after "
             f"{_MOST_STEPS} steps of Newton's method; its wires may be slack there"

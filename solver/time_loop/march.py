@@ -122,7 +122,7 @@ class March:
         self._pantographs = Pantographs(comm, problem, effects, self._wire, height)
         self._moving = MovingColumns()
         self._set_ups = SchemeFactory(comm, form, self.ownership, self._nominal_height)
-        self._set_up(unchanged(model))
+        self._set_up(unchanged(model, form))
         self._set_off(model)
         self._showing.cross(0.0)
         give_back()
@@ -185,9 +185,7 @@ class March:
         after, step = changed_line(self._first, self._form, happened.incidents), happened.step
         moving = line.displacement, line.velocity
         kept_ratio = self._first.simulated.kept_ratio
-        jump = acceleration_jump(
-            self._comm, self.ownership, before, after, self._form, moving, kept_ratio
-        )
+        jump = acceleration_jump(self._comm, self.ownership, before, after, moving, kept_ratio)
         try:
             self._set_up(after)
             # What the method keeps besides the state moves with the acceleration.
@@ -245,7 +243,7 @@ class March:
         if incidents != self._happened:
             self.destroy()
             changed = changed_line(self._first, self._form, incidents)
-            self._set_up(changed if incidents else unchanged(self._first))
+            self._set_up(changed if incidents else unchanged(self._first, self._form))
         self._happened, self._ahead = incidents, happening[len(past) :]
         time = self._first_step * self._problem.numerics.dt
         self._pantographs.move_to(time)

@@ -107,6 +107,9 @@ def _arms(rng: random.Random, words: Words, span: float) -> None:
         words["line.steady_arm.uplift_stop_m"] = rng.uniform(0.005, 0.15)
         words["line.steady_arm.uplift_stop_stiffness_N_per_m"] = 10 ** rng.uniform(3.0, 6.0)
     words["line.stagger_m"] = rng.uniform(-0.3, 0.3)
+    if rng.random() < 0.3:
+        words["line.steady_arm.stiffness_by_radial_force"] = "true"
+        words["line.steady_arm.stiffness_N_per_m"] = 0.0
 
 
 def _damping(rng: random.Random, words: Words, span: float) -> None:

@@ -45,6 +45,17 @@ def test_a_messenger_wire_has_a_stagger_of_its_own() -> None:
             "takes holds_height or inclination_deg, but both are given",
         ),
         ([ON, "line.steady_arm.inclination_deg=40"], "inclination_deg"),
+        (
+            ["line.steady_arm.stiffness_by_radial_force=true", "line.steady_arm.length_m=0"],
+            "needs length_m above 0 for stiffness_by_radial_force",
+        ),
+        (
+            [
+                "line.steady_arm.stiffness_by_radial_force=true",
+                "line.steady_arm.stiffness_N_per_m=9",
+            ],
+            "takes stiffness_N_per_m or stiffness_by_radial_force, but both are given",
+        ),
         (["line.messenger_stagger_m=0.2"], "line.messenger_stagger_m .* acts only with"),
         (["line.curve.radius_m=3000"], "acts only with effects.lateral_motion = true"),
         ([ON, "line.curve.radius_m=50"], "line.curve.radius_m"),
@@ -74,3 +85,16 @@ def test_lateral_motion_goes_with_another_temperature() -> None:
     changes = [ON, "effects.axial_motion=true", "line.temperature.difference_K=30", *wires]
     problem = problem_of(load_scene("ac_simple", [*changes, "line.ends.end.along=tensioner"]))
     assert {"lateral_motion", "temperature"} <= {effect.name for effect in active(problem)}
+
+
+def test_arms_of_a_vertical_scene_have_the_stiffness_of_their_radial_force() -> None:
+    """4 F a / (L l) of a zig-zag, and no effect without a stagger."""
+    changes = ["line.steady_arm.stiffness_by_radial_force=true", "line.n_spans=4"]
+    changes += ["train.start_m=60", "evaluation.from_m=120", "evaluation.to_m=160"]
+    problem = problem_of(load_scene("ac_simple", changes))
+    (arms,) = problem.line.steady_arms
+    found = arms.vertical_stiffness(problem.line.wire(arms.wire))
+    assert found == pytest.approx(4 * 22e3 * 0.2 / (55 * 1.22), rel=1e-12)
+    assert "arm_stiffness" in {effect.name for effect in active(problem)}
+    straight = problem_of(load_scene("ac_simple", [*changes, "line.stagger_m=0"]))
+    assert "arm_stiffness" not in {effect.name for effect in active(straight)}

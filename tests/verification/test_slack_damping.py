@@ -200,10 +200,10 @@ def test_a_slack_dropper_that_breaks_takes_its_damper_along(scheme: str) -> None
     assert abs(pushed) > 10.0
     incident = DropperBreak(step * 1e-3, float(mesh.x(mesh.droppers[number, 1])))
     broken = replace(problem, effects=WHOLE | {"dropper_break"}, incidents=(incident,))
-    first, later = unchanged(model), changed_line(model, form, (incident,))
+    first, later = unchanged(model, form), changed_line(model, form, (incident,))
     ownership = distribute(model, COMM.size, COMM.rank)
     moving = state["displacement"], state["velocity"]
-    jump = acceleration_jump(COMM, ownership, first, later, form, moving, 0.0)
+    jump = acceleration_jump(COMM, ownership, first, later, moving, 0.0)
     # The line loses the damper's force and nothing else: the spring carried none.
     force = np.zeros(model.n_dofs)
     force[upper], force[lower] = pushed, -pushed

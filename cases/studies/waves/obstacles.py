@@ -98,8 +98,11 @@ def obstacles_of(rest: LineAtRest) -> list[Obstacle]:
         kind = arms.kind
         moves = kind.mass_per_length * kind.length / 3.0 + kind.clamp_mass
         mass = moves if "arm_inertia" in on else 0.0
-        stiffness = kind.stiffness if "arm_stiffness" in on else 0.0
-        bench = Bench((line.wire(arms.wire),), (replace(arms, x=(HALF,)),))
+        # Of the first one, where each has its own.
+        of_each = arms.vertical_stiffness(line.wire(arms.wire))
+        stiffness = float(of_each[0]) if "arm_stiffness" in on and of_each.size else 0.0
+        alone = replace(kind, stiffness=stiffness, by_radial_force=False)
+        bench = Bench((line.wire(arms.wire),), (replace(arms, kind=alone, x=(HALF,)),))
         found.append(_alone(arms.name, bench, stiffness, mass))
     contact = line.wires[0]
     for above in line.wires[1:2]:

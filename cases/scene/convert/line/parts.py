@@ -122,4 +122,5 @@ def steady_arm(table: SteadyArmTable) -> SteadyArm:
         inclination=None if tilt is None else angle_from_deg(tilt),
         uplift_stop=table.uplift_stop_m,
         stop_stiffness=table.uplift_stop_stiffness_N_per_m or _STOP_STIFFNESS,
+        by_radial_force=table.stiffness_by_radial_force,
     )

@@ -22,6 +22,11 @@ class SteadyArmTable(Table):
     stiffness_N_per_m: float = Field(
         0.0, ge=0, le=1e8, description="vertical stiffness at the contact wire"
     )
+    stiffness_by_radial_force: bool = Field(
+        False,
+        description="whether the vertical stiffness is the radial force of the stagger over "
+        "length_m, as with lateral motion, in place of stiffness_N_per_m",
+    )
     holds_height: bool = Field(
         False,
         description="whether the arm holds the contact wire at its height at rest; otherwise the "
@@ -60,4 +65,15 @@ class SteadyArmTable(Table):
             raise ValueError(
                 f"takes holds_height or inclination_deg, but both are given{TAKE_AWAY}"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _one_stiffness(self) -> SteadyArmTable:
+        if self.stiffness_by_radial_force and self.stiffness_N_per_m:
+            raise ValueError(
+                "takes stiffness_N_per_m or stiffness_by_radial_force, but both are given"
+                f"{TAKE_AWAY}"
+            )
+        if self.stiffness_by_radial_force and not self.length_m:
+            raise ValueError("needs length_m above 0 for stiffness_by_radial_force = true")
         return self
