@@ -102,7 +102,7 @@ class LineView:
                 show_scalar_bar=not self._wires,
                 scalar_bar_args={
                     "title": f"{title} [mm]\n", "vertical": False, "height": 0.07, "width": 0.28,
-                    "position_x": 0.7, "position_y": 0.9, "n_labels": 3, "fmt": "%.3g",
+                    "position_x": 0.7, "position_y": 0.87, "n_labels": 3, "fmt": "%.3g",
                     "label_font_size": 14, "title_font_size": 14, "color": "black",
                 },
             )  # fmt: skip

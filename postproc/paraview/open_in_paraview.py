@@ -113,7 +113,6 @@ def _settings(
         "size": scale.size,
         "motion": scale.motion,
         "largest_m": float(f"{largest:.2g}"),
-        "radius": 0.0018 * width,
         "metres_a_newton": arrow,
         "width_m": width,
         "middle_m": 0.5 * scale.size * (low + high),

@@ -62,7 +62,9 @@ def _command() -> tuple[Sequence[str], str]:
         return (_PROGRAM,), ""
     # Debian's draws on a screen only. One of its own is there whatever DISPLAY says.
     if shutil.which(_SCREEN) is not None:
-        return (_SCREEN, "-a", "-s", "-screen 0 1600x900x24", _PROGRAM), ""
+        # Two that begin at one time look for a free number from different ones on.
+        number = str(100 + os.getpid() % 5000)
+        return (_SCREEN, "-a", "-n", number, "-s", "-screen 0 1600x900x24", _PROGRAM), ""
     if os.environ.get("DISPLAY"):
         return (_PROGRAM,), ""
     return (), f"no state is written: {_PROGRAM} needs a screen, or {_SCREEN}"
