@@ -85,10 +85,20 @@ def waves(
             "leading one acts on the trailing one, and nothing else.",
         ),
     ] = None,
+    window_error: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SPANS,...",
+            help="March the whole line and windows of so many moving spans, and draw the error of "
+            "the contact force over their size, and nothing else.",
+        ),
+    ] = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(
-            "--vary", metavar="KEY=V1,V2,...", help="With --separations: a curve for each value."
+            "--vary",
+            metavar="KEY=V1,V2,...",
+            help="With --separations or --window-error: a curve for each value.",
         ),
     ] = None,
     assignments: Assignments = None,
@@ -112,14 +122,24 @@ def waves(
         )
     if obstacles and not train:
         raise InputError("--obstacles runs pulses of its own; leave --excite away")
-    if vary and separations is None:
-        raise InputError("--vary belongs to --separations; vary other runs with catenary sweep")
-    if separations is not None:
+    if vary and separations is None and window_error is None:
+        raise InputError(
+            "--vary belongs to --separations and --window-error; vary other runs with catenary "
+            "sweep"
+        )
+    if separations is not None and window_error is not None:
+        raise InputError("--separations and --window-error are two studies; give one")
+    for option, text in (("--separations", separations), ("--window-error", window_error)):
+        if text is None:
+            continue
         if obstacles or not train:
-            raise InputError("--separations runs the train; leave --obstacles and --excite away")
+            raise InputError(f"{option} runs the train; leave --obstacles and --excite away")
         if out is None:
             raise InputError("-o is missing; it names the folder of the runs")
+    if separations is not None and out is not None:
         return _separations(case, out, separations, vary or [], given, shortened, force)
+    if window_error is not None and out is not None:
+        return _window_error(case, out, window_error, vary or [], given, shortened, force)
     if (folder / "run.h5").is_file():
         if obstacles:
             raise InputError(f"{folder} is a run; --obstacles is for cases")
@@ -184,6 +204,32 @@ def _separations(
     said = separation.as_text(separation.curves_of(ended), theory, span)
     console.say("\n" + said + "\n" + "\n".join(map(str, files)))
     return verdict(ended, "curve")
+
+
+def _window_error(
+    case: str, out: Path, text: str, vary: list[str], given: list[str], shortened: bool, force: bool
+) -> int:
+    """What --window-error does; returns the exit code."""
+    from catenary.cases.process.petsc_options import start_petsc
+    from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product
+    from catenary.cases.studies.waves import window_error
+    from catenary.cases.studies.waves.study import refuse_table
+
+    refuse_impossible(out)
+    refuse_table(out / window_error.TABLE, force)
+    sizes = window_error.parse_sizes(text)
+    variants = product([parse_vary(one) for one in vary], {}) if vary else []
+    check_keys(variants, "on the command line (--vary)")
+    assigned = [(one.name, list(one.assignments)) for one in variants]
+    scenes = [
+        (name, load(case, [*given, *more], None, shortened))
+        for name, more in assigned or [("", [])]
+    ]
+    start_petsc([])
+    curves = [window_error.curve_of(name, scene, sizes) for name, scene in scenes]
+    files = window_error.write(out, curves)
+    console.say(window_error.as_text(curves) + "\n" + "\n".join(map(str, files)))
+    return console.DONE
 
 
 def _run(scene: object, out: Path, force: bool) -> bool:

@@ -16,7 +16,7 @@ class WindowChoice:
     ``mode`` is ``off`` (all), ``exact`` (all that any wave has reached) or ``bounded``: those whose
     motion exceeds ``tolerance`` times the largest one of the line, or those from ``spans_behind``
     behind the last pantograph to ``spans_ahead`` ahead of the first one. ``fading`` [1/s] is the
-    damping on mass with which the outer half of that stretch ends.
+    damping on mass with which the outer part of that stretch ends.
     """
 
     mode: str = OFF

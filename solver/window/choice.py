@@ -18,8 +18,8 @@ from catenary.solver.problem.window import BOUNDED, EXACT, ROUND_OFF, WindowChoi
 _OMEGA = 2.0 * math.pi * 2.0
 _RATE, _SPEED_RATIO = 0.0141, 0.57
 # Spans ahead there, and error of the force history below 20 Hz [% of sigma].
-_AHEAD = (4.0, 6.0, 8.0, 10.0, 15.0, 20.0, 25.0, 30.0)
-_ERROR = (9.8, 5.9, 3.8, 2.4, 1.1, 0.7, 0.6, 0.09)
+_AHEAD = (5.0, 9.0, 14.0, 18.0, 23.0, 26.0, 30.0)
+_ERROR = (14.0, 6.4, 1.3, 0.39, 0.26, 0.13, 0.035)
 # So many times as many spans ahead are needed as behind.
 _BEHIND = 1.25
 # Times at which what moves is counted.

@@ -17,6 +17,8 @@ from catenary.solver.linear.factors.meeting_station import middle_of, turn
 STEP, IS_FRESH = 0, 1
 # Looks from one search for the largest motion to the next, once it has grown for as many.
 _PEAK_EVERY = 64
+# Share of a window to each side of the train that fades.
+_FADING = 0.7
 # Stations of the smallest window.
 _LEAST = 64
 
@@ -225,19 +227,23 @@ def turn_to(window, begin, end):
 
 @compiled
 def fade(window, motion, first, last):
-    """Slow down the outer half of what is behind the place ``first`` and ahead of ``last`` [m]."""
+    """Slow down the outer part of what is behind the place ``first`` and ahead of ``last`` [m].
+
+    The damping begins with its fourth power of the way into that part: waves that are hardly faster
+    or slower than the train are sent back by what begins at once.
+    """
     ends, low, high = window.ends, window.low, window.high
     begin, end = ends[0], ends[1]
-    behind, ahead = 0.5 * (first - low[begin]), 0.5 * (high[end - 1] - last)
+    behind, ahead = _FADING * (first - low[begin]), _FADING * (high[end - 1] - last)
     i = begin
     while begin > 0 and i < end and high[i] < low[begin] + behind:
         share = 1.0 - (high[i] - low[begin]) / behind
-        slow_down(window, motion, i, window.rule[3] * share * share)
+        slow_down(window, motion, i, window.rule[3] * share**4)
         i += 1
     i = end - 1
     while end < low.size and i >= begin and low[i] > high[end - 1] - ahead:
         share = 1.0 - (high[end - 1] - low[i]) / ahead
-        slow_down(window, motion, i, window.rule[3] * share * share)
+        slow_down(window, motion, i, window.rule[3] * share**4)
         i -= 1
 
 

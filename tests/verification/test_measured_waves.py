@@ -19,7 +19,7 @@ from small_lines import (
 
 from catenary.cases.studies.waves.energy import EnergyMotion
 from catenary.cases.studies.waves.excited import Asked, excitation_of, march, without_train
-from catenary.cases.studies.waves.measured import arrived, measured_rows
+from catenary.cases.studies.waves.measured import arrived, measured_rows, transmitted
 from catenary.cases.studies.waves.seen import WireMotion
 from catenary.cases.studies.waves.theory import wave_theory
 from catenary.mbs.lumped_data import LumpedData
@@ -64,12 +64,37 @@ def test_group_velocities_of_a_periodic_line_are_those_of_its_bloch_waves() -> N
     rows = {
         row["name"]: row["value"] for row in measured_rows(wave_theory(rest.problem, rest), seen)
     }
-    assert len(rows) == 4
+    assert len(rows) == 5
     for number in (1, 2):
         expected = rows[f"group_velocity_{number}_theory"]
         assert 110.0 < expected < 118.0
         check("group velocity [m/s]", rows[f"group_velocity_{number}"], expected,
               within=0.01 * expected)  # fmt: skip
+
+
+def test_what_passes_lies_in_the_pass_bands() -> None:
+    """Within 0.1 Hz, the resolution of 12 s: the second station is 9 spans beyond the first one.
+
+    In the middle of a wide gap next to nothing comes: what the record's end lets spill over.
+    """
+    line = en50318_line(44)
+    problem = problem_of(line, WHOLE - {"dropper_slackening"})
+    struck = excitation_of("hammer", Asked(impulse=0.2), problem, 1e-3)
+    rest = line_at_rest(without_train(problem, struck), mesh_of(line, 4))
+    wire = WireMotion(rest.model.contact_nodes, rest.model.contact_x)
+    march(rest, struck, 4e-3, [wire])
+    seen = wire.seen(lambda times: np.zeros((times.size, 0)), 22 * 60.0)
+    found = transmitted(wave_theory(rest.problem, rest), seen)
+    assert found is not None and len(found.bands) > 8
+    print(f"share in the pass bands {found.inside:.4f}")
+    assert found.inside > 0.985
+    gaps = np.column_stack([found.bands[:-1, 1], found.bands[1:, 0]])
+    wide = gaps[np.diff(gaps, axis=1)[:, 0] > 0.4]
+    assert len(wide) > 2
+    for low, high in wide:
+        middle = np.abs(found.frequency - 0.5 * (low + high)) < 0.05
+        print(f"gap {low:.2f} to {high:.2f} Hz: {found.second[middle].max():.1e} of the largest")
+        assert found.second[middle].max() < 5e-3
 
 
 def test_a_moving_force_sends_waves_by_doppler_and_energy_by_its_factor() -> None:

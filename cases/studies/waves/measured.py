@@ -1,4 +1,4 @@
-"""Group velocities measured from the signals that a blow sends along a line."""
+"""Group velocities and pass bands measured from the signals that a blow sends along a line."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from catenary.solver.waves.bloch import BlochWaves
 _WIDTHS, _WIDEST = 4.0, 0.2
 # Narrower bands last too long [Hz]; in which share of the record waves are to arrive [-].
 _NARROWEST, _IN_TIME = 0.03, 0.8
+# Share of a record, at its end, over which a signal is let fade before its spectrum is taken.
+_FADED = 0.25
 # The fastest waves up to these frequencies are measured [Hz].
 _UP_TO = (0.5 * HIGHEST, HIGHEST)
 # Spans from the blow to the first station, least spans from there to the second, and which share of
@@ -83,17 +85,19 @@ def measured_rows(theory: WaveTheory, seen: WavesSeen) -> list[dict[str, Any]]:
     waves = theory.bloch
     if waves is None or seen.position.shape[1]:
         return []
-    length, room = waves.length, _SHARE * (seen.x[-1] - seen.struck)
-    n = int(room // length) - _FIRST
-    if n < _APART:
+    columns = _stations(seen, waves.length)
+    if columns is None:
         return []
-    columns = [
-        int(np.argmin(np.abs(seen.x - (seen.struck + spans * length))))
-        for spans in (_FIRST, _FIRST + n)
-    ]
     first, second = (seen.velocity[:, column].astype(float) for column in columns)
     distance = float(seen.x[columns[1]] - seen.x[columns[0]])
     rows = []
+    spectrum = transmitted(theory, seen)
+    if spectrum is not None:
+        meaning = "share of what has come so far that lies in the pass bands of the periodic line"
+        rows.append(
+            {"name": "energy_in_pass_bands", "value": spectrum.inside, "unit": "-"}
+            | {"meaning": f"{meaning}, {distance:.0f} m on"}
+        )
     for number, highest in enumerate(_UP_TO, start=1):
         frequency, velocity = branch_of_fastest(waves, highest)
         at, wide = 0.5 * (frequency[0] + frequency[-1]), frequency[-1] - frequency[0]
@@ -109,6 +113,63 @@ def measured_rows(theory: WaveTheory, seen: WavesSeen) -> list[dict[str, Any]]:
                  f"of the periodic line, {what}"),
         ]  # fmt: skip
     return rows
+
+
+class Transmitted(NamedTuple):
+    """Spectra of the velocity at two stations, the second one further from a blow.
+
+    Attributes
+    ----------
+    frequency : (f,) up to 20 Hz [Hz]
+    first, second : (f,) energy at both stations, each relative to its largest [-]
+    bands : (n, 2) pass bands of the periodic line [Hz]
+    inside : share of the energy at the second station that lies in them, widened by what the record
+        resolves [-]
+    """
+
+    frequency: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+    bands: np.ndarray
+    inside: float
+
+
+def transmitted(theory: WaveTheory, seen: WavesSeen) -> Transmitted | None:
+    """What passes from one station to another; None without a blow, periodic line or room."""
+    waves = theory.bloch
+    columns = None if waves is None or seen.position.shape[1] else _stations(seen, waves.length)
+    if columns is None:
+        return None
+    n = seen.time.size
+    # What has not come to its end at the end of the record would spill over all frequencies.
+    fade = np.ones(n)
+    late = max(1, int(_FADED * n))
+    fade[-late:] = 0.5 * (1.0 + np.cos(np.pi * np.arange(late) / late))
+    step = float(seen.time[1] - seen.time[0])
+    frequency = np.fft.rfftfreq(4 * n, step)
+    chosen = frequency <= HIGHEST
+    first, second = (
+        np.abs(np.fft.rfft(seen.velocity[:, column] * fade, 4 * n)[chosen]) ** 2
+        for column in columns
+    )
+    frequency, bands, wide = frequency[chosen], theory.bands(), 1.0 / (n * step)
+    within = np.zeros(frequency.size, dtype=bool)
+    for low, high in bands:
+        within |= (frequency > low - wide) & (frequency < high + wide)
+    inside = float(second[within].sum() / second.sum())
+    return Transmitted(frequency, first / first.max(), second / second.max(), bands, inside)
+
+
+def _stations(seen: WavesSeen, length: float) -> tuple[int, int] | None:
+    """Columns of two places whole spans of a ``length`` [m] beyond a blow; None without room."""
+    n = int(_SHARE * (seen.x[-1] - seen.struck) // length) - _FIRST
+    if n < _APART:
+        return None
+    first, second = (
+        int(np.argmin(np.abs(seen.x - (seen.struck + spans * length))))
+        for spans in (_FIRST, _FIRST + n)
+    )
+    return first, second
 
 
 def branch_of_fastest(waves: BlochWaves, highest: float) -> tuple[np.ndarray, np.ndarray]:

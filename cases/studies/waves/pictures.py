@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from catenary.cases.studies.waves.energy import EnergySeen
+from catenary.cases.studies.waves.measured import Transmitted
 from catenary.cases.studies.waves.seen import WavesSeen, places_of
 from catenary.cases.studies.waves.theory import HIGHEST, WaveTheory
 from catenary.postproc.report import figures
@@ -108,6 +109,26 @@ def wavenumbers(seen: WavesSeen, theory: WaveTheory) -> Figure:
     axes.set_ylim(0.0, HIGHEST)
     figures.tidy(axes, "wavenumber [rad/m], positive with the train", "frequency [Hz]")
     figures.legend_above(axes, 3)
+    return figure
+
+
+def transmission(found: Transmitted) -> Figure:
+    """Energy at two stations beyond a blow over frequency; pass bands are shaded."""
+    figure = figures.new_figure(4.2)
+    axes = figure.add_subplot()
+    for low, high in found.bands:
+        axes.axvspan(low, high, color=figures.SHADE, zorder=0)
+    for values, label, colour in (
+        (found.first, "near the blow", figures.GREY),
+        (found.second, "many spans further", figures.COLOURS[0]),
+    ):
+        axes.semilogy(
+            found.frequency, np.maximum(values, 1e-12), color=colour, linewidth=1.0, label=label
+        )
+    axes.set_xlim(0.0, HIGHEST)
+    axes.set_ylim(1e-7, 2.0)
+    figures.tidy(axes, "frequency [Hz], pass bands shaded", "energy over its largest [-]")
+    figures.legend_above(axes, 2)
     return figure
 
 

@@ -17,7 +17,7 @@ from catenary.cases.studies.sweep.output import as_csv
 from catenary.cases.studies.waves import ends, obstacles, pictures
 from catenary.cases.studies.waves.energy import EnergyMotion, EnergySeen
 from catenary.cases.studies.waves.excited import Asked, excitation_of, march, without_train
-from catenary.cases.studies.waves.measured import measured_rows
+from catenary.cases.studies.waves.measured import measured_rows, transmitted
 from catenary.cases.studies.waves.seen import WavesSeen, WireMotion, places_of, waves_seen
 from catenary.cases.studies.waves.theory import WaveTheory, wave_theory
 from catenary.postproc.files.disk import write_all
@@ -89,7 +89,7 @@ def study_excited(scene: Scene, kind: str, asked: Asked, folder: Path, force: bo
     problem = problem_of(scene)
     excitation = excitation_of(kind, asked, problem, problem.numerics.dt)
     refuse_earlier(folder, force)
-    _refuse_table(folder / TABLE, force)
+    refuse_table(folder / TABLE, force)
     rest = line_at_rest(without_train(problem, excitation), mesh_of(scene))
     wire = WireMotion(rest.model.contact_nodes, rest.model.contact_x)
     energy = EnergyMotion(rest)
@@ -114,7 +114,7 @@ def study_obstacles(scene: Scene, folder: Path, force: bool) -> tuple[str, list[
     InputError
         If the folder holds such a table and ``force`` is not given.
     """
-    _refuse_table(folder / OBSTACLES, force)
+    refuse_table(folder / OBSTACLES, force)
     problem = problem_of(scene)
     rest = line_at_rest(problem, mesh_of(scene))
     results = [obstacles.result_of(one, problem) for one in obstacles.obstacles_of(rest)]
@@ -136,7 +136,8 @@ def theory_of(scene: Scene) -> tuple[WaveTheory, float]:
     return wave_theory(problem, line_at_rest(problem, mesh_of(scene))), last - first
 
 
-def _refuse_table(path: Path, force: bool) -> None:
+def refuse_table(path: Path, force: bool) -> None:
+    """Raise InputError if there is a table of an earlier study that may not be replaced."""
     if not force and path.exists():
         raise InputError(f"{path} is there already; name another folder with -o, or give --force")
 
@@ -176,6 +177,9 @@ def _write(
         drawn = ends.picture(reflections, rest.problem.ends, theory.speed)
         content["end_reflection.png"] = figures.png(drawn)
         content["end_reflection.csv"] = as_csv(ends.curve_rows(reflections))
+    spectra = transmitted(theory, seen)
+    if spectra is not None:
+        content["transmission.png"] = figures.png(pictures.transmission(spectra))
     if seen.position.shape[1]:
         ahead_of = "first pantograph" if what == "train" else what
         content["train_frame.png"] = figures.png(

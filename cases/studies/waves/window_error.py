@@ -1,0 +1,249 @@
+"""Error in the contact force that a window of moving spans makes, over its size.
+
+The line is marched once whole and once with each window; forces are compared below 20 Hz within the
+evaluated stretch.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+from mpi4py import MPI
+
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.sweep.output import as_csv
+from catenary.postproc.evaluate.filters import low_pass
+from catenary.postproc.files.disk import write_all
+from catenary.postproc.report import figures
+from catenary.solver.base.errors import InputError, RunBroken
+from catenary.solver.problem.window import WindowChoice
+from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
+from catenary.solver.time_loop.march import March
+from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.window.choice import estimated_error, spans_of_window
+
+TABLE, PICTURE = "window_error.csv", "window_error.png"
+OPTION = "--window-error"
+# Sizes that a curve may have, and the least [spans].
+MOST, LEAST = 100, 2
+# Share of a window that is ahead of the train, as in the one that the program chooses.
+_AHEAD = 5.0 / 9.0
+_NEVER = 2**62
+
+
+class Error(NamedTuple):
+    """What a window costs in accuracy; worst of all pantographs.
+
+    Attributes
+    ----------
+    ahead, behind : spans
+    history : rms difference of the force from that of the whole line [% of its sigma]
+    sigma : difference of the standard deviation, with its sign [%]
+    estimated : of ``history`` by the program [%]
+    is_default : whether the program chooses this window
+    """
+
+    ahead: float
+    behind: float
+    history: float
+    sigma: float
+    estimated: float
+    is_default: bool
+
+    @property
+    def spans(self) -> float:
+        return self.ahead + self.behind
+
+
+class Curve(NamedTuple):
+    """Errors by ascending size, of a line called ``name``, empty if there is no other."""
+
+    name: str
+    errors: tuple[Error, ...]
+
+
+def parse_sizes(text: str) -> list[int]:
+    """Sizes of windows, ``a,b,...`` [spans], ascending.
+
+    Raises
+    ------
+    InputError
+        If it has another form, or names one that is too small, or one twice.
+    """
+    try:
+        values = [int(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if not 0 < len(values) <= MOST or min(values) < LEAST or len(set(values)) < len(values):
+        raise InputError(
+            f"{OPTION} {text} must be whole numbers of spans from {LEAST} on, each once, as "
+            "a,b,..., e.g. 8,16,24,40,54"
+        )
+    return sorted(values)
+
+
+def curve_of(name: str, scene: Scene, sizes: Sequence[int]) -> Curve:
+    """March a scene whole and with windows of these ascending sizes. Serial.
+
+    The window that the program chooses is one of them if the line is longer.
+
+    Raises
+    ------
+    InputError
+        If one is no smaller than the line, or there can be none.
+    RunBroken
+        If a march breaks.
+    """
+    problem = problem_of(scene)
+    n_spans = len(problem.line.support_positions) - 1
+    if sizes[-1] >= n_spans:
+        raise InputError(
+            f"{OPTION} has a window of {sizes[-1]} spans, but the line has {n_spans} "
+            f"(line.n_spans {scene.origin.of('line.n_spans')})"
+        )
+    usual = spans_of_window(problem)
+    windows = set()
+    if usual.spans_ahead + usual.spans_behind < n_spans:
+        windows.add((usual.spans_ahead, usual.spans_behind))
+    for size in sizes:
+        ahead = float(min(size - 1, math.ceil(_AHEAD * size)))
+        windows.add((ahead, size - ahead))
+    rest = line_at_rest(replace(problem, window=WindowChoice()), mesh_of(scene))
+    whole = _forces(rest, WindowChoice())
+    errors = []
+    for ahead, behind in sorted(windows, key=sum):
+        found = _forces(rest, spans_of_window(problem, ahead, behind))
+        history, sigma = _worst(found, whole)
+        errors.append(
+            Error(
+                ahead,
+                behind,
+                history,
+                sigma,
+                estimated_error(problem, ahead, behind),
+                (ahead, behind) == (usual.spans_ahead, usual.spans_behind),
+            )
+        )
+    return Curve(name, tuple(errors))
+
+
+def write(folder: Path, curves: Sequence[Curve]) -> list[Path]:
+    """Write table and picture; returns the files. Not collective."""
+    rows: list[dict[str, Any]] = [
+        {
+            "with": curve.name, "spans_ahead": one.ahead, "spans_behind": one.behind,
+            "history_percent_of_std": one.history, "std_percent": one.sigma,
+            "estimated_percent": one.estimated,
+            "default": int(one.is_default),
+        }
+        for curve in curves
+        for one in curve.errors
+    ]  # fmt: skip
+    content: dict[str, bytes | str] = {
+        TABLE: as_csv(rows), PICTURE: figures.png(draw(curves))
+    }  # fmt: skip
+    return write_all(folder, content)
+
+
+def draw(curves: Sequence[Curve]) -> Figure:
+    """Errors over size; the window that the program chooses is a star, its estimates are dotted."""
+    figure = figures.new_figure(4.6)
+    axes = figure.add_subplot()
+    for number, curve in enumerate(curves):
+        colour = figures.COLOURS[number % len(figures.COLOURS)]
+        spans = [one.spans for one in curve.errors]
+        axes.plot(
+            spans, [one.history for one in curve.errors], "o-", color=colour, ms=3.5,
+            linewidth=1.4, label=f"history {curve.name}".strip(),
+        )  # fmt: skip
+        axes.plot(
+            spans, [abs(one.sigma) for one in curve.errors], "s--", color=colour, ms=3.0,
+            linewidth=0.8, label=f"sigma {curve.name}".strip(),
+        )  # fmt: skip
+        axes.plot(
+            spans, [one.estimated for one in curve.errors], ":", color=colour, linewidth=1.0
+        )  # fmt: skip
+        for one in curve.errors:
+            if one.is_default:
+                axes.plot(one.spans, one.history, "*", color=colour, ms=13.0)
+    axes.set_yscale("log")
+    label = "spans that move (star: chosen by the program, dotted: its estimate)"
+    figures.tidy(axes, label, "error of the force [% of sigma]")
+    figures.legend_above(axes, 2)
+    return figure
+
+
+def as_text(curves: Sequence[Curve]) -> str:
+    """A line for each window, for a terminal."""
+    lines = []
+    for curve in curves:
+        for one in curve.errors:
+            chosen = ", chosen by the program" if one.is_default else ""
+            lines.append(
+                f"{curve.name} {one.ahead:g} spans ahead, {one.behind:g} behind{chosen}: history "
+                f"{one.history:.2g} % of sigma (estimated {one.estimated:.2g}), sigma "
+                f"{one.sigma:+.2g} %".strip()
+            )
+    return "\n".join(lines)
+
+
+class _Forces:
+    """Observer that keeps positions and contact forces of all pantographs at all steps."""
+
+    def __init__(self) -> None:
+        self._blocks: list[np.ndarray] = []
+
+    def start(self, stage: Stage) -> None:
+        """Nothing is needed."""
+
+    def next_state(self, step: int) -> int:
+        """No state is needed."""
+        return _NEVER
+
+    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
+        """Copy."""
+        self._blocks.append(np.hstack([rows[:, part] for part in self._parts]))
+
+    def observe(self, view: StepView) -> None:
+        """Copy; the first view says where the channels stand."""
+        self._parts = [view.columns[name] for name in ("contact_position", "contact_force")]
+        self._blocks.append(np.hstack([view.row[None, part] for part in self._parts]))
+
+    def finish(self, outcome: str) -> None:
+        """Nothing is left to do."""
+
+    def table(self) -> np.ndarray:
+        """(rows, 2, n_pantographs), positions [m] and forces [N]."""
+        rows = np.concatenate(self._blocks)
+        return rows.reshape(len(rows), 2, -1)
+
+
+def _forces(rest: LineAtRest, window: WindowChoice) -> list[np.ndarray]:
+    """Filtered force (n,) of each pantograph in the stretch [N]."""
+    problem, seen = replace(rest.problem, window=window), _Forces()
+    with March(MPI.COMM_SELF, *rest._replace(problem=problem)) as run:
+        outcome = run.run([seen])
+    if outcome.outcome != "done":
+        raise RunBroken(outcome.outcome)
+    position, force = seen.table().transpose(1, 2, 0)
+    first, last = problem.evaluation
+    filtered = low_pass(force.T, problem.numerics.dt).T
+    return [own[(at >= first) & (at <= last)] for own, at in zip(filtered, position, strict=True)]
+
+
+def _worst(found: list[np.ndarray], whole: list[np.ndarray]) -> tuple[float, float]:
+    """Errors of history and sigma, each of the pantograph where it is largest [%]."""
+    history, sigma = 0.0, 0.0
+    for own, expected in zip(found, whole, strict=True):
+        deviation = float(expected.std())
+        history = max(history, 100.0 * float(np.sqrt(((own - expected) ** 2).mean())) / deviation)
+        sigma = max(sigma, 100.0 * (float(own.std()) / deviation - 1.0), key=abs)
+    return history, sigma

@@ -1,0 +1,41 @@
+"""The error that a window makes in the contact force, over its size."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from catenary.cases.scene.load import load_scene
+from catenary.cases.studies.waves import window_error
+from catenary.solver.base.errors import InputError
+
+# The paper's line with average damping, on which waves fade within a few spans.
+SHORT = (
+    "line.n_spans=14", "train.pantographs=[{name='lumped'}]", "train.start_m=330",
+    "train.end_m=420", "train.raise_time_s=0.2", "evaluation.from_m=360", "evaluation.to_m=410",
+)  # fmt: skip
+
+
+def test_the_error_falls_with_the_size_of_the_window(tmp_path: Path) -> None:
+    curve = window_error.curve_of("average", load_scene("ambrosio2012", SHORT), [2, 5])
+    sizes = [one.spans for one in curve.errors]
+    assert sizes == [2.0, 5.0, 8.0] and [one.is_default for one in curve.errors] == [0, 0, 1]
+    small, _, usual = (one.history for one in curve.errors)
+    # One span ahead and behind: some tenths of a per cent; the program's own is as good as exact.
+    assert 1e-3 < small < 5.0 and usual < 1e-3 * small
+    assert all(abs(one.sigma) <= one.history for one in curve.errors)
+    assert "chosen by the program" in window_error.as_text([curve]).splitlines()[-1]
+    names = {path.name for path in window_error.write(tmp_path, [curve])}
+    assert names == {"window_error.csv", "window_error.png"}
+    rows = (tmp_path / "window_error.csv").read_text().splitlines()
+    assert len(rows) == 4 and rows[0].startswith("with,spans_ahead")
+
+
+def test_sizes_that_cannot_be_are_refused() -> None:
+    for text in ("", "8,x", "1,2", "8,8", "4.5"):
+        with pytest.raises(InputError, match="--window-error .* must be whole numbers of spans"):
+            window_error.parse_sizes(text)
+    assert window_error.parse_sizes("16,8") == [8, 16]
+    with pytest.raises(InputError, match="window of 14 spans, but the line has 14"):
+        window_error.curve_of("", load_scene("ambrosio2012", SHORT), [4, 14])
