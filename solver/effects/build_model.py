@@ -21,23 +21,27 @@ def build(
     broken: np.ndarray | None = None,
     form: Equilibrium | None = None,
     gap: np.ndarray | None = None,
+    before: Model | None = None,
 ) -> Model:
     """The model of a problem on a mesh, for given dropper lengths [m]. Not collective.
 
     ``broken`` (n_droppers,) bool, droppers that carry nothing beside those that the problem has;
     ``gap`` (n_droppers,) what droppers that are slack at rest lack to be taut [m]; none if not
     given. ``form`` is the shape at rest, where it is known: before it is found wires are straight
-    and droppers upright.
+    and droppers upright. ``before`` is a model of the same problem and mesh that has numbers.
     """
     active = effects.active(problem)
-    row_of_node = np.empty(mesh.n_nodes, dtype=np.int64)
-    row_of_node[along_the_track(mesh)] = np.arange(mesh.n_nodes)
+    if before is None:
+        numbering, row_of_node = numbering_of(problem, mesh), np.empty(mesh.n_nodes, dtype=np.int64)
+        row_of_node[along_the_track(mesh)] = np.arange(mesh.n_nodes)
+    else:
+        numbering, row_of_node = before.numbering, before.row_of_node
     model = Model(
         problem,
         effects.simulated(problem),
         mesh,
         tuple(effect.name for effect in active),
-        numbering_of(problem, mesh),
+        numbering,
         row_of_node,
         dropper_lengths,
     )

@@ -65,7 +65,8 @@ class LineIntegrator(ABC):
         coefficients = (1.0, self.position_factor, self.velocity_factor)
         self.windows = Windows(model.numbering, reach(model, coefficients))
         self.operators = LineOperators(comm, model, ownership, coefficients, self.windows)
-        self.responses = UnitResponses(comm, model, ownership, coefficients, self.windows)
+        like = self.operators.like
+        self.responses = UnitResponses(comm, model, ownership, coefficients, self.windows, like)
         self._proportional = model.damping_is_proportional
         # What is folded into the product with K, and what is left to do after the solve.
         self._alpha_share = self._beta_share = 0.0

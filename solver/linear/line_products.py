@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
-from scipy import sparse
 
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.linear.halo import Subdomain
-from catenary.solver.linear.sections import Sections, neighbours
+from catenary.solver.linear.like_stations import LikeStations
+from catenary.solver.linear.sections import Sections
 from catenary.solver.linear.station_layout import Layout
 from catenary.solver.linear.station_products import (
     StationProduct,
@@ -15,6 +17,7 @@ from catenary.solver.linear.station_products import (
     station_product,
     with_damping,
 )
+from catenary.solver.linear.station_rows import LikeRows, StationRows
 from catenary.solver.model.matrices import as_petsc, part_of
 from catenary.solver.model.model import Model
 
@@ -32,6 +35,7 @@ class LineProducts:
     ----------
     model : Model
     domain : Subdomain, whose rows are multiplied
+    like : marks of the line's stations
     padded : what products by stations read, with one station more at both ends
     read : a vector around the same without these
 
@@ -41,11 +45,17 @@ class LineProducts:
     """
 
     def __init__(
-        self, model: Model, domain: Subdomain, padded: np.ndarray, read: PETSc.Vec
+        self,
+        model: Model,
+        domain: Subdomain,
+        padded: np.ndarray,
+        read: PETSc.Vec,
+        like: LikeStations,
     ) -> None:
         self._model, self._domain, self._padded, self._read = model, domain, padded, read
+        self._like = like
         self.layout: Layout | None = None
-        self._stiffness: sparse.bsr_matrix | None = None  # kept until its product is made
+        self._stiffness: StationRows | None = None  # kept until its product is made
         self._matrices: dict[str, PETSc.Mat] = {}
         self._products: dict[str, StationProduct | None] = {}
 
@@ -63,7 +73,16 @@ class LineProducts:
     def _matrix(self, name: str) -> PETSc.Mat:
         """M, K or C for the rows of the subdomain."""
         if name not in self._matrices:
-            self._matrices[name] = as_petsc(self._rows_of(name), PETSc.COMM_SELF)
+            domain = self._domain
+            part = part_of(
+                self._model,
+                (domain.low, domain.high),
+                (domain.read_low, domain.read_high),
+                _COEFFICIENTS[name],
+                0.0,
+                self._model.numbering.block,
+            )
+            self._matrices[name] = as_petsc(part, PETSc.COMM_SELF)
         return self._matrices[name]
 
     def multiply(self, name: str, result: np.ndarray, wrapped: PETSc.Vec) -> None:
@@ -80,30 +99,45 @@ class LineProducts:
         a product with C."""
         key = f"damped {name}" if damped else name
         if key not in self._products:
-            domain, product = self._domain, None
-            if self.layout is not None and domain.size:
-                columns, first = self._columns()
-                layout, damping = self.layout, None
-                if damped:
-                    damping = self._rows_of("damping")
-                    layout = with_damping(layout, neighbours(damping, first, columns))
-                product = station_product(self._rows_of(name), first, layout, damping, columns)
-            self._products[key] = product
+            rows = None
+            if self.layout is not None and self._domain.size:
+                rows = self._rows_of(name)
+            self._products[key] = None if rows is None else self._product(rows, damped)
         return self._products[key]
 
-    def find_layout(self, part: sparse.bsr_matrix) -> None:
-        """Find how unknowns of a station stand in lanes, if they can, from this and the operator
-        ``part`` that is solved with. Only where nodes form stations."""
-        rows, (columns, first) = (
-            self._sections(self._domain.low, self._domain.high),
-            self._columns(),
-        )
-        operator = neighbours(part, 0, rows)
+    def of_operator(self, operator: StationRows) -> StationProduct | None:
+        """The product with the operator that is solved with, by its rows."""
+        assert self.layout is not None
+        rows = self._sections(self._domain.low, self._domain.high)
+        return station_product(operator, 0, self.layout, columns=rows)
+
+    def _product(self, rows: StationRows, damped: bool) -> StationProduct | None:
+        assert self.layout is not None
+        (columns, first), layout, damping = self._columns(), self.layout, None
+        if damped:
+            damping = self._rows_of("damping")
+            layout = with_damping(layout, None if damping is None else damping.blocks)
+        return station_product(rows, first, layout, damping, columns)
+
+    def find_layout(self, coefficients: tuple[float, float, float]) -> StationRows | None:
+        """Find how unknowns of a station stand in lanes, if they can, from K and from the operator
+        with these ``coefficients`` of M, K and C. Only where nodes form stations.
+
+        Returns rows of the operator, None if there is no layout.
+        """
+        domain = self._domain
+        rows = self._sections(domain.low, domain.high)
+        operator = self._like_rows.sum_of(coefficients, (domain.low, domain.high), 1.0)
         self._stiffness = self._rows_of("stiffness")
-        stiffness = neighbours(self._stiffness, first, columns)
-        if operator is None or stiffness is None:
-            return
-        self.layout = layout_of(operator, stiffness, rows.make_ups if rows.varies else ())
+        if operator is None or self._stiffness is None:
+            return None
+        make_ups = rows.make_ups if rows.varies else ()
+        self.layout = layout_of(operator.blocks, self._stiffness.blocks, make_ups)
+        return operator if self.layout is not None else None
+
+    @cached_property
+    def _like_rows(self) -> LikeRows:
+        return LikeRows(self._model, self._like, self._domain.low, self._domain.high)
 
     def _sections(self, low: int, high: int) -> Sections:
         return Sections.of(self._model.numbering, low, high)
@@ -114,15 +148,8 @@ class LineProducts:
         columns = self._sections(domain.read_low, domain.read_high)
         return columns, int(np.searchsorted(columns.starts, domain.low - domain.read_low))
 
-    def _rows_of(self, name: str) -> sparse.bsr_matrix:
+    def _rows_of(self, name: str) -> StationRows | None:
         if name == "stiffness" and self._stiffness is not None:
             return self._stiffness
-        domain = self._domain
-        return part_of(
-            self._model,
-            (domain.low, domain.high),
-            (domain.read_low, domain.read_high),
-            _COEFFICIENTS[name],
-            0.0,
-            self._model.numbering.block,
-        )
+        read = self._domain.read_low, self._domain.read_high
+        return self._like_rows.sum_of(_COEFFICIENTS[name], read)

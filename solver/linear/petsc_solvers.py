@@ -8,8 +8,9 @@ direct solver. ``LineOperators`` verifies that, and iterates where it does not h
 from __future__ import annotations
 
 import weakref
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from catenary.solver.base.petsc import PETSc
 from catenary.solver.linear.factors.station_factors import StationFactors, station_factors
 from catenary.solver.linear.sections import Sections
 from catenary.solver.linear.station_layout import Layout
+from catenary.solver.linear.station_rows import StationRows
 from catenary.solver.model.matrices import as_petsc
 from catenary.solver.model.partition import Ownership
 
@@ -62,51 +64,73 @@ class PartSolver:
     Not collective. With an overlap as wide as the reach of A^-1 the rank's own unknowns come out
     exactly, without a word to other ranks; ``residual`` of ``LineOperators`` verifies that.
 
+    PETSc's matrix and solver are made where our own factors cannot be used, where options ask for
+    something of them, and for an iteration.
+
     Parameters
     ----------
-    part : rows and columns of what it solves for, in blocks of stations or of nodes
+    part : assembles rows and columns of what it solves for, in blocks of stations or of nodes
     own : the rank's own among them, in blocks
     in_stations : whether its blocks are stations
     is_whole : whether it is the whole line, which decides the prefix of its options
     layout, stations : of its stations, None if our own factors cannot be used
+    rows : the same as ``part`` by stations, if it is known
+    turns : whether the place where our own elimination ends may be moved
 
     Attributes
     ----------
-    matrix : ``part`` as a sequential PETSc matrix
     factors : our own, None if PETSc's are used
     """
 
     def __init__(
         self,
-        part: sparse.bsr_matrix,
+        part: Callable[[], sparse.bsr_matrix],
         own: slice,
         in_stations: bool,
         is_whole: bool,
         layout: Layout | None = None,
         stations: Sections | None = None,
+        rows: StationRows | None = None,
         turns: bool = False,
     ) -> None:
-        prefix = PREFIX if is_whole else PART_PREFIX
-        self.matrix = as_petsc(part, PETSc.COMM_SELF)
-        self._ksp = PETSc.KSP().create(PETSc.COMM_SELF)
+        self._part, self._in_stations = part, in_stations
+        self._prefix = PREFIX if is_whole else PART_PREFIX
+        self.factors: StationFactors | None = None
+        if layout is not None and not _is_given(f"{self._prefix}pc_"):
+            matrix = part() if rows is None else rows
+            self.factors = station_factors(matrix, layout, own.start, own.stop, stations, turns)
+        self._made: list[Callable[[], object]] = []  # what frees PETSc's objects
+        self._solve: Callable[[Wrapped, Wrapped], None] = self._solve_by_petsc
+        if self.factors is None or _is_given(f"{self._prefix}ksp_", f"{self._prefix}mat_"):
+            self._ksp.setUp()  # what options ask for, and PETSc refuses, is found out here
+        else:
+            self._solve = self._solve_by_stations
+
+    @cached_property
+    def matrix(self) -> PETSc.Mat:
+        """``part`` as a sequential PETSc matrix."""
+        matrix = as_petsc(self._part(), PETSc.COMM_SELF)
         # PETSc cannot free a PC in Python when Python has ended, so that it is freed before,
         # whatever error kept ``destroy`` from being called. No other rank takes part.
-        self._free = weakref.finalize(self, _destroy, self._ksp, self.matrix)
-        self._ksp.setOptionsPrefix(prefix)
-        self._ksp.setOperators(self.matrix)
-        _choose_direct(self._ksp, in_stations)
-        self.factors: StationFactors | None = None
-        if layout is not None and not _is_given(f"{prefix}pc_"):
-            self.factors = station_factors(part, layout, own.start, own.stop, stations, turns)
+        self._made.append(weakref.finalize(self, _destroy, matrix))
+        return matrix
+
+    @cached_property
+    def _ksp(self) -> PETSc.KSP:
+        ksp = PETSc.KSP().create(PETSc.COMM_SELF)
+        self._made.append(weakref.finalize(self, _destroy, ksp))
+        ksp.setOptionsPrefix(self._prefix)
+        ksp.setOperators(self.matrix)
+        _choose_direct(ksp, self._in_stations)
         if self.factors is not None:
-            self._ksp.getPC().setType(PETSc.PC.Type.PYTHON)
-            self._ksp.getPC().setPythonContext(self.factors)
+            ksp.getPC().setType(PETSc.PC.Type.PYTHON)
+            ksp.getPC().setPythonContext(self.factors)
         # Of an iteration that the options ask for; a direct solver has no tolerance.
-        self._ksp.setTolerances(rtol=DIRECT)
+        ksp.setTolerances(rtol=DIRECT)
         with refused_options():
-            self._ksp.setFromOptions()
-            self._ksp.setUp()
-        self._solve = self._solve_by_petsc
+            ksp.setFromOptions()
+            ksp.setUp()
+        return ksp
 
     def solve(self, right: Wrapped, solution: Wrapped) -> None:
         """Solve A ``solution`` = ``right`` here."""
@@ -115,28 +139,36 @@ class PartSolver:
     def _solve_by_petsc(self, right: Wrapped, solution: Wrapped) -> None:
         self._ksp.solve(right.vector, solution.vector)
 
+    def _solve_by_stations(self, right: Wrapped, solution: Wrapped) -> None:
+        assert self.factors is not None
+        self.factors.solve(right.array, solution.array)
+
+    @property
+    def _uses_petsc(self) -> bool:
+        return "_ksp" in self.__dict__
+
     @property
     def is_direct(self) -> bool:
         """Whether a solve cannot fail to converge: neither options nor ``iterate`` ask for more."""
-        return bool(self._ksp.getType() == PETSc.KSP.Type.PREONLY)
+        return not self._uses_petsc or bool(self._ksp.getType() == PETSc.KSP.Type.PREONLY)
 
     @property
     def failure(self) -> int:
         """PETSc's reason why the last solve did not converge; 0 if it did."""
-        return min(0, self._ksp.getConvergedReason())
+        return min(0, self._ksp.getConvergedReason()) if self._uses_petsc else 0
 
     def hurry(self) -> None:
         """Use the bare factors from now on, if the solver is direct.
 
         What PETSc does around them is a tenth of a solve with a short line.
         """
-        pc = self._ksp.getPC()
         if not self.is_direct:
             return
         if self.factors is not None:
-            solve_with = self.factors.solve
-            self._solve = lambda right, solution: solve_with(right.array, solution.array)
-        elif pc.getType() in (PETSc.PC.Type.CHOLESKY, PETSc.PC.Type.LU):
+            self._solve = self._solve_by_stations
+            return
+        pc = self._ksp.getPC()
+        if pc.getType() in (PETSc.PC.Type.CHOLESKY, PETSc.PC.Type.LU):
             factored = pc.getFactorMatrix().solve
             self._solve = lambda right, solution: factored(right.vector, solution.vector)
 
@@ -147,10 +179,12 @@ class PartSolver:
     def iterate(self) -> None:
         """Use the factors as a preconditioner of GMRES from now on."""
         _use_gmres(self._ksp)
+        self._solve = self._solve_by_petsc
 
     def destroy(self) -> None:
         """Free matrix and factors."""
-        self._free()
+        for free in reversed(self._made):
+            free()
 
 
 class SchwarzSolver:

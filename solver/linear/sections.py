@@ -110,8 +110,8 @@ def _of_varying(matrix: sparse.bsr_matrix, first: int, columns: Sections) -> np.
     """``neighbours`` of a matrix in blocks of any size."""
     entries = matrix.tocoo()
     n = int(np.searchsorted(columns.starts, columns.starts[first] + matrix.shape[0])) - first
-    rows, row_place = _cross_sections(entries.row + columns.starts[first], columns)
-    others, place = _cross_sections(entries.col, columns)
+    rows, row_place = places_of(entries.row + columns.starts[first], columns)
+    others, place = places_of(entries.col, columns)
     rows -= first
     step = others - rows - first
     there = entries.data != 0
@@ -122,7 +122,7 @@ def _of_varying(matrix: sparse.bsr_matrix, first: int, columns: Sections) -> np.
     return blocks
 
 
-def _cross_sections(unknowns: np.ndarray, columns: Sections) -> tuple[np.ndarray, np.ndarray]:
+def places_of(unknowns: np.ndarray, columns: Sections) -> tuple[np.ndarray, np.ndarray]:
     """Station of each unknown, and its place in a cross-section."""
     station = np.searchsorted(columns.starts, unknowns, side="right") - 1
     place_of = np.full((len(columns.make_ups), columns.width), -1)

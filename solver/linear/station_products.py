@@ -41,8 +41,9 @@ from catenary.solver.linear.make_ups import (
     make_up_of,
     start_of,
 )
-from catenary.solver.linear.sections import Sections, neighbours
+from catenary.solver.linear.sections import Sections
 from catenary.solver.linear.station_layout import LANES, WIDEST, Layout
+from catenary.solver.linear.station_rows import StationRows, rows_of
 from catenary.solver.linear.unique_rows import kinds_of
 
 
@@ -177,39 +178,45 @@ class StationProduct:
 
 
 def station_product(
-    matrix: sparse.bsr_matrix,
+    matrix: sparse.bsr_matrix | StationRows,
     first: int,
     layout: Layout,
-    damping: sparse.bsr_matrix | None = None,
+    damping: sparse.bsr_matrix | StationRows | None = None,
     columns: Sections | None = None,
 ) -> StationProduct | None:
-    """Products with a matrix in sorted blocks, whose first row is that of column ``first``.
+    """Products with a matrix in sorted blocks, or with its rows by stations.
 
-    The factor has a whole cross-section more at both ends than the matrix has ``columns``, which
-    are alike if not given. None if the matrix joins what the layout does not.
+    The first row is that of column ``first``; ``damping`` has kinds of the same stations. The
+    factor has a whole cross-section more at both ends than the matrix has ``columns``, which are
+    alike if not given. None if the matrix joins what the layout does not.
     """
     numbers: list[tuple[np.ndarray, str]] = []
-    for rows, sign in ((matrix, 1.0), (damping, -1.0)):
-        if rows is None:
+    rows: StationRows | None = None
+    for part, sign in ((matrix, 1.0), (damping, -1.0)):
+        if part is None:
             continue
-        blocks = neighbours(rows, first, columns)
-        if blocks is None:
+        found = rows_of(part, first, columns)
+        if found is None:
             return None
+        rows = rows or found
         for place, terms in ((1, "own_terms"), (0, "beside_terms"), (2, "beside_terms")):
-            numbers.append((sign * blocks[place], terms))
-    n_rows = numbers[0][0].shape[0]
-    stations = Sections.alike(matrix.shape[1] // layout.pitch, layout.pitch)
-    stations = (stations if columns is None else columns).padded()
+            numbers.append((sign * found.blocks[place], terms))
+    assert rows is not None
+    n_rows = rows.kinds.size
+    if columns is None:
+        columns = Sections.alike(first + n_rows + 1, layout.pitch)
+    stations = columns.padded()
 
-    def pack(part: Layout, rows: slice | np.ndarray) -> np.ndarray:
-        packed = [part.packed(blocks[rows], getattr(part, terms)) for blocks, terms in numbers]
+    def pack(part: Layout, which: slice | np.ndarray) -> np.ndarray:
+        packed = [part.packed(blocks[which], getattr(part, terms)) for blocks, terms in numbers]
         return np.concatenate(packed, axis=1)
 
-    make_up = stations.make_up[first + 1 : first + 1 + n_rows]
+    make_up = stations.make_up[first + 1 : first + 1 + n_rows][rows.chosen]
     kinds, packed, n_kinds, count = kinds_by_make_up(layout, make_up, pack)
     if count != sum(np.count_nonzero(blocks) for blocks, _ in numbers):
         return None
-    return StationProduct(layout, stations.places(), kinds, packed, first + 1, n_kinds)
+    of_row = kinds[rows.kinds]
+    return StationProduct(layout, stations.places(), of_row, packed, first + 1, n_kinds)
 
 
 @inner

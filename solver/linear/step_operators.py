@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
+from scipy import sparse
 
 from catenary.solver.base import aligned_arrays
 from catenary.solver.base.errors import NotConverged, RunBroken
@@ -18,6 +19,7 @@ from catenary.solver.base.petsc import PETSc
 from catenary.solver.base.petsc_events import event
 from catenary.solver.linear.factors.station_factors import StationFactors
 from catenary.solver.linear.halo import Halo, Subdomain
+from catenary.solver.linear.like_stations import LikeStations
 from catenary.solver.linear.line_products import LineProducts
 from catenary.solver.linear.petsc_solvers import (
     DIRECT,
@@ -71,11 +73,14 @@ class LineOperators:
     factor : (n_local,) what products multiply: this rank's part, to be filled in
     answer : (n_local,) this rank's part of the last solution
     domain : Subdomain
+    like : marks of the line's stations
     """
 
     # None on a rank that owns nothing.
     _solver: PartSolver | SchwarzSolver | None = None
     _is_direct = True
+    # A product with the operator, until it is verified.
+    _checked: StationProduct | None = None
     _rate_halo: Halo | None = None
 
     def __init__(
@@ -90,6 +95,7 @@ class LineOperators:
         self._model = model
         self._ownership = ownership
         self._coefficients = coefficients
+        self.like = LikeStations(model)
         self._block, self._pad = model.numbering.block, model.numbering.width
         self._product_event, self._solve_event = event("LineProduct"), event("LineSolve")
         if comm.size > 1 and wants_distributed_solver():
@@ -121,6 +127,7 @@ class LineOperators:
             if comm.size > 1 and comm.rank == 0 and wants_view():
                 self._solver.view()  # one for all; on one rank PETSc shows it at its first solve
             self._solver.hurry()
+        self._checked = None
         self._products.prepare()
 
     def by_stations(self, damped: bool) -> ByStations | None:
@@ -252,7 +259,12 @@ class LineOperators:
         self.factor[:] = self.answer
         self.answer[:] = 0.0
         self.exchange()
-        if self._solver is not None:
+        if self._checked is not None:
+            low, size = self.domain.low - self.domain.read_low, self.domain.size
+            # Beyond what is solved for the operator has no entries.
+            read = self._read_padded[low : low + size + 2 * self._pad]
+            self._checked.multiply(read, self._loaded.array)
+        elif self._solver is not None:
             self._solver.matrix.mult(self._read_domain, self._loaded.vector)
         missing = self._loaded.array[owned] - load[owned]
         squares = np.array([missing @ missing, load[owned] @ load[owned]])
@@ -292,17 +304,24 @@ class LineOperators:
         is_direct = True
         if self.domain.size:
             rows = (low, high)
-            part = part_of(self._model, rows, rows, self._coefficients, 1.0, self._block)
             owned = self.domain.owned
             products, stations = self._products, Sections.of(self._model.numbering, low, high)
             own = slice(*np.searchsorted(stations.starts, [owned.start, owned.stop]).tolist())
+            operator = None
             if self._in_stations:
-                products.find_layout(part)
+                operator = products.find_layout(self._coefficients)
             whole = self._comm.size == 1
             turns = whole and self._model.problem.window.moves
-            layout = products.layout
-            solver = PartSolver(part, own, self._in_stations, whole, layout, stations, turns)
+
+            def assembled() -> sparse.bsr_matrix:
+                return part_of(self._model, rows, rows, self._coefficients, 1.0, self._block)
+
+            solver = PartSolver(
+                assembled, own, self._in_stations, whole, products.layout, stations, operator, turns
+            )
             self._solver, is_direct = solver, solver.is_direct
+            if operator is not None and solver.factors is not None:
+                self._checked = products.of_operator(operator)
         self._is_direct = bool(self._comm.allreduce(int(is_direct), op=MPI.MIN))
 
     def _solve_together(self, windows: Windows) -> None:
@@ -357,7 +376,7 @@ class LineOperators:
         ]
         self._read_domain = read_domain.vector
         self._vectors = (*here, *(pair.vector for pair in solved))
-        self._products = LineProducts(self._model, domain, self._read_padded, self._read)
+        self._products = LineProducts(self._model, domain, self._read_padded, self._read, self.like)
         self.factor, self.answer = read[domain.owned_of_read], answer[domain.owned]
         self._halo = Halo(self._comm, own, read_low, read)
         self._loaded_halo = Halo(self._comm, own, low, loaded)

@@ -7,7 +7,6 @@ Columns at places with like surroundings are the same, and are stored once.
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -81,6 +80,7 @@ class UnitResponses:
     comm : mpi4py communicator
     model, ownership : of the line
     coefficients : of M, K and C in A
+    like : marks of the line's stations, found here if not given
     """
 
     def __init__(
@@ -90,7 +90,9 @@ class UnitResponses:
         ownership: Ownership,
         coefficients: tuple[float, float, float],
         windows: Windows,
+        like: LikeStations | None = None,
     ) -> None:
+        self._like = LikeStations(model) if like is None else like
         self._comm, self._model, self._ownership = comm, model, ownership
         self._coefficients, self.windows = coefficients, windows
 
@@ -128,10 +130,6 @@ class UnitResponses:
                 f"{self.windows.reach:.0f} m; give the scene a smaller numerics.dt_s"
             )
         return ShortColumns(places.begin, at[kinds], places.width, data)
-
-    @cached_property
-    def _like(self) -> LikeStations:
-        return LikeStations(self._model)
 
     def _kinds(self, places: _Places) -> tuple[np.ndarray, np.ndarray]:
         """Places of which each has columns of its own, and which of these each place shares."""

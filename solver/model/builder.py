@@ -186,7 +186,7 @@ class ModelBuilder:
         gravity = model.simulated.gravity
         if gravity:
             for dofs, mass in self._hanging:
-                np.add.at(model.weight, dofs, -gravity * mass)
+                model.weight -= gravity * np.bincount(dofs, weights=mass, minlength=model.n_dofs)
         held = [model.numbering.missing, *self._constrained]
         model.constrained = np.unique(np.concatenate(held))
         return model

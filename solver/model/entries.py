@@ -10,11 +10,18 @@ from catenary.solver.model.model import Model
 
 
 def iterate_entries(
-    model: Model, first: int, last: int, mass: float, stiffness: float, damping: float
+    model: Model,
+    first: int,
+    last: int,
+    mass: float,
+    stiffness: float,
+    damping: float,
+    wanted: np.ndarray | None = None,
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Entries (rows, columns, values) of ``mass`` M + ``stiffness`` K + ``damping`` C.
 
-    Only rows in [first, last); rows and columns of constrained unknowns are left out.
+    Only rows in [first, last), of these ``wanted`` (last - first,) ones if that is given; rows and
+    columns of constrained unknowns are left out.
     """
     free = np.ones(model.n_dofs, dtype=bool)
     free[model.constrained] = False
@@ -22,6 +29,10 @@ def iterate_entries(
         alpha, beta = model.damping_of(block.component)
         near = block.near(first, last)
         dofs, kind = block.dofs[near], block.kind[near]
+        if wanted is not None:
+            inside = (dofs >= first) & (dofs < last)
+            chosen = (inside & wanted[np.where(inside, dofs - first, 0)]).any(axis=1)
+            dofs, kind = dofs[chosen], kind[chosen]
         if not kind.size:
             continue
         matrix = np.zeros((dofs.shape[0], dofs.shape[1], dofs.shape[1]))
@@ -34,4 +45,6 @@ def iterate_entries(
         rows = np.broadcast_to(dofs[:, :, None], matrix.shape)
         columns = np.broadcast_to(dofs[:, None, :], matrix.shape)
         keep = (rows >= first) & (rows < last) & free[rows] & free[columns]
+        if wanted is not None:
+            keep[keep] = wanted[rows[keep] - first]
         yield rows[keep], columns[keep], matrix[keep]

@@ -11,8 +11,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import linalg as sparse_linalg
 
 from catenary.meshgen.geometry import SAME_CUT
 from catenary.meshgen.line import Line
@@ -26,9 +24,10 @@ from catenary.solver.model.rest.lateral_shape import LateralShape
 from catenary.solver.model.rest.rest_shape import Equilibrium as Equilibrium
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.as_hung import hang
+from catenary.solver.statics.banded_factors import BandedFactors
 from catenary.solver.statics.lateral_equilibrium import lateral_shape
 from catenary.solver.statics.rest_loads import dead_loads
-from catenary.solver.statics.sparse_sum import clamp_parts, summed, wire_parts
+from catenary.solver.statics.sparse_sum import Part, clamp_parts, wire_parts
 
 # Lengths are printed to the millimetre; the iteration contracts by the ratio of dropper weight
 # to tension sag, about 1e-3, so that this costs one more pass and leaves no trace in the forces.
@@ -65,9 +64,10 @@ def _cut(problem: Problem, mesh: LineMesh, pushing: bool = False) -> tuple[Model
     """The line for which droppers are cut; they may push where ``pushing`` says so."""
     length = mesh.points[mesh.droppers[:, 0], 2] - mesh.points[mesh.droppers[:, 1], 2]
     hanging: _HangingWires | None = None
+    model: Model | None = None
     lateral: LateralShape | None = None
     for _ in range(_MAX_PASSES):
-        model = build(problem, mesh, length)
+        model = build(problem, mesh, length, before=model)
         hanging = hanging or _HangingWires(model)
         form = hanging.at_rest(model, lateral)
         _check(problem.line, mesh, form, pushing)
@@ -125,29 +125,25 @@ class _HangingWires:
     def __init__(self, model: Model) -> None:
         self._w = 2 * model.row_of_node
         n = 2 * model.mesh.n_nodes
-        stiffness, self._spring_load = _assembled(model, self._w)
+        parts, self._spring_load = _springs_and_wires(model, self._w)
         nodes, heights, held_at = _given_heights(model)
         self._given = self._w[nodes]
         self._heights = np.zeros(n)
         self._heights[self._given] = heights
-        self._from_given = stiffness @ self._heights
         # Without weight droppers carry nothing: what holds the lower wire pulls at nothing above.
         self._weighted = model.simulated.gravity != 0.0
         upper, lower = self._w[model.mesh.droppers if self._weighted else model.mesh.droppers[:0]].T
         rows = np.concatenate([self._w[held_at], upper])
         columns = np.concatenate([self._given, lower])
         sign = np.repeat([-1.0, 1.0], [self._given.size, upper.size])
-        forces = sparse.csc_matrix((sign, (rows, columns)), shape=(n, n))
-        free = np.ones(n)
-        free[self._given] = 0.0
-        matrix = (stiffness @ sparse.diags(free) + forces).tocsc()
-        self._factor = sparse_linalg.splu(matrix, permc_spec="NATURAL")
+        forces = rows, columns, sign
+        self._factor = BandedFactors(parts, self._given, heights, forces, n)
 
     def at_rest(self, model: Model, lateral: LateralShape | None) -> Equilibrium:
         """The line at rest under the weights of ``model``, which may differ in them only, and
         under what arms lift of their own in the lateral plane."""
         mesh, every = model.mesh, np.arange(model.mesh.n_nodes)
-        load = self._spring_load - self._from_given
+        load = self._spring_load - self._factor.from_given
         dead = dead_loads(model)
         load[self._w] += dead[model.dofs(every)]
         load[self._w + 1] += dead[model.dofs(every, "theta_y")]
@@ -175,7 +171,7 @@ def _holding(model: Model) -> np.ndarray:
     return np.array([*holds, False])[model.mesh.arm_group]
 
 
-def _assembled(model: Model, w: np.ndarray) -> tuple[sparse.csc_matrix, np.ndarray]:
+def _springs_and_wires(model: Model, w: np.ndarray) -> tuple[list[Part], np.ndarray]:
     """Stiffness of wires, supports and clamps, and the load of relaxed supports.
 
     ``w`` is the number of each node's height; that of its slope follows. A support is a spring
@@ -194,7 +190,7 @@ def _assembled(model: Model, w: np.ndarray) -> tuple[sparse.csc_matrix, np.ndarr
         relaxed = line.wire(supports.wire).points(np.array(supports.x))[:, 2]
         np.add.at(load, dofs, supports.stiffness * relaxed)
     parts += clamp_parts(model, w)
-    return summed(parts, n), load
+    return parts, load
 
 
 def _given_heights(model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,6 +13,8 @@ from catenary.solver.model.model import Model
 from catenary.solver.problem.window import EXACT, WindowChoice
 from catenary.solver.window import window_kernels
 from catenary.solver.window.window_kernels import IS_FRESH, STEP, WindowArrays
+
+logger = logging.getLogger(__name__)
 
 # Steps from one look to the next.
 EVERY = 8
@@ -85,6 +88,21 @@ class MovingWindow:
             known=known,
         )
         self.arrays.ranges[2, 1] = len(links)
+        self._tell_growth()
+
+    def _tell_growth(self) -> None:
+        """Say so where ends of the window stand much further out than was asked for."""
+        low, masts, (begins, ends) = self.arrays.low, self.arrays.masts, self.arrays.edges
+        x = np.append(low, self.arrays.high[-1])
+        further = max(float((x - x[begins]).max()), float((x[ends] - x).max()))
+        if further > (masts[-1] - masts[0]) / (masts.size - 1):
+            logger.warning(
+                "elements are so short for the time step that the window cannot end at every "
+                "station: it reaches up to %.0f m further than its %s; take a smaller "
+                "mesh.elements_per_gap or numerics.dt_s",
+                further,
+                "motion asks for" if self.arrays.rule[0] > 0.0 else "spans",
+            )
 
     @property
     def unknowns(self) -> tuple[int, int]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from catenary.cases.run.describe.arrivals import arrival_facts
@@ -99,3 +101,23 @@ def test_plan_and_arrivals_tell_how_the_line_ends() -> None:
     assert "begins at 720 m" in inside
     assert facts["pantographs"][0]["far_end_met_at_m"] is None
     assert "end 4 spans that absorb waves" in plan_text(make_plan(scene))
+
+
+def test_the_far_end_is_not_met_where_a_window_ends_before_it() -> None:
+    """Fixed ends far beyond a window of some spans reflect nothing that the train meets."""
+    line = ["line.n_spans=60", "evaluation.to_m=2700", "window.mode=bounded"]
+    window = ["window.spans_ahead=5", "window.spans_behind=5"]
+
+    def facts(words: list[str]) -> dict[str, Any]:
+        scene = load_scene("en50318_2002", words)
+        return arrival_facts(scene, problem_of(scene))
+
+    whole, moving = facts(line[:2]), facts([*line, *window])
+    assert any("far end of the line reflects" in text for text in whole["warnings"])
+    assert not any("reflects" in text for text in moving["warnings"])
+    by_motion = facts([*line, "window.tolerance=1e-6"])
+    assert by_motion["warnings"] == whole["warnings"]
+    # Up to the end of the line the window has reached it: what is reflected then is met later.
+    to_the_end = facts([line[0], "evaluation.to_m=3300", line[2], *window])
+    (at,) = (one["far_end_met_at_m"] for one in to_the_end["pantographs"])
+    assert at is not None and at > whole["pantographs"][0]["far_end_met_at_m"]

@@ -10,6 +10,7 @@ from catenary.cases.run.wave_arrivals import (
     SHORT_RUN_IN,
     Arrivals,
     Course,
+    Meeting,
     WaveLine,
     arrivals,
     end_for,
@@ -111,7 +112,10 @@ def _told(problem: Problem) -> Told:
         )
         for start in starts
     )
-    found = tuple(_without_let_out(arrivals(line, course), problem.ends) for course in courses)
+    found = tuple(
+        _in_window(_without_let_out(arrivals(line, course), problem.ends), line, course, problem)
+        for course in courses
+    )
     n = len(starts)
     names = tuple("pantograph" if n == 1 else f"pantograph {i + 1}" for i in range(n))
     return Told(line, courses, found, names)
@@ -123,6 +127,28 @@ def _without_let_out(found: Arrivals, ends: tuple[EndCondition, EndCondition]) -
     if start:
         found = found._replace(near_end=None)
     return found._replace(far_end=None, far_share=0.0) if end else found
+
+
+def _in_window(found: Arrivals, line: WaveLine, course: Course, problem: Problem) -> Arrivals:
+    """The same without waves that the ends of the line do not reflect, as they lie outside of a
+    window of so many spans; what the window's own ends send back is in its error."""
+    window = problem.window
+    if not window.moves or window.by_motion > 0.0:
+        return found
+    if course.rear - window.spans_behind * line.span >= line.start:
+        found = found._replace(near_end=None)
+    if found.far_end is None:
+        return found
+    # Where this pantograph is when the window reaches the far end, and where it meets what is then
+    # reflected there.
+    leader_then = line.end - window.spans_ahead * line.span
+    here = leader_then - (course.leader - course.start)
+    met = here + course.speed * (line.end - here) / (course.speed + line.fastest)
+    if met <= found.far_end.at:
+        return found
+    if met > course.end:
+        return found._replace(far_end=None, far_share=0.0)
+    return found._replace(far_end=Meeting(met, (met - course.start) / course.speed))
 
 
 def _hardware(line: Line) -> float:
@@ -158,11 +184,15 @@ def _sentence(name: str, found: Arrivals) -> str:
     )
 
 
+def _meets_in_stretch(found: Arrivals, course: Course) -> bool:
+    return found.far_end is not None and found.far_end.at < course.stretch[1]
+
+
 def _reflections(scene: Scene, told: Told) -> list[str]:
     felt = [
         i
         for i, course in enumerate(told.courses)
-        if told.found[i].far_end is not None and reflection_felt(told.line, course)
+        if _meets_in_stretch(told.found[i], course) and reflection_felt(told.line, course)
     ]
     if not felt:
         return []

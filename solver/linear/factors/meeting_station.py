@@ -7,8 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.solver.base.compiled import compiled
-from catenary.solver.base.inverse import invert
-from catenary.solver.linear.factors.elimination import factorise
 
 # Where elimination may end at several places, it may at every so many stations.
 MIDDLES = 16
@@ -55,49 +53,25 @@ def turn(kinds, turning, before, middle):
     kinds[middle] = here[middle // MIDDLES]
 
 
-def factors_of_all_middles(blocks: np.ndarray) -> np.ndarray:
-    """Factors of all stations before the middle, of all behind it, and of those where it may be."""
-    n, size = blocks.shape[1], blocks.shape[2]
-    n_middles = len(range(0, n, MIDDLES))
-    factors = np.zeros((2 * n + n_middles, 3, size, size))
-    factorise(blocks, n - 1, factors[:n])
-    factorise(blocks, 0, factors[n : 2 * n])
-    join(blocks, factors[:n], factors[n : 2 * n], factors[2 * n :])
-    return factors
-
-
-def edges(blocks: np.ndarray, factors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def edges(
+    whole: np.ndarray, eliminated: np.ndarray, towards_end: np.ndarray, towards_start: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Where steps of a part of the line may begin and end, from each station outwards, (n + 1,).
 
     What is beyond is held, but the factors let it give way by its mass and stiffness D. That leaves
     M + tau C - D in place of M + tau C there, which must not become negative: it does where
     elements are so short that the step operator A is mostly stiffness. D is what A has more than
     the block S after elimination; all eigenvalues of S^-1 A are to be below 2.
+
+    ``whole`` (k, b, b) and ``eliminated`` (k, b, b) are A and S^-1 of each factor; ``towards_end``
+    and ``towards_start`` (n,) those of each station by elimination to either side.
     """
-    n = blocks.shape[1]
+    n = towards_end.size
     number = np.arange(n + 1)
-    softened = [
-        np.einsum("nij,nji->n", part[:, 0], blocks[1]) - blocks.shape[2] < _SOFTENED
-        for part in (factors[:n], factors[n : 2 * n])
-    ]
-    can_begin, can_end = np.append(softened[0], True), np.append(True, softened[1])
+    softened = np.einsum("kij,kji->k", eliminated, whole) - whole.shape[1] < _SOFTENED
+    can_begin = np.append(softened[towards_end], True)
+    can_end = np.append(True, softened[towards_start])
     can_begin[0] = can_end[n] = True
     begins = np.maximum.accumulate(np.where(can_begin, number, 0))
     ends = np.minimum.accumulate(np.where(can_end, number, n)[::-1])[::-1]
     return begins, ends
-
-
-@compiled
-def join(blocks, before, behind, here):
-    """Fill in the factors of stations where elimination may end from those to both sides."""
-    for number in range(here.shape[0]):
-        i = number * MIDDLES
-        pivot = here[number, 0]
-        pivot[:] = blocks[1, i]
-        if i > 0:
-            here[number, 2] = before[i - 1, 1].T
-            pivot += blocks[0, i] @ before[i - 1, 1]
-        if i < blocks.shape[1] - 1:
-            here[number, 1] = behind[i + 1, 1].T
-            pivot += blocks[2, i] @ behind[i + 1, 1]
-        invert(pivot)

@@ -8,25 +8,25 @@ A^-1, so that the factors of alike spans are alike, and a solve reads little mor
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
 
 from catenary.solver.base.bound import bound
 from catenary.solver.base.petsc import PETSc
-from catenary.solver.linear.factors.elimination import factorise
+from catenary.solver.linear.factors.elimination import eliminate_stations, join
 from catenary.solver.linear.factors.meeting_station import (
     MIDDLES,
     Turning,
     edges,
-    factors_of_all_middles,
     turn,
 )
 from catenary.solver.linear.factors.substitution import solve
-from catenary.solver.linear.sections import Sections, neighbours
+from catenary.solver.linear.sections import Sections
 from catenary.solver.linear.station_layout import Layout
 from catenary.solver.linear.station_products import kinds_by_make_up
+from catenary.solver.linear.station_rows import StationRows, rows_of
 
 # Bytes of factors from which on they share blocks: more would leave no room for the state in a
 # cache next to a processor, of 1 to 2 MB; a product with a transpose waits some longer.
@@ -96,38 +96,38 @@ class StationFactors:
 
 
 def station_factors(
-    matrix: sparse.bsr_matrix,
+    matrix: sparse.bsr_matrix | StationRows,
     layout: Layout,
     low: int = 0,
     high: int | None = None,
     stations: Sections | None = None,
     turns: bool = False,
 ) -> StationFactors | None:
-    """Factors of a positive definite matrix in sorted blocks, eliminated towards the middle of the
-    stations from ``low`` to ``high``, all by default. ``stations`` may be of several make-ups. The
-    middle may be moved if it ``turns``.
+    """Factors of a positive definite matrix in sorted blocks, or of its rows by stations.
+
+    It is eliminated towards the middle of the stations from ``low`` to ``high``, all by default.
+    ``stations`` may be of several make-ups. The middle may be moved if it ``turns``.
 
     None if it is not block tridiagonal by stations, or if a station is joined to unknowns of one
     beside it that it lacks itself. A matrix that is not positive definite gives
     wrong answers or NaN.
     """
-    blocks = neighbours(matrix, 0, stations)
-    if blocks is None:
+    rows = rows_of(matrix, 0, stations)
+    if rows is None:
         return None
-    n = blocks.shape[1]
+    n = rows.kinds.size
     high = n if high is None else high
     stations = Sections.alike(n, layout.pitch) if stations is None else stations
     # Factors join all of a plane, whatever matrices join: the same kernels serve them all.
     layout = Layout(layout.widths, make_ups=layout.make_ups)
-    station, lacking = np.nonzero(stations.missing())
-    blocks[1, station, lacking, lacking] = 1.0
-    if turns:
-        factors = factors_of_all_middles(blocks)
-        meeting = np.arange(0, n, MIDDLES)
-        make_up = np.concatenate([stations.make_up, stations.make_up, stations.make_up[meeting]])
-    else:
-        factors, make_up = np.zeros((n, 3, layout.pitch, layout.pitch)), stations.make_up
-        factorise(blocks, (low + high) // 2, factors)
+    lacks, blocks = stations.missing()[rows.chosen], rows.blocks
+    if lacks.any():
+        number, lacking = np.nonzero(lacks)
+        blocks = blocks.copy()
+        blocks[1, number, lacking, lacking] = 1.0
+        rows = rows._replace(blocks=blocks)
+    found = _Found.of(rows, None if turns else (low + high) // 2)
+    factors, make_up = found.factors, stations.make_up[rows.chosen][found.kinds]
 
     def pack(part: Layout, rows: slice | np.ndarray) -> np.ndarray:
         n_blocks = 2 if part.shares else 3
@@ -135,20 +135,54 @@ def station_factors(
         return packed.reshape(packed.shape[0], n_blocks * part.whole_terms.sources.size)
 
     kinds, numbers, n_kinds, count = kinds_by_make_up(layout, make_up, pack)
-    if layout.varies:
-        lacks = stations.missing().sum(axis=1)
-        lacks = np.r_[lacks, lacks, lacks[::MIDDLES]] if turns else lacks
-        if count != np.count_nonzero(factors) - lacks.sum():
-            return None  # elimination joins what a station lacks
+    if layout.varies and count != np.count_nonzero(factors) - lacks[found.kinds].sum():
+        return None  # elimination joins what a station lacks
     sharing = layout.changed(shares=True)
     if numbers.nbytes > LARGE and sharing.shares and not layout.varies:
         layout = sharing
         kinds, numbers, n_kinds, _ = kinds_by_make_up(layout, make_up, pack)
+    of_station = kinds[found.numbers]
     if not turns:
-        return StationFactors(layout, stations, kinds, numbers, low, high, n_kinds)
-    turning = Turning(
-        kinds[:n].copy(), kinds[n : 2 * n].copy(), kinds[2 * n :].copy(), *edges(blocks, factors)
+        return StationFactors(layout, stations, of_station, numbers, low, high, n_kinds)
+    begins, ends = edges(
+        blocks[1][found.kinds], factors[:, 0], found.numbers[:n], found.numbers[n : 2 * n]
     )
-    return StationFactors(
-        layout, stations, turning.to_end.copy(), numbers, low, high, n_kinds, turning
-    )
+    turning = Turning(of_station[:n], of_station[n : 2 * n], of_station[2 * n :], begins, ends)
+    of_station = of_station[:n].copy()
+    return StationFactors(layout, stations, of_station, numbers, low, high, n_kinds, turning)
+
+
+class _Found(NamedTuple):
+    """Factors (m, 3, b, b), the kind of station (m,) of each, and ``numbers`` of those that the
+    stations have: (n,) in order for a given middle; for any middle (n,) before it, (n,) behind it,
+    and of those where it may be. Factors stand in the order of these numbers."""
+
+    factors: np.ndarray
+    kinds: np.ndarray
+    numbers: np.ndarray
+
+    @classmethod
+    def of(cls, rows: StationRows, middle: int | None) -> _Found:
+        """All factors of the matrix with these rows; of one ``middle``, or of all if it is None."""
+        kinds, blocks, n = rows.kinds, rows.blocks, rows.kinds.size
+        meeting = np.arange(0, n, MIDDLES) if middle is None else np.array([middle])
+        first, last = (n, 0) if middle is None else (middle, middle + 1)
+        before = eliminate_stations(kinds[:first], blocks, from_end=False)
+        behind = eliminate_stations(kinds[last:], blocks, from_end=True)
+        # The stations that the middle joins, one more at each end that is none.
+        earlier = np.concatenate([[-1], before.numbers])[meeting]
+        later = np.concatenate([behind.numbers, [-1]])[meeting + 1 - last]
+        triples, at_middle = np.unique(
+            np.stack([kinds[meeting], earlier, later], axis=1), axis=0, return_inverse=True
+        )
+        here = np.zeros((len(triples), *before.factors.shape[1:]))
+        join(triples, blocks, before.factors, behind.factors, here)
+        n_before, n_behind = len(before.factors), len(behind.factors)
+        parts = [before.numbers, n_before + behind.numbers, n_before + n_behind + at_middle.ravel()]
+        numbers = np.concatenate(parts if middle is None else [parts[0], parts[2], parts[1]])
+        found, first_met, number = np.unique(numbers, return_index=True, return_inverse=True)
+        order = np.argsort(first_met)
+        factors = np.concatenate([before.factors, behind.factors, here])
+        of_factor = np.concatenate([before.kinds, behind.kinds, triples[:, 0]])
+        chosen = found[order]
+        return cls(factors[chosen], of_factor[chosen], np.argsort(order)[number])
