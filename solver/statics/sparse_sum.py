@@ -21,7 +21,9 @@ def wire_parts(model: Model, at: np.ndarray) -> list[Part]:
         length = mesh.x(second) - mesh.x(first)
         dofs = np.stack([at[first], at[first] + 1, at[second], at[second] + 1], axis=1)
         tension = wire.tension_at(0.5 * (mesh.x(first) + mesh.x(second)))
-        parts.append((dofs, beam.stiffness(length, wire.bending_stiffness, tension)))
+        alike, kind = np.unique(length + 1j * tension, return_inverse=True)
+        stiffness = beam.stiffness(alike.real, wire.bending_stiffness, alike.imag)
+        parts.append((dofs, stiffness[kind]))
     return parts
 
 

@@ -76,12 +76,17 @@ def line_data_of(scene: Scene) -> LineData:
     wires = free_wires(scene, spans)
     links = free_links(scene, spans, wires)
     contact_height, contact_wire, stagger = _contact_of(table, wires)
-    positions = [positions_in(scene, "line.dropper", hung, span) for span in spans]
+    # Spans of one length are alike.
+    lengths = dict.fromkeys(spans)
+    of_length = {span: positions_in(scene, "line.dropper", hung, span) for span in lengths}
+    positions = [of_length[span] for span in spans]
     first, last = table.transition.n_spans_start, table.n_spans - table.transition.n_spans_end
+    sag_of = {
+        span: () if hung is None else pre_sag_of(hung, span, of_length[span])
+        for span in dict.fromkeys(spans[first:last])
+    }
     pre_sag = [
-        pre_sag_of(hung, spans[i], positions[i])
-        if hung is not None and first <= i < last
-        else (0.0,) * len(positions[i])
+        sag_of[spans[i]] if first <= i < last else (0.0,) * len(positions[i])
         for i in range(table.n_spans)
     ]
     return LineData(
