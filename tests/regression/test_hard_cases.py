@@ -24,6 +24,7 @@ IN_PARALLEL = (
     "lost_over_spans",
     "dropper_breaks_at_a_cut",
     "all_at_once",
+    "arm_at_its_stop",
 )
 
 

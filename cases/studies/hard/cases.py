@@ -36,6 +36,7 @@ class Needs(Table):
     passes: int = Field(
         0, ge=0, description="times the greater part of the force passes to another contact wire"
     )
+    stopped: int = Field(0, ge=0, description="steps in which an arm presses on its uplift stop")
     lost_m: float = Field(0, ge=0, description="longest way without contact, regained after it")
     lost_share_below: float | None = Field(
         None, gt=0, description="share of the steps without contact in the later half of the run"

@@ -138,6 +138,9 @@ def _needs(case: HardCase, rest: LineAtRest, base: Watched) -> list[Criterion]:
         found.append(_reaches(case, "switches of droppers", base.switches().sum(), needs.switches))
     if needs.passes:
         found.append(_reaches(case, "passes between wires", passes(base), needs.passes))
+    if needs.stopped:
+        stopped = np.count_nonzero(base.stops.any(axis=1))
+        found.append(_reaches(case, "steps at an uplift stop", stopped, needs.stopped))
     if needs.lost_m:
         found.append(_reaches(case, "way without contact [m]", lost_way(base), needs.lost_m))
     if needs.lost_share_below is not None:

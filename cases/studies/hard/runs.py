@@ -67,6 +67,7 @@ class Watched:
     height: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     wire: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     on_wires: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    stops: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
     taut: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
     energy: np.ndarray = field(default_factory=lambda: np.zeros(0))
     work: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -119,7 +120,8 @@ class LineBalance:
 
     **A dropper that slackens** from its tension k a to a gap b, a + b being its change of length
     in the step, stored k a^2 / 2 and does the work (1 - gamma) k a (a + b). With a + b = h e' that
-    makes at most (1 - gamma)^2 k (h e')^2 / 2; one that tightens makes nothing.
+    makes at most (1 - gamma)^2 k (h e')^2 / 2; one that tightens makes nothing. The same holds for
+    an uplift stop that opens or closes.
 
     Integrators other than Newmark's are balanced like average acceleration. After incidents the
     terms are those of the line as it was.
@@ -149,6 +151,9 @@ class LineBalance:
             ("acceleration", dt**2 * excess * of_velocity),
         ]
         self._share = 0.5 * model.dropper_stiffness * ((1.0 - gamma) * dt) ** 2
+        self._arms = model.dofs(model.mesh.steady_arms)
+        stops = [arms.kind.stop_stiffness for arms in problem.line.steady_arms]
+        self._stop_share = 0.5 * max(stops, default=0.0) * ((1.0 - gamma) * dt) ** 2
 
     def damping_terms(self, states: Mapping[str, np.ndarray], taut: np.ndarray) -> np.ndarray:
         """What numerical damping adds to the energy of states (k, n_dofs) each [J], shape (k,).
@@ -166,6 +171,13 @@ class LineBalance:
         """The most that one dropper makes [J] at velocities (k, n_dofs) after the steps in which
         those ``switched`` (k, n_droppers) slackened or tightened."""
         made = self._share * self._between(velocity) ** 2
+        return float(made[switched].max(initial=0.0))
+
+    def one_stop(self, velocity: np.ndarray, switched: np.ndarray) -> float:
+        """The same of uplift stops, ``switched`` (k, n_arms), or (k, 0) without them."""
+        if not switched.shape[1]:
+            return 0.0
+        made = self._stop_share * velocity[:, self._arms] ** 2
         return float(made[switched].max(initial=0.0))
 
     def _between(self, values: np.ndarray) -> np.ndarray:
@@ -241,6 +253,7 @@ class Watcher:
             wire=self._channel("wire_height"),
             on_wires=self._channel("contact_wire_force"),
             taut=self._channel("dropper_force") > 0.0,
+            stops=self._channel("stop_force") > 0.0,
             energy=np.array(self._energy),
             work=self._work,
             damping_terms=self._terms,
@@ -276,6 +289,10 @@ class Watcher:
         self._one_switch = max(
             self._one_switch, balance.one_switch(states["velocity"][1:], switched)
         )
+        stopped = self._channel("stop_force", k) > 0.0
+        pushed_off = stopped[1:] != stopped[:-1]
+        one_stop = balance.one_stop(states["velocity"][1:], pushed_off)
+        self._one_switch = max(self._one_switch, one_stop)
         again = min(seen, 1)  # the first state ended the block before
         self._work = np.append(self._work, np.cumsum(done)[again:])
         self._terms = np.append(self._terms, balance.damping_terms(states, taut)[again:])
