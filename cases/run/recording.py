@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,6 +15,8 @@ from catenary.postproc.channels.line_record import GZIP, NONE, LineRecord, says
 from catenary.postproc.record.snapshots.field_kinds import USUAL_FIELDS
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.solver.effects.all_effects import simulated
+from catenary.solver.effects.axial_effects import moves_along
+from catenary.solver.model.gauges import gauge_places
 from catenary.solver.problem.problem import Problem
 from catenary.solver.time_loop import channels
 
@@ -72,6 +74,7 @@ class Recording:
     arm_x, dropper_x : positions [m]
     n_nodes, n_cells : of the snapshots
     n_steps : steps after step 0
+    end_x : positions of ends of wires and sides of mid-points that are recorded [m]
     """
 
     line: LineRecord
@@ -84,10 +87,13 @@ class Recording:
     n_nodes: int
     n_cells: int
     n_steps: int
+    end_x: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def sentences(self, dt: float) -> dict[str, str]:
         """What is recorded in words, by what it is, at a time step of ``dt`` [s]."""
-        told = {"line": f"arm uplift and dropper forces {says(self.line, dt)}"}
+        ends = ", tensions and travel at wire ends" if self.end_x.size else ""
+        what = f"arm uplift and dropper forces{ends}"
+        told = {"line": f"{what} {says(self.line, dt)}"}
         if self.field_every:
             chosen = " (chosen by size)" if self.field_by_size else ""
             told["film"] = f"a snapshot of the line every {self.field_every * dt:.3g} s{chosen}"
@@ -114,8 +120,13 @@ def recording_of(output: OutputTable, problem: Problem, extent: Extent, n_steps:
     """
     fields = _field_record(output, problem)
     field_every, by_size = _field_every(output, problem, fields, extent, n_steps)
-    places = {channels.ARM: extent.arm_x.size, channels.DROPPER: extent.dropper_x.size}
     train = train_of(problem)
+    end_x = np.array([end.x for end in gauge_places(problem, train.moves_along)])
+    places = {
+        channels.ARM: extent.arm_x.size,
+        channels.DROPPER: extent.dropper_x.size,
+        channels.WIRE_END: end_x.size,
+    }
     names = channels.line_channels(train)
     n_columns = sum(places[channels.CHANNELS[name].per] for name in names)
     return Recording(
@@ -126,6 +137,7 @@ def recording_of(output: OutputTable, problem: Problem, extent: Extent, n_steps:
         by_size,
         *extent,
         n_steps,
+        end_x,
     )
 
 
@@ -138,6 +150,7 @@ def train_of(problem: Problem) -> channels.Train:
         len(problem.line.wires_of(Role.CONTACT)),
         laws.lateral,
         laws.uplift_stops,
+        moves_along(problem),
     )
 
 

@@ -17,7 +17,7 @@ GZIP_LEVEL = 1
 
 @dataclass(frozen=True)
 class LineRecord:
-    """What is recorded of the channels that have a column for each arm or dropper.
+    """What is recorded of the channels that have a column for each arm, dropper or wire end.
 
     Attributes
     ----------

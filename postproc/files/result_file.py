@@ -110,7 +110,7 @@ class ResultFile:
         self._begun = resume
         self._on_begun = on_begun
         self._record = record
-        places = {channels.ARM: stage.arm_x, channels.DROPPER: stage.dropper_x}
+        places = {kind: x for kind, (x, _) in stage.places.items()}
         self._columns = {
             name: record.columns(places[channels.CHANNELS[name].per]) for name in record.names
         }
@@ -291,6 +291,13 @@ def _write_head(
         "line/dropper_x": stage.dropper_x,
         "line/node_points": stage.node_points,
     }
+    if stage.wire_ends:
+        wires, x, outwards = zip(*stage.wire_ends, strict=True)
+        known |= {
+            "line/end_x": np.array(x),
+            "line/end_wire": np.array(wires),
+            "line/end_outwards": np.array(outwards),
+        }
     for name, array in {**header.datasets, **known, COMPLETE: [0, 0, 0]}.items():
         create_checked(file, name, array)
     facts = file.create_group("facts")

@@ -214,14 +214,17 @@ ATTRIBUTES: dict[str, Attribute] = {
     "inner_iterations": Attribute("a table of numbers", _table_of_numbers, True, {}),
 }
 
-# Letters: A arms, D droppers, N nodes, M masts, W contact wires, C their nodes, E places of the
-# elasticity.
+# Letters: A arms, D droppers, G wire ends, N nodes, M masts, W contact wires, C their nodes, E
+# places of the elasticity.
 _NUMBERS = Constant("D", 0, 1e12, whole=True)
 # Nodes of a wire, and where in them its further pieces begin.
 WIRE, BREAKS = _NUMBERS._replace(shape="*"), Constant("*", 1, 1e12, whole=True)
 CONSTANTS: dict[str, Constant] = {
     "line/arm_x": Constant("A"),
     "line/dropper_x": Constant("D"),
+    "line/end_x": Constant("G", later=True),
+    "line/end_wire": Constant("G", 0, 1e6, whole=True, later=True),
+    "line/end_outwards": Constant("G", -1, 1, whole=True, later=True),
     "line/node_points": Constant("N3"),
     "line/support_x": Constant("M", ascending=True),
     "line/dropper_span": _NUMBERS,
@@ -249,8 +252,9 @@ _LETTERS = {
     channels.CONTACT: "K",
     channels.ARM: "a",
     channels.DROPPER: "d",
+    channels.WIRE_END: "g",
 }
-_ALL_OF = {channels.ARM: "A", channels.DROPPER: "D"}
+_ALL_OF = {channels.ARM: "A", channels.DROPPER: "D", channels.WIRE_END: "G"}
 CLOCK = Growing("s", "", essential=True)
 LINE_CLOCK = "line_channels/time"
 

@@ -239,12 +239,17 @@ class Results(LineOfRun):
 
     def _n_places(self, name: str) -> int:
         """Columns that a channel has if all are recorded."""
-        of = {channels.ARM: "line/arm_x", channels.DROPPER: "line/dropper_x"}
+        of = {
+            channels.ARM: "line/arm_x",
+            channels.DROPPER: "line/dropper_x",
+            channels.WIRE_END: "line/end_x",
+        }
         channel = channels.CHANNELS[name]
         if not channel.of_line:
             n_wires = len(self.wires_of(Role.CONTACT))
             return channel.n_columns(channels.Train(tuple(self.n_strips()), False, n_wires))
-        return int(self._file[of[channel.per]].shape[0])
+        path = of[channel.per]
+        return int(self._file[path].shape[0]) if path in self._file else 0
 
     def _unrecorded(self, name: str, part: slice) -> np.ndarray:
         n = len(range(*part.indices(self.n_rows(name))))

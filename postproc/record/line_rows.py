@@ -55,10 +55,7 @@ class LineGather:
 
     def __init__(self, comm: Any, stage: Stage, record: LineRecord, max_rows: int) -> None:
         self._record, self._moving = record, stage.moving
-        places = {
-            channels.ARM: (stage.arm_x, stage.owned_arms),
-            channels.DROPPER: (stage.dropper_x, stage.owned_droppers),
-        }
+        places = stage.places
         rows = max_rows // record.every + 1
         self._parts: dict[str, _Part] = {}
         self._chosen: list[np.ndarray] = []

@@ -1,4 +1,4 @@
-"""Pictures of channels without one made for them: histories along the track, ranges on the line."""
+"""Pictures of channels without one made for them: histories, and ranges on the line."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from catenary.solver.time_loop.channels import (
     ENERGIES,
     STRIP,
     WIRE,
+    WIRE_END,
     Channel,
 )
 
@@ -25,14 +26,21 @@ def channel_pictures(results: Results) -> list[tuple[str, str, Figure]]:
     drawn = []
     for channel in CHANNELS.values():
         if not channel.own_picture and results.has(channel.name) and results.n_rows("time") > 1:
-            figure = _on_line(results, channel) if channel.of_line else _of_train(results, channel)
-            drawn.append((picture_name(channel), f"{_sentence(channel)}.", figure))
+            figure = _picture_of(results, channel)
+            if figure is not None:
+                drawn.append((picture_name(channel), f"{_sentence(channel)}.", figure))
     recorded = results.energies()
     for channel in ENERGIES.values():
         if channel.energy is not None and not channel.own_picture and channel.name in recorded:
             figure = _of_energy(recorded["time"], recorded[channel.name], channel)
             drawn.append((picture_name(channel), f"{_sentence(channel)}.", figure))
     return drawn
+
+
+def _picture_of(results: Results, channel: Channel) -> Figure | None:
+    if channel.per == WIRE_END:
+        return _at_ends(results, channel)
+    return _on_line(results, channel) if channel.of_line else _of_train(results, channel)
 
 
 def picture_name(channel: Channel) -> str:
@@ -93,6 +101,32 @@ def _on_line(results: Results, channel: Channel) -> Figure:
     axes.vlines(x, low, high, color=COLOURS[0], linewidth=1.6, label="range over the run")
     tidy(axes, "position along the track [m]", _label(channel))
     legend_above(axes)
+    return figure
+
+
+def _at_ends(results: Results, channel: Channel) -> Figure | None:
+    """A panel for each wire with the history at each of its ends, None if all stay zero."""
+    low, high = results.extremes(channel.name)
+    if not (np.any(low) or np.any(high)):
+        return None
+    x, wire, outwards = (results.line(f"end_{part}") for part in ("x", "wire", "outwards"))
+    names = list(results.attributes["wires"])
+    there = np.unique(wire).astype(int)
+    figure, panels = stacked(0.7 + 2.4 * there.size, there.size)
+    for axes, number in zip(panels, there.tolist(), strict=True):
+        own = np.flatnonzero((wire == number) & ((low != 0.0) | (high != 0.0)))
+        for k, column in enumerate(own.tolist()):
+            values = results.column(channel.name, column)
+            chosen = thinned(values)
+            side = "from" if outwards[column] < 0 else "up to"
+            label = f"wire {side} {x[column]:g} m"
+            time = results.line_time[chosen]
+            axes.plot(time, values[chosen], color=colour(k), linewidth=1.2, label=label)
+        axes.margins(x=0.0)
+        tidy(axes, "", _label(channel), names[number].replace("_", " "))
+        if own.size:
+            legend_above(axes)
+    panels[-1].set_xlabel("time [s]")
     return figure
 
 

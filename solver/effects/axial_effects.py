@@ -12,7 +12,7 @@ from catenary.solver.effects import vertical_effects  # noqa: F401  (built befor
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.model import axial_elements, wire_ends
 from catenary.solver.model.links.leaning import across_droppers
-from catenary.solver.model.links.links import PULLS, PUSHES, Direction, between_nodes, law
+from catenary.solver.model.links.links import PULLS, PUSHES, Direction, between_nodes, law, slips
 from catenary.solver.model.model import Block
 from catenary.solver.model.unknowns.stations import SAME_STATION
 from catenary.solver.problem.problem import Problem
@@ -25,6 +25,10 @@ AXIAL = "axial_motion"
 # Components: tensioners in the damping, and their stops, of weights at their lowest and highest.
 TENSIONERS = "tensioners"
 _LOWEST, _HIGHEST = "tensioner_stops_down", "tensioner_stops_up"
+# Of wheels that slip as the wire pulls them, and as the weights do.
+_GIVES, _TAKES = "tensioner_slips_in", "tensioner_slips_out"
+# Speed of a wheel that stands by friction, at the edge of its band [m/s].
+CREEP = 1e-4
 
 
 def _axial(builder: ModelBuilder) -> None:
@@ -78,18 +82,20 @@ def _add_pendulums(builder: ModelBuilder) -> None:
 
 
 def _tensioners(builder: ModelBuilder) -> None:
-    """Inertia of the weights and end stops, of those that turn."""
+    """Inertia of the weights, friction of the wheels and end stops."""
     model, problem = builder.model, builder.problem
     tensioner = model.simulated.tensioner
     assert tensioner is not None
     ends = [end for end in wire_ends.tensioned_ends(model) if not wire_ends.at_stop(model, end)]
-    if not (tensioner.turns and ends):
+    if not ends:
         return
     nodes = np.array([end.node for end in ends])
     inertia = [
         tensioner.inertia(end.wire, problem.line.wire(end.wire), problem.gravity) for end in ends
     ]
     builder.add_masses(TENSIONERS, nodes, np.array(inertia), unknown="u")
+    if not tensioner.turns:
+        _add_friction(builder, ends)
     if tensioner.travel is None:
         return
     # Stretch is how far an end is outwards: from there on weights sink no further.
@@ -102,6 +108,34 @@ def _tensioners(builder: ModelBuilder) -> None:
         gap = np.maximum(tensioner.travel + way, 0.0)
         laws = law(builder.mesh.x(nodes), tensioner.stop_stiffness, acts=acts, gap=gap)
         builder.add_links(stop, direction, laws)
+
+
+def _add_friction(builder: ModelBuilder, ends: list[wire_ends.WireEnd]) -> None:
+    """Dry friction of wheels: a damper that slips where the tension leaves the band of a wheel that
+    stands. While one stands it creeps, by ``CREEP`` at the most."""
+    model, problem = builder.model, builder.problem
+    tensioner = model.simulated.tensioner
+    assert tensioner is not None
+    nodes = np.array([end.node for end in ends])
+    unknowns = model.dofs(nodes, "u")[:, None]
+    low, high, tension = np.array(
+        [
+            (
+                *tensioner.band(end.wire, problem.line.wire(end.wire), problem.gravity),
+                wire_ends.tension_at_rest(model, end),
+            )
+            for end in ends
+        ]
+    ).T
+    damping = 0.5 * (high - low) / CREEP
+    kind = np.arange(nodes.size)
+    builder.add_block(Block(TENSIONERS, unknowns, kind, None, None, damping[:, None, None].copy()))
+    outwards = np.array([[float(end.outwards)] for end in ends])
+    x = builder.mesh.x(nodes)
+    # A wire that pulls more than the band allows moves inwards, one that pulls less outwards.
+    for name, sign, left in ((_GIVES, 1.0, high - tension), (_TAKES, -1.0, tension - low)):
+        laws = slips(x, np.maximum(left, 0.0), damping)
+        builder.add_links(name, Direction(unknowns, sign * outwards), laws, of_shape=True)
 
 
 def _with_tensioner(laws: Simulated, problem: Problem) -> Simulated:

@@ -156,6 +156,8 @@ def energy_of_switching(displacement, links, begin, end):
         law, stretch = laws[link], 0.0
         for k in range(unknowns.shape[1]):
             stretch += weights[link, k] * displacement[unknowns[link, k]]
+        if law.stiffness == 0.0:  # of what slips nothing is stored
+            continue
         beyond = min(law.rest + law.stiffness * stretch, 0.0)
         energy -= law.released * beyond**2 / (2.0 * law.stiffness)
     return energy

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from catenary.solver.model.gauges import gauges_of
 from catenary.solver.model.model import Model
 
 # Nodes whose steps take as long as what rank 0 does for pantographs while the others are at the
@@ -50,15 +51,17 @@ def distribute(model: Model, n_ranks: int, rank: int) -> Ownership:
 
     They are of nearly equal size but for rank 0, which has fewer nodes of a long line because it
     moves the pantographs besides. A cut never separates nodes of one station nor the unknowns of a
-    link, so that forces of links need no communication. Ranks beyond the number of stations own
-    nothing.
+    link or a gauge, so that their forces need no communication. Ranks beyond the number of stations
+    own nothing.
     """
     numbering = model.numbering
     n_stations = numbering.low.size
     # +1 where a link's range of stations begins to forbid cuts, -1 where it ends.
     steps = np.zeros(n_stations + 2)
-    for links in model.links:
-        stations = np.searchsorted(numbering.starts, links.direction.unknowns, side="right") - 1
+    together = [links.direction.unknowns for links in model.links]
+    together += [watched.unknowns for watched in gauges_of(model).watched.values()]
+    for unknowns in together:
+        stations = np.searchsorted(numbering.starts, unknowns, side="right") - 1
         np.add.at(steps, stations.min(axis=1) + 1, 1)
         np.add.at(steps, stations.max(axis=1) + 1, -1)
     cuts = np.flatnonzero(np.cumsum(steps)[: n_stations + 1] == 0)

@@ -108,7 +108,7 @@ def switching_links(model: Model, dropper_force: np.ndarray) -> LinkTable:
     # Two at least, which kernels take without a loop.
     m = max((part.unknowns.shape[1] for part in parts), default=2)
     m = max(m, 2)
-    parts = [_padded(part, m) for part in parts]
+    parts = [padded(part, m) for part in parts]
     arrays = LinkArrays(*(np.concatenate(same) for same in zip(*parts, strict=True)))
     order = np.argsort(arrays.law["place"], kind="stable")
     sizes = [part.law.size for part in parts]
@@ -158,8 +158,8 @@ def _one_sign(model: Model, links: Links) -> LinkArrays:
     return LinkArrays(links.direction.unknowns[given], weights, law)
 
 
-def _padded(links: LinkArrays, m: int) -> LinkArrays:
-    """The same with m unknowns each: their first one again, without weight."""
+def padded(links: LinkArrays, m: int) -> LinkArrays:
+    """The same with m unknowns each, or more: their last one again, without weight."""
     more = m - links.unknowns.shape[1]
     unknowns = np.pad(links.unknowns, ((0, 0), (0, more)), mode="edge")
     weights = np.pad(links.weights, ((0, 0), (0, more)))

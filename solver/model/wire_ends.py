@@ -48,11 +48,11 @@ def tensioned_ends(model: Model) -> list[WireEnd]:
 
 
 def held_along(model: Model) -> np.ndarray:
-    """Nodes that do not move along the track: ends without a tensioner that turns, mid-points."""
-    tensioner = model.simulated.tensioner
-    turns = tensioner is not None and tensioner.turns
+    """Nodes that do not move along the track: ends without a tensioner or at its stop, and
+    mid-points."""
+    there = model.simulated.tensioner is not None
     held = [
-        end.node for end in ends_of(model) if not (end.tensioned and turns) or at_stop(model, end)
+        end.node for end in ends_of(model) if not (end.tensioned and there) or at_stop(model, end)
     ]
     return np.unique(np.concatenate([np.array(held, dtype=np.int64), mid_points(model)]))
 
@@ -77,3 +77,14 @@ def mid_points(model: Model) -> np.ndarray:
         close = np.abs(mesh.x(own)[:, None] - places) < 1e-3
         nodes.append(own[close.any(axis=1)])
     return np.concatenate(nodes)
+
+
+def tension_at_rest(model: Model, end: WireEnd) -> float:
+    """Tension of a wire in its last element before an end, at rest [N]."""
+    mesh, wire = model.mesh, model.problem.line.wire(end.wire)
+    pairs = mesh.elements(end.wire)
+    element = int(np.flatnonzero((pairs == end.node).any(axis=1))[0])
+    tension = float(wire.tension_at(mesh.x(pairs[element]).mean()))
+    if model.form is not None and end.wire in model.form.gained_tension:
+        tension += float(model.form.gained_tension[end.wire][element])
+    return tension

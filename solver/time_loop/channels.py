@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from catenary.solver.model import gauges
 from catenary.solver.model.links.links import UPLIFT_STOPS
 
 if TYPE_CHECKING:
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 PANTOGRAPH = "pantograph"
 ARM = "steady arm"
 DROPPER = "dropper"
+WIRE_END = "wire end"
 STRIP = "strip"
 WIRE = "contact wire"
 CONTACT = "contact"
@@ -33,7 +36,8 @@ class Sources(NamedTuple):
     """What channels take their values from, as it is for one part of a march.
 
     ``arm_uplift`` [m] and ``dropper_force`` [N] are those of this rank, as ``link_force`` [N] of
-    further links of one sign, by component; models of pantographs are on rank 0 only.
+    further links of one sign, by component, and ``gauges``, by what they show; models of
+    pantographs are on rank 0 only.
     """
 
     pantographs: Pantographs
@@ -42,6 +46,7 @@ class Sources(NamedTuple):
     arm_uplift: np.ndarray
     dropper_force: np.ndarray
     link_force: Mapping[str, np.ndarray]
+    gauges: Mapping[str, np.ndarray] = MappingProxyType({})
 
 
 class Energies(NamedTuple):
@@ -55,13 +60,14 @@ class Energies(NamedTuple):
 class Train(NamedTuple):
     """What decides which channels a run has: strips of each pantograph in running order, whether a
     pantograph has joints that may open, the number of contact wires, whether these move sideways,
-    and whether steady arms have stops."""
+    whether steady arms have stops, and whether wires move along the track."""
 
     n_strips: tuple[int, ...]
     joints_in_loop: bool
     n_wires: int = 1
     lateral: bool = False
     uplift_stops: bool = False
+    moves_along: bool = False
 
     @property
     def several_strips(self) -> bool:
@@ -78,13 +84,14 @@ class Channel:
     name : name of the dataset in the result file
     unit : SI unit, "-" if none
     meaning : what it is and which sign it has, in words
-    per : what a column stands for: ``PANTOGRAPH``, ``STRIP``, ``ARM`` or ``DROPPER``; ``WIRE`` for
-        each contact wire under each pantograph; ``CONTACT`` for each contact wire on each strip,
-        strip by strip; ``RUN`` for one value a row
-    values : which array (columns,) of contiguous doubles holds the values after a step. Of arms and
-        droppers these are the rank's own; of pantographs and strips rank 0 has them, and the array
-        may be empty elsewhere. A function () -> (columns,) is called after each step, which then
-        are taken one by one. None for clocks
+    per : what a column stands for: ``PANTOGRAPH``, ``STRIP``, ``ARM`` or ``DROPPER``; ``WIRE_END``
+        for each end of a wire and side of a mid-point, of lines whose wires move along the track;
+        ``WIRE`` for each contact wire under each pantograph; ``CONTACT`` for each contact wire on
+        each strip, strip by strip; ``RUN`` for one value a row
+    values : which array (columns,) of contiguous doubles holds the values after a step. Of places
+        on the line these are the rank's own; of pantographs and strips rank 0 has them, and the
+        array may be empty elsewhere. A function () -> (columns,) is called after each step, which
+        then are taken one by one. None for clocks
     energy : for one of ``ENERGIES``: the value of this rank's, collective
     of_motion : whether an energy follows from ``kinetic`` and ``elastic`` alone, not from the
         sources: a compiled loop then does not end its block for it
@@ -114,7 +121,7 @@ class Channel:
     @property
     def of_line(self) -> bool:
         """Whether it has a column for each place on the line, which may be recorded in part."""
-        return self.per in (ARM, DROPPER)
+        return self.per in (ARM, DROPPER, WIRE_END)
 
     def n_columns(self, train: Train) -> int:
         """Columns of a channel of pantographs, strips or contact wires."""
@@ -124,6 +131,11 @@ class Channel:
 
 
 _NOTHING = np.zeros(0)
+
+
+def _gauge(name: str) -> Callable[[Sources], np.ndarray]:
+    return lambda sources: sources.gauges.get(name, _NOTHING)
+
 
 TIME = Channel("time", "s", "time since the start of the run", RUN)
 
@@ -239,6 +251,35 @@ CHANNELS: dict[str, Channel] = {
             ARM,
             lambda sources: sources.link_force.get(UPLIFT_STOPS, _NOTHING),
             when=lambda train: train.uplift_stops,
+        ),
+        *(
+            Channel(
+                name,
+                unit,
+                meaning,
+                WIRE_END,
+                _gauge(name),
+                when=lambda train: train.moves_along,
+            )
+            for name, unit, meaning in (
+                (
+                    gauges.TENSION,
+                    "N",
+                    "tension of a wire at its end, or beside a mid-point anchor",
+                ),
+                (
+                    gauges.TRAVEL,
+                    "m",
+                    "how far the end of a wire has moved outwards since the installation",
+                ),
+                (
+                    gauges.WEIGHT,
+                    "m",
+                    "how far the weights of a tensioner have sunk since the installation",
+                ),
+                (gauges.LOW_STOP, "N", "force of the stop of weights at their lowest, >= 0"),
+                (gauges.HIGH_STOP, "N", "force of the stop of weights at their highest, >= 0"),
+            )
         ),
     )
 }

@@ -9,6 +9,8 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from catenary.solver.model.gauges import GaugePlace
+from catenary.solver.time_loop import channels
 from catenary.solver.time_loop.channels import Train
 from catenary.solver.window.moving_columns import MovingColumns
 
@@ -33,6 +35,8 @@ class Stage:
     owned_nodes : node numbers of what ``StepView.node_motion`` returns, one owner each
     unknowns : names of the unknowns that nodes have
     moving : which columns of arms and droppers have changed since the rows that were shown before
+    wire_ends : places of gauges at wire ends and mid-points, none without motion along the track
+    owned_ends : indices of those whose values this rank provides
     n_places : how many numbers say where each pantograph's masses or bodies are; on rank 0
     """
 
@@ -54,12 +58,24 @@ class Stage:
     lateral: bool = False
     uplift_stops: bool = False
     moving: MovingColumns = field(default_factory=MovingColumns)
+    wire_ends: tuple[GaugePlace, ...] = ()
+    owned_ends: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    @property
+    def places(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Positions of what columns of the line's channels stand for, by its kind, and those that
+        this rank owns."""
+        return {
+            channels.ARM: (self.arm_x, self.owned_arms),
+            channels.DROPPER: (self.dropper_x, self.owned_droppers),
+            channels.WIRE_END: (np.array([end.x for end in self.wire_ends]), self.owned_ends),
+        }
 
     @property
     def train(self) -> Train:
         """What decides which channels are recorded."""
         strips = self.n_strips or (1,) * self.n_pantographs
-        laws = self.lateral, self.uplift_stops
+        laws = self.lateral, self.uplift_stops, bool(self.wire_ends)
         return Train(strips, self.joints_in_loop, self.n_wires, *laws)
 
 

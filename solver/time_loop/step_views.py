@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -16,7 +16,8 @@ from catenary.solver.contact.followed_links import FollowedLinks
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.integrators import state_kernels
-from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
+from catenary.solver.model.gauges import SHOWN, Gauges, gauges_of
+from catenary.solver.model.switching_links import NO_LINKS, LinkArrays, padded
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.after_incidents import ChangedLine
 from catenary.solver.statics.equilibrium import Equilibrium
@@ -88,8 +89,11 @@ class Showing:
         self._owned_droppers, droppers = interaction.links.shown(DROPPERS)
         self._shown = np.zeros(n_outputs + n_arms + self._owned_droppers.size)
         _, uplift, tension = np.split(self._shown, [n_outputs, n_outputs + n_arms])
-        others, other_force, by_name = _further_links(interaction.links)
-        self._sources = Sources(pantographs, interaction, scheme, uplift, tension, by_name)
+        self._gauges = gauges_of(model)
+        self._owned_gauges, watched = _owned_gauges(self._gauges, owned, first)
+        others, other_force, by_name = _further_links(interaction.links, watched)
+        at_ends = {name: by_name.pop(name) for name in watched}
+        self._sources = Sources(pantographs, interaction, scheme, uplift, tension, by_name, at_ends)
         self.layout = RowLayout(self._sources, self._shown)
         self._is_kept, self._energies_follow_motion = False, energies_follow_motion()
         self._rows_of_unknown: dict[str, tuple[np.ndarray, np.ndarray]] = {}
@@ -155,6 +159,8 @@ class Showing:
             lateral=self._pantographs.lateral,
             uplift_stops=model_laws.uplift_stops,
             moving=self._moving,
+            wire_ends=self._gauges.places,
+            owned_ends=self._owned_gauges,
         )
 
     def view(self, step: int, time: float, *, followed: bool = False) -> StepView:
@@ -372,15 +378,33 @@ class Showing:
         return result
 
 
+def _owned_gauges(
+    gauges: Gauges, owned: Callable[[np.ndarray], np.ndarray], first: int
+) -> tuple[np.ndarray, dict[str, LinkArrays]]:
+    """Numbers of the gauges that a rank owns, and what they watch in its unknowns."""
+    if not gauges.places:
+        return np.zeros(0, dtype=np.int64), {}
+    mine = np.flatnonzero(owned(gauges.watched[SHOWN[0]].unknowns[:, 0]))
+    local = {
+        name: links._replace(unknowns=links.unknowns - first).of(mine)
+        for name, links in gauges.watched.items()
+    }
+    return mine, local
+
+
 def _further_links(
-    links: FollowedLinks,
+    links: FollowedLinks, watched: Mapping[str, LinkArrays]
 ) -> tuple[LinkArrays, np.ndarray, dict[str, np.ndarray]]:
-    """Owned links of one sign beside droppers, room for their forces [N], and that by component."""
-    names = [name for name in links.table.components if name != DROPPERS]
-    parts = [links.shown(name)[1] for name in names]
+    """Owned links of one sign beside droppers, then gauges, room for their forces [N], and that by
+    component and by what a gauge shows."""
+    parts = {
+        name: links.shown(name)[1] for name in links.table.components if name != DROPPERS
+    } | dict(watched)
     if not parts:
         return NO_LINKS, np.zeros(0), {}
-    ends = np.cumsum([part.law.size for part in parts])
+    width = max(part.unknowns.shape[1] for part in parts.values())
+    wide = [padded(part, width) for part in parts.values()]
+    ends = np.cumsum([part.law.size for part in wide])
     force = np.zeros(ends[-1])
-    by_name = dict(zip(names, np.split(force, ends[:-1]), strict=True))
-    return LinkArrays(*map(np.concatenate, zip(*parts, strict=True))), force, by_name
+    by_name = dict(zip(parts, np.split(force, ends[:-1]), strict=True))
+    return LinkArrays(*map(np.concatenate, zip(*wide, strict=True))), force, by_name

@@ -145,3 +145,15 @@ def law(
         sign = -1.0 if acts == PULLS else 1.0
         result["rest"], result["open"] = sign * np.asarray(stiffness) * gap, True
     return result
+
+
+def slips(place: np.ndarray, holds: np.ndarray, damping: np.ndarray) -> np.ndarray:
+    """Laws of n links that let dampers of the line slip, as records of ``LAW``.
+
+    Together with such a damper [N s/m] a link resists its stretch getting shorter with
+    min(-damping e', holds): it takes back what the damper does beyond ``holds`` (n,) >= 0 [N].
+    """
+    result = np.zeros(np.shape(place), dtype=LAW)
+    result["place"], result["rest"], result["damping"] = place, holds, damping
+    result["acts"] = PULLS
+    return result

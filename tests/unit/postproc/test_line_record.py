@@ -13,7 +13,7 @@ from catenary.postproc.channels.line_record import GZIP, LineRecord, from_table,
 from catenary.postproc.evaluate import statistics
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
-from catenary.solver.time_loop.channels import line_channels
+from catenary.solver.time_loop.channels import line_channels_of_all
 
 N_STEPS, FLUSH = 3000, 400
 WINDOW = (120.0, 80.0)
@@ -65,7 +65,7 @@ def test_a_part_of_the_record_is_that_of_the_whole_one(
     with Results(whole) as everything, Results(path) as part:
         assert part.line_record == record
         np.testing.assert_array_equal(part.line_time, everything.time[:: record.every])
-        for channel in line_channels():
+        for channel in line_channels_of_all():
             values = expected(everything, channel, record)
             np.testing.assert_array_equal(part.channel(channel), values, channel)
             blocks = list(part.blocks(channel))
@@ -114,7 +114,7 @@ def test_a_restarted_run_has_the_same_content(
         part.close({})
     with Results(reference) as one, Results(path) as other:
         np.testing.assert_array_equal(one.line_time, other.line_time)
-        for channel in line_channels():
+        for channel in line_channels_of_all():
             np.testing.assert_array_equal(one.channel(channel), other.channel(channel))
             np.testing.assert_array_equal(one.extremes(channel), other.extremes(channel))
         np.testing.assert_array_equal(one.energies()["time"], other.energies()["time"])

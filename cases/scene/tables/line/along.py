@@ -24,7 +24,7 @@ class TensionerTable(Table):
         gt=0.5,
         le=1,
         description="share of the weights' pull that arrives; below 1 friction holds the wheel "
-        "while the tension is between efficiency and 1/efficiency of that pull, in motion always",
+        "while the tension is between efficiency and 1/efficiency of that pull, and slips beyond",
     )
     travel_m: float | None = Field(
         None,

@@ -1,0 +1,152 @@
+"""Gauges at the ends of wires and at mid-point anchors: tension, place of the end, stops.
+
+What a gauge shows is linear in the displacements: it is a link that is watched and has no force.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from catenary.meshgen.wires import End
+from catenary.solver.model import axial_elements, wire_ends
+from catenary.solver.model.model import Model
+from catenary.solver.model.switching_links import RESERVE, LinkArrays
+from catenary.solver.model.unknowns.stations import SAME_STATION
+from catenary.solver.problem.problem import Problem
+
+# What a gauge shows, in the order of its tables.
+TENSION, TRAVEL, WEIGHT = "wire_end_tension", "wire_end_travel", "tensioner_weight"
+LOW_STOP, HIGH_STOP = "tensioner_low_stop", "tensioner_high_stop"
+SHOWN = (TENSION, TRAVEL, WEIGHT, LOW_STOP, HIGH_STOP)
+AXIAL = "axial_motion"
+
+
+class GaugePlace(NamedTuple):
+    """Where a gauge is: number of its wire in the line, place [m], and on which side of the wire:
+    -1 where the wire begins there, 1 where it ends there."""
+
+    wire: int
+    x: float
+    outwards: int
+
+
+def gauge_places(problem: Problem) -> tuple[GaugePlace, ...]:
+    """Ends of wires that no clamp carries, and both sides of mid-points, by ascending place; none
+    where wires do not move along the track."""
+    if AXIAL not in problem.effects:
+        return ()
+    found = []
+    for number, wire in enumerate(problem.line.wires):
+        for piece in wire.pieces:
+            for end, outwards in ((0, -1), (-1, 1)):
+                if piece.ends[end] is not End.CLAMPED:
+                    found.append(GaugePlace(number, piece.x[end], outwards))
+            if wire.pieces[0].ends[0] is not End.CLAMPED:
+                inside = [x for x in problem.along.mid_points if piece.x[0] < x < piece.x[-1]]
+                found += [GaugePlace(number, x, side) for x in inside for side in (1, -1)]
+    return tuple(sorted(found, key=lambda place: place.x))
+
+
+class Gauges(NamedTuple):
+    """Gauges of a line: their places, and for each of ``SHOWN`` what is watched, (n,) links of all
+    unknowns of the line."""
+
+    places: tuple[GaugePlace, ...]
+    watched: dict[str, LinkArrays]
+
+
+def gauges_of(model: Model) -> Gauges:
+    """The gauges of a line about its shape at rest, empty without motion along the track."""
+    places = gauge_places(model.problem)
+    if not places:
+        return Gauges((), {})
+    ends = {(end.wire, end.node): end for end in wire_ends.ends_of(model)}
+    tensioner = model.simulated.tensioner
+    width = 10 if model.simulated.lateral else 6
+    watched = {
+        name: LinkArrays(
+            np.zeros((len(places), width), dtype=np.int64),
+            np.zeros((len(places), width)),
+            np.zeros(len(places), dtype=RESERVE),
+        )
+        for name in SHOWN
+    }
+    for i, place in enumerate(places):
+        wire = model.problem.line.wires[place.wire]
+        element, node = _element_at(model, wire.name, place)
+        unknowns = axial_elements.unknowns_along(model, wire.name)[element]
+        assert wire.axial_stiffness is not None
+        left, _ = wire.left_of(model.mesh.x(model.mesh.elements(wire.name)[element])[None])
+        tension = _row(watched[TENSION], i, unknowns, place)
+        tension.weights[i] = axial_elements.strain_rows(model, wire.name)[element]
+        tension.law["stiffness"][i] = wire.axial_stiffness * left[0]
+        rest = _tension_at_rest(model, place, element)
+        tension.law["rest"][i] = rest
+        end = ends.get((wire.name, node))
+        outwards = np.zeros(width)
+        outwards[0 if place.outwards < 0 else 1] = place.outwards
+        moved = _moved(model, node) * place.outwards
+        for name in SHOWN[1:]:
+            _row(watched[name], i, unknowns, place)
+        if end is None:
+            continue
+        watched[TRAVEL].weights[i] = outwards
+        watched[TRAVEL].law["stiffness"][i], watched[TRAVEL].law["rest"][i] = 1.0, moved
+        if not end.tensioned or tensioner is None:
+            continue
+        watched[WEIGHT].weights[i] = tensioner.ratio * outwards
+        watched[WEIGHT].law["stiffness"][i] = 1.0
+        watched[WEIGHT].law["rest"][i] = tensioner.ratio * moved
+        if tensioner.travel is None:
+            continue
+        if wire_ends.at_stop(model, end):
+            low, high = tensioner.band(wire.name, wire, model.problem.gravity)
+            stop, sign, pull = (LOW_STOP, -1.0, low) if moved > 0.0 else (HIGH_STOP, 1.0, high)
+            watched[stop].weights[i] = tension.weights[i]
+            watched[stop].law["stiffness"][i] = sign * tension.law["stiffness"][i]
+            watched[stop].law["rest"][i] = sign * (rest - pull)
+        else:
+            for stop, sign in ((LOW_STOP, 1.0), (HIGH_STOP, -1.0)):
+                gap = max(tensioner.travel - sign * moved, 0.0)
+                _open(watched[stop], i, sign * outwards, gap, tensioner.stop_stiffness)
+    return Gauges(places, watched)
+
+
+def _open(table: LinkArrays, i: int, weights: np.ndarray, gap: float, stiffness: float) -> None:
+    """Watch a stop that is ``gap`` [m] away at rest: its force is what its reserve lacks."""
+    table.weights[i], law = weights, table.law
+    law["rest"][i], law["stiffness"][i] = stiffness * gap, -stiffness
+    law["carried"][i], law["released"][i] = 0.0, 1.0
+
+
+def _row(table: LinkArrays, i: int, unknowns: np.ndarray, place: GaugePlace) -> LinkArrays:
+    """The table with the unknowns of its gauge ``i``, which is watched as it is."""
+    table.unknowns[i] = unknowns
+    table.law["place"][i], table.law["carried"][i] = place.x, 1.0
+    return table
+
+
+def _element_at(model: Model, wire: str, place: GaugePlace) -> tuple[int, int]:
+    """The wire's element at a gauge, and its node there."""
+    pairs = model.mesh.elements(wire)
+    side = 0 if place.outwards < 0 else 1
+    element = int(np.argmin(np.abs(model.mesh.x(pairs[:, side]) - place.x)))
+    assert abs(model.mesh.x(pairs[element, side]) - place.x) < SAME_STATION
+    return element, int(pairs[element, side])
+
+
+def _tension_at_rest(model: Model, place: GaugePlace, element: int) -> float:
+    wire, mesh, form = model.problem.line.wires[place.wire], model.mesh, model.form
+    x = float(mesh.x(mesh.elements(wire.name)[element]).mean())
+    gained = 0.0
+    if form is not None and wire.name in form.gained_tension:
+        gained = float(form.gained_tension[wire.name][element])
+    return float(wire.tension_at(x)) + gained
+
+
+def _moved(model: Model, node: int) -> float:
+    """How far a node has moved along the track since the installation, at rest [m]."""
+    form = model.form
+    return float(form.along[node]) if form is not None and form.along.size else 0.0
