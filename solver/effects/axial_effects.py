@@ -31,6 +31,11 @@ _GIVES, _TAKES = "tensioner_slips_in", "tensioner_slips_out"
 CREEP = 1e-4
 
 
+def moves_along(problem: Problem) -> bool:
+    """Whether the wires of a problem move along the track."""
+    return AXIAL in problem.effects
+
+
 def _axial(builder: ModelBuilder) -> None:
     for wire in builder.problem.line.wires:
         _add_bars(builder, wire.name)

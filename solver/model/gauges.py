@@ -20,7 +20,6 @@ from catenary.solver.problem.problem import Problem
 TENSION, TRAVEL, WEIGHT = "wire_end_tension", "wire_end_travel", "tensioner_weight"
 LOW_STOP, HIGH_STOP = "tensioner_low_stop", "tensioner_high_stop"
 SHOWN = (TENSION, TRAVEL, WEIGHT, LOW_STOP, HIGH_STOP)
-AXIAL = "axial_motion"
 
 
 class GaugePlace(NamedTuple):
@@ -32,10 +31,10 @@ class GaugePlace(NamedTuple):
     outwards: int
 
 
-def gauge_places(problem: Problem) -> tuple[GaugePlace, ...]:
+def gauge_places(problem: Problem, moves: bool) -> tuple[GaugePlace, ...]:
     """Ends of wires that no clamp carries, and both sides of mid-points, by ascending place; none
-    where wires do not move along the track."""
-    if AXIAL not in problem.effects:
+    unless the line ``moves`` along the track."""
+    if not moves:
         return ()
     found = []
     for number, wire in enumerate(problem.line.wires):
@@ -59,7 +58,7 @@ class Gauges(NamedTuple):
 
 def gauges_of(model: Model) -> Gauges:
     """The gauges of a line about its shape at rest, empty without motion along the track."""
-    places = gauge_places(model.problem)
+    places = gauge_places(model.problem, "u" in model.unknowns)
     if not places:
         return Gauges((), {})
     ends = {(end.wire, end.node): end for end in wire_ends.ends_of(model)}

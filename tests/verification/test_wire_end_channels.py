@@ -9,6 +9,7 @@ from axial_lines import ALONG, elastic_line
 from measuring import check, march
 from small_lines import mesh_of, numerics, problem_of, train
 
+from catenary.solver.effects.axial_effects import moves_along
 from catenary.solver.model.gauges import SHOWN, gauge_places
 from catenary.solver.problem.along_track import AlongTrack, Tensioner
 
@@ -27,7 +28,7 @@ def test_tension_travel_and_stops_are_those_of_the_moving_weights() -> None:
     problem = problem_of(
         line, UNDAMPED, along=along, train=train(70.0, 65.0, 150.0), numerics=numerics(DT)
     )
-    places = gauge_places(problem)
+    places = gauge_places(problem, moves_along(problem))
     assert [(place.wire, place.x, place.outwards) for place in places] == [
         (0, 0.0, -1), (1, 0.0, -1), (0, 60.0, 1), (0, 60.0, -1), (1, 60.0, 1), (1, 60.0, -1),
         (0, 240.0, 1), (1, 240.0, 1),
@@ -59,6 +60,6 @@ def test_tension_travel_and_stops_are_those_of_the_moving_weights() -> None:
 
 def test_lines_that_do_not_move_along_the_track_have_no_such_channels() -> None:
     problem = problem_of(elastic_line(3), ALONG - {"axial_motion", "tensioners", "temperature"})
-    assert gauge_places(problem) == ()
+    assert gauge_places(problem, moves_along(problem)) == ()
     held = replace(problem, effects=ALONG)
-    assert len(gauge_places(held)) == 4
+    assert len(gauge_places(held, moves_along(held))) == 4
