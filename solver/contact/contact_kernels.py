@@ -167,16 +167,20 @@ def locate(x, wires, touches):
 @in_line
 def add_columns(node, data, by_height, by_slope, answer):
     """Add the weighted columns of a node's two unknowns."""
+    # Slices, whose indices are never negative: such loops become vector instructions.
     width, begin, at = node.width, node.begin, node.at
+    changed = answer[begin : begin + width]
+    first, second = data[at : at + width], data[at + width : at + 2 * width]
     for j in range(width):
-        answer[begin + j] += by_height * data[at + j] + by_slope * data[at + width + j]
+        changed[j] += by_height * first[j] + by_slope * second[j]
 
 
 @in_line
 def clear(answer, low, high):
     """Make the numbers from ``low`` to ``high`` zero."""
-    for j in range(low, high):
-        answer[j] = 0.0
+    cleared = answer[low:high]
+    for j in range(cleared.size):
+        cleared[j] = 0.0
 
 
 @in_line
@@ -283,23 +287,34 @@ def respond(motion, touches, gains, answers, bounds, followed, share):
 
 
 @in_line
+def add_answer(force, answer, begin, motion, gains):
+    """Add the answer to a force, of the unknowns from ``begin`` on, to the state."""
+    size = answer.size
+    x, y, z = (
+        motion[0][begin : begin + size],
+        motion[1][begin : begin + size],
+        motion[2][begin : begin + size],
+    )
+    for j in range(size):
+        change = force * answer[j]
+        z[j] += gains[2] * change
+        x[j] += gains[0] * change
+        y[j] += gains[1] * change
+
+
+@in_line
 def superpose(force, answers, touches, motion, gains):
     """Add the answers to contact forces to the state.
 
     ``answers`` and ``touches`` are those of ``place``; ``motion`` and ``gains`` those of
     ``LineState``, the former as it is read.
     """
-    x, y, z, _ = motion
     by_force = answers.by_force
     for i in range(force.size):
         f = force[i]
         if f != 0.0:
             low, high = touches[i].filled
-            for j in range(low, high):
-                change = f * by_force[i, j]
-                z[j] += gains[2] * change
-                x[j] += gains[0] * change
-                y[j] += gains[1] * change
+            add_answer(f, by_force[i, low:high], low, motion, gains)
 
 
 @in_line
@@ -309,13 +324,7 @@ def compensate(numbers, compensation, start, at, width, data, motion, gains):
     ``data[at[d] : at[d] + width[d]]`` is the column of link d from the local unknown ``start[d]``
     on; the rest as for ``superpose``.
     """
-    x, y, z, _ = motion
     for k in range(numbers.size):
         d, f = numbers[k], compensation[k]
-        begin = start[d] - at[d]
         if f != 0.0:
-            for j in range(at[d], at[d] + width[d]):
-                change = f * data[j]
-                z[begin + j] -= gains[2] * change
-                x[begin + j] -= gains[0] * change
-                y[begin + j] -= gains[1] * change
+            add_answer(-f, data[at[d] : at[d] + width[d]], start[d], motion, gains)

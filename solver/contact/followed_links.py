@@ -128,7 +128,7 @@ class LinkCoupling:
         table = followed.table
         unknowns, weights, law = followed.local
         x = law["place"]
-        distance = line.windows.reach + 2.0 * table.half_length.max(initial=0.0)
+        distance = columns.reach + 2.0 * table.half_length.max(initial=0.0)
         n = x.size
         far = np.searchsorted(x, x + distance, side="right") - 1 - np.arange(n)
         half = int(far.max(initial=0))

@@ -65,7 +65,7 @@ class ForcesOnLine:
         free = np.ones(model.n_dofs)
         free[model.constrained] = 0.0
         self._free = free[line.ownership.first : line.ownership.last]
-        node_columns = self._columns_of_nodes(range_of_run, free)
+        node_columns, reach = self._columns_of_nodes(range_of_run, free)
         columns = NO_COLUMNS
         self.link_coupling: LinkCoupling | None = None
         if table.switches:
@@ -75,7 +75,7 @@ class ForcesOnLine:
         self._contact_place = candidates.place
         self._touches = self.wires.on_wires(candidates.wire, candidates.half_length)
         self._answers = Answers(np.zeros((n, n_local)), np.zeros((n, n_local if uses_rate else 0)))
-        reach = line.windows.reach + table.half_length.max(initial=0.0)
+        reach += table.half_length.max(initial=0.0)
         self.reach = reach
         self._gains = Gains(train_speed, line.position_factor, line.velocity_factor, reach)
         touched = self._touches, self._answers
@@ -85,7 +85,7 @@ class ForcesOnLine:
         self._force = np.zeros(n)
         self.superposing = self._answers, self._touches, *motion
         self._superpose = bound(contact_kernels.superpose, self._force, *self.superposing)
-        self.compensating = (*columns, *motion)
+        self.compensating = (*columns[:4], *motion)
         self._speed = float(train_speed)
         self._across: WiresAcross | None = None
         self.crossing: tuple[Any, ...]
@@ -174,8 +174,11 @@ class ForcesOnLine:
         pushed = contact_force[:, None] * value * self._free[local]
         return [(local.ravel(), pushed.ravel()), *self.links.loads(compensation)]
 
-    def _columns_of_nodes(self, range_of_run: tuple[float, float], free: np.ndarray) -> np.ndarray:
-        """Columns of A^-1 for the nodes in a stretch of the wires, each with the place of its own.
+    def _columns_of_nodes(
+        self, range_of_run: tuple[float, float], free: np.ndarray
+    ) -> tuple[np.ndarray, float]:
+        """Columns of A^-1 for the nodes in a stretch of the wires, each with the place of its own,
+        and how far off a force on them is felt [m].
 
         Collective; ``free`` (n_dofs,) is zero for the unknowns that are held.
         """
@@ -189,4 +192,4 @@ class ForcesOnLine:
         nodes = self.wires.nodes
         nodes["begin"][chosen], nodes["at"][chosen] = found.start, found.at
         nodes["width"][chosen] = found.width
-        return found.data
+        return found.data, found.reach
