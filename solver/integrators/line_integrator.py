@@ -70,6 +70,8 @@ class LineIntegrator(ABC):
         self._proportional = model.damping_is_proportional
         # What is folded into the product with K, and what is left to do after the solve.
         self._alpha_share = self._beta_share = 0.0
+        # What M and K are in A, if damping leaves it their sum.
+        self._shares: tuple[float, float] | None = None
         if self._proportional:
             alpha, beta_damping = (
                 model.damping_of(model.blocks[0].component) if model.blocks else (0.0, 0.0)
@@ -77,6 +79,7 @@ class LineIntegrator(ABC):
             stiffness_share = self.position_factor + self.velocity_factor * alpha
             self._beta_share = beta_damping / (1.0 + self.velocity_factor * beta_damping)
             self._alpha_share = alpha - self._beta_share * stiffness_share
+            self._shares = 1.0 + self.velocity_factor * beta_damping, stiffness_share
         n = ownership.n_local
         gains = self.position_factor, self.velocity_factor
         self._passes: StationPasses | None = None
@@ -115,10 +118,9 @@ class LineIntegrator(ABC):
             return
         motion, steps = ahead
         loads = np.zeros(0) if self.loads is None else self.loads.values
-        parts, passes = self.operators.by_stations(not self._proportional), None
+        parts, passes = self.operators.by_stations(not self._proportional, self._shares), None
         if parts is not None:
-            product, factors, read, rates, answer = parts
-            passes = StationPasses(product, factors, read, rates, loads, answer, motion, steps)
+            passes = StationPasses(parts, loads, motion, steps)
         # A rank without stations has no passes; it keeps its state like the others.
         can = passes is not None or self.ownership.n_local == 0
         if not self._comm.allreduce(int(can), op=MPI.MIN):

@@ -15,7 +15,6 @@ from catenary.solver.base.compiled import compiled, inner
 from catenary.solver.base.pointers import borrowed
 from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps, PredictedLineState, Steps
 from catenary.solver.integrators.state_kernels import reserves_within
-from catenary.solver.linear.factors.station_factors import StationFactors
 from catenary.solver.linear.factors.substitution import (
     eliminate,
     first_of,
@@ -26,6 +25,7 @@ from catenary.solver.linear.factors.substitution import (
 from catenary.solver.linear.lanes import (
     add,
     add_scaled,
+    is_by_mass,
     load,
     remembers,
     same_part,
@@ -34,7 +34,8 @@ from catenary.solver.linear.lanes import (
     zero,
 )
 from catenary.solver.linear.make_ups import by_make_up
-from catenary.solver.linear.station_products import StationProduct, read_station, row_sums
+from catenary.solver.linear.station_products import read_station, row_sums
+from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
 from catenary.solver.window.window_kernels import NO_WINDOW, WindowArrays, look
 
@@ -52,42 +53,37 @@ class StationPasses:
         compiled loops that take steps themselves. ``track_links`` replaces the tuple
     factors : as given
     known : what the motion keeps besides x, y and z, or nothing
+    by_mass : whether right-hand sides are made by M, as where that is shorter than by K
 
     Parameters
     ----------
-    product : with K
-    factors : of the step operator
-    read : what ``product`` reads; the rank's own part is x of the motion, and what others have of
-        it is there before a step
-    velocity : the same of y of the motion, or of what it predicts of the velocity, which a product
-        with C reads
+    parts : product, factors and what they work on. The rank's own part of ``read`` is x of the
+        motion, and what others have of it is there before a step; that of ``rates`` is y of the
+        motion, or of what it predicts of the velocity; that of ``answer`` is the acceleration
     loads : of all that is solved for [N], or none, added in the pass forth; kept by reference
-    answer : of all that is solved for; the rank's own part is the acceleration
     motion : of the rank's own stations
     steps : those that the motion is kept for
     """
 
     def __init__(
         self,
-        product: StationProduct,
-        factors: StationFactors,
-        read: np.ndarray,
-        velocity: np.ndarray,
+        parts: ByStations,
         loads: np.ndarray,
-        answer: np.ndarray,
         motion: PredictedLineState,
         steps: Steps | AlphaSteps,
     ) -> None:
+        product, factors, read, velocity, answer, by_mass = parts
         _, _, low, high, _ = factors.ends.tolist()
-        layout = factors.layout
-        if isinstance(steps, AlphaSteps):
-            layout = layout.remembering()
-        factored = layout, *factors.factored[1:]
+        self.by_mass = by_mass != 0.0
+        layout = factors.layout.changed(
+            remembers=isinstance(steps, AlphaSteps), by_mass=self.by_mass
+        )
+        factored = factors.factored._replace(layout=layout)
         multiplied = (
             *(product.layout, product.places, product.kinds, product.blocks, product.first),
             *(read, velocity),
         )
-        changes, *more = changes_of(motion, steps)
+        changes, *more = changes_of(motion, steps, by_mass)
         starts = factors.starts[low : high + 1] - factors.starts[low]
         self._stretch = max(1, _STRETCH * (high - low) // max(1, int(starts[-1])))
         self._place = low, high, self._stretch, starts
@@ -121,14 +117,14 @@ class StationPasses:
 
 
 def changes_of(
-    motion: PredictedLineState, steps: Steps | AlphaSteps
+    motion: PredictedLineState, steps: Steps | AlphaSteps, by_mass: float
 ) -> tuple[tuple[float, ...], np.ndarray, np.ndarray]:
     """Numbers that take a state from one prediction to the next, the known acceleration, and the
     array for predicted velocities."""
     by_position, by_velocity, _ = map(float, motion.gains)
     if isinstance(steps, Steps):
         newmark = steps.dt, by_position, by_velocity, steps.damping_share
-        return (*newmark, *[0.0] * 6), np.zeros(0), np.zeros(0)
+        return (*newmark, *[0.0] * 6, by_mass), np.zeros(0), np.zeros(0)
     assert isinstance(motion, AlphaAhead)
     of_balanced, of_known = steps.balance
 
@@ -139,7 +135,7 @@ def changes_of(
     # z of the end of the step stands for its part of the coming prediction.
     by_position += of_balanced
     step = steps.dt, by_position, by_velocity, steps.damping_share
-    more = *from_kept(steps.known), *from_kept(steps.velocity), *steps.balance
+    more = *from_kept(steps.known), *from_kept(steps.velocity), *steps.balance, by_mass
     return tuple(map(float, (*step, *more))), motion.known, motion.predicted
 
 
@@ -159,8 +155,10 @@ def predict_velocities(motion, changes, begin, end):
 def go_on(layout, at, solution, motion, changes):
     """Take the rank's own station, whose first unknown is ``at``, from one prediction to the next:
     ``kernels.correct`` and ``predict`` at once. What was solved for is its acceleration but for
-    damping on mass."""
+    damping on mass, and for its share of x if the right-hand side was made by M."""
     x, y, z = motion[:3]
+    if is_by_mass(layout):
+        solution = add_scaled(solution, changes[10], load(layout, x, at))
     if remembers(layout):
         go_on_by_alpha(layout, at, solution, motion, changes)
         return
@@ -207,7 +205,7 @@ eliminate_in = by_make_up(_eliminate_row)
 def eliminate_row(multiplied, factored, loads, station, before, states, outward, answer):
     """``eliminate`` with the right-hand side from a row of the product, and of ``loads`` if there
     are any; ``states`` are what ``read_station`` gives to the start, at and to the end of it."""
-    layout, make_up = factored[0], make_up_at(factored, station)
+    layout, make_up = factored.layout, make_up_at(factored, station)
     return eliminate_in(
         layout, make_up, multiplied, factored, loads, station, before, states, outward, answer
     )
@@ -217,8 +215,8 @@ def eliminate_row(multiplied, factored, loads, station, before, states, outward,
 def forth(multiplied, factored, loads, answer):
     """Leave in ``answer`` what elimination leaves of the right-hand side; see ``StationPasses``."""
     multiplied, factored, loads, answer = borrowed((multiplied, factored, loads, answer))
-    layout, _, kinds, _, _, ends = factored
-    n, begin, end, middle = kinds.size, ends[0], ends[1], ends[4]
+    layout, ends = factored.layout, factored.ends
+    n, begin, end, middle = factored.kinds.size, ends[0], ends[1], ends[4]
     pairs = min(middle - begin, end - 1 - middle)
     left = right = zero(layout)
     before, here = read_station(multiplied, begin - 1), read_station(multiplied, begin)
@@ -288,7 +286,7 @@ def follow(number, motion, followed):
 @inner
 def _go_back(part, factored, station, inward, answer, motion, changes):
     own = solved(part, factored, station, inward, answer)
-    at = first_of(factored, station) - first_of(factored, factored[4])
+    at = first_of(factored, station) - first_of(factored, factored.low)
     go_on(part, at, own, motion, changes)
     return widened(part, own)
 
@@ -299,14 +297,14 @@ go_back_in = by_make_up(_go_back)
 @inner
 def go_back(factored, station, inward, answer, motion, changes):
     """Solve for an own station from those ``inward`` of it, and take its motion on."""
-    layout, make_up = factored[0], make_up_at(factored, station)
+    layout, make_up = factored.layout, make_up_at(factored, station)
     return go_back_in(layout, make_up, factored, station, inward, answer, motion, changes)
 
 
 @inner
 def _begin_back(part, factored, middle, answer, motion, changes):
     own = load(part, answer, first_of(factored, middle))
-    at = first_of(factored, middle) - first_of(factored, factored[4])
+    at = first_of(factored, middle) - first_of(factored, factored.low)
     go_on(part, at, own, motion, changes)
     return widened(part, own)
 
@@ -319,7 +317,7 @@ def back(factored, motion, answer, changes, followed):
     """Take the rank's own motion on from what ``forth`` has left in ``answer``, and find the
     reserve of its links, which come with their ranges of ``left_behind``."""
     factored, motion, answer, followed = borrowed((factored, motion, answer, followed))
-    layout, _, _, _, _, ends = factored
+    layout, ends = factored.layout, factored.ends
     stretch = followed[3]
     low, high, middle = ends[2], ends[3], ends[4]
     pairs = min(middle - low, high - 1 - middle)

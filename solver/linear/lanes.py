@@ -99,8 +99,14 @@ beside_size = _constant(
 remembers = _constant(
     lambda layout: layout.remembers, "Whether steps need an acceleration known before."
 )
+is_by_mass = _constant(
+    lambda layout: layout.by_mass, "Whether steps make their right-hand side by M."
+)
 shares = _constant(
     lambda layout: layout.shares, "Whether factors keep one block for both ways between stations."
+)
+is_sparse = _constant(
+    lambda layout: layout.sparse, "Whether factors keep the matrix's own blocks between stations."
 )
 is_damped = _constant(lambda layout: layout.damped, "Whether a product with K is one with C too.")
 

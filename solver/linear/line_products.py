@@ -13,6 +13,7 @@ from catenary.solver.linear.sections import Sections
 from catenary.solver.linear.station_layout import Layout
 from catenary.solver.linear.station_products import (
     StationProduct,
+    joining,
     layout_of,
     station_product,
     with_damping,
@@ -26,6 +27,8 @@ _COEFFICIENTS = {
     "stiffness": (0.0, 1.0, 0.0),
     "damping": (0.0, 0.0, 1.0),
 }
+# Terms that a row of M is to have less than one of K to take its place.
+FEWER = 3
 
 
 class LineProducts:
@@ -118,6 +121,25 @@ class LineProducts:
             damping = self._rows_of("damping")
             layout = with_damping(layout, None if damping is None else damping.blocks)
         return station_product(rows, first, layout, damping, columns)
+
+    def instead_of_stiffness(self, mass: float, stiffness: float) -> StationProduct | None:
+        """The product with P = -(``mass`` / ``stiffness``) M, where A = ``mass`` M + ``stiffness``
+        K, so that A^-1 K x = x / ``stiffness`` + A^-1 P x; None unless it is the shorter way.
+
+        M joins a wire's own unknowns of one plane, whatever K joins, and is the same in all
+        elements of a length.
+        """
+        if self.layout is None or not self._domain.size:
+            return None
+        rows = self._rows_of("mass")
+        if rows is None:
+            return None
+        rows = rows._replace(blocks=-mass / stiffness * rows.blocks)
+        layout = joining(self.layout.changed(own=(0, 1), beside=(0, 1)), rows.blocks)
+        if layout.n_terms + FEWER > self.layout.n_terms:
+            return None
+        columns, first = self._columns()
+        return station_product(rows, first, layout, None, columns)
 
     def find_layout(self, coefficients: tuple[float, float, float]) -> StationRows | None:
         """Find how unknowns of a station stand in lanes, if they can, from K and from the operator

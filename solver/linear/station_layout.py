@@ -16,6 +16,11 @@ LANES = (2, 4, 8, 12, 16)
 WIDEST = LANES[-1]
 # Lanes of an LLVM vector; more are held in several.
 REGISTER = 8
+# Parameters of a layout.
+_SETTINGS = (
+    *("widths", "own", "beside", "damped", "remembers", "shares", "make_ups", "sparse"),
+    "by_mass",
+)
 
 
 class Terms(NamedTuple):
@@ -52,8 +57,11 @@ class Layout:
         and those beside it; all of them by default
     damped : whether a product with K is one with C as well
     remembers : whether steps need an acceleration known before, as the generalized-alpha method's
+    by_mass : whether steps make their right-hand side by M in place of K
     shares : whether factors keep one block for both ways between two stations; only if it turns
         and one register holds all lanes
+    sparse : whether factors keep the matrix's own blocks between stations, of the terms
+        ``beside``, in place of products with these, which join all of a plane
     make_ups : places in a cross-section that stations of each make-up have; none if all have all
 
     Attributes
@@ -78,6 +86,8 @@ class Layout:
         remembers: bool = False,
         shares: bool = False,
         make_ups: tuple[tuple[int, ...], ...] = (),
+        sparse: bool = False,
+        by_mass: bool = False,
     ) -> None:
         self.widths = tuple(widths)
         self._plane = min(lanes for lanes in LANES if lanes >= max(self.widths))
@@ -85,7 +95,7 @@ class Layout:
         self.own = every if own is None else tuple(own)
         self.beside = every if beside is None else tuple(beside)
         self.damped, self.remembers = bool(damped), bool(remembers)
-        self.make_ups = make_ups
+        self.make_ups, self.sparse, self.by_mass = make_ups, bool(sparse), bool(by_mass)
         self.pitch = sum(self.widths)
         self.n_lanes = self._plane * len(self.widths)
         # Columns where there are fewer of these than of differences.
@@ -103,18 +113,18 @@ class Layout:
         """All that makes a layout."""
         own = (
             *(self.widths, self.own, self.beside, self.damped, self.remembers, self.shares),
-            self.make_ups,
+            *(self.make_ups, self.sparse, self.by_mass),
         )
         return own if self.whole is None else (*own, self.number, self.whole.key)
 
-    def remembering(self) -> Layout:
-        """The same for steps that need an acceleration known before."""
-        return self.changed(remembers=True)
-
     def changed(self, **settings: Any) -> Layout:
         """The same with some other parameters, by their names."""
-        names = ("widths", "own", "beside", "damped", "remembers", "shares", "make_ups")
-        return Layout(**{**{name: getattr(self, name) for name in names}, **settings})
+        return Layout(**{**{name: getattr(self, name) for name in _SETTINGS}, **settings})
+
+    @property
+    def n_terms(self) -> int:
+        """Terms of a row of K or C."""
+        return len(self.own) + 2 * len(self.beside)
 
     @property
     def varies(self) -> bool:
@@ -130,12 +140,14 @@ class Layout:
         places = np.array(self.make_ups[number])
         planes = np.searchsorted(np.cumsum(self.widths), places, side="right")
         widths = tuple(int(width) for width in np.bincount(planes) if width)
-        part = Layout(widths, (), (), self.damped, self.remembers)
+        names = "damped", "remembers", "sparse", "by_mass"
+        settings = {name: getattr(self, name) for name in names}
+        part = Layout(widths, (), (), **settings)
         lane = self._lane_of[places]
         apart, together = lane[:, None] ^ lane, planes[:, None] == planes
         own = part.differences(np.isin(apart, self.own) & together)
         beside = part.differences(np.isin(apart, self.beside) & together)
-        part = Layout(widths, own, beside, self.damped, self.remembers)
+        part = Layout(widths, own, beside, **settings)
         part.whole, part.places, part.number = self, self.make_ups[number], number
         return part
 

@@ -63,16 +63,16 @@ def layout_of(
     # a straight line lacks: few kernels serve them all.
     usual = ((0, 1, 2), (0, 1)) if max(widths) in (3, 4) else ((0, 1), (0, 1))
     own, beside = usual if max(widths) <= 4 else ((), ())
-    return _joining(Layout(widths, own, beside, make_ups=make_ups), stiffness)
+    return joining(Layout(widths, own, beside, make_ups=make_ups), stiffness)
 
 
 def with_damping(layout: Layout, damping: np.ndarray | None) -> Layout:
     """The same for products with C, by its blocks, as well."""
-    found = layout if damping is None else _joining(layout, damping)
+    found = layout if damping is None else joining(layout, damping)
     return found.changed(damped=True)
 
 
-def _joining(layout: Layout, blocks: np.ndarray) -> Layout:
+def joining(layout: Layout, blocks: np.ndarray) -> Layout:
     """A layout for a matrix of these blocks, see ``neighbours``, too."""
     joined = (blocks != 0).any(axis=1)
     own = layout.differences(joined[1])

@@ -47,7 +47,8 @@ class ByStations(NamedTuple):
     """A product with K and factors of A by stations, and the arrays that both work on.
 
     ``read`` is what the product reads, ``rates`` what a product with C does, ``answer`` what the
-    solve fills, of all that is solved for.
+    solve fills, of all that is solved for. If ``by_mass`` is not 0 the product is one with M, and
+    ``by_mass`` times what it reads is to be added to the answer.
     """
 
     product: StationProduct
@@ -55,6 +56,7 @@ class ByStations(NamedTuple):
     read: np.ndarray
     rates: np.ndarray
     answer: np.ndarray
+    by_mass: float
 
 
 class LineOperators:
@@ -130,11 +132,14 @@ class LineOperators:
         self._checked = None
         self._products.prepare()
 
-    def by_stations(self, damped: bool) -> ByStations | None:
+    def by_stations(
+        self, damped: bool, shares: tuple[float, float] | None = None
+    ) -> ByStations | None:
         """What a step in two passes works on, None unless all goes by stations. Not collective.
 
         The operator is then factored and multiplied by stations, and solved for in one application.
-        ``damped`` steps need a product with C, of ``rate``, too.
+        ``damped`` steps need a product with C, of ``rate``, too. If A is a sum of M and K, the
+        ``shares`` of both let steps take M where that is shorter.
         """
         product, solver = self._products.by_stations("stiffness", damped), self._solver
         if product is None or not isinstance(solver, PartSolver):
@@ -143,7 +148,13 @@ class LineOperators:
             return None
         read = self._read_padded
         rates = self._rate_padded if damped else read
-        return ByStations(product, solver.factors, read, rates, self._solution.array)
+        by_mass = 0.0
+        # Beyond the ends of a window the state is not zero, which A^-1 A x would need.
+        if shares is not None and not self._model.problem.window.moves:
+            instead = self._products.instead_of_stiffness(*shares)
+            if instead is not None:
+                product, by_mass = instead, 1.0 / shares[1]
+        return ByStations(product, solver.factors, read, rates, self._solution.array, by_mass)
 
     @property
     def station_widths(self) -> tuple[int, ...]:

@@ -25,6 +25,7 @@ from catenary.solver.integrators.newmark import NewmarkLine
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.linear.factors.station_factors import station_factors
 from catenary.solver.linear.station_products import station_product
+from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.equilibrium import find_form
 
@@ -56,7 +57,9 @@ def passes(widths: tuple[int, ...]) -> Callable[[], None]:
     answer, velocity = aligned_arrays.zeros(n, 1), aligned_arrays.zeros(n, 2)
     motion = PredictedLineState(read[b:-b], velocity, answer, np.zeros(n), STEPS)
     motion.put(*np.full((3, n), 1e-3))
-    return StationPasses(product, factors, read, read, np.zeros(0), answer, motion, STEPS).step
+    return StationPasses(
+        ByStations(product, factors, read, read, answer, 0.0), np.zeros(0), motion, STEPS
+    ).step
 
 
 @pytest.fixture(scope="module")

@@ -295,19 +295,6 @@ def test_a_stop_holds_a_tensioner_that_has_gone_its_way() -> None:
     assert after.min() < gap, "the stop pushes, it does not hold on"
 
 
-def test_friction_holds_a_tensioner_in_motion() -> None:
-    """Within its band a tensioner with friction is a fixed end: the same matrices."""
-    line = elastic_line(2)
-    mesh = mesh_of(line, 2)
-    stuck, _ = find_form(
-        problem_of(line, ALONG, along=AlongTrack(Tensioner(efficiency=0.97), end=True)), mesh
-    )
-    held, _ = find_form(problem_of(line, ALONG), mesh)
-    assert np.array_equal(stuck.constrained, held.constrained)
-    assert (matrix_of(stuck, stiffness=1.0) != matrix_of(held, stiffness=1.0)).nnz == 0
-    assert (matrix_of(stuck, mass=1.0) != matrix_of(held, mass=1.0)).nnz == 0
-
-
 def test_arms_swing_along_the_track_by_their_radial_force() -> None:
     """P / l of each, P = 4 T a / L of a zig-zag +-a."""
     line = replace(

@@ -8,7 +8,7 @@ A^-1, so that the factors of alike spans are alike, and a solve reads little mor
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -22,7 +22,7 @@ from catenary.solver.linear.factors.meeting_station import (
     edges,
     turn,
 )
-from catenary.solver.linear.factors.substitution import solve
+from catenary.solver.linear.factors.substitution import Factored, solve
 from catenary.solver.linear.sections import Sections
 from catenary.solver.linear.station_layout import Layout
 from catenary.solver.linear.station_products import kinds_by_make_up
@@ -31,6 +31,10 @@ from catenary.solver.linear.station_rows import StationRows, rows_of
 # Bytes of factors from which on they share blocks: more would leave no room for the state in a
 # cache next to a processor, of 1 to 2 MB; a product with a transpose waits some longer.
 LARGE = 2**19
+# Unknowns of a plane up to which factors join all of it.
+NARROW = 4
+# Where factors do not keep the matrix's own blocks.
+NO_BESIDES = np.zeros(0, dtype=np.int32), np.zeros(0)
 
 
 class StationFactors:
@@ -44,7 +48,10 @@ class StationFactors:
     blocks : of each kind S^-1, -S^-1 B with its block B towards the middle, and, unless the
         layout shares these, the transpose of the second of the station before it in elimination,
         which that multiplies with; packed by the layout. S is a diagonal block after elimination.
-        In the middle the second is for elimination from the other end
+        In the middle the second is for elimination from the other end. S^-1 alone if the layout is
+        sparse
+    beside_kinds, besides : then the kinds of the matrix's own blocks between stations, and of each
+        kind those to the stations before and after it, negative; else empty
     low : first station of a rank's own
     ends : (5,) int, read at each step: first station that a step solves for and the one after the
         last, first own one that it takes on and the one after the last, and where elimination ends
@@ -61,9 +68,11 @@ class StationFactors:
         low: int,
         high: int,
         n_kinds: int,
+        besides: tuple[np.ndarray, np.ndarray],
         turning: Turning | None = None,
     ) -> None:
         self.layout, self.kinds, self.blocks = layout, kinds, blocks
+        self.beside_kinds, self.besides = besides
         self.starts, self.places = stations.starts, stations.places()
         self.low, self.turning = low, turning
         self.n_stations, self.n_kinds = kinds.size, n_kinds
@@ -75,9 +84,10 @@ class StationFactors:
         self._solve = bound(solve, self.factored, later=vectors)
 
     @property
-    def factored(self) -> tuple[Any, ...]:
+    def factored(self) -> Factored:
         """What kernels read of them."""
-        return self.layout, self.places, self.kinds, self.blocks, self.low, self.ends
+        blocks = self.kinds, self.blocks, self.beside_kinds, self.besides
+        return Factored(self.layout, self.places, *blocks, self.low, self.ends)
 
     def solve(self, right: np.ndarray, answer: np.ndarray) -> None:
         """Make ``answer`` that to ``right``, of all unknowns, perhaps the same array."""
@@ -118,8 +128,7 @@ def station_factors(
     n = rows.kinds.size
     high = n if high is None else high
     stations = Sections.alike(n, layout.pitch) if stations is None else stations
-    # Factors join all of a plane, whatever matrices join: the same kernels serve them all.
-    layout = Layout(layout.widths, make_ups=layout.make_ups)
+    layout = _for_factors(layout, rows.blocks)
     lacks, blocks = stations.missing()[rows.chosen], rows.blocks
     if lacks.any():
         number, lacking = np.nonzero(lacks)
@@ -130,26 +139,62 @@ def station_factors(
     factors, make_up = found.factors, stations.make_up[rows.chosen][found.kinds]
 
     def pack(part: Layout, rows: slice | np.ndarray) -> np.ndarray:
-        n_blocks = 2 if part.shares else 3
+        n_blocks = 1 if part.sparse else 2 if part.shares else 3
         packed = part.packed(factors[rows, :n_blocks], part.whole_terms)
         return packed.reshape(packed.shape[0], n_blocks * part.whole_terms.sources.size)
 
     kinds, numbers, n_kinds, count = kinds_by_make_up(layout, make_up, pack)
-    if layout.varies and count != np.count_nonzero(factors) - lacks[found.kinds].sum():
+    kept = factors[:, :1] if layout.sparse else factors
+    if layout.varies and count != np.count_nonzero(kept) - lacks[found.kinds].sum():
         return None  # elimination joins what a station lacks
+    besides = _besides(layout, stations, rows) if layout.sparse else NO_BESIDES
+    if besides is None:
+        return None
     sharing = layout.changed(shares=True)
-    if numbers.nbytes > LARGE and sharing.shares and not layout.varies:
+    if numbers.nbytes > LARGE and sharing.shares and not (layout.varies or layout.sparse):
         layout = sharing
         kinds, numbers, n_kinds, _ = kinds_by_make_up(layout, make_up, pack)
     of_station = kinds[found.numbers]
     if not turns:
-        return StationFactors(layout, stations, of_station, numbers, low, high, n_kinds)
+        return StationFactors(layout, stations, of_station, numbers, low, high, n_kinds, besides)
     begins, ends = edges(
         blocks[1][found.kinds], factors[:, 0], found.numbers[:n], found.numbers[n : 2 * n]
     )
     turning = Turning(of_station[:n], of_station[n : 2 * n], of_station[2 * n :], begins, ends)
     of_station = of_station[:n].copy()
-    return StationFactors(layout, stations, of_station, numbers, low, high, n_kinds, turning)
+    return StationFactors(
+        layout, stations, of_station, numbers, low, high, n_kinds, besides, turning
+    )
+
+
+def _for_factors(layout: Layout, blocks: np.ndarray) -> Layout:
+    """Layout of factors of a matrix by its blocks, see ``neighbours``.
+
+    Narrow planes wait for each other more than for memory: a product that joins all of a plane has
+    one product less in a row than one with S^-1 and one with a sparse block. Wide ones wait for
+    memory, of which sparse blocks take a share, and which are alike where S is not.
+    """
+    if max(layout.widths) <= NARROW:
+        # Factors join all of a plane, whatever matrices join: the same kernels serve them all.
+        return Layout(layout.widths, make_ups=layout.make_ups)
+    joined = (blocks[0] != 0).any(axis=0) | (blocks[2] != 0).any(axis=0)
+    beside = tuple(sorted({0, 1, *layout.differences(joined)}))
+    return Layout(layout.widths, (0,), beside, make_ups=layout.make_ups, sparse=True)
+
+
+def _besides(
+    layout: Layout, stations: Sections, rows: StationRows
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Kinds of the blocks between stations and their numbers, as ``StationFactors`` keeps them;
+    None if a station is joined to unknowns of one beside it that it lacks itself."""
+
+    def pack(part: Layout, chosen: slice | np.ndarray) -> np.ndarray:
+        packed = [part.packed(-rows.blocks[place][chosen], part.beside_terms) for place in (0, 2)]
+        return np.concatenate(packed, axis=1)
+
+    kinds, numbers, _, count = kinds_by_make_up(layout, stations.make_up[rows.chosen], pack)
+    joined = np.count_nonzero(rows.blocks[0]) + np.count_nonzero(rows.blocks[2])
+    return (kinds[rows.kinds], numbers) if count == joined else None
 
 
 class _Found(NamedTuple):

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from catenary.solver.base.compiled import compiled, inner
 from catenary.solver.base.pointers import borrowed
 from catenary.solver.linear.lane_products import (
+    add_beside,
     add_transposed,
     add_whole,
     numbers_from,
@@ -14,6 +17,8 @@ from catenary.solver.linear.lane_products import (
     total_of,
 )
 from catenary.solver.linear.lanes import (
+    beside_size,
+    is_sparse,
     load,
     narrowed,
     shares,
@@ -22,35 +27,78 @@ from catenary.solver.linear.lanes import (
     widened,
     zero,
 )
-from catenary.solver.linear.make_ups import block_at, by_make_up, make_up_of, start_of
+from catenary.solver.linear.make_ups import Places, block_at, by_make_up, make_up_of, start_of
+from catenary.solver.linear.station_layout import Layout
+
+
+class Factored(NamedTuple):
+    """What kernels read of ``StationFactors``, whose attributes these are."""
+
+    layout: Layout
+    places: Places
+    kinds: np.ndarray
+    blocks: np.ndarray
+    beside_kinds: np.ndarray
+    besides: np.ndarray
+    low: int
+    ends: np.ndarray
 
 
 @inner
 def factors_of(part, factored, station):
     """Where the blocks of a station are; ``part`` is the layout of its make-up."""
-    _, _, kinds, blocks, _, _ = factored
-    n_blocks = np.uint64(2) if shares(part) else np.uint64(3)
-    return numbers_from(blocks, block_at(part, kinds, station, n_blocks * whole_size(part)))
+    n_blocks = np.uint64(3)
+    if is_sparse(part):
+        n_blocks = np.uint64(1)
+    elif shares(part):
+        n_blocks = np.uint64(2)
+    at = block_at(part, factored.kinds, station, n_blocks * whole_size(part))
+    return numbers_from(factored.blocks, at)
+
+
+@inner
+def add_joined(part, factored, sums, station, towards_end, x):
+    """Add to sums what a station gets from the one beside it, ``towards_end`` of the line or else
+    its start, which holds ``x``: the block of the matrix between both, negative, times x."""
+    size = beside_size(part)
+    at = block_at(part, factored.beside_kinds, station, np.uint64(2) * size)
+    numbers = numbers_from(factored.besides, at)
+    return add_beside(part, sums, numbers, size if towards_end else np.uint64(0), x)
+
+
+@inner
+def divided(part, factored, station, left):
+    """What is ``left`` of a station's right-hand side, divided by its block after elimination."""
+    numbers = factors_of(part, factored, station)
+    return total_of(part, add_whole(part, sums_from(part, zero(part)), numbers, np.uint64(0), left))
 
 
 @inner
 def first_of(factored, station):
     """First unknown of a station."""
-    return start_of(factored[0], factored[1], station)
+    return start_of(factored.layout, factored.places, station)
 
 
 @inner
 def make_up_at(factored, station):
     """Make-up of a station."""
-    return make_up_of(factored[0], factored[1], station)
+    return make_up_of(factored.layout, factored.places, station)
 
 
 @inner
 def eliminate(part, factored, sums, station, before, outward, answer):
     """Leave in ``answer`` what the right-hand side of a station, as ``sums``, is after those
-    ``outward`` of it are eliminated, of which ``before`` is the last; ``part`` is the layout of its
-    make-up."""
+    outwards of it are eliminated, of which ``before`` is the last; ``part`` is the layout of its
+    make-up.
+
+    Returns what the station inwards of it takes as ``outward``.
+    """
     outward = narrowed(part, outward)
+    if is_sparse(part):
+        sums = add_joined(part, factored, sums, station, before > station, outward)
+        left = total_of(part, sums)
+        store(part, answer, first_of(factored, station), left)
+        return widened(part, divided(part, factored, station, left))
     if shares(part):
         numbers, total = factors_of(part, factored, before), total_of(part, sums)
         left = add_transposed(part, total, numbers, whole_size(part), outward)
@@ -74,22 +122,24 @@ eliminate_in = by_make_up(_eliminate_right)
 def eliminate_right(factored, right, station, before, outward, answer):
     """``eliminate`` with the right-hand side of an array."""
     make_up = make_up_at(factored, station)
-    return eliminate_in(factored[0], make_up, factored, right, station, before, outward, answer)
+    layout = factored.layout
+    return eliminate_in(layout, make_up, factored, right, station, before, outward, answer)
 
 
 @inner
 def _meet(part, factored, middle, towards_end, answer):
-    here, kinds = first_of(factored, middle), factored[2]
-    numbers, left = factors_of(part, factored, middle), load(part, answer, here)
-    towards_end = narrowed(part, towards_end)
-    if shares(part):
-        beyond = factors_of(part, factored, min(middle + 1, kinds.size - 1))
+    here = first_of(factored, middle)
+    left, towards_end = load(part, answer, here), narrowed(part, towards_end)
+    if is_sparse(part):
+        sums = sums_from(part, left)
+        left = total_of(part, add_joined(part, factored, sums, middle, True, towards_end))
+    elif shares(part):
+        beyond = factors_of(part, factored, min(middle + 1, factored.kinds.size - 1))
         left = add_transposed(part, left, beyond, whole_size(part), towards_end)
     else:
-        sums = sums_from(part, left)
+        numbers, sums = factors_of(part, factored, middle), sums_from(part, left)
         left = total_of(part, add_whole(part, sums, numbers, whole_size(part), towards_end))
-    sums = sums_from(part, zero(part))
-    own = total_of(part, add_whole(part, sums, numbers, np.uint64(0), left))
+    own = divided(part, factored, middle, left)
     store(part, answer, here, own)
     return widened(part, own)
 
@@ -102,17 +152,21 @@ def meet(factored, middle, towards_end, answer):
     """Unknowns of the middle station from what ``answer`` holds of it and what is left of the one
     beside it, ``towards_end`` of the line."""
     make_up = make_up_at(factored, middle)
-    return meet_in(factored[0], make_up, factored, middle, towards_end, answer)
+    return meet_in(factored.layout, make_up, factored, middle, towards_end, answer)
 
 
 @inner
 def solved(part, factored, station, inward, answer):
     """Unknowns of a station, in lanes of ``part``, from what ``answer`` holds of it and those
     ``inward`` of it."""
-    numbers = factors_of(part, factored, station)
     left = load(part, answer, first_of(factored, station))
-    sums = add_whole(part, sums_from(part, zero(part)), numbers, np.uint64(0), left)
     inward = narrowed(part, inward)
+    if is_sparse(part):
+        sums, towards_end = sums_from(part, left), station < factored.ends[4]
+        left = total_of(part, add_joined(part, factored, sums, station, towards_end, inward))
+        return divided(part, factored, station, left)
+    numbers = factors_of(part, factored, station)
+    sums = add_whole(part, sums_from(part, zero(part)), numbers, np.uint64(0), left)
     return total_of(part, add_whole(part, sums, numbers, whole_size(part), inward))
 
 
@@ -130,16 +184,14 @@ substitute_in = by_make_up(_substitute_into)
 def substitute_into(factored, station, inward, answer):
     """``solved`` in lanes of a whole cross-section, left in ``answer``, too."""
     make_up = make_up_at(factored, station)
-    return substitute_in(factored[0], make_up, factored, station, inward, answer)
+    return substitute_in(factored.layout, make_up, factored, station, inward, answer)
 
 
 @compiled
 def solve(factored, right, answer):
-    """Fill ``answer`` from ``right``, for all stations; ``factored`` are layout, places, kinds,
-    blocks, low and ends of ``StationFactors``."""
+    """Fill ``answer`` from ``right``, for all stations; see ``Factored``."""
     factored, right, answer = borrowed((factored, right, answer))
-    layout, _, kinds, _, _, ends = factored
-    n, middle = kinds.size, ends[4]
+    layout, n, middle = factored.layout, factored.kinds.size, factored.ends[4]
     pairs = min(middle, n - 1 - middle)
     x, y = zero(layout), zero(layout)
     for i in range(pairs):

@@ -43,7 +43,7 @@ def test_factors_and_products_of_any_width(widths: tuple[int, ...], joined: bool
     compare_product(matrix, 0, lanes)
 
 
-@pytest.mark.parametrize("widths", [(2,), (3,), (4,), (8,), (4, 4)])
+@pytest.mark.parametrize("widths", [(2,), (3,), (4,), (4, 4)])
 @pytest.mark.parametrize("n_stations", [1, 2, 3, 40])
 def test_large_factors_keep_one_block_for_both_ways(
     n_stations: int, widths: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
@@ -56,6 +56,20 @@ def test_large_factors_keep_one_block_for_both_ways(
     assert shared.layout.shares and not apart.layout.shares
     assert 3 * shared.blocks.size <= 2 * apart.blocks.size
     compare_factors(n_stations, 0, n_stations, widths)
+
+
+@pytest.mark.parametrize("widths", [(6,), (10,), (6, 4)])
+@pytest.mark.parametrize("n_stations", [1, 2, 3, 40])
+@pytest.mark.parametrize("joined", [False, True])
+def test_factors_of_wide_planes_keep_the_blocks_of_the_matrix(
+    widths: tuple[int, ...], n_stations: int, joined: bool
+) -> None:
+    matrix = line(n_stations, widths=widths, joined=joined)
+    found = station_factors(matrix, layout(matrix))
+    assert found is not None and found.layout.sparse
+    # Blocks between stations repeat with the line, those after elimination more slowly.
+    assert found.beside_kinds.max() <= min(n_stations, 9) and found.kinds.size == n_stations
+    compare_factors(n_stations, 0, n_stations, widths, joined)
 
 
 @pytest.mark.parametrize("widths", [(4, 4, 4), (8, 4)])

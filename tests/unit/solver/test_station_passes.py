@@ -12,6 +12,7 @@ from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.linear.factors import station_factors as module
 from catenary.solver.linear.factors.station_factors import station_factors
 from catenary.solver.linear.station_products import station_product
+from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.switching_links import RESERVE, LinkArrays
 
 RNG = np.random.default_rng(11)
@@ -78,7 +79,9 @@ def compare(
     read, shown = others.copy(), np.zeros(b * n_own)
     motion = PredictedLineState(read[b:-b][own], np.zeros(b * n_own), answer[own], shown, STEPS)
     motion.put(displacement, velocity, answer[own].copy())
-    passes = StationPasses(product, factors, read, read, loads, answer, motion, STEPS)
+    passes = StationPasses(
+        ByStations(product, factors, read, read, answer, 0.0), loads, motion, STEPS
+    )
     links = LinkArrays(ends, RNG.standard_normal(ends.shape), LAWS[: len(ends)])
     passes.track_links(links, tension)
     passes.step()
@@ -100,7 +103,9 @@ def test_a_compiled_loop_takes_the_same_steps_with_kernel_and_arguments() -> Non
         read, answer, shown = np.zeros(88), np.zeros(80), np.zeros(80)
         motion = PredictedLineState(read[4:-4], np.zeros(80), answer, shown, STEPS)
         motion.put(start, 2.0 * start, 3.0 * start)
-        passes = StationPasses(product, factors, read, read, np.zeros(0), answer, motion, STEPS)
+        passes = StationPasses(
+            ByStations(product, factors, read, read, answer, 0.0), np.zeros(0), motion, STEPS
+        )
         for _ in range(3):
             if by_kernel:
                 passes.kernel(*passes.arguments)

@@ -93,9 +93,20 @@ def test_solves_are_those_of_the_matrix(name: str) -> None:
         assert np.abs(answer - expected).max() < ROUND_OFF * np.abs(expected).max()
 
 
-def test_a_wire_that_ends_at_its_last_station_is_left_to_petsc() -> None:
-    """Elimination joins the next station, which has fewer unknowns, to all of the last."""
-    assert parts("stitch", ends=0)[2] is None
+@pytest.mark.parametrize("name", ["stitch", "lateral", "odd"])
+def test_a_wire_may_end_at_its_last_station(name: str) -> None:
+    """Blocks between stations are the matrix's own: they join no unknowns that a station lacks."""
+    matrix, _, factors = parts(name, ends=0)
+    assert factors is not None and factors.layout.sparse
+    right, answer = RNG.standard_normal(len(matrix)), np.zeros(len(matrix))
+    factors.solve(right, answer)
+    expected = np.linalg.solve(matrix, right)
+    assert np.abs(answer - expected).max() < ROUND_OFF * np.abs(expected).max()
+
+
+def test_wires_that_meet_without_a_common_station_are_left_to_petsc() -> None:
+    """Elimination joins the next station, which lacks unknowns, to all of the last."""
+    assert parts("overlap", ends=0)[2] is None
 
 
 def test_blocks_of_one_make_up_are_kept_once() -> None:
