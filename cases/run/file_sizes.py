@@ -23,8 +23,8 @@ from catenary.cases.run.recording import (
 from catenary.cases.scene.convert.course import resolved
 from catenary.postproc.channels.line_record import GZIP
 from catenary.postproc.files.chunk_shapes import Chunk, chunks_of
-from catenary.solver.model.gauges import SHOWN
 from catenary.solver.problem.problem import Problem
+from catenary.solver.problem.watched_links import GAUGES
 from catenary.solver.time_loop import channels
 from catenary.solver.time_loop.channels import Channel
 
@@ -93,7 +93,7 @@ def estimate_files(
         for path, (_, columns) in tables.items()
     )
     n_droppers, n_arms = recording.dropper_x.size, recording.arm_x.size
-    n_ends = len(SHOWN) * recording.end_x.size
+    n_ends = len(GAUGES) * recording.end_x.size
     kept = 2 * (_STATE_ARRAYS * n_dofs + 2 * (n_droppers + n_arms + n_ends))
     at_rest = _PER_NODE * recording.n_nodes + _PER_DROPPER * n_droppers
     head = _EMPTY_FILE + len(json.dumps(resolved(scene)))

@@ -25,8 +25,8 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.integrators.detour import Detour, detour_of
-from catenary.solver.model.gauges import SHOWN
 from catenary.solver.problem.problem import Problem
+from catenary.solver.problem.watched_links import GAUGES
 from catenary.solver.time_loop.single_steps import single_steps_of
 from catenary.solver.window.choice import moving_share
 
@@ -201,7 +201,7 @@ def flush_cadence(problem: Problem, n_dofs: int, recording: Recording) -> int:
 def _steps_in_memory(problem: Problem, recording: Recording) -> int:
     """Steps whose channels fit into memory."""
     of_train = _PER_PANTOGRAPH * len(problem.train.placements)
-    columns = recording.arm_x.size + recording.dropper_x.size + len(SHOWN) * recording.end_x.size
+    columns = recording.arm_x.size + recording.dropper_x.size + len(GAUGES) * recording.end_x.size
     window, masts = recording.line.window, problem.line.support_positions
     if window is None or not problem.window.moves:
         return int(FLUSH_MEMORY / (_BYTES * (of_train + columns)))

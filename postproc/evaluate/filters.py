@@ -8,8 +8,8 @@ gain is 1/2 (-6 dB), at frequency f of a low-pass 1 / (1 + (tan(pi f dt)/tan(pi 
 from __future__ import annotations
 
 import numpy as np
+from scipy import signal
 
-from catenary.postproc.evaluate import butterworth
 from catenary.solver.base.errors import InputError
 
 CUT_OFF = 20.0
@@ -46,7 +46,8 @@ def low_pass(values: np.ndarray, dt: float, cut_off: float = CUT_OFF) -> np.ndar
         If the record is sampled at no more than twice the cut-off.
     """
     check_sampling(dt, cut_off)
-    return _both_ways(butterworth.low_pass(ORDER, cut_off, dt), values, dt, cut_off)
+    sos = signal.butter(ORDER, cut_off, btype="low", fs=1.0 / dt, output="sos")
+    return _both_ways(sos, values, dt, cut_off)
 
 
 def band_0_5(values: np.ndarray, dt: float) -> np.ndarray:
@@ -57,15 +58,13 @@ def band_0_5(values: np.ndarray, dt: float) -> np.ndarray:
 def band_5_20(values: np.ndarray, dt: float) -> np.ndarray:
     """Part of ``values`` between 5 and 20 Hz, free of the mean: a band-pass of 6th-order edges."""
     check_sampling(dt, CUT_OFF)
-    return _both_ways(
-        butterworth.band_pass(ORDER, (BAND_LIMIT, CUT_OFF), dt), values, dt, BAND_LIMIT
-    )
+    edges = (BAND_LIMIT, CUT_OFF)
+    sos = signal.butter(ORDER, edges, btype="bandpass", fs=1.0 / dt, output="sos")
+    return _both_ways(sos, values, dt, BAND_LIMIT)
 
 
-def _both_ways(
-    sections: butterworth.Sections, values: np.ndarray, dt: float, slowest: float
-) -> np.ndarray:
-    """As ``scipy.signal.sosfiltfilt`` along the first axis.
+def _both_ways(sos: np.ndarray, values: np.ndarray, dt: float, slowest: float) -> np.ndarray:
+    """Like ``scipy.signal.sosfiltfilt`` along the first axis, to the last bit.
 
     It takes the memory of one more record, not of five: a record is filtered in place, in blocks,
     each of which goes on from the state that the one before has left.
@@ -81,6 +80,15 @@ def _both_ways(
     if padding:
         extended[:padding] = 2.0 * values[:1] - values[padding:0:-1]
         extended[padding + n :] = 2.0 * values[-1:] - values[-2 : -padding - 2 : -1]
-    butterworth.filter_in_place(sections, extended, _BLOCK)
-    butterworth.filter_in_place(sections, extended[::-1], _BLOCK)
+    _in_place(sos, extended)
+    _in_place(sos, extended[::-1])
     return extended[padding : padding + n]
+
+
+def _in_place(sos: np.ndarray, record: np.ndarray) -> None:
+    """Filter a record along its first axis, from the steady state of its first value on."""
+    at_rest = signal.sosfilt_zi(sos)
+    state = at_rest.reshape(*at_rest.shape, *[1] * (record.ndim - 1)) * record[:1]
+    for start in range(0, record.shape[0], _BLOCK):
+        block = record[start : start + _BLOCK]
+        block[:], state = signal.sosfilt(sos, block, axis=0, zi=state)

@@ -9,7 +9,8 @@ import numpy as np
 
 from catenary.solver.effects import vertical_effects  # noqa: F401  (built before)
 from catenary.solver.effects.effect import Effect, register
-from catenary.solver.model.links.links import PULLS, UPLIFT_STOPS, at_nodes, at_places, law
+from catenary.solver.model.links.links import PULLS, at_nodes, at_places, law
+from catenary.solver.problem.watched_links import UPLIFT_STOPS
 
 if TYPE_CHECKING:
     from catenary.solver.model.builder import ModelBuilder

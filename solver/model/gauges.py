@@ -15,11 +15,14 @@ from catenary.solver.model.model import Model
 from catenary.solver.model.switching_links import RESERVE, LinkArrays
 from catenary.solver.model.unknowns.stations import SAME_STATION
 from catenary.solver.problem.problem import Problem
-
-# What a gauge shows, in the order of its tables.
-TENSION, TRAVEL, WEIGHT = "wire_end_tension", "wire_end_travel", "tensioner_weight"
-LOW_STOP, HIGH_STOP = "tensioner_low_stop", "tensioner_high_stop"
-SHOWN = (TENSION, TRAVEL, WEIGHT, LOW_STOP, HIGH_STOP)
+from catenary.solver.problem.watched_links import (
+    GAUGES,
+    HIGH_STOP,
+    LOW_STOP,
+    TENSION,
+    TRAVEL,
+    WEIGHT,
+)
 
 
 class GaugePlace(NamedTuple):
@@ -49,7 +52,7 @@ def gauge_places(problem: Problem, moves: bool) -> tuple[GaugePlace, ...]:
 
 
 class Gauges(NamedTuple):
-    """Gauges of a line: their places, and for each of ``SHOWN`` what is watched, (n,) links of all
+    """Gauges of a line: their places, and for each of ``GAUGES`` what is watched, (n,) links of all
     unknowns of the line."""
 
     places: tuple[GaugePlace, ...]
@@ -70,7 +73,7 @@ def gauges_of(model: Model) -> Gauges:
             np.zeros((len(places), width)),
             np.zeros(len(places), dtype=RESERVE),
         )
-        for name in SHOWN
+        for name in GAUGES
     }
     for i, place in enumerate(places):
         wire = model.problem.line.wires[place.wire]
@@ -87,7 +90,7 @@ def gauges_of(model: Model) -> Gauges:
         outwards = np.zeros(width)
         outwards[0 if place.outwards < 0 else 1] = place.outwards
         moved = _moved(model, node) * place.outwards
-        for name in SHOWN[1:]:
+        for name in GAUGES[1:]:
             _row(watched[name], i, unknowns, place)
         if end is None:
             continue

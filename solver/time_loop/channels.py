@@ -12,12 +12,18 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
-from catenary.solver.model import gauges
-from catenary.solver.model.links.links import UPLIFT_STOPS
+from catenary.solver.problem.watched_links import (
+    HIGH_STOP,
+    LOW_STOP,
+    TENSION,
+    TRAVEL,
+    UPLIFT_STOPS,
+    WEIGHT,
+)
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from catenary.solver.contact.forces_on_line import ForcesOnLine
     from catenary.solver.contact.pantographs import Pantographs
     from catenary.solver.schemes.scheme import Scheme
@@ -130,11 +136,14 @@ class Channel:
         return several.get(self.per, n)
 
 
-_NOTHING = np.zeros(0)
+def _nothing() -> np.ndarray:
+    import numpy as np  # the command line reads names of channels, and loads no arrays for them
+
+    return np.zeros(0)
 
 
 def _gauge(name: str) -> Callable[[Sources], np.ndarray]:
-    return lambda sources: sources.gauges.get(name, _NOTHING)
+    return lambda sources: sources.gauges.get(name, _nothing())
 
 
 TIME = Channel("time", "s", "time since the start of the run", RUN)
@@ -249,7 +258,7 @@ CHANNELS: dict[str, Channel] = {
             "N",
             "force of the stop above a steady arm on the contact wire, downward",
             ARM,
-            lambda sources: sources.link_force.get(UPLIFT_STOPS, _NOTHING),
+            lambda sources: sources.link_force.get(UPLIFT_STOPS, _nothing()),
             when=lambda train: train.uplift_stops,
         ),
         *(
@@ -263,22 +272,22 @@ CHANNELS: dict[str, Channel] = {
             )
             for name, unit, meaning in (
                 (
-                    gauges.TENSION,
+                    TENSION,
                     "N",
                     "tension of a wire at its end, or beside a mid-point anchor",
                 ),
                 (
-                    gauges.TRAVEL,
+                    TRAVEL,
                     "m",
                     "how far the end of a wire has moved outwards since the installation",
                 ),
                 (
-                    gauges.WEIGHT,
+                    WEIGHT,
                     "m",
                     "how far the weights of a tensioner have sunk since the installation",
                 ),
-                (gauges.LOW_STOP, "N", "force of the stop of weights at their lowest, >= 0"),
-                (gauges.HIGH_STOP, "N", "force of the stop of weights at their highest, >= 0"),
+                (LOW_STOP, "N", "force of the stop of weights at their lowest, >= 0"),
+                (HIGH_STOP, "N", "force of the stop of weights at their highest, >= 0"),
             )
         ),
     )

@@ -16,8 +16,9 @@ from catenary.solver.contact.followed_links import FollowedLinks
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.integrators import state_kernels
-from catenary.solver.model.gauges import SHOWN, Gauges, gauges_of
+from catenary.solver.model.gauges import Gauges, gauges_of
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays, padded
+from catenary.solver.problem.watched_links import GAUGES
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.after_incidents import ChangedLine
 from catenary.solver.statics.equilibrium import Equilibrium
@@ -384,7 +385,7 @@ def _owned_gauges(
     """Numbers of the gauges that a rank owns, and what they watch in its unknowns."""
     if not gauges.places:
         return np.zeros(0, dtype=np.int64), {}
-    mine = np.flatnonzero(owned(gauges.watched[SHOWN[0]].unknowns[:, 0]))
+    mine = np.flatnonzero(owned(gauges.watched[GAUGES[0]].unknowns[:, 0]))
     local = {
         name: links._replace(unknowns=links.unknowns - first).of(mine)
         for name, links in gauges.watched.items()

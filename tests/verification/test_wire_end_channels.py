@@ -10,8 +10,9 @@ from measuring import check, march
 from small_lines import mesh_of, numerics, problem_of, train
 
 from catenary.solver.effects.axial_effects import moves_along
-from catenary.solver.model.gauges import SHOWN, gauge_places
+from catenary.solver.model.gauges import gauge_places
 from catenary.solver.problem.along_track import AlongTrack, Tensioner
+from catenary.solver.problem.watched_links import GAUGES
 
 UNDAMPED = ALONG - {"structural_damping"}
 DT = 1e-3
@@ -34,7 +35,7 @@ def test_tension_travel_and_stops_are_those_of_the_moving_weights() -> None:
         (0, 240.0, 1), (1, 240.0, 1),
     ]  # fmt: skip
     seen = march(
-        problem, mesh_of(line, 2), lambda view: [getattr(view, name).copy() for name in SHOWN]
+        problem, mesh_of(line, 2), lambda view: [getattr(view, name).copy() for name in GAUGES]
     )
     tension, moved, weight, low, high = np.moveaxis(np.array(seen.watched), 1, 0)
     assert (moved[:, :6] == 0.0).all() and (low[:, :6] == 0.0).all()

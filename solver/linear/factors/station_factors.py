@@ -31,7 +31,7 @@ from catenary.solver.linear.station_rows import StationRows, rows_of
 # Bytes of factors from which on they share blocks: more would leave no room for the state in a
 # cache next to a processor, of 1 to 2 MB; a product with a transpose waits some longer.
 LARGE = 2**19
-# Unknowns of a plane up to which factors join all of it.
+# Unknowns of a plane up to which large factors join all of it, too.
 NARROW = 4
 # Where factors do not keep the matrix's own blocks.
 NO_BESIDES = np.zeros(0, dtype=np.int32), np.zeros(0)
@@ -128,7 +128,8 @@ def station_factors(
     n = rows.kinds.size
     high = n if high is None else high
     stations = Sections.alike(n, layout.pitch) if stations is None else stations
-    layout = _for_factors(layout, rows.blocks)
+    # Factors join all of a plane, whatever matrices join: the same kernels serve them all.
+    layout = Layout(layout.widths, make_ups=layout.make_ups)
     lacks, blocks = stations.missing()[rows.chosen], rows.blocks
     if lacks.any():
         number, lacking = np.nonzero(lacks)
@@ -144,11 +145,16 @@ def station_factors(
         return packed.reshape(packed.shape[0], n_blocks * part.whole_terms.sources.size)
 
     kinds, numbers, n_kinds, count = kinds_by_make_up(layout, make_up, pack)
-    kept = factors[:, :1] if layout.sparse else factors
-    if layout.varies and count != np.count_nonzero(kept) - lacks[found.kinds].sum():
-        return None  # elimination joins what a station lacks
-    besides = _besides(layout, stations, rows) if layout.sparse else NO_BESIDES
-    if besides is None:
+    lacked = lacks[found.kinds].sum() if layout.varies else 0
+    # Where elimination joins what a station lacks.
+    unfit = layout.varies and count != np.count_nonzero(factors) - lacked
+    besides: tuple[np.ndarray, np.ndarray] | None = NO_BESIDES
+    if max(layout.widths) > NARROW and (unfit or numbers.nbytes > LARGE):
+        layout = _sparse(layout, rows.blocks)
+        kinds, numbers, n_kinds, count = kinds_by_make_up(layout, make_up, pack)
+        besides = _besides(layout, stations, rows)
+        unfit = layout.varies and count != np.count_nonzero(factors[:, :1]) - lacked
+    if unfit or besides is None:
         return None
     sharing = layout.changed(shares=True)
     if numbers.nbytes > LARGE and sharing.shares and not (layout.varies or layout.sparse):
@@ -167,16 +173,13 @@ def station_factors(
     )
 
 
-def _for_factors(layout: Layout, blocks: np.ndarray) -> Layout:
-    """Layout of factors of a matrix by its blocks, see ``neighbours``.
+def _sparse(layout: Layout, blocks: np.ndarray) -> Layout:
+    """Layout of factors that keep S^-1 and a matrix's own ``blocks``, see ``neighbours``.
 
-    Narrow planes wait for each other more than for memory: a product that joins all of a plane has
-    one product less in a row than one with S^-1 and one with a sparse block. Wide ones wait for
-    memory, of which sparse blocks take a share, and which are alike where S is not.
+    A product that joins all of a plane has one product less in a row than one with S^-1 and one
+    with a sparse block. Numbers that a cache does not hold are waited for longer than that: sparse
+    blocks take a share of them, and are alike where S is not.
     """
-    if max(layout.widths) <= NARROW:
-        # Factors join all of a plane, whatever matrices join: the same kernels serve them all.
-        return Layout(layout.widths, make_ups=layout.make_ups)
     joined = (blocks[0] != 0).any(axis=0) | (blocks[2] != 0).any(axis=0)
     beside = tuple(sorted({0, 1, *layout.differences(joined)}))
     return Layout(layout.widths, (0,), beside, make_ups=layout.make_ups, sparse=True)

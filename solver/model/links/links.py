@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 # Which forces a link has: tension and compression, or one of both.
 BOTH, PULLS, PUSHES = 0, 1, 2
-# Component of the stops above steady arms, one for each of these.
-UPLIFT_STOPS = "arm_stops"
 # Force at rest [N], of an open link that of its spring drawn on through the gap; stiffness [N/m];
 # damping [N s/m] beside that of its component; place along the track [m]; which forces it has;
 # whether it stands open at rest.

@@ -23,7 +23,7 @@ from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.base.errors import RunBroken
-from catenary.solver.model.gauges import SHOWN
+from catenary.solver.problem.watched_links import GAUGES
 
 
 def recorder(march: Any, path: Path, **options: Any) -> Recorder:
@@ -179,7 +179,8 @@ def test_a_reports_files_are_all_declared(tmp_path: Path, make_march: Any, recor
     written = {one.name for one in write_report(path, tmp_path).files}
     assert written <= set(REPORT_FILES)
     # Pictures of parts that not every run has.
-    ends = (f"channel_{name}.png" for name in SHOWN)
+    lateral = "lateral_place", "lateral_displacement"
+    ends = (f"channel_{name}.png" for name in (*GAUGES, *lateral, "stop_force"))
     assert set(REPORT_FILES) - written <= {
         *("strip_forces.png", "wire_forces.png", "plan_view.png", "registration.csv"),
         *ends,

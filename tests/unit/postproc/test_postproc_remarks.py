@@ -27,6 +27,9 @@ class Told:
             "contact_stiffness": np.full(2, stiffness),
         } | facts
 
+    def has(self, name: str) -> bool:
+        return False
+
     def fact(self, name: str) -> float:
         return float(self.facts[name])
 

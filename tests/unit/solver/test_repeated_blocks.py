@@ -61,9 +61,10 @@ def test_large_factors_keep_one_block_for_both_ways(
 @pytest.mark.parametrize("widths", [(6,), (10,), (6, 4)])
 @pytest.mark.parametrize("n_stations", [1, 2, 3, 40])
 @pytest.mark.parametrize("joined", [False, True])
-def test_factors_of_wide_planes_keep_the_blocks_of_the_matrix(
-    widths: tuple[int, ...], n_stations: int, joined: bool
+def test_factors_of_large_wide_planes_keep_the_blocks_of_the_matrix(
+    widths: tuple[int, ...], n_stations: int, joined: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(module, "LARGE", 0)
     matrix = line(n_stations, widths=widths, joined=joined)
     found = station_factors(matrix, layout(matrix))
     assert found is not None and found.layout.sparse
