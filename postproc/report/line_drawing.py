@@ -85,7 +85,10 @@ def draw_line(
         figure.text(_LEFT / _WIDTH, high, f"{number + 1}  {mark.says}", fontsize=9)
     _plan_view(plan, line, mesh, points, stretch, half_head)
     _cross_section(cross, line, mesh, points, form, stretch, half_head)
-    names = {wire.role: wire.name.replace("_", " ") for wire in reversed(line.wires)}
+    names: dict[Role, str] = {}
+    for wire in reversed(line.wires):
+        alone = wire.role not in names
+        names[wire.role] = wire.name.replace("_", " ") if alone else f"{wire.role.value} wires"
     handles = [Line2D([], [], color=_COLOUR[role], label=name) for role, name in names.items()]
     figure.legend(handles=handles, loc="upper right", ncols=len(handles), frameon=False)
     figure.savefig(path, format=path.suffix[1:], metadata={} if path.suffix == ".png" else None)
