@@ -70,7 +70,7 @@ test: setup ## lint and tests, also on several ranks
 	$(call BESIDE_LINT,$(PYTEST_SHARED) -m "not study" tests/regression tests/verification tests/unit)
 	@$(MAKE) --no-print-directory test-mpi
 
-test-studies: setup ## whole studies: hard cases, stability, accuracy, waves, the paper's; random topologies
+test-studies: setup ## whole studies: hard cases, stability, accuracy, waves, the paper's; random scenes
 	$(PYTEST_SHARED) -m study tests/regression tests/verification tests/unit
 
 test-unit: setup ## tests of single parts

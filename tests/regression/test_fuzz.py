@@ -36,6 +36,8 @@ from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.incidents import DropperBreak
 from catenary.solver.statics.after_incidents import dropper_at
 
+pytestmark = pytest.mark.study
+
 FIRST = int(os.environ.get("FUZZ_SEED", "1"))
 CASES = int(os.environ.get("FUZZ_CASES", "100"))
 # One test is one block of seeds, so that none runs into the limit of a test's time.

@@ -25,6 +25,8 @@ from catenary.cases.studies.hard.runs import Watched
 from catenary.postproc.read.results import Results
 from catenary.solver.base.errors import InputError
 
+pytestmark = pytest.mark.study
+
 FIRST = int(os.environ.get("FUZZ_SEED", "1"))
 CASES = int(os.environ.get("FUZZ_PROCESSES", "2"))
 SEEDS = range(FIRST, FIRST + CASES)

@@ -23,6 +23,8 @@ from catenary.cases.cli.main import app
 from catenary.cases.scene.load import load_scene
 from catenary.postproc.read.results import Results
 
+pytestmark = pytest.mark.study
+
 FIRST = int(os.environ.get("FUZZ_SEED", "1"))
 PLAIN = ("output.field_every_s=0",)
 SEEDS = range(FIRST, FIRST + int(os.environ.get("FUZZ_SWEEPS", "2")))

@@ -7,6 +7,7 @@ import time
 import numpy as np
 import paper_pantograph as paper
 import plane_pantograph
+import pytest
 from agreement import print_agreement, ways
 from long_runs import DT, HEIGHT, STATIC, check_balance, check_no_drift, contact_forces, mean
 from measuring import check
@@ -15,6 +16,8 @@ from seven_bodies import HEAD, at_rest, calibrated, pressed
 
 from catenary.mbs.build import raising_data
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+
+pytestmark = pytest.mark.study
 
 
 def test_plane_pantograph_rests_where_the_bodies_do() -> None:
