@@ -30,7 +30,7 @@ class Seen:
         self.owned = stage.owned_droppers, stage.owned_arms
 
     def observe(self, view: StepView) -> None:
-        stops = view.stop_force  # type: ignore[attr-defined]
+        stops = view.further_stop_force  # type: ignore[attr-defined]
         self.rows.append((view.contact_force.copy(), view.dropper_force.copy(), stops.copy()))
 
     def finish(self, outcome: str) -> None:

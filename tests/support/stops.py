@@ -24,7 +24,11 @@ UPLIFT_STOP = Effect(
     "uplift_stop", "stops above the steady arms", "a link each", "test", False, build=_stops
 )
 STOP_FORCE = Channel(
-    "stop_force", "N", "force of an uplift stop", ARM, lambda now: now.link_force[STOPS]
+    "further_stop_force",
+    "N",
+    "force of a stop of the tests",
+    ARM,
+    lambda now: now.link_force[STOPS],
 )
 
 # Places [m] of a stop below the contact wire, and of both ends of leaning links.

@@ -118,7 +118,7 @@ def recorded(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def stop_force(view: StepView) -> Any:
-    return view.stop_force.copy(), view.energies()  # type: ignore[attr-defined]
+    return view.further_stop_force.copy(), view.energies()  # type: ignore[attr-defined]
 
 
 @pytest.mark.usefixtures("recorded")
