@@ -148,7 +148,7 @@ def static(
         return
     scene = load(case, assignments, extras)
     from catenary.cases.run.describe.defects import defect_facts
-    from catenary.cases.run.runner import static_table
+    from catenary.cases.run.static_table import static_table
     from catenary.cases.scene.convert.problem import problem_of
 
     table, problem = static_table(scene), problem_of(scene)

@@ -13,7 +13,10 @@ import typer
 # Each of these files adds its verbs to the application, in this order of --help.
 # isort: off
 from catenary.cases.cli import run, plan, line, results  # noqa: F401
-from catenary.cases.cli import sweep, accuracy, hard, pantograph, stability, waves, lists  # noqa: F401
+from catenary.cases.cli.studies import sweep, accuracy, hard  # noqa: F401
+from catenary.cases.cli import pantograph  # noqa: F401
+from catenary.cases.cli.studies import stability, waves  # noqa: F401
+from catenary.cases.cli import lists  # noqa: F401
 
 # isort: on
 from catenary.cases.cli.app import app

@@ -56,7 +56,7 @@ def run(
     from catenary.cases.scene.load import load_scene
 
     if study:
-        from catenary.cases.cli.sweep import run_study
+        from catenary.cases.cli.studies.sweep import run_study
 
         if strict:
             raise InputError("a study is not judged as a whole: give --study without --strict")

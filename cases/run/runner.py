@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from catenary.cases.process.interrupts import Phase, StopRequest
-from catenary.cases.process.versions import versions
 from catenary.cases.result_folder.folder_lock import held
 from catenary.cases.result_folder.output_folder import (
     RunSize,
@@ -25,11 +24,7 @@ from catenary.cases.result_folder.output_folder import (
     prepare,
 )
 from catenary.cases.run.continuing import refuse_other_run, state_to_continue
-from catenary.cases.run.describe.arrivals import arrival_facts
-from catenary.cases.run.describe.defects import defect_facts
-from catenary.cases.run.describe.incidents import incident_facts
-from catenary.cases.run.describe.pantographs import header_words
-from catenary.cases.run.installed import installed
+from catenary.cases.run.describe.header import header_of
 from catenary.cases.run.needs import (
     flush_cadence,
     needs_before_meshing,
@@ -37,15 +32,12 @@ from catenary.cases.run.needs import (
     run_size,
 )
 from catenary.cases.run.performance import Phases, performance
-from catenary.cases.run.plan import effect_rows
 from catenary.cases.run.recording import extent_of, recording_of
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.mesh import LineMesh
-from catenary.postproc.channels.facts import facts_of
-from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
+from catenary.postproc.channels.header import Header
 from catenary.postproc.files.later_end import BEGUN_FOR, CHANGED, let_go_on
 from catenary.postproc.files.own_files import remove_stale
 from catenary.postproc.read.results import Results
@@ -57,10 +49,9 @@ from catenary.postproc.record.strip_watch import StripWatch
 from catenary.solver.base.errors import CatenaryError, RunBroken
 from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest, line_at_rest_on_all
+from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all
 from catenary.solver.time_loop.march import March, Outcome
 from catenary.solver.time_loop.observers import Observer
-from catenary.solver.window.choice import window_sentence
 
 logger = logging.getLogger("catenary.runner")
 
@@ -150,24 +141,6 @@ def restart_case(
         return _run(order, lambda size: check_room_to_continue(out_dir, size, force))
 
 
-def static_table(scene: Scene) -> dict[str, np.ndarray]:
-    """The line at rest, arrays named as in the result file's groups, and what `installed` adds.
-
-    Not collective.
-    """
-    problem = problem_of(scene)
-    mesh = mesh_of(scene)
-    rest = line_at_rest(problem, mesh)
-    data = {
-        **line_datasets(problem.line, mesh, problem.evaluation),
-        **static_datasets(problem.line, mesh, rest.form, rest.lift),
-        "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
-        "line/arm_x": mesh.x(mesh.steady_arms),
-        **installed(problem.line, mesh, rest.form.height),
-    }
-    return {name.split("/", 1)[1]: values for name, values in data.items()}
-
-
 @dataclass(frozen=True)
 class _Order:
     """A run that is wanted: the arguments of ``run_case``, and the state that it continues from."""
@@ -207,7 +180,9 @@ def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
             on_root(comm, phase.alone(lambda: _judge_before_meshing(scene, judge)))
             order.ready()
             at_rest = _at_rest(scene, problem, comm, phases, phase, judge)
-            header = _header(order, problem, at_rest) if comm.rank == 0 else None
+            header: Header | None = None
+            if comm.rank == 0:
+                header = header_of(scene, problem, at_rest, order.petsc_options)
             if order.resume:
                 on_root(comm, lambda: _refuse_other_run(order, header, problem))
             phase.next("the line was distributed")
@@ -353,37 +328,6 @@ def _report(out_dir: Path, outcome: Outcome, only_summary: bool) -> RunOutcome:
             "again"
         ) from error
     return RunOutcome(outcome.outcome, accepted, summary)
-
-
-def _header(order: _Order, problem: Problem, at_rest: LineAtRest) -> Header:
-    scene = order.scene
-    on, off = effect_rows(scene, problem)
-    line = problem.line
-    return Header(
-        attributes={
-            "case": scene.case.name,
-            "title": scene.case.title,
-            "n_dofs": at_rest.model.n_unknowns,
-            "system": scene.evaluation.system,
-            "edition": scene.evaluation.edition,
-            "pantographs": header_words(scene, problem),
-            "defects": defect_facts(scene, problem),
-            "incidents": incident_facts(scene, problem),
-            "arrivals": arrival_facts(scene, problem),
-            "window": window_sentence(problem),
-            "versions": versions(),
-            "config": resolved(scene),
-            "wires": wire_roles(line),
-            "petsc_options": list(order.petsc_options),
-            "effects_on": [tuple(row) for row in on],
-            "effects_off": [tuple(row) for row in off],
-        },
-        datasets={
-            **line_datasets(line, at_rest.mesh, problem.evaluation),
-            **static_datasets(line, at_rest.mesh, at_rest.form, at_rest.lift),
-        },
-        facts=facts_of(problem, at_rest.mesh, at_rest.model.dropper_lengths),
-    )
 
 
 def _refuse_other_run(order: _Order, header: Header | None, problem: Problem) -> None:

@@ -12,8 +12,8 @@ from typing import Any
 from pydantic import Field, PrivateAttr
 
 from catenary.cases.scene.input.origin import Origin
-from catenary.cases.scene.tables.line.defects import Defect
-from catenary.cases.scene.tables.line.irregularities import IrregularitiesTable
+from catenary.cases.scene.tables.line.imperfections.defects import Defect
+from catenary.cases.scene.tables.line.imperfections.irregularities import IrregularitiesTable
 from catenary.cases.scene.tables.line.line import LineTable
 from catenary.cases.scene.tables.line.mesh import MeshTable
 from catenary.cases.scene.tables.run.case import CaseTable

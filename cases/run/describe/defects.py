@@ -6,7 +6,7 @@ from typing import Any
 
 from catenary.cases.scene.convert.line.defects import place_of, stretch_of
 from catenary.cases.scene.scene import Scene
-from catenary.cases.scene.tables.line.defects import (
+from catenary.cases.scene.tables.line.imperfections.defects import (
     Defect,
     HardSpotTable,
     KinkTable,
@@ -15,7 +15,7 @@ from catenary.cases.scene.tables.line.defects import (
     WornWireTable,
     WrongTensionTable,
 )
-from catenary.cases.scene.tables.line.irregularities import HeightTable, LengthsTable
+from catenary.cases.scene.tables.line.imperfections.irregularities import HeightTable, LengthsTable
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate.wording import counted

@@ -10,7 +10,7 @@ from catenary.cases.scene.convert.line.defects import stretch_of
 from catenary.cases.scene.convert.line.line import line_of
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
-from catenary.cases.scene.tables.line.defects import (
+from catenary.cases.scene.tables.line.imperfections.defects import (
     DropperDefectTable,
     HardSpotTable,
     KinkTable,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from catenary.cases.scene.tables.line.defects import (
+from catenary.cases.scene.tables.line.imperfections.defects import (
     Defect,
     HardSpotTable,
     KinkTable,
@@ -14,7 +14,7 @@ from catenary.cases.scene.tables.line.defects import (
     WornWireTable,
     WrongTensionTable,
 )
-from catenary.cases.scene.tables.line.irregularities import (
+from catenary.cases.scene.tables.line.imperfections.irregularities import (
     HeightTable,
     IrregularitiesTable,
     LengthsTable,

@@ -19,8 +19,8 @@ from catenary.cases.scene.convert.line.parts import (
     steady_arm,
 )
 from catenary.cases.scene.scene import Scene
-from catenary.cases.scene.tables.line.curve import CurveTable
 from catenary.cases.scene.tables.line.line import LineTable
+from catenary.cases.scene.tables.line.track.curve import CurveTable
 from catenary.cases.scene.tables.line.wires import BridleTable, StitchWireTable
 from catenary.meshgen.curve import Curve
 from catenary.meshgen.hardware import Fittings

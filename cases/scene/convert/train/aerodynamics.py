@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from catenary.cases.scene.tables.line.tunnels import TunnelTable
+from catenary.cases.scene.tables.line.track.tunnels import TunnelTable
 from catenary.cases.scene.tables.train.aerodynamics import AerodynamicsTable, UpliftTable
 from catenary.cases.scene.tables.units import speed_from_km_h
 from catenary.mbs.air.airflow import Tunnel

@@ -7,7 +7,6 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from catenary.cases.scene.tables.line.along import Along, TemperatureTable, TensionerTable
-from catenary.cases.scene.tables.line.curve import CurveTable
 from catenary.cases.scene.tables.line.damping import DampingTable
 from catenary.cases.scene.tables.line.droppers import DropperTable
 from catenary.cases.scene.tables.line.ends import EndsTable
@@ -15,7 +14,8 @@ from catenary.cases.scene.tables.line.fittings import FittingTable
 from catenary.cases.scene.tables.line.free import FreeLinkTable, FreeWireTable
 from catenary.cases.scene.tables.line.hardware import SteadyArmTable, SupportTable
 from catenary.cases.scene.tables.line.spans import Span
-from catenary.cases.scene.tables.line.tunnels import TunnelTable
+from catenary.cases.scene.tables.line.track.curve import CurveTable
+from catenary.cases.scene.tables.line.track.tunnels import TunnelTable
 from catenary.cases.scene.tables.line.wires import (
     AuxiliaryWireTable,
     BridleTable,

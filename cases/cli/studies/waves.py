@@ -181,7 +181,7 @@ def _separations(
     """What --separations does; returns the exit code."""
     from mpi4py import MPI
 
-    from catenary.cases.cli.sweep import verdict
+    from catenary.cases.cli.studies.sweep import verdict
     from catenary.cases.process.petsc_options import start_petsc
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.sweep.jobs import RunOptions

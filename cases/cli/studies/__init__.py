@@ -1,0 +1,1 @@
+"""Verbs that run many simulations, or study the line itself."""

@@ -1,0 +1,1 @@
+"""Keys of what is not as it was meant to be: irregularities, defects."""

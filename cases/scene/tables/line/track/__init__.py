@@ -1,0 +1,1 @@
+"""Keys of the track beneath a line: curve, tunnels."""
