@@ -93,6 +93,7 @@ def test_the_windows_of_en50318_miss_what_its_readme_says(tmp_path: Path) -> Non
                 assert values[name] == pytest.approx(value, abs=0.51 * 10**-decimals)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("speed", ["275", "320"])
 def test_ac_simple_keeps_the_allowed_mean_force(speed: str, tmp_path: Path) -> None:
     words = ["--set", f"train.speed_km_h={speed}", "output.field_every_s=0"]
@@ -106,6 +107,7 @@ def test_ac_simple_keeps_the_allowed_mean_force(speed: str, tmp_path: Path) -> N
     assert 0.0 < limit - value < 0.5
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("case", CASES)
 def test_a_shipped_case_ends_without_a_warning(case: str, tmp_path: Path) -> None:
     """The first run of a newcomer: the case as it is shipped."""

@@ -16,6 +16,11 @@ from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.load import load_scene
 
 CASES = shipped()
+# One of each kind of line is run with every test, all of them in whole studies.
+OF_EACH_KIND = ("ambrosio2012", "en50318_2002", "ac_simple_3d", "overlap", "re330_stitched")
+ALL_CASES = [
+    pytest.param(case, marks=() if case in OF_EACH_KIND else pytest.mark.study) for case in CASES
+]
 FILES = {"run.h5", "fields.xdmf", "fields.h5", "fields.vtkhdf", "summary.json", "report.html"}
 
 # What other programs rely on in summary.json: keys and the kind of their values.
@@ -108,7 +113,7 @@ def assert_kinds(found: dict[str, Any], kinds: dict[str, Any]) -> None:
             assert math.isfinite(found[key]), key
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", ALL_CASES)
 def test_every_case_runs_and_is_judged(case: str, shortened: Any) -> None:
     folder, summary = shortened[case]
     scene = load_scene(case, shortened=True)
@@ -148,7 +153,7 @@ def test_every_case_runs_and_is_judged(case: str, shortened: Any) -> None:
     assert summary["complaints"] == []
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", ALL_CASES)
 def test_shortened_cases_keep_their_golden_numbers(case: str, shortened: Any) -> None:
     rows = [row for row in table(Path(__file__).with_name("golden.csv")) if row["case"] == case]
     assert rows, f"golden.csv lacks {case}: run golden.py"

@@ -60,6 +60,7 @@ def job(script: str, programs: Path, out: Path, **variables: str) -> tuple[int, 
     return done.returncode, calls.read_text().splitlines() if calls.exists() else []
 
 
+@pytest.mark.study
 def test_a_run_goes_on_in_the_next_job_to_the_same_end(tmp_path: Path) -> None:
     programs, out, whole = stand_in(tmp_path / "slurm"), tmp_path / "out", tmp_path / "whole"
     words = ["en50318_2002", "--short"] + [word for key in SCENE for word in ("--set", key)]

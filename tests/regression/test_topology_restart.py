@@ -30,7 +30,9 @@ def words(case: str, out: Path) -> list[str]:
     return ["run", case, "-o", str(out), "--set", *given]
 
 
-@pytest.mark.parametrize(("case", "ranks"), [("dc_twin", 1), ("overlap", 2)])
+@pytest.mark.parametrize(
+    ("case", "ranks"), [("overlap", 2), pytest.param("dc_twin", 1, marks=pytest.mark.study)]
+)
 def test_a_run_over_several_contact_wires_is_continued(
     case: str, ranks: int, tmp_path: Path
 ) -> None:

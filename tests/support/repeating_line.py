@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import Any
+
 import numpy as np
+import pytest
 from scipy import sparse
 
 from catenary.solver.linear.sections import Sections, neighbours
 from catenary.solver.linear.station_layout import Layout
 from catenary.solver.linear.station_products import layout_of
+
+# Unknowns of stations, plane by plane, whose loops shipped cases need in any case. Loops of others
+# take some seconds each to compile, and are left to whole studies.
+SHIPPED_WIDTHS = ((4,), (6,), (4, 4))
+
+
+def widths_of(*widths: tuple[int, ...]) -> Iterable[Any]:
+    """Parameters of a test over widths; those that no shipped case has are marked ``study``."""
+    for those in widths:
+        marks = () if those in SHIPPED_WIDTHS else (pytest.mark.study,)
+        yield pytest.param(those, marks=marks)
 
 
 def line(

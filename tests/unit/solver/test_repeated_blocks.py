@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from repeating_line import layout, line
+from repeating_line import layout, line, widths_of
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
@@ -33,7 +33,7 @@ def test_factors_solve_parts_of_lines(n_own: int, ends: tuple[int, int]) -> None
 
 
 @pytest.mark.parametrize("joined", [False, True])
-@pytest.mark.parametrize("widths", WIDTHS)
+@pytest.mark.parametrize("widths", widths_of(*WIDTHS))
 def test_factors_and_products_of_any_width(widths: tuple[int, ...], joined: bool) -> None:
     compare_factors(40, 5, 33, widths, joined)
     matrix = line(40, widths=widths, joined=joined)
@@ -43,7 +43,7 @@ def test_factors_and_products_of_any_width(widths: tuple[int, ...], joined: bool
     compare_product(matrix, 0, lanes)
 
 
-@pytest.mark.parametrize("widths", [(2,), (3,), (4,), (4, 4)])
+@pytest.mark.parametrize("widths", widths_of((2,), (3,), (4,), (4, 4)))
 @pytest.mark.parametrize("n_stations", [1, 2, 3, 40])
 def test_large_factors_keep_one_block_for_both_ways(
     n_stations: int, widths: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
@@ -58,7 +58,7 @@ def test_large_factors_keep_one_block_for_both_ways(
     compare_factors(n_stations, 0, n_stations, widths)
 
 
-@pytest.mark.parametrize("widths", [(6,), (10,), (6, 4)])
+@pytest.mark.parametrize("widths", widths_of((6,), (10,), (6, 4)))
 @pytest.mark.parametrize("n_stations", [1, 2, 3, 40])
 @pytest.mark.parametrize("joined", [False, True])
 def test_factors_of_large_wide_planes_keep_the_blocks_of_the_matrix(
@@ -73,7 +73,7 @@ def test_factors_of_large_wide_planes_keep_the_blocks_of_the_matrix(
     compare_factors(n_stations, 0, n_stations, widths, joined)
 
 
-@pytest.mark.parametrize("widths", [(4, 4, 4), (8, 4)])
+@pytest.mark.parametrize("widths", widths_of((4, 4, 4), (8, 4)))
 def test_large_factors_of_planes_in_two_registers_keep_all_blocks(
     widths: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from repeating_line import layout, line
+from repeating_line import layout, line, widths_of
 
 from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_state import LineState, PredictedLineState, Steps
@@ -32,12 +32,12 @@ def test_passes_take_the_steps_of_their_parts(n_own: int, before: int, after: in
 
 
 @pytest.mark.parametrize("loaded", [False, True])
-@pytest.mark.parametrize("widths", [(2,), (6,), (8,), (10,), (12,), (16,), (4, 4), (6, 4)])
+@pytest.mark.parametrize("widths", widths_of((2,), (6,), (8,), (10,), (12,), (16,), (4, 4), (6, 4)))
 def test_passes_over_stations_of_any_width(widths: tuple[int, ...], loaded: bool) -> None:
     compare(90, 4, 7, widths, loaded)
 
 
-@pytest.mark.parametrize("widths", [(4,), (8,)])
+@pytest.mark.parametrize("widths", widths_of((4,), (8,)))
 def test_passes_with_factors_that_keep_one_block_for_both_ways(
     widths: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:

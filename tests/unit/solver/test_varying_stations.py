@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from repeating_line import holding, lacking, line, sections_of
@@ -18,6 +20,12 @@ from catenary.solver.linear.station_products import (
 RNG = np.random.default_rng(3)
 ROUND_OFF = 1e-12
 N = 60
+
+
+def some(*names: str) -> list[Any]:
+    """Parameters of a test over lines; a third wire stands for all but in whole studies."""
+    usual = ("stitch",)
+    return [pytest.param(name, marks=() if name in usual else pytest.mark.study) for name in names]
 
 
 def stretches(*places: tuple[int, int, tuple[int, ...]]) -> np.ndarray:
@@ -69,7 +77,7 @@ def parts(
     return matrix.toarray(), product, station_factors(matrix, layout, low, high, stations)
 
 
-@pytest.mark.parametrize("name", LINES)
+@pytest.mark.parametrize("name", some(*LINES))
 def test_products_are_those_of_the_matrix(name: str) -> None:
     width = PRESENT[name].shape[1]
     for damped in (False, True):
@@ -82,7 +90,7 @@ def test_products_are_those_of_the_matrix(name: str) -> None:
         assert np.abs(result - expected).max() < ROUND_OFF * np.abs(expected).max()
 
 
-@pytest.mark.parametrize("name", LINES)
+@pytest.mark.parametrize("name", some(*LINES))
 def test_solves_are_those_of_the_matrix(name: str) -> None:
     for low, high in ((0, N), (12, 45), (30, 31), (55, N)):
         matrix, _, factors = parts(name, low, high)
@@ -93,7 +101,7 @@ def test_solves_are_those_of_the_matrix(name: str) -> None:
         assert np.abs(answer - expected).max() < ROUND_OFF * np.abs(expected).max()
 
 
-@pytest.mark.parametrize("name", ["stitch", "lateral", "odd"])
+@pytest.mark.parametrize("name", some("stitch", "lateral", "odd"))
 def test_a_wire_may_end_at_its_last_station(name: str) -> None:
     """Blocks between stations are the matrix's own: they join no unknowns that a station lacks."""
     matrix, _, factors = parts(name, ends=0)

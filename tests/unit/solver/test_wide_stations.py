@@ -45,7 +45,9 @@ def line(found: Model, method: Numerics, in_passes: bool = True) -> LineIntegrat
     return make_line(COMM, found, distribute(found, 1, 0), method, in_passes)
 
 
-@pytest.mark.parametrize("method", [NEWMARK, HHT], ids=lambda method: method.integrator)
+@pytest.mark.parametrize(
+    "method", [NEWMARK, pytest.param(HHT, marks=pytest.mark.study)], ids=["newmark", "hht"]
+)
 def test_right_hand_sides_by_mass_are_those_by_stiffness(
     method: Numerics, monkeypatch: pytest.MonkeyPatch
 ) -> None:
