@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from catenary.postproc.evaluate.lateral_places import lateral_ranges, sentence
+from catenary.postproc.evaluate.statistics import slackens_at_all
+from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.read.results import Results
 
 # Share of a gust's load that linear drag may leave out.
@@ -19,6 +21,7 @@ _RESOLVED = 0.5
 # Stiffness of droppers times the step squared [N s2/m] from which their switches feed the line: see
 # docs/hard_cases.md.
 _STIFF_DROPPER = 10.0
+_SIDES = ("start", "end")
 
 
 class _Contact(NamedTuple):
@@ -48,6 +51,7 @@ def remarks(results: Results) -> list[str]:
         *_about_incidents(results),
         *_about_contact(results),
         *_about_droppers(results),
+        *_about_ends(results),
         *_about_iterations(results),
         *_about_sizes(results),
         *_about_gusts(results),
@@ -126,6 +130,40 @@ def _about_droppers(results: Results) -> list[str]:
         f"numerics.dt_s of {1e3 * longest:.2g} ms at most, or damp droppers by as much as a step: "
         f"line.damping.per_component.droppers with alpha_s = {dt:g}, beta_per_s = 0."
     ]
+
+
+def _about_ends(results: Results) -> list[str]:
+    """That droppers beyond a periodic end would have slackened, by those of the span before it."""
+    config = results.attributes.get("config", {})
+    kinds = [_key(config, "line", "ends", side, "kind") for side in _SIDES]
+    periodic = [side for side, kind in zip(_SIDES, kinds, strict=True) if kind == "periodic"]
+    if not periodic or not slackens_at_all(results):
+        return []
+    masts, x = results.line("support_x"), results.line("dropper_x")
+    lowest, (first, last) = results.extremes("dropper_force")[0], results.evaluation
+    said = []
+    for side in periodic:
+        low, high = masts[:2] if side == "start" else masts[-2:]
+        slack = int(np.count_nonzero((x > low) & (x < high) & (lowest <= 0.0)))
+        if slack and first < high and last > low:
+            remedy = (
+                f"take an evaluation.to_m of {low:g} at most" if side == "end"
+                else f"take an evaluation.from_m of {high:g} at least"
+            )  # fmt: skip
+            said.append(
+                f"{counted(slack, 'dropper')} of the span at the periodic {side} of the line "
+                "slackened, which is part of the evaluated stretch; those beyond do not slacken, "
+                "and near the end the force is not that of a longer line: "
+                f"{remedy}, or a larger line.n_spans."
+            )
+    return said
+
+
+def _key(table: Any, *names: str) -> Any:
+    """The value of a key in nested tables, None if it is not there."""
+    for name in names:
+        table = table.get(name) if isinstance(table, dict) else None
+    return table
 
 
 def _about_contact(results: Results) -> list[str]:

@@ -269,21 +269,25 @@ def _droppers(results: Results) -> DropperStatistics:
     x = results.line("dropper_x")
     lowest, highest = results.extremes("dropper_force")
     evaluated = _inside(x, results.evaluation)
-    # Droppers that may push, or that carry nothing at rest, do not slacken at zero force.
-    kept = results.fact("slack_stiffness_share")
-    slackens = kept < 1.0
-    if np.isnan(kept):  # a file without this fact, of a version with one effect for it
-        on = results.attributes["effects_on"]
-        slackens = any(name == "dropper_slackening" for name, *_ in on)
     return DropperStatistics(
         x,
         highest,
         lowest,
         evaluated,
-        int(np.count_nonzero(lowest[evaluated] <= 0.0)) if slackens else 0,
+        int(np.count_nonzero(lowest[evaluated] <= 0.0)) if slackens_at_all(results) else 0,
         _of(highest[evaluated], np.max),
         _of(lowest[evaluated], np.min),
     )
+
+
+def slackens_at_all(results: Results) -> bool:
+    """Whether droppers of a run slacken at zero force: not if they may push, or carry nothing at
+    rest."""
+    kept = results.fact("slack_stiffness_share")
+    if np.isnan(kept):  # a file without this fact, of a version with one effect for it
+        on = results.attributes["effects_on"]
+        return any(name == "dropper_slackening" for name, *_ in on)
+    return bool(kept < 1.0)
 
 
 def _inside(x: np.ndarray, evaluation: tuple[float, float]) -> np.ndarray:

@@ -26,8 +26,9 @@ from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.as_hung import hang
 from catenary.solver.statics.banded_factors import BandedFactors
 from catenary.solver.statics.lateral_equilibrium import lateral_shape
+from catenary.solver.statics.repeated_ends import repeated_ends, settled
 from catenary.solver.statics.rest_loads import dead_loads
-from catenary.solver.statics.sparse_sum import Part, clamp_parts, wire_parts
+from catenary.solver.statics.sparse_sum import Part, clamp_parts, columns_of, wire_parts
 
 # Lengths are printed to the millimetre; the iteration contracts by the ratio of dropper weight
 # to tension sag, about 1e-3, so that this costs one more pass and leaves no trace in the forces.
@@ -119,7 +120,8 @@ class _HangingWires:
     """The wires of a line between what holds them, factored; their loads may change.
 
     Unknowns are height and slope at each node. Where a height is given, the upward force that holds
-    the wire there is unknown in its place; that of a dropper also pulls down its upper end.
+    the wire there is unknown in its place; that of a dropper also pulls down its upper end. Where
+    the line goes on height and slope are given, and those of the mast before.
     """
 
     def __init__(self, model: Model) -> None:
@@ -127,13 +129,18 @@ class _HangingWires:
         n = 2 * model.mesh.n_nodes
         parts, self._spring_load = _springs_and_wires(model, self._w)
         nodes, heights, held_at = _given_heights(model)
-        self._given = self._w[nodes]
+        self._repeated = repeated_ends(model)
+        ends = self._w[self._repeated.ends]
+        self._at_ends = np.concatenate([ends, ends + 1])
+        self._pulls = columns_of(parts, self._at_ends, n)
+        self._given = np.concatenate([self._w[nodes], ends + 1])
+        heights = np.concatenate([heights, np.zeros(ends.size)])
         self._heights = np.zeros(n)
         self._heights[self._given] = heights
         # Without weight droppers carry nothing: what holds the lower wire pulls at nothing above.
         self._weighted = model.simulated.gravity != 0.0
         upper, lower = self._w[model.mesh.droppers if self._weighted else model.mesh.droppers[:0]].T
-        rows = np.concatenate([self._w[held_at], upper])
+        rows = np.concatenate([self._w[held_at], ends + 1, upper])
         columns = np.concatenate([self._given, lower])
         sign = np.repeat([-1.0, 1.0], [self._given.size, upper.size])
         forces = rows, columns, sign
@@ -151,9 +158,7 @@ class _HangingWires:
         if lateral is not None:
             at = self._w[mesh.steady_arms[~holding]]
             np.add.at(load, at, lateral.arm_force[~holding, 1])
-        solution = self._factor.solve(load)
-        held_by = solution[self._given]
-        solution[self._given] = self._heights[self._given]
+        solution, held_by = self._solve(load)
         height, slope = solution[self._w], solution[self._w + 1]
         n = mesh.droppers.shape[0]
         force = held_by[:n] if self._weighted else np.zeros(n)
@@ -163,6 +168,23 @@ class _HangingWires:
         lift[np.flatnonzero(holding)[by_group]] = held_by[first : first + by_group.size]
         cut = stretched - force / model.dropper_stiffness
         return Equilibrium(height, slope, force, cut, arm_lift=lift)
+
+    def _solve(self, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Heights and slopes (n,) under a load, and the forces by which given ones are held."""
+        given, first = self._given, self._heights[self._at_ends]
+        masts, rise = self._w[self._repeated.masts[0]], self._repeated.rise
+        found = solution = np.zeros(0)
+
+        def turn(values: np.ndarray) -> np.ndarray:
+            nonlocal found, solution
+            found = self._factor.solve(load - self._pulls @ (values - first))
+            solution = found.copy()
+            solution[given] = self._heights[given]
+            solution[self._at_ends] = values
+            return np.concatenate([solution[masts] + rise, solution[masts + 1]])
+
+        settled(turn, first)
+        return solution, found[given]
 
 
 def _holding(model: Model) -> np.ndarray:

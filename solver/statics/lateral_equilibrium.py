@@ -15,6 +15,7 @@ from catenary.solver.base.errors import InputError
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest.lateral_shape import LateralShape
 from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.statics.repeated_ends import repeated_ends, settled
 from catenary.solver.statics.rest_loads import curve_load, dead_loads
 from catenary.solver.statics.sparse_sum import clamp_parts, springs_between, summed, wire_parts
 
@@ -50,10 +51,18 @@ def lateral_shape(model: Model, form: Equilibrium) -> LateralShape:
     given[at[nodes]] = True
     course = np.zeros(n)
     course[at[nodes]] = places
+    repeated = repeated_ends(model)
+    slopes, before = at[repeated.ends] + 1, at[repeated.masts[1]] + 1
+    given[slopes] = True
     free = np.flatnonzero(~given)
-    right = (load - stiffness @ course)[free]
-    inner = stiffness[free][:, free].tocsc()
-    course[free] = sparse_linalg.splu(inner, permc_spec="NATURAL").solve(right)
+    factors = sparse_linalg.splu(stiffness[free][:, free].tocsc(), permc_spec="NATURAL")
+
+    def turn(values: np.ndarray) -> np.ndarray:
+        course[free], course[slopes] = 0.0, values
+        course[free] = factors.solve((load - stiffness @ course)[free])
+        return np.asarray(course[before])
+
+    settled(turn, np.zeros(slopes.size))
     y, slope = course[at], course[at + 1]
     held_by = (stiffness @ course - load)[at[mesh.steady_arms]]
     lift = _carried(model, held_by, form.arm_lift)

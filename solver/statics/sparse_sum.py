@@ -53,3 +53,12 @@ def summed(parts: list[Part], size: int) -> sparse.csc_matrix:
     ]
     values = np.concatenate([matrix.ravel() for _, matrix in parts])
     return sparse.csc_matrix((values, (at[0], at[1])), shape=(size, size))
+
+
+def columns_of(parts: list[Part], columns: np.ndarray, size: int) -> sparse.csc_matrix:
+    """Some columns (size, k) of the matrix of all parts."""
+    near = []
+    for dofs, matrices in parts if columns.size else ():
+        touched = np.isin(dofs, columns).any(axis=1)
+        near.append((dofs[touched], matrices[touched]))
+    return summed(near, size)[:, columns] if near else sparse.csc_matrix((size, columns.size))

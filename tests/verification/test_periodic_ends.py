@@ -16,7 +16,7 @@ import pytest
 from going_on import EN, SPAN, heights, line_of, struck_line, with_more
 from measuring import check, march, start_march
 from scipy.sparse.linalg import spsolve
-from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
+from small_lines import WHOLE, ac_simple_line, en50318_line, mesh_of, numerics, problem_of, train
 
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects.build_model import build
@@ -96,6 +96,30 @@ def test_the_contact_force_of_a_short_line_is_that_of_a_long_one() -> None:
     held = force_of(running(n, 0.0))
     print(f"ends that are held: {np.abs(held - of_long).max() / sigma:.3f} of sigma")
     assert np.abs(held - of_long).max() > 0.1 * sigma
+
+
+def test_the_force_is_that_of_a_long_line_to_the_very_end() -> None:
+    """The line hangs at its end as at any mast: with clamps, pre-sag and arms that hold no height.
+
+    Droppers that slacken beyond the end, as the train comes within a tenth of a span of it, are not
+    those of the half line: here they push.
+    """
+    n, beside, speed = 4, 6, 275.0 / 3.6
+    effects = WHOLE - {"dropper_slackening"} | {"periodic_ends"}
+
+    def force(n_spans: int, before: int, ends: Any) -> np.ndarray:
+        line, first = ac_simple_line(n_spans), 55.0 * before + 60.0
+        problem = problem_of(
+            replace(line, stagger=(0.0,) * (n_spans + 1)), effects, ends=ends, damping=EN,
+            train=train(speed, first, 55.0 * (before + n) - 1e-3),
+            evaluation=(first + 40.0, first + 100.0),
+        )  # fmt: skip
+        return force_of(problem)
+
+    of_long = force(n + 2 * beside, beside, (Fixed(), Fixed()))
+    short = force(n, 0, GOES_ON)
+    sigma = float(of_long[500:].std())
+    check("contact force over sigma", short / sigma, of_long / sigma, within=1e-8)
 
 
 def test_a_march_that_is_continued_is_the_same_to_the_last_bit() -> None:

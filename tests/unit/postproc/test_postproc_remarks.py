@@ -139,3 +139,41 @@ def test_strong_gusts_of_linear_drag_are_told() -> None:
     (sentence,) = said(7.2, 1e-3, 1e6, strongest_gust=1.0)
     assert "25 % of the load" in sentence and "quadratic" in sentence
     assert said(7.2, 1e-3, 1e6, strongest_gust=0.5) == []
+
+
+class Ended(Told):
+    """Four spans of 50 m that go on beyond both ends, with droppers 10 and 40 m into each."""
+
+    evaluation = (60.0, 140.0)
+
+    def __init__(self, *slack: float) -> None:
+        super().__init__(7.2, 1e-3, 1e6, slack_stiffness_share=0.0)
+        ends = {side: {"kind": "periodic", "along": "fixed"} for side in ("start", "end")}
+        self.attributes["config"] = {"line": {"ends": ends}}
+        self._x = np.arange(4).repeat(2) * 50.0 + np.tile([10.0, 40.0], 4)
+        self._lowest = np.where(np.isin(self._x, slack), 0.0, 5.0)
+
+    def line(self, name: str) -> np.ndarray:
+        return {"support_x": 50.0 * np.arange(5), "dropper_x": self._x}[name]
+
+    def extremes(self, name: str) -> np.ndarray:
+        assert name == "dropper_force"
+        return np.array([self._lowest, self._lowest + 50.0])
+
+
+def test_droppers_that_slacken_at_a_periodic_end_of_the_stretch_are_told() -> None:
+    """Those beyond do not slacken; of spans outside of the stretch nothing is judged."""
+    told = Ended(90.0, 160.0, 190.0)
+    assert remarks(told) == []  # type: ignore[arg-type]
+    told.evaluation = (60.0, 170.0)
+    (sentence,) = remarks(told)  # type: ignore[arg-type]
+    assert sentence.startswith("2 droppers of the span at the periodic end of the line slackened")
+    assert "evaluation.to_m of 150 at most" in sentence
+    told.attributes["config"]["line"]["ends"]["end"] = {"kind": "fixed"}
+    assert remarks(told) == []  # type: ignore[arg-type]
+    early = Ended(10.0)
+    early.evaluation = (40.0, 140.0)
+    (sentence,) = remarks(early)  # type: ignore[arg-type]
+    assert "1 droppers" not in sentence and "evaluation.from_m of 50 at least" in sentence
+    early.facts["slack_stiffness_share"] = 1.0
+    assert remarks(early) == []  # type: ignore[arg-type]
