@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -18,11 +17,12 @@ from catenary.solver.linear.station_products import layout_of
 SHIPPED_WIDTHS = ((4,), (6,), (4, 4))
 
 
-def widths_of(*widths: tuple[int, ...]) -> Iterable[Any]:
+def widths_of(*widths: tuple[int, ...]) -> list[Any]:
     """Parameters of a test over widths; those that no shipped case has are marked ``study``."""
-    for those in widths:
-        marks = () if those in SHIPPED_WIDTHS else (pytest.mark.study,)
-        yield pytest.param(those, marks=marks)
+    return [
+        pytest.param(those, marks=() if those in SHIPPED_WIDTHS else pytest.mark.study)
+        for those in widths
+    ]
 
 
 def line(
