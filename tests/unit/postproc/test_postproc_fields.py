@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from typing import Any
 
@@ -12,22 +11,15 @@ import pytest
 import pyvista
 from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
 from vtkmodules.vtkIOHDF import vtkHDFReader
+from watched_fields import BLOCKS, blocks_at, times_in, watch
 
 from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE
-from catenary.postproc.record.snapshots import fields_file, growing_xdmf
+from catenary.postproc.record.snapshots import fields_file
 from catenary.postproc.record.snapshots.blocks import ARMS, MASTS, RecordedLine, blocks_of
 from catenary.postproc.record.snapshots.field_kinds import FIELDS
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.postproc.record.snapshots.field_values import curvature
 from catenary.postproc.record.snapshots.fields import FieldRecorder
-from catenary.solver.base.errors import RunBroken
-
-BLOCKS = (CONTACT_WIRE, MESSENGER_WIRE, DROPPERS, ARMS, MASTS)
-
-
-def watch(march: Any, path: Path, **options: Any) -> FieldRecorder:
-    known = {"every": 50, "snapshots_per_flush": 4, **options}
-    return FieldRecorder(march.comm, path, march.recorded, **known)
 
 
 def test_xdmf_has_the_times_of_the_steps_to_the_last_digit(tmp_path: Path, make_march: Any) -> None:
@@ -38,15 +30,6 @@ def test_xdmf_has_the_times_of_the_steps_to_the_last_digit(tmp_path: Path, make_
         times = file["times"][...].tolist()
     assert times_in(path) == times * len(BLOCKS)
     assert times == [step * march.dt for step in range(0, 991, 7)]
-
-
-def blocks_at(path: Path, time: float) -> dict[str, pyvista.DataSet]:
-    """The blocks of a file at a time by name."""
-    reader = pyvista.get_reader(path)
-    (number,) = np.flatnonzero(np.isclose(reader.time_values, time, rtol=1e-9))
-    reader.set_active_time_point(int(number))
-    found = reader.read()
-    return {name: found[name] for name in found.keys()}
 
 
 def test_vtk_reads_points_times_and_values(tmp_path: Path, make_march: Any) -> None:
@@ -235,214 +218,6 @@ def test_pieces_of_a_wire_stay_apart_in_a_window(tmp_path: Path, make_march: Any
         expected = [k for k in range(grid.n_points - 1) if k + 1 not in inside]
         np.testing.assert_array_equal(cells[:, 0], expected)
         np.testing.assert_array_equal(cells[:, 1] - cells[:, 0], 1)
-
-
-def test_files_are_valid_after_every_flush(tmp_path: Path, make_march: Any) -> None:
-    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
-    watcher = watch(march, path)
-    watcher.start(march.stage())
-    watcher.observe(march.view(0))
-    assert blocks_at(path, 0.0)[CONTACT_WIRE].n_points == len(march.mesh.wires[CONTACT_WIRE])
-    for step in range(1, 230):  # the steps 50, 100, 150 and 200 fill the buffer
-        watcher.observe(march.view(step))
-    assert pyvista.get_reader(path).time_values == pytest.approx([0.0, 0.05, 0.1, 0.15, 0.2])
-
-
-def test_xdmf_names_the_numbers_beside_it(tmp_path: Path, make_march: Any) -> None:
-    march, path = make_march(n_steps=100), tmp_path / "run_7.xdmf"
-    march.drive(watch(march, path))
-    items = list(ElementTree.parse(path).iter("DataItem"))
-    assert items and {item.text for item in items} == {"run_7.h5"}
-    places = set()
-    with h5py.File(tmp_path / "run_7.h5") as file:
-        for name in BLOCKS:
-            for table in file[name].values():
-                begin = table.id.get_offset() or 0
-                places |= {*range(begin, begin + table.nbytes + 1)}
-    assert {int(item.attrib["Seek"]) for item in items} <= places
-
-
-def test_the_text_is_well_formed_after_each_write_of_a_flush(
-    tmp_path: Path, make_march: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As a kill finds it: what was there before the flush, or some of what it adds."""
-    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
-    write, found = growing_xdmf.write_at, []
-
-    def watched(*words: Any) -> None:
-        write(*words)
-        found.append(len(times_in(path)))
-
-    monkeypatch.setattr(growing_xdmf, "write_at", watched)
-    watcher = watch(march, path, snapshots_per_flush=3)
-    watcher.start(march.stage())
-    for step in range(420):
-        watcher.observe(march.view(step))
-    # The first snapshot, then three and three of a full buffer; two writes each, block by block.
-    n = len(BLOCKS)
-    assert found == [
-        before + done * added
-        for before, added in ((0, 1), (n, 3), (4 * n, 3))
-        for done in (step // 2 for step in range(1, 2 * n + 1))
-    ]
-    assert pyvista.get_reader(path).time_values == pytest.approx(0.05 * np.arange(7))
-    watcher.finish("interrupted")
-    assert times_in(path) == pytest.approx(np.tile(0.05 * np.arange(9), n))
-    assert "CDATA" not in path.read_text()
-
-
-def test_a_flush_writes_as_much_of_the_text_however_long_it_is(
-    tmp_path: Path, make_march: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    write, sizes = growing_xdmf.write_at, []
-    monkeypatch.setattr(
-        growing_xdmf, "write_at", lambda *words: (sizes.append(words[2].nbytes), write(*words))
-    )
-    for n_steps in (200, 1000):
-        march = make_march(n_steps=n_steps)
-        march.drive(watch(march, tmp_path / f"{n_steps}.xdmf", every=10, snapshots_per_flush=5))
-    # Two writes for each of 1 + 20 / 5 flushes, and of 1 + 9 + 1 + 10 + 1 with one at step 499.
-    assert set(sizes) == {9} and len(sizes) == 2 * len(BLOCKS) * (5 + 22)
-
-
-def times_in(path: Path) -> list[float]:
-    """Times of the snapshots that a reader of XML finds."""
-    return [float(item.attrib["Value"]) for item in ElementTree.parse(path).iter("Time")]
-
-
-@pytest.mark.process
-def test_resumed_fields_replace_what_follows(tmp_path: Path, make_march: Any) -> None:
-    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
-    march.drive(watch(march, path), outcome="interrupted", last=620)
-    march.drive(watch(march, path, resume=True), first_step=500)
-    reader = pyvista.get_reader(path)
-    np.testing.assert_allclose(reader.time_values, 0.05 * np.arange(21), rtol=1e-12)
-
-
-@pytest.mark.process
-def test_a_snapshot_that_a_kill_left_half_written_is_replaced(
-    tmp_path: Path, make_march: Any
-) -> None:
-    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
-    march.drive(watch(march, path), outcome="interrupted", last=620)
-    with h5py.File(tmp_path / "fields.h5", "r+") as file:
-        # In its place, but not yet among the times.
-        n = file["contact_wire/count"][0]
-        file["contact_wire/uplift"][13 * n : 13 * n + 7] = 99.0
-    march.drive(watch(march, path, resume=True), first_step=600)
-    reader = pyvista.get_reader(path)
-    np.testing.assert_allclose(reader.time_values, 0.05 * np.arange(21), rtol=1e-12)
-    reader.set_active_time_value(reader.time_values[13])
-    wire = reader.read()[CONTACT_WIRE]
-    expected = march.wave(0.65, wire.points[:, 0])
-    np.testing.assert_allclose(wire.point_data["uplift"], expected, atol=1e-8)
-
-
-def other_times(path: Path) -> None:
-    with h5py.File(path, "r+") as file:
-        file["times"][3] = -1.0
-
-
-def other_mesh(path: Path) -> None:
-    with h5py.File(path, "r+") as file:
-        file["contact_wire/points"][2, 2] = np.nan
-
-
-def no_snapshots(path: Path) -> None:
-    with h5py.File(path, "r+") as file:
-        del file["contact_wire/uplift"]
-
-
-def broken_tables(path: Path) -> None:
-    data = bytearray(path.read_bytes())
-    data[60:70] = b"x" * 10
-    path.write_bytes(data)
-
-
-@pytest.mark.process
-@pytest.mark.parametrize("damage", [other_times, other_mesh, no_snapshots, broken_tables])
-def test_damaged_snapshots_are_begun_anew(
-    damage: Any, tmp_path: Path, make_march: Any, caplog: pytest.LogCaptureFixture
-) -> None:
-    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
-    march.drive(watch(march, path), outcome="interrupted", last=620)
-    damage(tmp_path / "fields.h5")
-    with caplog.at_level("WARNING", "catenary.fields"):
-        march.drive(watch(march, path, resume=True), first_step=600)
-    assert "its snapshots now begin at t = 0.600 s" in caplog.text
-    reader = pyvista.get_reader(path)
-    np.testing.assert_allclose(reader.time_values, 0.6 + 0.05 * np.arange(9), rtol=1e-12)
-
-
-def test_no_table_of_the_file_changes_once_the_run_goes_on(tmp_path: Path, make_march: Any) -> None:
-    # What a kill could leave half done would be among the bytes outside the snapshots' places.
-    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
-    numbers = tmp_path / "fields.h5"
-    watcher = watch(march, path)
-    watcher.start(march.stage())
-    before = bytearray(numbers.read_bytes())
-    for step in range(1001):
-        watcher.observe(march.view(step))
-    watcher.finish("done")
-    after = bytearray(numbers.read_bytes())
-    assert len(after) == len(before) and after != before
-    with h5py.File(numbers) as file:
-        moving = [name for name in BLOCKS if name != MASTS]
-        kinds = [file[name][kind] for name in moving for kind in ("uplift", "displacement")]
-        places = [file["times"], file["pantograph_places"], *kinds]
-        assert len(places) == 2 + 2 * 4
-        for offset, size in [(place.id.get_offset(), place.nbytes) for place in places]:
-            before[offset : offset + size] = after[offset : offset + size] = bytes(size)
-    assert after == before
-
-
-def test_times_tell_how_far_a_run_came(tmp_path: Path, make_march: Any) -> None:
-    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
-    march.drive(watch(march, path), outcome="interrupted", last=620)
-    with h5py.File(tmp_path / "fields.h5") as file:
-        times = file["times"][...]
-    np.testing.assert_allclose(times[:13], 0.05 * np.arange(13), rtol=1e-12)
-    assert times.size == 21 and np.isnan(times[13:]).all()
-
-
-@pytest.mark.process
-@pytest.mark.parametrize("share", [0.0, 0.6])
-def test_a_file_that_a_kill_has_spoilt_is_begun_anew(
-    share: float, tmp_path: Path, make_march: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
-    march.drive(watch(march, path), outcome="interrupted", last=620)
-    numbers = tmp_path / "fields.h5"
-    numbers.write_bytes(numbers.read_bytes()[: int(share * numbers.stat().st_size)])
-    said: list[str] = []
-    monkeypatch.setattr(
-        fields_file.logger, "warning", lambda text, *words: said.append(text % words)
-    )
-    march.drive(watch(march, path, resume=True), first_step=500)
-    (sentence,) = said
-    assert str(numbers) in sentence and "its snapshots now begin at t = 0.500 s" in sentence
-    reader = pyvista.get_reader(path)
-    np.testing.assert_allclose(reader.time_values, 0.05 * np.arange(10, 21), rtol=1e-12)
-
-
-def test_a_full_disk_breaks_the_run_and_keeps_the_snapshots(
-    tmp_path: Path, make_march: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
-    watcher = watch(march, path)
-    watcher.start(march.stage())
-    for step in range(201):
-        watcher.observe(march.view(step))
-
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(fields_file, "write_at", full)
-    with pytest.raises(RunBroken, match=r"fields.h5 failed at t = 0.400 s \(No space left"):
-        for step in range(201, 500):
-            watcher.observe(march.view(step))
-    watcher.finish("the disk is full")
-    assert pyvista.get_reader(path).time_values == pytest.approx([0.0, 0.05, 0.1, 0.15, 0.2])
 
 
 @pytest.mark.parametrize("window", [None, (30.0, 20.0)])
