@@ -1,0 +1,114 @@
+"""Contact laws, schemes and steps that cannot be: each ends in one sentence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from catenary.cases.cli.main import app
+
+SOUND = Path(__file__).with_name("sound.toml")
+
+# Assignments on the sound scene, and what the sentence must hold.
+ASSIGNMENTS = {
+    "no contact stiffness": (["contact.stiffness_N_per_m=0"], "greater than 0 [N/m]"),
+    "step above 20 Hz": (["numerics.dt_s=0.03"], "20 Hz"),
+    "step of nothing": (["numerics.dt_s=0"], "at least 1e-06 [s]"),
+    "unknown scheme": (["numerics.scheme=newton"], "one_solve, fixed_point or ts_alpha2"),
+    "unstable Newmark": (["numerics.newmark_gamma=0.7"], "2 newmark_beta >= newmark_gamma"),
+    "unknown integrator": (["numerics.integrator=rk4"], "newmark, hht or generalized_alpha"),
+    "spectral radius of Newmark": (
+        ["numerics.spectral_radius=0.8"],
+        "belongs to integrators hht and generalized_alpha",
+    ),
+    "no spectral radius": (
+        ["numerics.integrator=generalized_alpha"],
+        "must give spectral_radius with integrator generalized_alpha",
+    ),
+    "spectral radius above 1": (
+        ["numerics.integrator=generalized_alpha", "numerics.spectral_radius=1.1"],
+        "at most 1",
+    ),
+    "spectral radius below HHT's": (
+        ["numerics.integrator=hht", "numerics.spectral_radius=0.4"],
+        "from 0.5 to 1 with integrator hht",
+    ),
+    "two ways to damp": (
+        [
+            "numerics.integrator=hht",
+            "numerics.spectral_radius=0.8",
+            "numerics.newmark_gamma=0.55",
+            "numerics.newmark_beta=0.28",
+        ],
+        "belong to integrator newmark",
+    ),
+    "TSALPHA2 with another contact law": (
+        ["numerics.scheme=ts_alpha2", "contact.law=hertz"],
+        "ts_alpha2 knows only law linear",
+    ),
+    "TSALPHA2 under two contact wires": (
+        ["numerics.scheme=ts_alpha2", "line.topology=twin", "line.twin={spacing_m=0.1}"],
+        "ts_alpha2 knows only one contact wire",
+    ),
+    "TSALPHA2 in an overlap": (
+        [
+            "numerics.scheme=ts_alpha2",
+            "line.overlap={first_span=8,n_spans=3,rise_m=0.3,distance_m=0.4}",
+        ],
+        "ts_alpha2 knows only one contact wire",
+    ),
+    "TSALPHA2 with a moving base": (
+        [
+            "numerics.scheme=ts_alpha2",
+            "effects.vehicle_motion=true",
+            "vehicle.vertical={amplitude_m=0.01,frequency_hz=1.5}",
+        ],
+        "ts_alpha2 knows only heads and bases that move along a vertical",
+    ),
+    "TSALPHA2 with two strips": (
+        [
+            "numerics.scheme=ts_alpha2",
+            "pantographs.reference.strips={number=2,spacing_m=0.6}",
+        ],
+        "ts_alpha2 knows only one strip",
+    ),
+    "TSALPHA2 by Newmark's parameters": (
+        [
+            "numerics.scheme=ts_alpha2",
+            "numerics.newmark_gamma=0.55",
+            "numerics.newmark_beta=0.28",
+        ],
+        "with scheme ts_alpha2, which takes average acceleration",
+    ),
+    "TSALPHA2 with a coupling": (
+        ["numerics.scheme=ts_alpha2", "numerics.coupling=implicit"],
+        "must not give coupling",
+    ),
+    "kinematic contact by another method": (
+        [
+            "contact.law=kinematic",
+            "contact.stiffness_N_per_m=",
+            "numerics.integrator=generalized_alpha",
+            "numerics.spectral_radius=0.5",
+        ],
+        "only if one method steps both: take newmark",
+    ),
+    "negative Newmark damping": (["numerics.newmark_gamma=0.4"], "at least 0.5"),
+    "no iterations": (["numerics.max_iterations=0"], "at least 1"),
+}
+
+
+@pytest.mark.parametrize("name", ASSIGNMENTS)
+def test_numerics_that_cannot_be_are_refused(name: str, tmp_path: Path) -> None:
+    assignments, expected = ASSIGNMENTS[name]
+    words = [word for text in assignments for word in ("--set", text)]
+    out = tmp_path / "out"
+    result = CliRunner().invoke(app, ["run", str(SOUND), "-o", str(out), *words])
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    sentence = result.stderr.strip()
+    assert sentence.startswith("catenary: ") and "\n" not in sentence
+    assert expected in sentence, sentence
+    assert not out.exists()
