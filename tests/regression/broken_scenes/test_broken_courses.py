@@ -5,11 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from refusals import SOUND
 from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
-
-SOUND = Path(__file__).with_name("sound.toml")
 
 # What stands in the file, and what the sentence must hold.
 CONTENTS = {

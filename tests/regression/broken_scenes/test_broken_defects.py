@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from refusals import SOUND, assert_refused
 from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
 
-SOUND = Path(__file__).with_name("sound.toml")
 # Sound tables, of which an entry is changed at a time.
 DEFECTS = """
 [[line.fittings]]
@@ -152,16 +152,7 @@ def case(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("name", ASSIGNMENTS)
 def test_a_defect_that_cannot_be_is_refused(name: str, case: Path) -> None:
-    assignments, expected = ASSIGNMENTS[name]
-    words = [word for text in assignments for word in ("--set", text)]
-    out = case.parent / "out"
-    result = CliRunner().invoke(app, ["run", str(case), "-o", str(out), *words])
-    assert result.exit_code == 2, result.output
-    assert result.stdout == ""
-    sentence = result.stderr.strip()
-    assert sentence.startswith("catenary: ") and "\n" not in sentence
-    assert expected in sentence, sentence
-    assert not out.exists()
+    assert_refused(case, *ASSIGNMENTS[name], case.parent)
 
 
 def test_the_tables_themselves_are_sound(case: Path) -> None:

@@ -5,11 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
-
-from catenary.cases.cli.main import app
-
-SOUND = Path(__file__).with_name("sound.toml")
+from refusals import SOUND, assert_refused
 
 # Assignments on the sound scene, and what the sentence must hold.
 ASSIGNMENTS = {
@@ -102,13 +98,4 @@ ASSIGNMENTS = {
 
 @pytest.mark.parametrize("name", ASSIGNMENTS)
 def test_numerics_that_cannot_be_are_refused(name: str, tmp_path: Path) -> None:
-    assignments, expected = ASSIGNMENTS[name]
-    words = [word for text in assignments for word in ("--set", text)]
-    out = tmp_path / "out"
-    result = CliRunner().invoke(app, ["run", str(SOUND), "-o", str(out), *words])
-    assert result.exit_code == 2, result.output
-    assert result.stdout == ""
-    sentence = result.stderr.strip()
-    assert sentence.startswith("catenary: ") and "\n" not in sentence
-    assert expected in sentence, sentence
-    assert not out.exists()
+    assert_refused(SOUND, *ASSIGNMENTS[name], tmp_path)

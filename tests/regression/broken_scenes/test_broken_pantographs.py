@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from refusals import SOUND
 from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
 
-SOUND = Path(__file__).with_name("sound.toml")
 TELESCOPE = Path(__file__).parents[2] / "support" / "telescope.toml"
 KIND = "pantographs.telescope"
 

@@ -7,12 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from refusals import SOUND, assert_one_sentence, assert_refused
 from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
 
-# A scene of its own, so that a shipped case may change its numbers without a change here.
-SOUND = Path(__file__).with_name("sound.toml")
 # A car of [vehicle.suspension].
 CAR = (
     "body_mass_kg=3e4,pitch_inertia_kg_m2=2e6,stiffness_N_per_m=9e5,damping_N_s_per_m=4e4,"
@@ -226,15 +225,6 @@ EDITS = {
 }
 
 
-def _one_sentence(output: str, out: Path, expected: str) -> None:
-    sentence = output.strip()
-    assert sentence.startswith("catenary: ")
-    assert "\n" not in sentence
-    assert expected in sentence, sentence
-    assert "Traceback" not in output
-    assert not out.exists()
-
-
 @pytest.fixture(autouse=True)
 def _own_hook_and_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(sys, "excepthook", sys.excepthook)  # run replaces it
@@ -243,13 +233,7 @@ def _own_hook_and_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("name", ASSIGNMENTS)
 def test_a_broken_assignment_ends_in_one_sentence_and_code_2(name: str, tmp_path: Path) -> None:
-    assignments, expected = ASSIGNMENTS[name]
-    out = tmp_path / "out"
-    words = [word for text in assignments for word in ("--set", text)]
-    result = CliRunner().invoke(app, ["run", str(SOUND), "-o", str(out), *words])
-    assert result.exit_code == 2, result.output
-    assert result.stdout == ""
-    _one_sentence(result.stderr, out, expected)
+    assert_refused(SOUND, *ASSIGNMENTS[name], tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -263,7 +247,7 @@ def test_a_broken_file_ends_in_one_sentence_that_names_it(name: str, tmp_path: P
     out = tmp_path / "out"
     result = CliRunner().invoke(app, ["run", str(file), "-o", str(out)])
     assert result.exit_code == 2, result.output
-    _one_sentence(result.stderr, out, expected)
+    assert_one_sentence(result.stderr, out, expected)
     assert str(file) in result.stderr
     assert list(tmp_path.iterdir()) == [file]
 
@@ -282,7 +266,7 @@ def test_a_case_that_is_not_there_is_named(case: str, expected: str, tmp_path: P
     out = tmp_path / "out"
     result = CliRunner().invoke(app, ["run", case, "-o", str(out)])
     assert result.exit_code == 2, result.output
-    _one_sentence(result.stderr, out, expected)
+    assert_one_sentence(result.stderr, out, expected)
 
 
 def test_the_sound_scene_is_sound() -> None:
