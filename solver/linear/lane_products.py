@@ -21,7 +21,7 @@ from catenary.solver.linear.lanes import (
     spread,
     vector_type,
 )
-from catenary.solver.linear.station_layout import Terms
+from catenary.solver.linear.station_layout import Halves, Terms
 
 _NUMBERS = types.CPointer(types.float64)
 
@@ -107,6 +107,29 @@ add_beside = _product(
 
 
 @inlined
+def add_symmetric(typing_context, layout, sums, numbers, x):
+    """Add a symmetric block, of which one half is stored from the place of ``numbers`` on, times x
+    to sums; see ``Layout.halves``."""
+
+    def generate(context, builder, signature, arguments):
+        _, sums, data, x = arguments
+        layout = signature.args[0].layout
+        halves, registers = layout.halves, Registers(layout.n_lanes)
+        both = [builder.extract_value(sums, number) for number in range(2)]
+        lanes = np.tile(np.arange(layout.n_lanes), (len(halves.sources), 1))
+        direct = Terms(halves.sources, lanes, layout.sums_of(len(lanes)))
+        _add_terms(builder, both, data, x, direct)
+        if halves.mirrored.any():
+            other = _mirrored(builder, data, registers.apart(builder, x), halves)
+            total = registers.apart(builder, both[0])
+            total = [builder.fadd(*pair, flags=FUSED) for pair in zip(total, other, strict=True)]
+            both[0] = registers.together(builder, total)
+        return context.make_tuple(builder, signature.return_type, both)
+
+    return sums(layout, sums, numbers, x), generate
+
+
+@inlined
 def add_transposed(typing_context, layout, total, numbers, skipped, x):
     """``total`` plus the transpose of a block for ``add_whole`` times x; the layout shares such."""
 
@@ -153,3 +176,21 @@ def _add_terms(builder: Any, sums: list[Any], data: Any, x: Any, terms: Terms) -
             total = parts[number][register]
             parts[number][register] = builder.fadd(total, product, flags=FUSED)
     sums[:] = [registers.together(builder, part) for part in parts]
+
+
+def _mirrored(builder: Any, data: Any, factors: list[Any], halves: Halves) -> list[Any]:
+    """What the half of a symmetric block that is not stored makes of ``factors``, by registers."""
+    n_lanes = halves.sources.shape[1]
+    ranges = register_ranges(n_lanes)
+    total: list[Any] = []
+    for term in np.flatnonzero(halves.mirrored):
+        products = []
+        for factor, (first, size) in zip(factors, ranges, strict=True):
+            stored = _stored(builder, data, int(term) * n_lanes + first, size)
+            products.append(builder.fmul(stored, factor, flags=FUSED))
+        lanes = halves.back[term]
+        back = [gathered(builder, products, lanes[first : first + size]) for first, size in ranges]
+        if total:
+            back = [builder.fadd(*pair, flags=FUSED) for pair in zip(total, back, strict=True)]
+        total = back
+    return total

@@ -89,6 +89,9 @@ pitch = _constant(lambda layout: layout.pitch, "Unknowns of a station.")
 whole_size = _constant(
     lambda layout: layout.whole_terms.sources.size, "Numbers of a packed block of factors."
 )
+half_size = _constant(
+    lambda layout: layout.halves.sources.size, "Numbers of a packed symmetric block of factors."
+)
 own_size = _constant(
     lambda layout: layout.own_terms.sources.size, "Numbers of a packed diagonal block of K or C."
 )
@@ -280,18 +283,22 @@ def register_ranges(n_lanes: int) -> list[tuple[int, int]]:
 
 
 def gathered(builder: Any, vectors: list[Any], lanes: np.ndarray) -> Any:
-    """Numbers by their lanes in ``vectors``, of which they come from two at most."""
+    """Numbers by their lanes in ``vectors``."""
     source = lanes // REGISTER
-    first, last = int(source.min()), int(source.max())
-    one, other = vectors[first], vectors[last]
-    if first == last:
-        places = lanes - first * REGISTER
+    numbers = np.unique(source).tolist()
+    one = vectors[numbers[0]]
+    if len(numbers) == 1:
+        places = lanes - numbers[0] * REGISTER
         if np.array_equal(places, np.arange(one.type.count)):
             return one
         return spread(builder, one, places.tolist())
-    places = lanes % REGISTER + np.where(source == last, REGISTER, 0)
-    one, other = _widened(builder, one, REGISTER), _widened(builder, other, REGISTER)
-    return _shuffled(builder, one, other, places.tolist())
+    places = lanes % REGISTER
+    for number in numbers[1:]:
+        other = _widened(builder, vectors[number], REGISTER)
+        chosen = np.where(source == number, lanes % REGISTER + REGISTER, places)
+        one = _shuffled(builder, _widened(builder, one, REGISTER), other, chosen.tolist())
+        places = np.arange(lanes.size)
+    return one
 
 
 def _load_some(builder: Any, data: Any, at: Any, unknowns: np.ndarray) -> Any:

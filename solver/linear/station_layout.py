@@ -19,7 +19,7 @@ REGISTER = 8
 # Parameters of a layout.
 _SETTINGS = (
     *("widths", "own", "beside", "damped", "remembers", "shares", "make_ups", "sparse"),
-    "by_mass",
+    *("by_mass", "strands"),
 )
 
 
@@ -42,6 +42,28 @@ class Terms(NamedTuple):
     sums: np.ndarray
 
 
+class Halves(NamedTuple):
+    """What a symmetric block times a vector is the sum of, of which one half is stored.
+
+    Term k is as one of ``Terms`` whose targets are the lanes themselves. Where it is ``mirrored``,
+    its numbers times the vector, with lane ``back[k]`` of these products in each lane, are what
+    the other half makes. ``share`` is what of a number is stored: a half where both come to the
+    same.
+
+    Attributes
+    ----------
+    sources : (n_terms, n_lanes) int, -1 where there is no such lane
+    back : (n_terms, n_lanes) int, a lane of products that are zero where there is none
+    mirrored : (n_terms,) bool
+    share : (n_terms, n_lanes)
+    """
+
+    sources: np.ndarray
+    back: np.ndarray
+    mirrored: np.ndarray
+    share: np.ndarray
+
+
 class Layout:
     """How the unknowns of a station stand in lanes, and which of them matrices join.
 
@@ -61,7 +83,10 @@ class Layout:
     shares : whether factors keep one block for both ways between two stations; only if it turns
         and one register holds all lanes
     sparse : whether factors keep the matrix's own blocks between stations, of the terms
-        ``beside``, in place of products with these, which join all of a plane
+        ``beside``, in place of products with these, which join all of a plane, and of S^-1 one half
+    strands : sets of unknowns, of one plane each, to whose own the blocks between stations join
+        them, as those of a wire; terms are then by the columns of all sets at once, in place of
+        ``beside``
     make_ups : places in a cross-section that stations of each make-up have; none if all have all
 
     Attributes
@@ -88,6 +113,7 @@ class Layout:
         make_ups: tuple[tuple[int, ...], ...] = (),
         sparse: bool = False,
         by_mass: bool = False,
+        strands: tuple[tuple[int, ...], ...] = (),
     ) -> None:
         self.widths = tuple(widths)
         self._plane = min(lanes for lanes in LANES if lanes >= max(self.widths))
@@ -96,6 +122,7 @@ class Layout:
         self.beside = every if beside is None else tuple(beside)
         self.damped, self.remembers = bool(damped), bool(remembers)
         self.make_ups, self.sparse, self.by_mass = make_ups, bool(sparse), bool(by_mass)
+        self.strands = strands
         self.pitch = sum(self.widths)
         self.n_lanes = self._plane * len(self.widths)
         # Columns where there are fewer of these than of differences.
@@ -113,7 +140,7 @@ class Layout:
         """All that makes a layout."""
         own = (
             *(self.widths, self.own, self.beside, self.damped, self.remembers, self.shares),
-            *(self.make_ups, self.sparse, self.by_mass),
+            *(self.make_ups, self.sparse, self.by_mass, self.strands),
         )
         return own if self.whole is None else (*own, self.number, self.whole.key)
 
@@ -125,6 +152,11 @@ class Layout:
     def n_terms(self) -> int:
         """Terms of a row of K or C."""
         return len(self.own) + 2 * len(self.beside)
+
+    @property
+    def n_terms_beside(self) -> int:
+        """Terms of a row of a block between stations."""
+        return len(self.beside_terms.sources)
 
     @property
     def varies(self) -> bool:
@@ -142,6 +174,9 @@ class Layout:
         widths = tuple(int(width) for width in np.bincount(planes) if width)
         names = "damped", "remembers", "sparse", "by_mass"
         settings = {name: getattr(self, name) for name in names}
+        place_of = {int(place): at for at, place in enumerate(places)}
+        kept = (tuple(place_of[u] for u in strand if u in place_of) for strand in self.strands)
+        settings["strands"] = tuple(strand for strand in kept if strand)
         part = Layout(widths, (), (), **settings)
         lane = self._lane_of[places]
         apart, together = lane[:, None] ^ lane, planes[:, None] == planes
@@ -154,18 +189,21 @@ class Layout:
     @cached_property
     def _lane_of(self) -> np.ndarray:
         """Lane of each unknown in its plane, (pitch,)."""
+        return self._lane_of_unknown % self._plane
+
+    @cached_property
+    def _lane_of_unknown(self) -> np.ndarray:
+        """Lane of each unknown, (pitch,)."""
         lane_of, there = np.zeros(self.pitch, dtype=int), self.unknowns >= 0
-        lane_of[self.unknowns[there]] = (np.arange(self.n_lanes) % self._plane)[there]
+        lane_of[self.unknowns[there]] = np.flatnonzero(there)
         return lane_of
 
     @cached_property
     def lanes_of_whole(self) -> np.ndarray:
         """Lane of the whole that each lane of a part stands for, -1 in one without an unknown."""
         assert self.whole is not None
-        lane_of = np.zeros(self.whole.pitch, dtype=int)
-        there = self.whole.unknowns >= 0
-        lane_of[self.whole.unknowns[there]] = np.flatnonzero(there)
-        return np.where(self.unknowns >= 0, lane_of[np.array(self.places)[self.unknowns]], -1)
+        lane_of = self.whole._lane_of_unknown[np.array(self.places)]
+        return np.where(self.unknowns >= 0, lane_of[self.unknowns], -1)
 
     @cached_property
     def unknowns(self) -> np.ndarray:
@@ -194,7 +232,37 @@ class Layout:
     @cached_property
     def beside_terms(self) -> Terms:
         """Of the blocks of K and C that join a station to those beside it."""
-        return self._terms(self.beside)
+        if not self.strands:
+            return self._terms(self.beside)
+        lanes = np.arange(self.n_lanes)
+        sources = np.full((max(map(len, self.strands)), self.n_lanes), -1)
+        for strand in self.strands:
+            own = self._lane_of_unknown[list(strand)]
+            sources[: own.size, own] = own[:, None]
+        return Terms(sources, np.broadcast_to(lanes, sources.shape), self.sums_of(len(sources)))
+
+    @cached_property
+    def halves(self) -> Halves:
+        """Of a symmetric block that joins all unknowns of each plane.
+
+        Term d has the unknown that is d places further, round and round in its plane.
+        """
+        n_terms = max(self.widths) // 2 + 1
+        sources = np.full((n_terms, self.n_lanes), -1)
+        back = np.tile(np.arange(self.n_lanes), (n_terms, 1))
+        mirrored, share = np.zeros(n_terms, dtype=bool), np.ones(sources.shape)
+        mirrored[1 : (max(self.widths) + 1) // 2] = True
+        for plane, width in enumerate(self.widths):
+            own = plane * self._plane + np.arange(width)
+            for d in range(width // 2 + 1):
+                sources[d, own], back[d, np.roll(own, -d)] = np.roll(own, -d), own
+                if 2 * d == width and mirrored[d]:
+                    share[d, own] = 0.5
+        return Halves(sources, back, mirrored, share)
+
+    def sums_of(self, n_terms: int) -> np.ndarray:
+        """Sums (n_terms,) of terms that leave no lanes to be exchanged at the end."""
+        return np.zeros(n_terms, dtype=int) if self.turns else np.arange(n_terms) % 2
 
     def _terms(self, differences: tuple[int, ...]) -> Terms:
         number = np.array(differences, dtype=int)[:, None]
@@ -224,9 +292,18 @@ class Layout:
 
         Those of a part are of the whole.
         """
+        return self._packed(blocks, terms.sources, terms.targets)
+
+    def packed_halves(self, blocks: np.ndarray) -> np.ndarray:
+        """Symmetric blocks (..., pitch, pitch) as products with ``halves`` read them."""
+        sources, _, _, share = self.halves
+        lanes = np.broadcast_to(np.arange(self.n_lanes), sources.shape)
+        return np.asarray(self._packed(blocks, sources, lanes) * share.ravel())
+
+    def _packed(self, blocks: np.ndarray, sources: np.ndarray, targets: np.ndarray) -> np.ndarray:
         if self.whole is not None:
             blocks = blocks[..., self.places, :][..., self.places]
-        row, column = self.unknowns[terms.targets], self.unknowns[terms.sources]
-        there = (row >= 0) & (column >= 0) & (terms.sources >= 0)
+        row, column = self.unknowns[targets], self.unknowns[sources]
+        there = (row >= 0) & (column >= 0) & (sources >= 0)
         numbers = np.where(there, blocks[..., row, column], 0.0)
-        return numbers.reshape(*blocks.shape[:-2], terms.sources.size)
+        return numbers.reshape(*blocks.shape[:-2], sources.size)

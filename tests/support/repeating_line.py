@@ -26,12 +26,16 @@ def widths_of(*widths: tuple[int, ...]) -> list[Any]:
 
 
 def line(
-    n_stations: int, period: int = 7, widths: tuple[int, ...] = (4,), joined: bool = False
+    n_stations: int,
+    period: int = 7,
+    widths: tuple[int, ...] = (4,),
+    joined: bool = False,
+    wire: np.ndarray | None = None,
 ) -> sparse.bsr_matrix:
     """A positive definite block tridiagonal matrix that repeats but at its ends.
 
     Stations have planes of ``widths`` unknowns, and are joined by pairs of unknowns, unless all of
-    a plane is ``joined`` between them.
+    a plane is ``joined`` between them; with a ``wire`` (size,) of each only those of one wire are.
     """
     rng = np.random.default_rng(7)
     size = sum(widths)
@@ -43,6 +47,8 @@ def line(
     if not joined:
         pair = np.arange(size) // 2
         beside *= pair[:, None] == pair
+    if wire is not None:
+        beside *= wire[:, None] == wire
     data, indices, indptr = [], [], [0]
     for i in range(n_stations):
         if i > 0:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse import csgraph
 
 from catenary.solver.base.bound import bound
 from catenary.solver.base.petsc import PETSc
@@ -48,8 +49,8 @@ class StationFactors:
     blocks : of each kind S^-1, -S^-1 B with its block B towards the middle, and, unless the
         layout shares these, the transpose of the second of the station before it in elimination,
         which that multiplies with; packed by the layout. S is a diagonal block after elimination.
-        In the middle the second is for elimination from the other end. S^-1 alone if the layout is
-        sparse
+        In the middle the second is for elimination from the other end. Half of S^-1 alone if the
+        layout is sparse
     beside_kinds, besides : then the kinds of the matrix's own blocks between stations, and of each
         kind those to the stations before and after it, negative; else empty
     low : first station of a rank's own
@@ -140,7 +141,9 @@ def station_factors(
     factors, make_up = found.factors, stations.make_up[rows.chosen][found.kinds]
 
     def pack(part: Layout, rows: slice | np.ndarray) -> np.ndarray:
-        n_blocks = 1 if part.sparse else 2 if part.shares else 3
+        if part.sparse:
+            return part.packed_halves(factors[rows, 0])
+        n_blocks = 2 if part.shares else 3
         packed = part.packed(factors[rows, :n_blocks], part.whole_terms)
         return packed.reshape(packed.shape[0], n_blocks * part.whole_terms.sources.size)
 
@@ -153,7 +156,8 @@ def station_factors(
         layout = _sparse(layout, rows.blocks)
         kinds, numbers, n_kinds, count = kinds_by_make_up(layout, make_up, pack)
         besides = _besides(layout, stations, rows)
-        unfit = layout.varies and count != np.count_nonzero(factors[:, :1]) - lacked
+        halves = layout.packed_halves(factors[:, 0])
+        unfit = layout.varies and count != np.count_nonzero(halves) - lacked
     if unfit or besides is None:
         return None
     sharing = layout.changed(shares=True)
@@ -182,7 +186,18 @@ def _sparse(layout: Layout, blocks: np.ndarray) -> Layout:
     """
     joined = (blocks[0] != 0).any(axis=0) | (blocks[2] != 0).any(axis=0)
     beside = tuple(sorted({0, 1, *layout.differences(joined)}))
-    return Layout(layout.widths, (0,), beside, make_ups=layout.make_ups, sparse=True)
+    strands = _strands(joined)
+    if max(map(len, strands)) >= len(beside):
+        strands = ()
+    return Layout(
+        layout.widths, (0,), beside, make_ups=layout.make_ups, sparse=True, strands=strands
+    )
+
+
+def _strands(joined: np.ndarray) -> tuple[tuple[int, ...], ...]:
+    """Sets of the unknowns that ``joined`` (b, b) joins, directly or through others."""
+    n_sets, of_set = csgraph.connected_components(joined, directed=False)
+    return tuple(tuple(np.flatnonzero(of_set == n).tolist()) for n in range(n_sets))
 
 
 def _besides(

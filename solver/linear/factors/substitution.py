@@ -10,6 +10,7 @@ from catenary.solver.base.compiled import compiled, inner
 from catenary.solver.base.pointers import borrowed
 from catenary.solver.linear.lane_products import (
     add_beside,
+    add_symmetric,
     add_transposed,
     add_whole,
     numbers_from,
@@ -18,6 +19,7 @@ from catenary.solver.linear.lane_products import (
 )
 from catenary.solver.linear.lanes import (
     beside_size,
+    half_size,
     is_sparse,
     load,
     narrowed,
@@ -47,13 +49,12 @@ class Factored(NamedTuple):
 @inner
 def factors_of(part, factored, station):
     """Where the blocks of a station are; ``part`` is the layout of its make-up."""
-    n_blocks = np.uint64(3)
+    size = np.uint64(3) * whole_size(part)
     if is_sparse(part):
-        n_blocks = np.uint64(1)
+        size = half_size(part)
     elif shares(part):
-        n_blocks = np.uint64(2)
-    at = block_at(part, factored.kinds, station, n_blocks * whole_size(part))
-    return numbers_from(factored.blocks, at)
+        size = np.uint64(2) * whole_size(part)
+    return numbers_from(factored.blocks, block_at(part, factored.kinds, station, size))
 
 
 @inner
@@ -69,8 +70,10 @@ def add_joined(part, factored, sums, station, towards_end, x):
 @inner
 def divided(part, factored, station, left):
     """What is ``left`` of a station's right-hand side, divided by its block after elimination."""
-    numbers = factors_of(part, factored, station)
-    return total_of(part, add_whole(part, sums_from(part, zero(part)), numbers, np.uint64(0), left))
+    numbers, sums = factors_of(part, factored, station), sums_from(part, zero(part))
+    if is_sparse(part):
+        return total_of(part, add_symmetric(part, sums, numbers, left))
+    return total_of(part, add_whole(part, sums, numbers, np.uint64(0), left))
 
 
 @inner

@@ -73,6 +73,40 @@ def test_factors_of_large_wide_planes_keep_the_blocks_of_the_matrix(
     compare_factors(n_stations, 0, n_stations, widths, joined)
 
 
+@pytest.mark.parametrize("widths", widths_of((6,), (10,)))
+def test_large_factors_of_wires_that_only_stations_join_keep_blocks_by_wires(
+    widths: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "LARGE", 0)
+    # As unknowns stand in a cross-section: heights and slopes of both wires, then those along the
+    # track, then those across.
+    wire = np.array([0, 0, 1, 1, 0, 1, 0, 0, 1, 1])[: widths[0]]
+    matrix = line(40, widths=widths, joined=True, wire=wire)
+    found = station_factors(matrix, layout(matrix))
+    assert found is not None
+    expected = tuple(tuple(np.flatnonzero(wire == number).tolist()) for number in (0, 1))
+    assert found.layout.strands == expected
+    assert found.layout.n_terms_beside == np.bincount(wire).max() < len(found.layout.beside)
+    compare_factors(40, 0, 40, widths, wire=wire)
+
+
+@pytest.mark.parametrize("widths", [(1,), (2,), (5,), (8,), (9,), (6, 4), (9, 12), (3, 8, 4)])
+def test_half_of_a_symmetric_block_makes_its_whole_product(widths: tuple[int, ...]) -> None:
+    lanes, planes = Layout(widths, (0,), (0,)), np.repeat(np.arange(len(widths)), widths)
+    block = RNG.standard_normal((planes.size, planes.size)) * (planes[:, None] == planes)
+    block += block.T
+    halves, x = lanes.halves, np.zeros(lanes.n_lanes)
+    there = lanes.unknowns >= 0
+    factor = RNG.standard_normal(planes.size)
+    x[there] = factor[lanes.unknowns[there]]
+    numbers = lanes.packed_halves(block).reshape(halves.sources.shape)
+    result = (numbers * np.where(halves.sources >= 0, x[halves.sources], 0.0)).sum(axis=0)
+    for term in np.flatnonzero(halves.mirrored):
+        result += (numbers[term] * x)[halves.back[term]]
+    assert np.abs(result[there] - (block @ factor)[lanes.unknowns[there]]).max() < ROUND_OFF * 100
+    assert not result[~there].any()
+
+
 @pytest.mark.parametrize("widths", widths_of((4, 4, 4), (8, 4)))
 def test_large_factors_of_planes_in_two_registers_keep_all_blocks(
     widths: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
@@ -84,9 +118,14 @@ def test_large_factors_of_planes_in_two_registers_keep_all_blocks(
 
 
 def compare_factors(
-    n_stations: int, low: int, high: int, widths: tuple[int, ...] = (4,), joined: bool = True
+    n_stations: int,
+    low: int,
+    high: int,
+    widths: tuple[int, ...] = (4,),
+    joined: bool = True,
+    wire: np.ndarray | None = None,
 ) -> None:
-    matrix = line(n_stations, widths=widths, joined=joined)
+    matrix = line(n_stations, widths=widths, joined=joined, wire=wire)
     factors = station_factors(matrix, layout(matrix), low, high)
     assert factors is not None
     right, answer = RNG.standard_normal(matrix.shape[0]), np.zeros(matrix.shape[0])
