@@ -133,7 +133,7 @@ def _left_out(scene: Scene, problem: Problem, effect: Effect) -> EffectRow:
         return EffectRow(effect.name, effect.title, "left out by the scene")
     if effect.applies(problem):
         return EffectRow(effect.name, effect.title, "off unless the scene asks for it")
-    return EffectRow(effect.name, effect.title, _NO_DATA + effect.data)
+    return EffectRow(effect.name, effect.title, effect.instead(problem) or _NO_DATA + effect.data)
 
 
 def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:

@@ -54,6 +54,7 @@ class Effect:
     requires : effects without which it makes no sense
     always : True for what no scene can leave out
     applies : whether the problem holds anything for it to act on
+    instead : why it does not act on what a problem holds for it, "" if it acts or there is none
     build : adds matrices, weights, held unknowns and loads in time to the model
     law : the record of laws with the fields that the effect sets. Effects are applied in building
         order, so that an effect may change what one that it requires has set
@@ -74,6 +75,7 @@ class Effect:
     requires: tuple[str, ...] = ()
     always: bool = False
     applies: Callable[[Problem], bool] = lambda problem: True
+    instead: Callable[[Problem], str] = lambda problem: ""
     build: Callable[[ModelBuilder], None] | None = None
     law: Callable[[Simulated, Problem], Simulated] | None = None
     lifts: tuple[Limit, ...] = ()

@@ -15,6 +15,7 @@ from catenary.solver.problem.problem import Problem, slowest_wave_speed
 from catenary.solver.problem.simulated import Simulated, TargetHeight
 
 if TYPE_CHECKING:
+    from catenary.meshgen.hardware import SteadyArms
     from catenary.solver.model.builder import ModelBuilder
 
 
@@ -75,6 +76,27 @@ def _arm_stiffness(builder: ModelBuilder) -> None:
         nodes = mesh.steady_arms[mesh.arm_group == number]
         stiffness = arms.vertical_stiffness(builder.problem.line.wire(arms.wire))
         builder.add_springs(arms.name, nodes, "w", stiffness)
+
+
+def _is_bar(problem: Problem, arms: SteadyArms) -> bool:
+    """Whether arms are bars, whose stiffness follows from their radial force."""
+    return arms.kind.length > 0.0 and "lateral_motion" in problem.effects
+
+
+def _bars_instead(problem: Problem) -> str:
+    """The stiffness that arms have in a scene, and do not as bars."""
+    found = {
+        arms.name: arms.kind.stiffness
+        for arms in problem.line.steady_arms
+        if arms.kind.stiffness > 0.0 and _is_bar(problem, arms)
+    }
+    given = ", ".join(f"of {name} {stiffness:g} N/m" for name, stiffness in found.items())
+    return (
+        f"{given} are not used: with lateral motion they are bars, whose stiffness follows from "
+        "their radial force"
+        if found
+        else ""
+    )
 
 
 def _shaped(laws: Simulated, by: TargetHeight) -> Simulated:
@@ -191,10 +213,10 @@ register(
         "EN 50318:2002 reference model",
         default=True,
         applies=lambda p: any(
-            bool(group.vertical_stiffness(p.line.wire(group.wire)).any())
-            and not (group.kind.length > 0 and "lateral_motion" in p.effects)
+            bool(group.vertical_stiffness(p.line.wire(group.wire)).any()) and not _is_bar(p, group)
             for group in p.line.steady_arms
         ),
+        instead=_bars_instead,
         build=_arm_stiffness,
         data="line.steady_arm.stiffness_N_per_m above 0, or stiffness_by_radial_force",
     )

@@ -30,6 +30,8 @@ from catenary.solver.statics.tensioned_end import TensionedEnd
 # Displacements change by less than this where Newton's method ends [m].
 _SETTLED = 1e-9
 _MOST_STEPS = 40
+# A step that moves a line by more goes nowhere [m].
+_FARTHEST = 1e3
 # Steps at first in which droppers switch as they are, where matrices depend on the shape.
 _SWITCHING = 12
 # Passes in which all switch at once, before one at a time does, and the most after these.
@@ -146,11 +148,14 @@ class RestNearby:
                 about = build(model.problem, model.mesh, lengths, model.broken, shape)
                 about.constrained = constrained
             step = self._solved(about, slack, lacks)
-            if not np.isfinite(step).all():
-                break
+            change = float(np.abs(step).max())
+            if not change < _FARTHEST:
+                raise InputError(
+                    f"the line finds no rest{where(model)}: Newton's method leaves all bounds; its "
+                    "wires may be slack there"
+                )
             moved += step
             form = potential.form(moved)
-            change = float(np.abs(step).max())
             if change < _SETTLED or not self._bends:
                 return moved, form, slack
         raise InputError(
@@ -164,7 +169,10 @@ class RestNearby:
         return float(known.along[end.end.node]) if known.along.size else 0.0
 
     def _solved(self, about: Model, slack: np.ndarray, lacks: np.ndarray) -> np.ndarray:
-        """Displacement under what is lacking (n_dofs,), by the stiffness with droppers slack."""
+        """Displacement under what is lacking (n_dofs,), by the stiffness with droppers slack.
+
+        Infinite where that is singular.
+        """
         # PETSc is not loaded by a check of a sound line.
         from catenary.solver.model.matrices import stiffness_matrix
 
@@ -182,7 +190,10 @@ class RestNearby:
             spread = spread @ sparse.diags(free)
             gone = sparse.diags(self._lost * about.dropper_stiffness[slack])
             matrix = (matrix - spread.T @ gone @ spread).tocsc()
-        return np.asarray(sparse_linalg.splu(matrix.tocsc()).solve(lacks))
+        try:
+            return np.asarray(sparse_linalg.splu(matrix.tocsc()).solve(lacks))
+        except RuntimeError:  # of SuperLU: the matrix is singular
+            return np.full(about.n_dofs, np.inf)
 
 
 def where(model: Model) -> str:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass
 
-from fuzzing_along import put_along
 from fuzzing_broken import INCIDENTS, a_way
 from fuzzing_more import SLACK_DAMPINGS, as_assignments, mechanism, put_more
+from fuzzing_nonsense import nonsense
+from fuzzing_planes import put_planes
 from fuzzing_topologies import put_topology
 
 BASE = "en50318_2002"
@@ -47,7 +48,7 @@ def topology_scene(seed: int, n_steps: int = N_STEPS) -> RandomScene:
     words = _words(seed, n_steps, rng)
     span = words["line.span_m"]
     name = put_topology(rng, words, float(str(span[0] if isinstance(span, list) else span)))
-    put_along(random.Random(f"along {seed}"), words, name)
+    put_planes(random.Random(f"planes {seed}"), words, name)
     return RandomScene(seed, as_assignments(words))
 
 
@@ -220,6 +221,15 @@ def broken_happening(seed: int) -> RandomScene:
     )
     words = (*sound.assignments, *kept, *way.assignments)
     return RandomScene(seed, words, " ".join(way.assignments), names=way.key)
+
+
+def broken_topology(seed: int) -> RandomScene:
+    """A scene of any topology with nonsense in one of all keys, or with parts that contradict."""
+    made = topology_scene(seed)
+    given = dict(word.split("=", 1) for word in made.assignments)
+    way = nonsense(random.Random(f"nonsense {seed}"), given)
+    words = (*made.assignments, *way.assignments)
+    return RandomScene(seed, words, " ".join(way.assignments), names=way.names)
 
 
 def _word(rng: random.Random) -> str:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from free_tables import as_free
 
+from catenary.cases.run.plan import effect_rows
 from catenary.cases.scene.convert.line.line import line_data_of
 from catenary.cases.scene.convert.problem import problem_of
-from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.input.origin import Origin
+from catenary.cases.scene.load import load_scene, scene_from
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects.all_effects import active
 
@@ -98,3 +101,31 @@ def test_arms_of_a_vertical_scene_have_the_stiffness_of_their_radial_force() -> 
     assert "arm_stiffness" in {effect.name for effect in active(problem)}
     straight = problem_of(load_scene("ac_simple", [*changes, "line.stagger_m=0"]))
     assert "arm_stiffness" not in {effect.name for effect in active(straight)}
+
+
+def test_a_stiffness_that_bars_do_not_take_stands_among_what_is_left_out() -> None:
+    def reason(*changes: str) -> str:
+        scene = load_scene("re330_stitched", list(changes))
+        on, off = effect_rows(scene, problem_of(scene))
+        return next(row.reason for row in [*on, *off] if row.name == "arm_stiffness")
+
+    assert reason() == "default"
+    assert reason(ON, "line.steady_arm.stiffness_N_per_m=300").startswith(
+        "of steady_arms 300 N/m are not used: with lateral motion they are bars"
+    )
+    assert reason(ON, "line.steady_arm.length_m=0", "line.steady_arm.inclination_deg=") == "default"
+    assert reason(ON, "line.steady_arm.stiffness_N_per_m=0").startswith(
+        "the scene has no data for it: "
+    )
+
+
+def test_arms_of_a_free_line_are_checked_too() -> None:
+    raw = as_free(load_scene("ac_simple", []))
+    number, arms = next(
+        (i, link) for i, link in enumerate(raw["line"]["links"]) if link["type"] == "steady_arms"
+    )
+    arms.pop("holds_height", None)
+    arms["inclination_deg"] = 9
+    raw["effects"].pop("lateral_motion")
+    with pytest.raises(InputError, match=rf"links.{number}.inclination_deg is 9 .*acts only with"):
+        scene_from(raw, Origin("case.toml"))

@@ -132,9 +132,9 @@ class LineBalance:
         newmark = numerics.integrator == "newmark"
         dt, gamma = numerics.dt, numerics.gamma if newmark else 0.5
         excess = numerics.beta - 0.5 * gamma if newmark else 0.0
-        # Recorded forces of a kinematic contact are those means over the step already.
-        kinematic = isinstance(problem.contact, KinematicLaw)
-        self.weights = (0.0, 1.0) if kinematic else (1.0 - gamma, gamma)
+        self.weights = (1.0 - gamma, gamma)
+        # Recorded forces of a kinematic contact are means by these weights already.
+        self.recorded_means = isinstance(problem.contact, KinematicLaw)
         self._terms: list[tuple[str, csr_matrix]] = []
         if gamma != 0.5 or excess != 0.0:
             damping = whole_matrix(model, damping=0.5 * dt * (gamma - 0.5))
@@ -211,6 +211,7 @@ class Watcher:
         self._work = np.zeros(0)
         self._terms = np.zeros(0)
         self._one_switch = 0.0
+        self._latest = np.zeros(0)
 
     def start(self, stage: Stage) -> None:
         """Nothing is needed of the stage."""
@@ -274,6 +275,8 @@ class Watcher:
         states = dict(zip(_MOTION, map(np.array, zip(*self._states, strict=True)), strict=True))
         several = wire.n_wires > 1
         force = self._channel("contact_wire_force" if several else "contact_force", k)
+        if balance.recorded_means:
+            force = self._behind_means(force, balance.weights)
         place = np.repeat(self._channel("contact_position", k), wire.n_wires, axis=1).ravel()
         touches = wire.touches(place, np.arange(place.size) % wire.n_wires)
         elements = touches["element"][:, None] + np.array([0, 1])
@@ -297,6 +300,19 @@ class Watcher:
         self._work = np.append(self._work, np.cumsum(done)[again:])
         self._terms = np.append(self._terms, balance.damping_terms(states, taut)[again:])
         del self._states[:-1]
+
+    def _behind_means(self, means: np.ndarray, weights: tuple[float, float]) -> np.ndarray:
+        """Forces (k, n) at the ends of steps whose weighted means over the steps are given [N].
+
+        The first is the last one found before; a run begins without force.
+        """
+        forces = np.zeros_like(means)
+        if self._latest.size:
+            forces[0] = self._latest
+        for i in range(1, len(means)):
+            forces[i] = (means[i] - weights[0] * forces[i - 1]) / weights[1]
+        self._latest = forces[-1].copy()
+        return forces
 
 
 def at_rest(scene: Scene, comm: Any) -> LineAtRest:

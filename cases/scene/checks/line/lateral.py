@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
+from catenary.cases.scene.tables.line.free import FreeArmsTable
+from catenary.cases.scene.tables.line.hardware import SteadyArmTable
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
@@ -19,8 +21,8 @@ def check_lateral(scene: Scene) -> Iterator[Fault]:
     line = scene.line
     if scene.switches()[_EFFECT]:
         return
-    given = {
-        "line.steady_arm.inclination_deg": line.steady_arm.inclination_deg,
+    given: dict[str, object] = {
+        **{f"{key}.inclination_deg": arm.inclination_deg for key, arm in _arms(scene).items()},
         "line.messenger_stagger_m": line.messenger_stagger_m,
         "line.curve": line.curve and line.curve.radius_m,
     }
@@ -30,3 +32,10 @@ def check_lateral(scene: Scene) -> Iterator[Fault]:
                 f"it acts only with effects.{_EFFECT} = true; write that, or false to leave it out"
             )
             yield refusal(scene.origin, key, value, why)
+
+
+def _arms(scene: Scene) -> dict[str, SteadyArmTable]:
+    """Tables of steady arms by their keys."""
+    links = enumerate(scene.line.links or [])
+    found = {f"line.links.{i}": link for i, link in links if isinstance(link, FreeArmsTable)}
+    return {"line.steady_arm": scene.line.steady_arm, **found}

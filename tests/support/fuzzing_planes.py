@@ -1,0 +1,253 @@
+"""Random lines of all topologies in three dimensions: what lets their wires move in all planes,
+what holds them there, how they end, and the wind over them.
+
+Each function puts its keys into the words of a scene that is sound, and mostly leaves it sound:
+parts that do not go together are refused in a sentence.
+"""
+
+from __future__ import annotations
+
+import random
+
+from fuzzing_details import put_details
+from fuzzing_free import masts, put_free
+
+Words = dict[str, object]
+# Shares of the scenes.
+_LATERAL, _ALONG, _NOW_AND_THEN = 0.35, 0.15, 0.2
+# Tables of wires that are whole tables in one word, which takes further keys after it.
+_WHOLE_TABLES = ("stitch_wire", "auxiliary_wire", "bridle")
+
+
+def put_planes(rng: random.Random, words: Words, topology: str) -> None:
+    """Now and then each of the parts below."""
+    if topology == "free":
+        put_free(rng, words)
+    if rng.random() < _LATERAL:
+        _lateral(rng, words, topology)
+    if rng.random() < _NOW_AND_THEN:
+        _sway(rng, words)
+    if rng.random() < _NOW_AND_THEN:
+        _ends(rng, words)
+    if "overlap" not in topology and rng.random() < 0.5 * _NOW_AND_THEN:
+        _transition(rng, words)
+    if rng.random() < _ALONG:
+        _along(rng, words, topology)
+    if "wind.speed_m_per_s" in words:
+        _more_wind(rng, words)
+    if rng.random() < _NOW_AND_THEN:
+        _window(rng, words)
+    if rng.random() < 0.5 * _NOW_AND_THEN:
+        _adaptive(rng, words)
+    put_details(rng, words)
+
+
+# ---- wires in the horizontal plane --------------------------------------------------------------
+
+
+def _lateral(rng: random.Random, words: Words, topology: str) -> None:
+    """Stagger, steady arms as bars, now and then a curve."""
+    words["effects.lateral_motion"] = "true"
+    n = int(str(words["line.n_spans"]))
+    words["line.stagger_m"] = rng.choice(
+        (rng.uniform(-0.3, 0.3), [rng.uniform(-0.3, 0.3) for _ in range(n + 1)])
+    )
+    arm = _arm(words)
+    if rng.random() < 0.8:
+        words[f"{arm}.length_m"] = rng.uniform(0.5, 1.5)
+        words[f"{arm}.inclination_deg"] = rng.uniform(0.0, 25.0)
+        # An inclined arm carries what follows from its slope.
+        words[f"{arm}.holds_height"] = ""
+    # A bar has no stiffness but what its radial force gives it.
+    words[f"{arm}.stiffness_N_per_m"] = ""
+    if topology.split("+")[0] not in ("free", "single") and rng.random() < 0.5:
+        words["line.messenger_stagger_m"] = rng.uniform(-0.2, 0.2)
+    if rng.random() < 0.4:
+        _curve(rng, words)
+
+
+def _arm(words: Words) -> str:
+    """Where a scene has its steady arms."""
+    free = str(words.get("line.links", ""))
+    return f"line.links.{free.count('type=') - 1 - _links_behind(free)}" if free else _SIMPLE_ARM
+
+
+_SIMPLE_ARM = "line.steady_arm"
+
+
+def _links_behind(links: str) -> int:
+    """How many links stand behind the steady arms in the list of a free line."""
+    return links.rpartition("'steady_arms'")[2].count("type=")
+
+
+def _curve(rng: random.Random, words: Words) -> None:
+    places = masts(words)
+    words["line.curve.radius_m"] = 10 ** rng.uniform(2.9, 4.5)
+    words["line.curve.side"] = rng.choice(["'left'", "'right'"])
+    words["line.curve.cant_mm"] = rng.uniform(0.0, 180.0)
+    words["line.curve.rail_distance_mm"] = rng.uniform(1000.0, 1700.0)
+    if rng.random() < 0.5:
+        begin, end = sorted(rng.uniform(0.0, places[-1]) for _ in range(2))
+        words["line.curve.from_m"], words["line.curve.to_m"] = begin, end + 1.0
+        words["line.curve.transition_m"] = rng.uniform(0.0, 0.49) * (end - begin)
+
+
+def _sway(rng: random.Random, words: Words) -> None:
+    """Bases that move sideways under heads that roll, or follow a course over time or place."""
+    end = float(str(words["train.end_m"])) + 100.0
+    words["effects.vehicle_motion"] = "true"
+    if "effects.head_roll" in words:
+        words["vehicle.lateral.amplitude_m"] = rng.uniform(1e-3, 0.05)
+        words["vehicle.lateral.frequency_hz"] = rng.uniform(0.3, 3.0)
+        words["vehicle.lateral.phase_deg"] = rng.uniform(-180.0, 180.0)
+    course = [[i * end / 5, rng.uniform(-0.02, 0.02)] for i in range(6)]
+    direction = rng.choice(
+        ("vertical", "lateral") if "effects.head_roll" in words else ("vertical",)
+    )
+    if rng.random() < 0.5:
+        words[f"vehicle.{direction}.by_place"] = [[x - 100.0, y] for x, y in course]
+    else:
+        words[f"vehicle.{direction}.by_time"] = [[20.0 * i, y] for i, (_, y) in enumerate(course)]
+
+
+# ---- along the track ----------------------------------------------------------------------------
+
+
+def _along(rng: random.Random, words: Words, topology: str) -> None:
+    """Axial stiffness of all wires, ends, tensioners, mid-points and a temperature."""
+    words["effects.axial_motion"] = "true"
+    for table in wire_tables(words):
+        if rng.random() < 0.5:
+            words[f"{table}.axial_stiffness_N"] = 10 ** rng.uniform(6.3, 7.5)
+        else:
+            words[f"{table}.section_mm2"] = rng.uniform(30.0, 170.0)
+            words[f"{table}.youngs_modulus_GPa"] = rng.uniform(80.0, 125.0)
+        words[f"{table}.expansion_per_K"] = rng.uniform(1e-5, 2.5e-5)
+    words[f"{_arm(words)}.length_m"] = rng.uniform(0.8, 1.5)
+    places = masts(words)
+    sides = [side for side in ("start", "end") if rng.random() < 0.5]
+    for side in sides:
+        words[f"line.ends.{side}.along"] = "'tensioner'"
+    if "overlap" in topology:
+        words["line.overlap.along"] = rng.choice(["'tensioner'", "'fixed'"])
+    if len(places) > 2 and (len(sides) > 1 or "overlap" in topology or rng.random() < 0.3):
+        words["line.mid_points_m"] = sorted(
+            rng.sample(places[1:-1], rng.randint(1, len(places) - 2))
+        )
+    words["line.tensioner.ratio"] = rng.uniform(1.0, 5.0)
+    words["line.tensioner.efficiency"] = rng.choice([1.0, rng.uniform(0.9, 1.0)])
+    if rng.random() < 0.5:
+        words["line.tensioner.travel_m"] = 10 ** rng.uniform(-3.0, 0.5)
+        words["line.tensioner.stop_stiffness_N_per_m"] = 10 ** rng.uniform(4.0, 8.0)
+    if topology.split("+")[0] != "free" and rng.random() < 0.3:
+        tension = float(str(words["line.contact_wire.tension_N"]))
+        mass = tension / (9.81 * float(str(words["line.tensioner.ratio"])))
+        words["line.tensioner.weights_kg.contact_wire"] = mass
+    if rng.random() < 0.5:
+        words["line.temperature.difference_K"] = rng.uniform(-40.0, 60.0)
+
+
+def wire_tables(words: Words) -> list[str]:
+    """Keys of all tables of wires of a scene."""
+    if "line.wires" in words:
+        return [f"line.wires.{i}" for i in range(str(words["line.wires"]).count("name="))]
+    found = ["line.contact_wire"]
+    found += [] if words.get("line.messenger_wire") == "" else ["line.messenger_wire"]
+    return found + [f"line.{name}" for name in _WHOLE_TABLES if words.get(f"line.{name}")]
+
+
+# ---- ends, transition spans, window, steps ------------------------------------------------------
+
+
+def _ends(rng: random.Random, words: Words) -> None:
+    """Layers outside of what is judged, or ends beyond which the line goes on."""
+    places = masts(words)
+    n = len(places) - 1
+    first, last = (float(str(words[f"evaluation.{key}_m"])) for key in ("from", "to"))
+    free = {
+        "start": sum(mast <= first for mast in places[1:]),
+        "end": sum(mast >= last for mast in places[:-1]),
+    }
+    for side in ("start", "end"):
+        kind = rng.choice(("fixed", "absorbing_layer", "periodic"))
+        spans = min(free[side], n - 1)
+        if kind == "absorbing_layer" and spans:
+            words[f"line.ends.{side}.spans"] = rng.randint(1, spans)
+            words[f"line.ends.{side}.damping_per_s"] = 10 ** rng.uniform(-1.0, 1.0)
+        elif kind == "absorbing_layer":
+            continue
+        words[f"line.ends.{side}.kind"] = f"'{kind}'"
+
+
+def _transition(rng: random.Random, words: Words) -> None:
+    """Rising end spans as far as the train does not run on them; the line gets longer by these."""
+    n = int(str(words["line.n_spans"]))
+    span = words["line.span_m"]
+    if isinstance(span, list):
+        return
+    if len(words["line.stagger_m"]) if isinstance(words.get("line.stagger_m"), list) else 0:
+        return
+    words["line.n_spans"] = n + 1
+    words["line.transition.n_spans_end"] = 1
+    if float(str(words["train.start_m"])) - _rear(words) > float(str(span)) + 2.0:
+        words["line.transition.n_spans_start"] = 1
+    words["line.transition.rise_m"] = rng.uniform(0.0, 0.5)
+    if rng.random() < 0.3 and "line.dropper.count" in words:
+        words["line.transition.span_m"] = float(str(span)) * rng.uniform(0.95, 1.05)
+
+
+def _rear(words: Words) -> float:
+    """How far behind the first pantograph the last one is [m]."""
+    _, behind, last = str(words["train.pantographs"]).rpartition("behind_m=")
+    return float(last.partition("}")[0]) if behind else 0.0
+
+
+def _window(rng: random.Random, words: Words) -> None:
+    words["window.mode"] = rng.choice(("'exact'", "'bounded'"))
+    if words["window.mode"] == "'bounded'" and rng.random() < 0.3:
+        words["window.tolerance"] = 10 ** rng.uniform(-12.0, -3.0)
+    elif words["window.mode"] == "'bounded'" and rng.random() < 0.5:
+        words["window.spans_ahead"] = rng.randint(2, 5)
+        words["window.spans_behind"] = rng.randint(2, 5)
+
+
+def _adaptive(rng: random.Random, words: Words) -> None:
+    if words.get("contact.law") == "'kinematic'" or "numerics.integrator" in words:
+        return
+    words["numerics.adaptive_tolerance_N"] = 10 ** rng.uniform(-1.0, 6.0)
+    words["numerics.smallest_dt_s"] = float(str(words["numerics.dt_s"])) / rng.choice([2, 8, 32])
+
+
+# ---- wind -------------------------------------------------------------
+
+
+def _more_wind(rng: random.Random, words: Words) -> None:
+    """Profiles, stretches and spectra of a wind that blows already."""
+    words["wind.height_m"] = rng.uniform(2.0, 60.0)
+    words["wind.reference_height_m"] = rng.uniform(5.0, 20.0)
+    words["wind.roughness_length_m"] = 10 ** rng.uniform(-4.0, -0.1)
+    words["wind.air_density_kg_per_m3"] = rng.uniform(1.0, 1.4)
+    for table in wire_tables(words):
+        words[f"{table}.drag_coefficient"] = rng.uniform(0.5, 1.6)
+    if rng.random() < 0.5:
+        words["wind.profile"], words["wind.exponent"] = "'power'", rng.uniform(0.0, 0.4)
+    if rng.random() < 0.5:
+        places = masts(words)
+        begin, end = sorted(rng.uniform(0.0, 0.99 * places[-1]) for _ in range(2))
+        words["wind.stretches"] = (
+            f"[{{from_m={begin!r},to_m={end + 1e-3!r},speed_factor={rng.uniform(0.0, 2.0)!r},"
+            f"height_m={rng.uniform(2.0, 100.0)!r}}}]"
+        )
+    if "wind.gusts.seed" not in words:
+        return
+    words["wind.gusts.decay"] = rng.uniform(2.0, 20.0)
+    words["wind.gusts.decay_upward"] = rng.uniform(2.0, 20.0)
+    words["wind.gusts.lowest_hz"] = 10 ** rng.uniform(-3.0, -1.5)
+    words["wind.gusts.spacing_m"] = rng.uniform(2.0, 30.0)
+    words["wind.gusts.growth_s"] = rng.choice([0.0, rng.uniform(0.0, 5.0)])
+    intensity = rng.choice(("turbulence_intensity", "friction_velocity_m_per_s", ""))
+    if intensity:
+        words[f"wind.gusts.{intensity}"] = rng.uniform(0.05, 0.4)
+    if rng.random() < 0.5:
+        words["wind.gusts.spectrum"] = "'von_karman'"
+        words["wind.gusts.length_scale_m"] = rng.uniform(30.0, 200.0)
