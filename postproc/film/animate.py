@@ -176,14 +176,15 @@ def _pictures(
     width = wish.width or _fitting(data, snapshots, numbers)
     _check_width(data, snapshots, numbers, width)
     picture = _picture(data, pantographs, width, wish.view)
-    scale, largest = picture.scale(data, snapshots, numbers, wish.motion)
+    scale = picture.scale(data, snapshots, numbers, wish.motion)
     plotter = pyvista.Plotter(
         shape=(2, 1), row_weights=_SHARES, window_size=SIZE, off_screen=True, border=False
     )
     plotter.set_background("white")
     plotter.subplot(0, 0)
     projection = Projection(wish.view, scale)
-    view = LineView(plotter, data, projection, largest, pantographs, snapshots)
+    colours = picture.colours(snapshots, numbers)
+    view = LineView(plotter, data, projection, colours, pantographs, snapshots)
     plotter.enable_parallel_projection()
     words = plotter.add_text(" ", position=(12, 12), font_size=10, color="black")
     plotter.subplot(1, 0)

@@ -13,7 +13,7 @@ from catenary.meshgen.mesh import DROPPERS
 from catenary.postproc.film.film_data import FilmData
 from catenary.postproc.film.pantograph_shape import MovingPantographs
 from catenary.postproc.film.projection import Projection
-from catenary.postproc.film.scale import room_between
+from catenary.postproc.film.scale import Colours, room_between
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.film.train import HALF_WIDTH, coaches
 from catenary.postproc.film.view import View
@@ -53,7 +53,7 @@ class LineView:
     plotter : its active subplot is drawn into
     data : of the run
     projection : of the drawing
-    largest : end of the scale of colours [m]
+    colours : what colours of wires show
     pantographs : how they are drawn
     snapshots : whose parts of the line are shown
     """
@@ -63,7 +63,7 @@ class LineView:
         plotter: pyvista.Plotter,
         data: FilmData,
         projection: Projection,
-        largest: float,
+        colours: Colours,
         pantographs: MovingPantographs,
         snapshots: Snapshots,
     ) -> None:
@@ -82,7 +82,7 @@ class LineView:
         self._arms = pyvista.PolyData(np.zeros((2 * k, 3)), lines=segments(arms))
         if k:
             plotter.add_mesh(self._arms, color=MAST, line_width=3, lighting=False)
-        self._axis, title = projection.coloured
+        self._axis, title, largest = colours
         shown = [name for name in data.wires if name in parts]
         contacts = [name for name in shown if name in data.contacts]
         self._wires: list[pyvista.PolyData] = []
@@ -107,12 +107,16 @@ class LineView:
                 },
             )  # fmt: skip
             self._wires.append(mesh)
-        self._droppers = pyvista.PolyData(flat.copy(), lines=segments(droppers))
+        # Each has points of its own: where wires are cut, a dropper is there whole or not at all.
+        self._ends = droppers
+        pairs = np.arange(droppers.size).reshape(-1, 2)
+        self._droppers = pyvista.PolyData(flat[droppers.ravel()], lines=segments(pairs))
         self._droppers.cell_data["slack"] = np.zeros(len(droppers))
-        plotter.add_mesh(
-            self._droppers, scalars="slack", clim=(0, 1), cmap=[DROPPER, SLACK],
-            line_width=2, lighting=False, show_scalar_bar=False,
-        )  # fmt: skip
+        if len(droppers):
+            plotter.add_mesh(
+                self._droppers, scalars="slack", clim=(0, 1), cmap=[DROPPER, SLACK],
+                line_width=2, lighting=False, show_scalar_bar=False,
+            )  # fmt: skip
         self._pantographs = [
             self._add_pantograph(plotter, PANTOGRAPHS[p % len(PANTOGRAPHS)], shape)
             for p, shape in enumerate(pantographs.shapes)
@@ -134,6 +138,7 @@ class LineView:
         moved = np.nan_to_num(moved)
         data, projection = self._data, self._projection
         drawn = projection.seen(data.points, moved, 0.0)
+        hung = drawn[self._ends.ravel()]
         hinges = projection.seen(self._hinges, 0.0, 0.5)
         if projection.view is View.ALONG:
             first = float(data.position[row].max())
@@ -141,9 +146,13 @@ class LineView:
             self._cut(drawn, low, high)
             far = (self._hinges[:, 0] < low) | (self._hinges[:, 0] > high)
             hinges[far] = drawn[self._held[far]]
-        for mesh in (*self._wires, self._droppers):
+            x = data.points[self._ends[:, 1], 0]
+            hung[np.repeat((x < low) | (x > high), 2)] = _NOWHERE
+        for mesh in self._wires:
             mesh.points[:] = drawn
             mesh.Modified()
+        self._droppers.points[:] = hung
+        self._droppers.Modified()
         self._arms.points[:] = np.concatenate([hinges, drawn[self._held]])
         self._arms.Modified()
         for mesh in self._wires:

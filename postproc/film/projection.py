@@ -39,8 +39,3 @@ class Projection:
             View.ALONG: (-aside, up),
         }[self.view]
         return np.column_stack([across, np.full(len(rest), layer), high])
-
-    @property
-    def coloured(self) -> tuple[int, str]:
-        """Axis of the motion that colours show, and what it is called."""
-        return (1, "sideways") if self.view is View.PLAN else (2, "uplift")

@@ -7,6 +7,7 @@ and what moves from rest is drawn larger still; both factors stand in the pictur
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,6 +36,15 @@ class Scale:
         return np.asarray(self.size * rest + self.motion * moved)
 
 
+class Colours(NamedTuple):
+    """What colours of wires show: the motion along an ``axis`` (1 to the left, 2 upward), what it
+    is called, and the end of its scale [m]."""
+
+    axis: int
+    title: str
+    largest: float
+
+
 @dataclass(frozen=True)
 class Picture:
     """What a drawing of a run has to hold.
@@ -55,8 +65,8 @@ class Picture:
 
     def scale(
         self, data: FilmData, snapshots: Snapshots, numbers: np.ndarray, motion: float | None
-    ) -> tuple[Scale, float]:
-        """The scale that fills it, and the largest motion that is seen in some snapshots [m].
+    ) -> Scale:
+        """The scale that fills it.
 
         Parameters
         ----------
@@ -69,8 +79,16 @@ class Picture:
             between, room = _BESIDE, 2.0 * self.half_width(data)
         else:
             between, room = room_between(data), self.high - self.low
-        scale = scale_for(self.width, room, self.aspect, between, largest, motion)
-        return scale, max(largest, _SMALLEST)
+        return scale_for(self.width, room, self.aspect, between, largest, motion)
+
+    def colours(self, snapshots: Snapshots, numbers: np.ndarray) -> Colours:
+        """What colours show in some snapshots: uplift, from above the motion sideways if there is
+        one."""
+        if self.view is View.PLAN:
+            aside = snapshots.largest(numbers, 1)
+            if aside >= _SMALLEST:
+                return Colours(1, "sideways", _round_up(aside))
+        return Colours(2, "uplift", _round_up(max(snapshots.largest(numbers, 2), _SMALLEST)))
 
     @staticmethod
     def half_width(data: FilmData) -> float:
@@ -108,6 +126,12 @@ def scale_for(
         wanted = _SHARE * between_m * size / max(largest_m, _SMALLEST)
         motion = max(round_down(wanted), size) if largest_m >= _SMALLEST else size
     return Scale(size, motion)
+
+
+def _round_up(value: float) -> float:
+    """Two digits that are not below the value."""
+    digit = 10.0 ** (np.floor(np.log10(value)) - 1.0)
+    return float(f"{np.ceil(value / digit - 1e-9) * digit:.2g}")
 
 
 def round_down(value: float) -> float:

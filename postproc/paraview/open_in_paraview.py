@@ -90,9 +90,10 @@ def _settings(
     width = _WIDTH + 1.1 * float(np.ptp(data.position[0]))
     low, high = pantographs.roof - 0.4, float(data.points[:, 2].max()) + 0.6
     picture = Picture(look, width, _ASPECT, low, high)
-    scale, largest = picture.scale(data, snapshots, np.arange(times.size), motion)
+    numbers = np.arange(times.size)
+    scale = picture.scale(data, snapshots, numbers, motion)
+    colours = picture.colours(snapshots, numbers)
     arrow = _ARROW * scale.size * room_between(data) / max(float(data.force.mean()), 1.0)
-    sideways = look is View.PLAN and snapshots.has_vectors
     first = data.row_at(float(times[0]))
     kinds = {int(kind) for shape in pantographs.shapes for kind in shape.kinds}
     return {
@@ -108,11 +109,11 @@ def _settings(
         "lift": snapshots.field,
         "vector": int(snapshots.has_vectors),
         "view": str(look),
-        "component": "Y" if sideways else ("" if snapshots.field == "uplift" else "Z"),
-        "coloured": "sideways [m]" if sideways else "uplift [m]",
+        "component": "Y" if colours.axis == 1 else ("" if snapshots.field == "uplift" else "Z"),
+        "coloured": f"{colours.title} [m]",
         "size": scale.size,
         "motion": scale.motion,
-        "largest_m": float(f"{largest:.2g}"),
+        "largest_m": colours.largest,
         "metres_a_newton": arrow,
         "width_m": width,
         "middle_m": 0.5 * scale.size * (low + high),

@@ -13,6 +13,9 @@ STATE = "view.pvsm"
 _PROGRAM, _SCREEN = "pvpython", "xvfb-run"
 # Longest that ParaView may take [s].
 _PATIENCE = 300.0
+# Without -noreset a screen starts anew whenever nobody is connected to it, and refuses whoever
+# comes meanwhile: ParaView connects, leaves and connects again.
+SCREEN_OF_ITS_OWN = "-screen 0 1600x900x24 -noreset"
 # Two that begin at one time may take one screen, which the first to end takes from the other.
 _ATTEMPTS, _LOST = 3, "X server connection"
 
@@ -64,7 +67,7 @@ def _command() -> tuple[Sequence[str], str]:
     if shutil.which(_SCREEN) is not None:
         # Two that begin at one time look for a free number from different ones on.
         number = str(100 + os.getpid() % 5000)
-        return (_SCREEN, "-a", "-n", number, "-s", "-screen 0 1600x900x24", _PROGRAM), ""
+        return (_SCREEN, "-a", "-n", number, "-s", SCREEN_OF_ITS_OWN, _PROGRAM), ""
     if os.environ.get("DISPLAY"):
         return (_PROGRAM,), ""
     return (), f"no state is written: {_PROGRAM} needs a screen, or {_SCREEN}"

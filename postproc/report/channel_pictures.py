@@ -98,7 +98,10 @@ def _on_line(results: Results, channel: Channel) -> Figure:
     low, high = results.extremes(channel.name)
     figure, (axes,) = stacked(3.4, 1)
     mark_line(axes, results, float(np.min(x, initial=0.0)), float(np.max(x, initial=1.0)))
-    axes.vlines(x, low, high, color=COLOURS[0], linewidth=1.6, label="range over the run")
+    axes.vlines(
+        x, low, high, color=COLOURS[0], linewidth=1.6, capstyle="projecting",
+        label="range over the run",
+    )  # fmt: skip
     tidy(axes, "position along the track [m]", _label(channel))
     legend_above(axes)
     return figure

@@ -204,7 +204,7 @@ def arm_uplift(results: Results, statistics: RunStatistics, limit: float | None)
         along.axhline(1e3 * limit, color=LIMIT, linewidth=1.1, label=f"limit {1e3 * limit:.0f} mm")
     along.set_xlim(*_with_margin(supports.x))
     along.set_ylim(bottom=0.0)
-    tidy(along, "position along the track [m]", "largest uplift [mm]")
+    tidy(along, "position along the track [m]", "largest uplift [mm]", "All arms")
     legend_above(along)
     return figure
 
@@ -248,7 +248,7 @@ def _passing_train(axes: Axes, results: Results, statistics: RunStatistics) -> N
         )
     axes.set_xlim(before, after)
     who = "leading pantograph" if results.n_pantographs > 1 else "pantograph"
-    tidy(axes, f"position of the {who} relative to the arm [m]", "uplift [mm]")
+    tidy(axes, f"position of the {who} relative to the arm [m]", "uplift [mm]", "Evaluated arms")
     legend_above(axes)
 
 
@@ -272,7 +272,7 @@ def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
         history.plot(results.line_time[shown], force, color=line_colour, linewidth=1.2, label=label)
     history.axhline(0.0, color=LIMIT, linewidth=1.0, linestyle="--", label="slack")
     history.margins(x=0.0)
-    tidy(history, "time [s]", "dropper force [N]")
+    tidy(history, "time [s]", "dropper force [N]", "Histories")
     legend_above(history)
 
     mark_line(along, results, *_with_margin(x))
@@ -282,12 +282,14 @@ def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
         droppers.highest,
         color=COLOURS[0],
         linewidth=1.6,
+        # A dropper whose force stays as it was is a dot.
+        capstyle="projecting",
         label="range over the run",
     )
     slack = droppers.lowest <= 0.0
     along.plot(x[slack], droppers.lowest[slack], "v", color=LIMIT, ms=4, label="slackened")
     along.axhline(0.0, color=GREY, linewidth=0.8)
-    tidy(along, "position along the track [m]", "dropper force [N]")
+    tidy(along, "position along the track [m]", "dropper force [N]", "All droppers")
     legend_above(along)
     return figure
 

@@ -16,6 +16,7 @@ import pytest
 from PIL import Image
 from program import catenary
 
+from catenary.postproc.paraview.state import SCREEN_OF_ITS_OWN
 from catenary.postproc.read.results import Results
 
 TOOLS = ("pvpython", "xvfb-run")
@@ -86,7 +87,7 @@ def on_screen(*words: object) -> str:
     """What a program of ParaView prints under a screen of its own."""
     for attempt in range(3):
         number = str(5200 + 100 * attempt + os.getpid() % 5000)
-        command = ["xvfb-run", "-a", "-n", number, "-s", "-screen 0 1600x900x24", *map(str, words)]
+        command = ["xvfb-run", "-a", "-n", number, "-s", SCREEN_OF_ITS_OWN, *map(str, words)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=240)
         # Two screens that are made at one time may get one number.
         if "X server connection" not in done.stderr:

@@ -8,12 +8,14 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+import pyvista
 
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.shape import BODY, HEAD, shape_of
 from catenary.postproc.film import animate, pantograph_shape, scale, train
 from catenary.postproc.film.animate import SIZE, Wish
 from catenary.postproc.film.film_data import film_data
+from catenary.postproc.film.line_view import LineView
 from catenary.postproc.film.pantograph_shape import LOWER_ARM, UPPER_ARM, MovingPantographs
 from catenary.postproc.film.projection import Projection
 from catenary.postproc.film.snapshots import Snapshots
@@ -301,3 +303,24 @@ def test_without_its_libraries_a_film_says_what_is_missing(
     with pytest.raises(InputError, match="apt-get install libegl1"):
         animate.animate(folder, Wish(), None, progress=False)
     assert not (folder / "film.mp4").exists()
+
+
+def test_from_behind_droppers_beyond_what_is_seen_are_not_drawn(folder: Path) -> None:
+    with Results(folder) as results:
+        data = film_data(results)
+        with Snapshots(folder, len(data.points)) as snapshots:
+            schematic = MovingPantographs(data, snapshots, None)
+            plotter = pyvista.Plotter(off_screen=True)
+            view = LineView(
+                plotter, data, Projection(View.ALONG, scale.Scale(1.0, 1.0)),
+                scale.Colours(2, "uplift", 0.01), schematic, snapshots,
+            )  # fmt: skip
+            row = data.row_at(float(snapshots.times[3]))
+            view.update(row, snapshots.displacement(3), None, schematic.poses(3))
+            plotter.close()
+    drawn = np.abs(view._droppers.points).max(axis=1).reshape(-1, 2) < 1e3
+    x, first = data.points[data.droppers[:, 1], 0], float(data.position[row].max())
+    seen = (x >= first - 2.0) & (x <= first + 65.0)
+    assert 0 < seen.sum() < seen.size
+    # Both ends, or none: a line to nowhere crosses the picture.
+    np.testing.assert_array_equal(drawn, np.column_stack([seen, seen]))

@@ -80,23 +80,30 @@ def test_the_script_is_python_and_keeps_strangers_words_as_text(
 
 
 @pytest.mark.parametrize(
-    ("view", "component", "coloured"),
+    ("view", "aside", "component", "coloured"),
     [
-        (View.SIDE, "", "uplift [m]"),
-        (View.PLAN, "Y", "sideways [m]"),
-        (View.ALONG, "", "uplift [m]"),
+        (View.SIDE, 0.0, "", "uplift [m]"),
+        (View.PLAN, 0.0, "", "uplift [m]"),
+        (View.PLAN, 0.0123, "Y", "sideways [m]"),
+        (View.ALONG, 0.0123, "", "uplift [m]"),
     ],
 )
 def test_each_view_is_coloured_by_what_it_shows(
-    folder: Path, view: View, component: str, coloured: str
+    folder: Path, view: View, aside: float, component: str, coloured: str
 ) -> None:
+    with h5py.File(folder / "fields.h5", "r+") as file:
+        file["contact_wire/displacement"][:, 1] = aside
     text = open_in_paraview.write_script(folder, None, look=view)[0].read_text(encoding="utf-8")
     begin = text.index("SETTINGS = ") + len("SETTINGS = ")
     settings = json.JSONDecoder().raw_decode(text[begin:])[0]
     assert (settings["component"], settings["coloured"]) == (component, coloured)
     assert settings["view"] == view and settings["vector"] == 1
-    # Nothing moves sideways in this run: widths and motions are drawn alike from above.
-    assert (settings["motion"] == settings["size"]) == (view is View.PLAN)
+    # Where nothing moves sideways widths and motions are drawn alike from above.
+    alike = view is View.PLAN and aside == 0.0
+    assert (settings["motion"] == settings["size"]) == alike
+    if component:
+        # Ends of a scale have two digits, and are not below what is shown.
+        assert settings["largest_m"] == 0.013
 
 
 def test_a_folder_that_cannot_be_written_is_named(folder: Path) -> None:
