@@ -163,7 +163,7 @@ def _stored(builder: Any, data: Any, at: int, size: int) -> Any:
 
 def _add_terms(builder: Any, sums: list[Any], data: Any, x: Any, terms: Terms) -> None:
     """Add all terms of a block stored at ``data`` times x to two ``sums``, which are replaced."""
-    n_lanes = x.type.count
+    n_lanes = terms.sources.shape[1]
     registers = Registers(n_lanes)
     factors = registers.apart(builder, x)
     parts = [registers.apart(builder, one) for one in sums]

@@ -242,11 +242,14 @@ def add_scaled(typing_context, total, factor, x):
 class Registers:
     """LLVM's vectors of at most eight numbers that arithmetic on lanes is done with.
 
-    Between operations lanes are one vector: a struct of several would be kept in memory.
+    Between operations lanes are one vector: a struct of several would be kept in memory. Its size
+    is a power of two, with lanes at the end that are not defined: LLVM takes others apart into
+    single numbers wherever a loop begins anew.
     """
 
     def __init__(self, n_lanes: int) -> None:
-        self._ranges, self.type = register_ranges(n_lanes), vector_type(n_lanes)
+        self._ranges = register_ranges(n_lanes)
+        self.type = vector_type(1 << (n_lanes - 1).bit_length())
 
     def zeros(self) -> Any:
         """0 in all lanes."""
@@ -262,11 +265,11 @@ class Registers:
                 _widened(builder, vector, max(first, size)),
                 list(range(first + size)),
             )
-        return result
+        return _widened(builder, result, self.type.count)
 
     def apart(self, builder: Any, lanes: Any) -> list[Any]:
         """Vectors that hold the lanes."""
-        if len(self._ranges) == 1:
+        if self._ranges == [(0, lanes.type.count)]:
             return [lanes]
         return [spread(builder, lanes, list(range(a, a + size))) for a, size in self._ranges]
 
@@ -363,16 +366,18 @@ def spread(builder: Any, x: Any, lanes: list[int]) -> Any:
 
 
 def _chosen(builder: Any, x: Any, lanes: np.ndarray) -> Any:
-    """Numbers of x by their lanes, 0 for -1."""
+    """Numbers of x by their lanes, 0 for -1, as ``Registers`` hold them."""
     chosen = np.where(lanes < 0, x.type.count, lanes)
-    return _shuffled(builder, x, zeros(x.type.count), chosen.tolist())
+    result = _shuffled(builder, x, zeros(x.type.count), chosen.tolist())
+    return _widened(builder, result, Registers(lanes.size).type.count)
 
 
 def _widened(builder: Any, x: Any, size: int) -> Any:
     """x with lanes that are not defined at its end."""
     if x.type.count == size:
         return x
-    return spread(builder, x, [min(lane, x.type.count - 1) for lane in range(size)])
+    # The first lane after those of x is of what is not defined.
+    return spread(builder, x, [min(lane, x.type.count) for lane in range(size)])
 
 
 def _shuffled(builder: Any, x: Any, y: Any, lanes: list[int]) -> Any:
