@@ -13,6 +13,8 @@ from catenary.solver.base.errors import InputError
 
 # A place that is that near to the end of a wire is on it [m].
 _NEAR = 1e-6
+# Defects and incidents after which a dropper is not there.
+_GONE = ("missing_dropper", "dropper_break")
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,7 @@ class FilmData:
     roles : name -> role of each wire, in the order of the line
     elements : name -> (n, 2) nodes of the wire's elements
     droppers : (n_droppers, 2) nodes
+    gone : (n_droppers,) time from which a dropper is not there, infinite of those that stay [s]
     supports : (n_supports,) masts along the track [m]
     time : (n,) [s]
     position, force, filtered, head_height : (n, p) [m], [N], [N] below 20 Hz, [m]; filtered is all
@@ -42,6 +45,7 @@ class FilmData:
     roles: dict[str, Role]
     elements: dict[str, np.ndarray]
     droppers: np.ndarray
+    gone: np.ndarray
     supports: np.ndarray
     time: np.ndarray
     position: np.ndarray
@@ -98,14 +102,16 @@ def film_data(results: Results) -> FilmData:
     if results.n_steps < 1:
         raise InputError(f"{results.path} holds no step, of which a film could be made")
     force = results.channel("contact_force")
+    points, droppers = results.line("node_points"), results.line("droppers")
     return FilmData(
         str(results.attributes.get("title", "")),
         results.fact("speed"),
-        results.line("node_points"),
+        points,
         results.wires(),
         results.roles,
         results.elements(),
-        results.line("droppers"),
+        droppers,
+        _gone(results, points[droppers[:, 1], 0]),
         results.line("support_x"),
         results.time,
         results.channel("contact_position"),
@@ -114,6 +120,16 @@ def film_data(results: Results) -> FilmData:
         results.channel("head_height"),
         results.pantograph_names(),
     )
+
+
+def _gone(results: Results, x: np.ndarray) -> np.ndarray:
+    """When droppers at places [m] break, those that are missing before all time [s]."""
+    gone = np.full(x.size, np.inf)
+    for fact in (*results.attributes.get("defects", []), *results.attributes.get("incidents", [])):
+        # Files of earlier versions do not say where a dropper breaks.
+        if fact.get("type") in _GONE and "at_m" in fact and x.size:
+            gone[int(np.argmin(np.abs(x - fact["at_m"])))] = fact.get("time_s", -np.inf)
+    return gone
 
 
 def _filtered(force: np.ndarray, dt: float) -> np.ndarray:

@@ -13,7 +13,7 @@ from catenary.meshgen.mesh import DROPPERS
 from catenary.postproc.film.film_data import FilmData
 from catenary.postproc.film.pantograph_shape import MovingPantographs
 from catenary.postproc.film.projection import Projection
-from catenary.postproc.film.scale import Colours, room_between
+from catenary.postproc.film.scale import Colours, room_above
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.film.train import HALF_WIDTH, coaches
 from catenary.postproc.film.view import View
@@ -26,7 +26,7 @@ MAST, TRACK, VEHICLE, DROPPER, SLACK = "#b8bcc2", "#6b7078", "#d9dde2", "#8c9198
 _COLOURS = LinearSegmentedColormap.from_list("uplift", ["#2166ac", "#3a3f45", "#d6301f"])
 # How far masts stand out above the highest wire [m].
 _MAST_ABOVE = 0.4
-# Length of the arrow of a force: share of the drawn room between the wires per N.
+# Length of the arrow of a force: share of the drawn room above the contact wire per N.
 _ARROW = 0.0035
 # Length of line that is seen from behind the train, from behind the first pantograph on [m].
 _SEEN_BEHIND, _SEEN_AHEAD = 2.0, 65.0
@@ -139,6 +139,7 @@ class LineView:
         data, projection = self._data, self._projection
         drawn = projection.seen(data.points, moved, 0.0)
         hung = drawn[self._ends.ravel()]
+        hung[np.repeat(data.gone[: len(self._ends)] <= data.time[row], 2)] = _NOWHERE
         hinges = projection.seen(self._hinges, 0.0, 0.5)
         if projection.view is View.ALONG:
             first = float(data.position[row].max())
@@ -197,8 +198,8 @@ class LineView:
             ends = [[-half, 0.0, -half], [half, 0.0, half], [-half, 0.0, half], [half, 0.0, -half]]
             return at + (np.array(ends) if force > 0.0 else 0.0)
         size = self._projection.scale.size
-        length = _ARROW * size * room_between(self._data) * force
-        head = 0.12 * size * (force > 0.0)
+        length = _ARROW * size * room_above(self._data) * force
+        head = min(0.12 * size, 0.5 * length)
         return at + np.array(
             [
                 [0.0, 0.0, 0.0], [0.0, 0.0, length],

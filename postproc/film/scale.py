@@ -20,6 +20,8 @@ _SHARE = 0.4
 # Room beside the track in a picture from above that motions are compared with [m], and how far it
 # reaches at least to either side, and beyond the wires [m].
 _BESIDE, _LEAST, _BEYOND = 1.0, 1.3, 0.6
+# Room above a contact wire without another wire [m].
+_LEAST_ABOVE = 0.8
 # Motions smaller than this are drawn as if they were that large [m].
 _SMALLEST = 1e-4
 
@@ -100,6 +102,11 @@ def room_between(data: FilmData) -> float:
     """Height from the contact wire to what hangs above it at a support [m]."""
     heights = data.points[:, 2]
     return float(heights.max() - np.median(heights[data.wires[data.contact]]))
+
+
+def room_above(data: FilmData) -> float:
+    """Height above the contact wire that arrows have, also where nothing hangs there [m]."""
+    return max(room_between(data), _LEAST_ABOVE)
 
 
 def scale_for(

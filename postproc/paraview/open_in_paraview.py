@@ -13,7 +13,7 @@ import numpy as np
 from catenary.mbs.shape import BODY, HEAD, SPRING, Shape
 from catenary.postproc.film.film_data import FilmData, film_data
 from catenary.postproc.film.pantograph_shape import MovingPantographs
-from catenary.postproc.film.scale import Picture, room_between
+from catenary.postproc.film.scale import Picture, room_above
 from catenary.postproc.film.snapshots import FIELDS_FILE, Snapshots
 from catenary.postproc.film.view import View
 from catenary.postproc.paraview import scenery
@@ -25,7 +25,7 @@ from catenary.solver.base.errors import InputError
 SCRIPT, FOLDER = "view.py", "paraview"
 _TEMPLATE = "view.py.template"
 # Line in the window beside one pantograph [m], width over height of the window, and the share of
-# the room between the wires that the arrow of a mean force fills.
+# the room above the contact wire that the arrow of a mean force fills.
 _THICK = ((BODY, 1.4), (HEAD, 2.0), (SPRING, 0.5))
 _WIDTH, _ASPECT, _ARROW = 110.0, 1280.0 / 480.0, 0.4
 
@@ -93,7 +93,7 @@ def _settings(
     numbers = np.arange(times.size)
     scale = picture.scale(data, snapshots, numbers, motion)
     colours = picture.colours(snapshots, numbers)
-    arrow = _ARROW * scale.size * room_between(data) / max(float(data.force.mean()), 1.0)
+    arrow = _ARROW * scale.size * room_above(data) / max(float(data.force.mean()), 1.0)
     first = data.row_at(float(times[0]))
     kinds = {int(kind) for shape in pantographs.shapes for kind in shape.kinds}
     return {

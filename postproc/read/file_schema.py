@@ -137,17 +137,15 @@ def _effects(value: Any) -> bool:
 
 def _defects(value: Any) -> bool:
     return isinstance(value, list) and all(
-        isinstance(fact, dict) and isinstance(fact.get("says"), str) for fact in value
+        isinstance(fact, dict)
+        and is_number(fact.get("at_m", 0.0))
+        and isinstance(fact.get("says"), str)
+        for fact in value
     )
 
 
 def _incidents(value: Any) -> bool:
-    return isinstance(value, list) and all(
-        isinstance(fact, dict)
-        and is_number(fact.get("time_s"))
-        and isinstance(fact.get("says"), str)
-        for fact in value
-    )
+    return _defects(value) and all(is_number(fact.get("time_s")) for fact in value)
 
 
 def _arrivals(value: Any) -> bool:

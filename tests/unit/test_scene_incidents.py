@@ -74,6 +74,12 @@ def test_an_effect_that_is_left_out_is_not_told(kind: str) -> None:
     assert len(plan.incidents) == 2
 
 
+def test_a_dropper_that_breaks_has_its_place() -> None:
+    found = scene()
+    facts = incident_facts(found, problem_of(found))
+    assert [fact.get("at_m") for fact in facts] == [257.0, None, None]
+
+
 def test_without_incidents_there_are_no_effects_of_them() -> None:
     plan = make_plan(load_scene("en50318_2002"))
     reasons = {row.name: row.reason for row in plan.off}

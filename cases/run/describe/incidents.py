@@ -12,7 +12,8 @@ from catenary.solver.problem.problem import Problem
 
 
 def incident_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
-    """Type, time [s] and a sentence of each incident that is simulated, in order of time.
+    """Type, time [s] and a sentence of each incident that is simulated, in order of time; of a
+    dropper its place [m].
 
     Not collective.
     """
@@ -21,12 +22,17 @@ def incident_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
         {
             "type": table.type,
             "time_s": at_step(table.at_s, dt),
+            **_place(table, problem.line),
             "says": _sentence(table, problem.line),
         }
         for table in scene.incidents
         if table.type in problem.effects
     ]
     return sorted(found, key=lambda fact: float(str(fact["time_s"])))
+
+
+def _place(table: Incident, line: Line) -> dict[str, float]:
+    return {"at_m": dropper_place(table, line)} if isinstance(table, DropperBreakTable) else {}
 
 
 def _sentence(table: Incident, line: Line) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,10 @@ import pyvista
 
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.shape import BODY, HEAD, shape_of
+from catenary.postproc.files.checked import seal_attributes, set_attribute
 from catenary.postproc.film import animate, pantograph_shape, scale, train
 from catenary.postproc.film.animate import SIZE, Wish
-from catenary.postproc.film.film_data import film_data
+from catenary.postproc.film.film_data import FilmData, film_data
 from catenary.postproc.film.line_view import LineView
 from catenary.postproc.film.pantograph_shape import LOWER_ARM, UPPER_ARM, MovingPantographs
 from catenary.postproc.film.projection import Projection
@@ -305,22 +307,46 @@ def test_without_its_libraries_a_film_says_what_is_missing(
     assert not (folder / "film.mp4").exists()
 
 
-def test_from_behind_droppers_beyond_what_is_seen_are_not_drawn(folder: Path) -> None:
+def _drawn_droppers(folder: Path, look: View) -> tuple[FilmData, int, np.ndarray]:
+    """The run, the record of its fourth snapshot, and which ends of droppers are drawn there."""
     with Results(folder) as results:
         data = film_data(results)
         with Snapshots(folder, len(data.points)) as snapshots:
             schematic = MovingPantographs(data, snapshots, None)
             plotter = pyvista.Plotter(off_screen=True)
             view = LineView(
-                plotter, data, Projection(View.ALONG, scale.Scale(1.0, 1.0)),
+                plotter, data, Projection(look, scale.Scale(1.0, 1.0)),
                 scale.Colours(2, "uplift", 0.01), schematic, snapshots,
             )  # fmt: skip
             row = data.row_at(float(snapshots.times[3]))
             view.update(row, snapshots.displacement(3), None, schematic.poses(3))
             plotter.close()
-    drawn = np.abs(view._droppers.points).max(axis=1).reshape(-1, 2) < 1e3
+    return data, row, np.abs(view._droppers.points).max(axis=1).reshape(-1, 2) < 1e3
+
+
+def test_from_behind_droppers_beyond_what_is_seen_are_not_drawn(folder: Path) -> None:
+    data, row, drawn = _drawn_droppers(folder, View.ALONG)
     x, first = data.points[data.droppers[:, 1], 0], float(data.position[row].max())
     seen = (x >= first - 2.0) & (x <= first + 65.0)
     assert 0 < seen.sum() < seen.size
     # Both ends, or none: a line to nowhere crosses the picture.
     np.testing.assert_array_equal(drawn, np.column_stack([seen, seen]))
+
+
+def test_droppers_that_are_missing_or_broke_are_not_drawn(folder: Path) -> None:
+    # The fourth snapshot is that of 0.15 s.
+    defects = [{"type": "missing_dropper", "at_m": 60.0, "wire": "contact_wire", "says": "missing"}]
+    incidents = [
+        {"type": "dropper_break", "time_s": time, "at_m": x, "says": "breaks"}
+        for time, x in ((0.1, 115.0), (0.2, 120.0))
+    ]
+    # Of earlier versions, which did not say where.
+    incidents.append({"type": "dropper_break", "time_s": 0.0, "says": "breaks"})
+    with h5py.File(folder / "run.h5", "r+") as file:
+        set_attribute(file, "defects", json.dumps(defects))
+        set_attribute(file, "incidents", json.dumps(incidents))
+        seal_attributes(file, ["defects", "incidents"])
+    data, _, drawn = _drawn_droppers(folder, View.SIDE)
+    x = data.points[data.droppers[:, 1], 0]
+    np.testing.assert_allclose(x[~drawn[:, 0]], [60.0, 115.0])
+    np.testing.assert_array_equal(drawn[:, 0], drawn[:, 1])
