@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
+
+import numpy as np
 
 from catenary.cases.result_folder.output_folder import RunSize
 from catenary.cases.run.file_sizes import FileSizes, estimate_files
@@ -79,7 +82,7 @@ def needs_of(
     problem: Problem,
     extent: Extent,
     n_dofs: int,
-    widths: tuple[int, ...] = (),
+    stations: Mapping[int, int] | None = None,
     detour: Detour | None = None,
 ) -> Needs:
     """What a run of a scene needs. Not collective.
@@ -89,14 +92,15 @@ def needs_of(
     problem : of the scene
     extent : of its mesh
     n_dofs : unknowns of the line
-    widths : unknowns of a station in each plane; by default of one with a node of each wire
+    stations : how many have each number of unknowns; by default all have a node of each wire
     detour : why steps take longer than they could
     """
     active = effects.active(problem)
-    if not widths:
+    if not stations:
         groups = effects.unknown_groups(active, problem.line.wires)
-        widths = tuple(sum(map(len, group.values())) for group in groups)
+        stations = {sum(len(names) for group in groups for names in group.values()): 1}
     scheme, n_substeps = problem.numerics.scheme, _substeps(problem)
+    gusts = problem.wind is not None and problem.wind.gusts is not None
     n_moving = round(n_dofs * moving_share(problem))
     n_steps = max(1, math.floor(simulated_time(problem) / problem.numerics.dt + 1e-9))
     recording = recording_of(scene.output, problem, extent, n_steps)
@@ -105,7 +109,7 @@ def needs_of(
         n_steps=n_steps,
         memory=estimate_memory(n_dofs, n_steps),
         march=_slower(detour, n_substeps)
-        * estimate_march(n_moving, n_steps, scheme, n_substeps, widths),
+        * estimate_march(n_moving, n_steps, scheme, n_substeps, stations, gusts),
         files=estimate_files(scene, problem, recording, n_dofs, flush_every),
         recording=recording,
         detour=detour,
@@ -142,7 +146,10 @@ def needs_with_mesh(scene: Scene, mesh: LineMesh) -> Needs:
     numbering = numbering_of(problem, mesh)
     detour = detour_of(problem, numbering) or single_steps_of(problem)
     extent = extent_of(mesh)
-    return needs_of(scene, problem, extent, numbering.n_unknowns, numbering.planes, detour)
+    stations: Counter[int] = Counter()
+    for places, count in zip(numbering.make_ups, np.bincount(numbering.make_up), strict=True):
+        stations[len(places)] += int(count)
+    return needs_of(scene, problem, extent, numbering.n_unknowns, stations, detour)
 
 
 def run_size(needs: Needs) -> RunSize:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 # Cost model of the march on one rank, records included: overhead of a step, and time per unknown.
@@ -10,8 +12,13 @@ import numpy as np
 # two; the plan calls it an estimate.
 STEP_OVERHEAD = 1.4e-5  # [s]
 STEP_PER_UNKNOWN = 2.6e-9  # [s]
-# Time of a station by its unknowns in a plane, in terms of four; as in the benchmark of widths.
+# Time of a station by its unknowns, in terms of four; as in the benchmark of widths. Effects that
+# add planes join them to the others, as arms and the slope of wires at rest do.
 STATION_COST = {2: 0.6, 4: 1.0, 6: 1.8, 8: 2.2, 10: 4.8, 12: 5.6, 16: 8.0}
+# What stations of several make-ups take more than as many of one.
+SEVERAL_MAKE_UPS = 1.25
+# Gusts on wires [s an unknown], measured with the case windy_viaduct.
+GUSTS_PER_UNKNOWN = 4e-9
 # The fixed-point scheme repeats the solve, and PETSc's TSALPHA2 factors anew in every iteration:
 # 240 and 1800 us were measured with the same case.
 SCHEME_FACTOR = {"one_solve": 1.0, "fixed_point": 9.0, "ts_alpha2": 70.0}
@@ -38,24 +45,27 @@ def estimate_march(
     n_steps: int,
     scheme: str,
     n_substeps: int = 0,
-    widths: tuple[int, ...] = (4,),
+    stations: Mapping[int, int] | None = None,
+    gusts: bool = False,
 ) -> float:
     """Wall time of the time loop on one rank [s].
 
     ``n_substeps`` are those of a step that pantographs with all their bodies take, all together;
-    ``widths`` the unknowns of a station in each plane.
+    ``stations`` how many of the line's have each number of unknowns, all four by default;
+    ``gusts`` whether wind changes with time.
     """
-    step = STEP_OVERHEAD + STEP_PER_UNKNOWN * n_dofs * cost_of_widths(widths)
-    step *= SCHEME_FACTOR[scheme]
+    step = STEP_OVERHEAD + STEP_PER_UNKNOWN * n_dofs * cost_of_stations(stations or {4: 1})
+    step = SCHEME_FACTOR[scheme] * step + gusts * GUSTS_PER_UNKNOWN * n_dofs
     return n_steps * (step + ALL_BODIES_SUBSTEP * n_substeps)
 
 
-def cost_of_widths(widths: tuple[int, ...]) -> float:
-    """Time per unknown of stations with planes of these widths, in terms of one plane of four."""
-    station = sum(
-        np.interp(width, list(STATION_COST), list(STATION_COST.values())) for width in widths
-    )
-    return float(station / sum(widths) * 4.0)
+def cost_of_stations(stations: Mapping[int, int]) -> float:
+    """Time per unknown of a line with so many stations of each number of unknowns, in terms of one
+    of stations of four."""
+    sizes, counts = np.array(list(stations)), np.array(list(stations.values()))
+    costs = np.interp(sizes, list(STATION_COST), list(STATION_COST.values()))
+    several = SEVERAL_MAKE_UPS if sizes.size > 1 else 1.0
+    return float(several * 4.0 * (counts @ costs) / (counts @ sizes))
 
 
 def estimate_memory(n_dofs: int, n_steps: int = 0) -> float:

@@ -46,6 +46,7 @@ def test_estimates_grow_with_size_steps_and_scheme() -> None:
     assert estimate_march(20_000, 1000, "one_solve") > small
     assert estimate_march(10_000, 2000, "one_solve") == pytest.approx(2 * small)
     assert estimate_march(10_000, 1000, "fixed_point") > small
+    assert estimate_march(10_000, 1000, "one_solve", gusts=True) > small
 
 
 def needs(*changes: str) -> Needs:

@@ -9,8 +9,18 @@ import pytest
 from measuring import start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
+from catenary.cases.run.needs import needs_with_mesh
 from catenary.cases.run.plan import make_plan, plan_text
-from catenary.cases.scene.cost_model import STATION_COST, cost_of_widths, estimate_march
+from catenary.cases.run.scene_mesh import mesh_of as mesh_of_scene
+from catenary.cases.scene.convert.problem import problem_of as problem_of_scene
+from catenary.cases.scene.cost_model import (
+    SEVERAL_MAKE_UPS,
+    STATION_COST,
+    STEP_OVERHEAD,
+    STEP_PER_UNKNOWN,
+    cost_of_stations,
+    estimate_march,
+)
 from catenary.cases.scene.load import load_scene
 from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.integrators import detour
@@ -56,12 +66,45 @@ def test_log_and_outcome_of_a_march_say_the_same(
         assert (str(told) if told else "") == outcome.detour
 
 
-def test_estimates_know_the_widths_of_stations() -> None:
-    assert cost_of_widths((4,)) == 1.0
-    assert cost_of_widths((4, 4)) == pytest.approx(1.0)
-    assert cost_of_widths((8,)) == pytest.approx(0.5 * STATION_COST[8])
-    step = [estimate_march(n, 1, "one_solve", 0, (width,)) for n, width in ((4000, 4), (12000, 12))]
+def test_estimates_know_the_unknowns_of_stations() -> None:
+    assert cost_of_stations({4: 20}) == 1.0
+    assert cost_of_stations({8: 3}) == pytest.approx(0.5 * STATION_COST[8])
+    # Half of the stations have six: ten unknowns on two stations.
+    both = (1.0 + STATION_COST[6]) * 4.0 / 10.0
+    assert cost_of_stations({4: 7, 6: 7}) == pytest.approx(SEVERAL_MAKE_UPS * both)
+    step = [estimate_march(n, 1, "one_solve", 0, {size: 1}) for n, size in ((4000, 4), (12000, 12))]
     empty = estimate_march(0, 1, "one_solve")
     assert np.diff(np.array(step) - empty)[0] > 0
     ratio = (step[1] - empty) / (step[0] - empty)
     assert ratio == pytest.approx(STATION_COST[12])
+
+
+def test_estimates_count_the_stations_of_each_make_up() -> None:
+    elastic = [
+        f"line.{wire}.{key}"
+        for wire in ("contact_wire", "messenger_wire")
+        for key in ("section_mm2=100", "youngs_modulus_GPa=110")
+    ]
+    scenes = {
+        "plain": load_scene("ambrosio2012", ["train.pantographs.0.name=lumped"]),
+        "planes": load_scene(
+            "ambrosio2012",
+            [
+                "train.pantographs.0.name=lumped",
+                *("effects.axial_motion=true", "effects.lateral_motion=true"),
+                *("line.steady_arm.inclination_deg=10", *elastic),
+            ],
+        ),
+        "overlap": load_scene("overlap", []),
+    }
+    needs = {name: needs_with_mesh(scene, mesh_of_scene(scene)) for name, scene in scenes.items()}
+    of_line = {n: own.march / own.n_steps - STEP_OVERHEAD for n, own in needs.items()}
+    assert of_line["planes"] == pytest.approx(STATION_COST[10] * of_line["plain"], rel=0.01)
+    # Four unknowns but where the other section's wires hang beside, which is eight there.
+    overlap = scenes["overlap"]
+    numbering = numbering_of(problem_of_scene(overlap), mesh_of_scene(overlap))
+    counts = np.bincount(np.diff(numbering.starts))
+    stations = {size: int(counts[size]) for size in (4, 8)}
+    assert sum(counts) == sum(stations.values())
+    per_unknown = STEP_PER_UNKNOWN * cost_of_stations(stations)
+    assert of_line["overlap"] == pytest.approx(per_unknown * numbering.n_unknowns)
