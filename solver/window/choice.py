@@ -18,15 +18,17 @@ from catenary.solver.problem.window import BOUNDED, EXACT, ROUND_OFF, WindowChoi
 _OMEGA = 2.0 * math.pi * 2.0
 _RATE, _SPEED_RATIO = 0.0141, 0.57
 # Spans ahead there, and error of the force history below 20 Hz [% of sigma].
-_AHEAD = (5.0, 9.0, 14.0, 18.0, 23.0, 26.0, 30.0)
-_ERROR = (14.0, 6.4, 1.3, 0.39, 0.26, 0.13, 0.035)
+_AHEAD = (5.0, 9.0, 14.0, 18.0, 20.0, 22.0, 26.0, 30.0)
+_ERROR = (11.0, 5.3, 1.6, 0.39, 0.17, 0.080, 0.052, 0.032)
 # So many times as many spans ahead are needed as behind.
 _BEHIND = 1.25
 # Times at which what moves is counted.
 _SAMPLES = 200
-_FEWEST, _WANTED = 4, 30.0
-# Rate of fading below which the ends of a window are damped on mass, and by how much [1/s].
-_SLOW, _FADING = 0.1, 1.0
+_FEWEST, _WANTED = 4, 22.0
+# Rate of fading below which the ends of a window are damped on mass [1/s], and by how much, in wave
+# speeds times spans: the change of group velocity with wavenumber, some 0.08 of that, is a scale of
+# 2 of it (see ``window_kernels.fade``). Without that damping more spans are taken.
+_SLOW, _FADING, _WANTED_WITHOUT = 0.1, 2.0, 30.0
 
 
 def window_sentence(problem: Problem) -> str:
@@ -56,12 +58,12 @@ def spans_of_window(
     problem: Problem, ahead: float | None = None, behind: float | None = None
 ) -> WindowChoice:
     """A window of so many spans, by default of those that damping and speed ask for."""
+    fades = _fading_rate(problem) < _SLOW
     if ahead is None or behind is None:
-        ahead = max(_FEWEST, math.ceil(_WANTED / _worth(problem)))
+        wanted = _WANTED if fades else _WANTED_WITHOUT
+        ahead = max(_FEWEST, math.ceil(wanted / _worth(problem)))
         behind = max(_FEWEST, math.ceil(ahead / _BEHIND))
-    return WindowChoice(
-        BOUNDED, None, ahead, behind, _FADING if _fading_rate(problem) < _SLOW else 0.0
-    )
+    return WindowChoice(BOUNDED, None, ahead, behind, _fading(problem) if fades else 0.0)
 
 
 def moving_share(problem: Problem) -> float:
@@ -98,6 +100,14 @@ def estimated_error(problem: Problem, ahead: float, behind: float) -> float:
     slope = math.log(_ERROR[-1] / _ERROR[-3]) / (_AHEAD[-1] - _AHEAD[-3])
     beyond = slope * max(0.0, spans - _AHEAD[-1])
     return float(np.exp(np.interp(spans, _AHEAD, np.log(_ERROR)) + beyond))
+
+
+def _fading(problem: Problem) -> float:
+    """Damping at the ends of a window times the square of their length [m2/s]."""
+    masts = problem.line.support_positions
+    span = float(masts[-1] - masts[0]) / (len(masts) - 1)
+    speed = min(wire.wave_speed for wire in problem.line.wires_of(Role.CONTACT))
+    return _FADING * speed * span
 
 
 def _worth(problem: Problem) -> float:

@@ -17,8 +17,13 @@ from catenary.solver.linear.factors.meeting_station import middle_of, turn
 STEP, IS_FRESH = 0, 1
 # Looks from one search for the largest motion to the next, once it has grown for as many.
 _PEAK_EVERY = 64
-# Share of a window to each side of the train that fades.
-_FADING = 0.7
+# Shares of a window that fade, of what is behind the train and of what is ahead.
+_BEHIND, _AHEAD = 0.85, 0.6
+# Profile of what fades (Manolopoulos, 2002): where it would be infinite, its numbers, and how much
+# of its length is taken.
+_C = 2.62206
+_A, _B = 1.0 - 16.0 / _C**3, (1.0 - 17.0 / _C**3) / _C**2
+_TAKEN = 0.98
 # Stations of the smallest window.
 _LEAST = 64
 
@@ -31,8 +36,8 @@ class WindowArrays(NamedTuple):
     state : (2,) int, steps taken, and whether the whole line is still alive
     every, guard : steps between two looks, and stations that are looked at
     rule : (5,) share of the largest motion below which stations rest, 0 if spans decide; spans
-        behind and ahead; what stations in a fading end lose of their velocity at a look, at most;
-        1 if what rests is made zero, 0 if it stays where it is
+        behind and ahead; how much fades at a look, see ``fade`` [m2]; 1 if what rests is made zero,
+        0 if it stays where it is
     peak : (2,) largest of x and y of the motion
     contacts : (n,) where contacts are [m], by reference
     loaded : (2,) first and last place with a load [m]
@@ -229,28 +234,38 @@ def turn_to(window, begin, end):
 def fade(window, motion, first, last):
     """Slow down the outer part of what is behind the place ``first`` and ahead of ``last`` [m].
 
-    The damping begins with its fourth power of the way into that part: waves that are hardly faster
-    or slower than the train are sent back by what begins at once.
+    Waves whose group velocity is nearly the train's stay there for long. In its frame their
+    envelope obeys Schroedinger's equation, i a_t = -D / 2 a_xx, and damping that begins at once
+    sends them back, however little it is. It grows as the potential does that sends back least (D.
+    E. Manolopoulos, J. Chem. Phys. 117, 2002), by as much as the length lets it.
     """
     ends, low, high = window.ends, window.low, window.high
     begin, end = ends[0], ends[1]
-    behind, ahead = _FADING * (first - low[begin]), _FADING * (high[end - 1] - last)
+    behind, ahead = _BEHIND * (first - low[begin]), _AHEAD * (high[end - 1] - last)
     i = begin
     while begin > 0 and i < end and high[i] < low[begin] + behind:
-        share = 1.0 - (high[i] - low[begin]) / behind
-        slow_down(window, motion, i, window.rule[3] * share**4)
+        into = 1.0 - (high[i] - low[begin]) / behind
+        slow_down(window, motion, i, window.rule[3] / behind**2 * damping(into))
         i += 1
     i = end - 1
     while end < low.size and i >= begin and low[i] > high[end - 1] - ahead:
-        share = 1.0 - (high[end - 1] - low[i]) / ahead
-        slow_down(window, motion, i, window.rule[3] * share**4)
+        into = 1.0 - (high[end - 1] - low[i]) / ahead
+        slow_down(window, motion, i, window.rule[3] / ahead**2 * damping(into))
         i -= 1
 
 
 @in_line
-def slow_down(window, motion, station, loss):
-    """Take a share off the velocity of a station, which stays where it is."""
+def damping(into):
+    """Damping at a share ``into`` of the way into what fades, in terms of its scale."""
+    x = _TAKEN * _C * into
+    return _A * x - _B * x**3 + 4.0 / (_C - x) ** 2 - 4.0 / (_C + x) ** 2
+
+
+@in_line
+def slow_down(window, motion, station, decay):
+    """Let the velocity of a station decay, by so much for little; it stays where it is."""
     x, y, z, shares = motion
+    loss = decay / (1.0 + decay)
     for i in range(window.starts[station], window.starts[station + 1]):
         change = -loss * (shares[3] * y[i] + shares[4] * z[i])
         y[i] += change

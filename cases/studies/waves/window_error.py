@@ -35,7 +35,7 @@ OPTION = "--window-error"
 # Sizes that a curve may have, and the least [spans].
 MOST, LEAST = 100, 2
 # Share of a window that is ahead of the train, as in the one that the program chooses.
-_AHEAD = 5.0 / 9.0
+_AHEAD = 0.55
 _NEVER = 2**62
 
 
