@@ -51,6 +51,7 @@ class Strips:
     pitch : how the head turns across the track, None if it does not
     wires : contact wires side by side, each of which may touch each strip
     flexure : how strips on springs of their own bend, None if they are rigid
+    rake : angle between a strip and the cross-section [rad], > 0 if its left end is ahead
     """
 
     number: int = 1
@@ -60,6 +61,7 @@ class Strips:
     pitch: Turning | None = None
     wires: int = 1
     flexure: Flexure | None = None
+    rake: float = 0.0
 
     @property
     def offsets(self) -> tuple[float, ...]:

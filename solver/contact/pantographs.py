@@ -27,7 +27,8 @@ from catenary.solver.contact.air_around import airflow
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
 from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.output_kernels import Ends
-from catenary.solver.integrators import state_kernels
+from catenary.solver.contact.place_kernels import move_contacts
+from catenary.solver.contact.raked_strips import leads_of
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.problem import Placement, Problem
 from catenary.solver.problem.simulated import Simulated
@@ -65,7 +66,9 @@ class Pantographs:
     outputs : ``position`` and all these of the latest step one after another; ``of_step`` is the
         part that a step fills after its forces are known
     speed : of the train [m/s]
-    moving : start and places of contacts and pantographs, see ``kernels.shift``
+    moving : start and places of contacts and pantographs and leads of contacts on raked strips, see
+        ``move_contacts``
+    reach : how far contacts are behind and ahead of their pantographs at most [m], all ranks
     ends : Ends, contacts of each strip and strips of each pantograph
 
     Raises
@@ -102,18 +105,26 @@ class Pantographs:
         sizes = (self.n, 3 * self.n, strip_start.size, shares, self.n)
         places_and_outputs = np.zeros(self.n_contacts + sum(sizes))
         self._all_places = places_and_outputs[: self._all_start.size]
-        self.moving = self._all_start, self._all_places
-        self._move = bound(state_kernels.shift, *self.moving, later=(0.0,))
         self.candidates = Candidates(
             places_and_outputs[: self.n_contacts],
             np.tile(np.arange(n_wires), strip_start.size),
             np.repeat(np.repeat(half_length, counts), n_wires),
         )
+        rake = [
+            placement.data.strips.rake * simulated.raked_strips for placement in train.placements
+        ]
+        leads = leads_of(wires, self.candidates.wire, np.repeat(np.repeat(rake, counts), n_wires))
+        self.moving = self._all_start, self._all_places, leads
+        self._move = bound(move_contacts, *self.moving, later=(0.0,))
+        self.reach = (
+            max(0.0, -min(map(min, offsets))) + max(0.0, -leads.lead.min(initial=0.0)),
+            max(0.0, max(map(max, offsets))) + leads.lead.max(initial=0.0),
+        )
         self.outputs = places_and_outputs[self.n_contacts :]
         parts = np.split(self.outputs, np.cumsum(sizes)[:-1])
         self.position, forces, self.strip_force, self.contact_wire_force = parts[:-1]
         self.constraint_violation = parts[-1]
-        self._all_places[:] = self._all_start
+        self.move_to(0.0)
         self.contact_force, self.head_height, self.wire_height = forces.reshape(3, self.n)
         self.of_step = self.outputs[self.n : -self.n]
         self.wire_height[:] = wires.rest_height(self._start)

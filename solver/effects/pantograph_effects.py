@@ -42,6 +42,18 @@ register(
 )
 register(
     Effect(
+        "raked_strips",
+        "collector strips at an angle to the cross-section",
+        "places of contacts ahead of or behind a strip's middle, by the stagger",
+        "straight strip under the wires at rest",
+        default=True,
+        applies=lambda p: any(place.data.strips.rake for place in p.train.placements),
+        law=lambda laws, p: replace(laws, raked_strips=True),
+        data="pantographs.*.strips.rake_deg",
+    )
+)
+register(
+    Effect(
         "regulated_lift",
         "pantographs whose static force is regulated",
         "a force on the lift, by a sampled controller of the contact force or the head's height",

@@ -39,6 +39,7 @@ class Simulated:
     contact_loss : whether heads leave the wire; without it the contact force may pull
     head_roll : whether heads roll
     flexible_strips : whether strips bend
+    raked_strips : whether strips may stand at an angle to the cross-section
     meets_air : whether the air has forces on pantographs
     pantograph_laws : whether laws of pantographs act that are not linear
     regulated_lift : whether lifts are regulated as their placements say
@@ -67,6 +68,7 @@ class Simulated:
     contact_loss: bool = False
     head_roll: bool = False
     flexible_strips: bool = False
+    raked_strips: bool = False
     meets_air: bool = False
     pantograph_laws: bool = False
     regulated_lift: bool = False

@@ -72,8 +72,6 @@ class SchemeFactory:
         line = make_line(comm, model, self.ownership, numerics, not in_parts)
         laws = model.simulated
         trailing = max(placement.behind for placement in train.placements)
-        offsets = [x for placement in train.placements for x in placement.data.strip_offsets]
-        reach = (max(0.0, -min(offsets)), max(0.0, max(offsets)))
         # A kinematic contact ends depths through their rates.
         uses_rate = laws.contact.dissipates or isinstance(laws.contact, KinematicLaw)
         interaction = ForcesOnLine(
@@ -81,7 +79,7 @@ class SchemeFactory:
             model,
             own.form,
             line,
-            (train.start - trailing - reach[0], train.end + reach[1]),
+            (train.start - trailing - pantographs.reach[0], train.end + pantographs.reach[1]),
             pantographs.candidates,
             train.speed,
             uses_rate,

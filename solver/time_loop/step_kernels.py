@@ -15,6 +15,7 @@ from catenary.solver.base.compiled import compiled, in_line
 from catenary.solver.base.pointers import borrowed, call_held, numbers_at
 from catenary.solver.contact import contact_kernels, output_kernels
 from catenary.solver.contact.crossing_kernels import find_across
+from catenary.solver.contact.place_kernels import move_contacts
 from catenary.solver.contact_problem import complementarity_kernels
 from catenary.solver.contact_problem.complementarity_kernels import SmallProblem
 from catenary.solver.contact_problem.law_tangents import ReportedForces
@@ -60,7 +61,7 @@ class Steps(NamedTuple):
     Attributes
     ----------
     speed : of the train [m/s]
-    moving : start and places of contacts and pantographs, see ``kernels.shift``
+    moving : arguments of ``move_contacts`` but the way
     placing, responding : arguments of ``place`` and ``respond``
     problem : SmallProblem of a step's forces
     superposing, compensating : of ``superpose`` and ``compensate`` after the forces
@@ -188,7 +189,7 @@ def take(steps, times, drives, rows, moved, kept_motions, counts, shows, first, 
     steps, times, drives, rows, kept_motions = borrowed((steps, times, drives, rows, kept_motions))
     now, behind = borrowed(moved)
     kept = kept_motions
-    (start, places), speed, loading = steps.moving, steps.speed, steps.loading
+    moving, speed, loading = steps.moving, steps.speed, steps.loading
     records, heads, taps, shown = steps.records, steps.heads, steps.taps, steps.shown
     problem, law, switched, outputs = steps.problem, steps.law, steps.switched, steps.outputs
     clock, free, placing, responding = steps.clock, steps.free, steps.placing, steps.responding
@@ -203,7 +204,7 @@ def take(steps, times, drives, rows, moved, kept_motions, counts, shows, first, 
     force = solution[:n]
     for i in range(first, n_steps):
         time = times[i]
-        state_kernels.shift(start, places, speed * time)
+        move_contacts(*moving, speed * time)
         contact_kernels.place(*placing)
         if loading[0] != 0:
             clock[0] = time

@@ -70,7 +70,7 @@ def full_problem(names: frozenset[str]) -> Problem:
     limiter = Law(1, 2, False, (-1.0, 0.1, 1.0), (0.0, 0.0, 9e3), from_rest=True)
     rolling = replace(EN_PANTOGRAPH, roll=Turning(2.0, 470.0, 1.0), uplift=uplift, laws=(limiter,))
     bending = Strips(
-        length=1.6, suspension=Suspension(1.0, 8e3, 10.0), flexure=Flexure(600.0, 0.9, 2)
+        length=1.6, suspension=Suspension(1.0, 8e3, 10.0), flexure=Flexure(600.0, 0.9, 2), rake=0.3
     )
     rolling = replace(rolling, strips=bending)
     speed = 1.1 * line.contact_wire.wave_speed

@@ -19,7 +19,7 @@ _LEFT_OUT = (
     "wind", "uplift_stops", "fittings", "contact_wire_height", "dropper_lengths", "missing_dropper",
     "running_surface", "loose_clamp", "worn_wire", "wrong_tension", "hard_spot", "kink", "pre_sag",
     "tensioners", "temperature", "transition_spans", "absorbing_layers", "periodic_ends",
-    "pantograph_laws", "flexible_strips", "regulated_lift", "vehicle_suspension",
+    "pantograph_laws", "flexible_strips", "raked_strips", "regulated_lift", "vehicle_suspension",
     "pantograph_aerodynamics",
 )  # fmt: skip
 

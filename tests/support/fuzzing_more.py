@@ -172,6 +172,8 @@ def _strips(rng: random.Random, words: Words) -> None:
     if len(masses) > 1 and rng.random() < 0.5:
         words[f"{table}.strips.pitch_inertia_kg_m2"] = rng.uniform(0.05, 1.0)
         words[f"{table}.strips.pitch_spring_distance_m"] = rng.uniform(0.2, 0.6)
+    elif rng.random() < 0.5:
+        words[f"{table}.strips.rake_deg"] = rng.uniform(-20.0, 20.0)
     if len(masses) > 1 and rng.random() < 0.5:
         inertia, distance = rng.uniform(0.5, 5.0), rng.uniform(0.5, 1.2)
         words[f"{table}.roll"] = f"{{inertia_kg_m2={inertia!r},spring_distance_m={distance!r}}}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from catenary.cases.scene.scene import Scene
@@ -50,6 +51,8 @@ def _description(placement: Placement, problem: Problem) -> str:
     flexure = placement.data.strips.flexure
     if acts.flexible_strips and flexure is not None:
         text += f"; strips bend in {counted(flexure.n_modes, 'mode')}"
+    if acts.raked_strips and placement.data.strips.rake:
+        text += f"; strips raked by {math.degrees(placement.data.strips.rake):.3g} degrees"
     if acts.pantograph_laws and placement.data.laws:
         n = len(placement.data.laws)
         text += f"; {counted(n, 'law')} not linear"

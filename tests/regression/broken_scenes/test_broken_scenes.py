@@ -118,6 +118,21 @@ ASSIGNMENTS = {
         ],
         "at least 1.6 m more than the 0 m",
     ),
+    "raked strips of no length": (
+        ["pantographs.reference.strips={rake_deg=10}"],
+        "needs length_m for strips with rake_deg",
+    ),
+    "strips along the track": (
+        ["pantographs.reference.strips={rake_deg=80,length_m=1.6}"],
+        "at most 45",
+    ),
+    "raked strips that pitch": (
+        [
+            "pantographs.reference.strips={number=2,spacing_m=0.5,length_m=1.6,rake_deg=10,"
+            "pitch_inertia_kg_m2=0.4,pitch_spring_distance_m=0.5}"
+        ],
+        "must not have rake_deg with pitch_inertia_kg_m2",
+    ),
     "roll without its effect": (
         ["pantographs.reference.roll={inertia_kg_m2=2, spring_distance_m=0.6}"],
         "acts only with effects.head_roll = true",

@@ -48,7 +48,7 @@ from catenary.solver.time_loop.observers import Stage, StepView
 LINE = replace(ac_simple_line(4), stagger=(0.2, -0.2, 0.2, -0.2, 0.2))
 TWO = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0))
 PAIR = Strips(2, 0.56, 1.6, Suspension(1.0, 8000.0, 10.0))
-BENDING = replace(PAIR, flexure=Flexure(600.0, 0.9, 3, 0.01))
+BENDING = replace(PAIR, flexure=Flexure(600.0, 0.9, 3, 0.01), rake=0.3)
 ROLLING = replace(TWO, strips=PAIR, roll=Turning(2.0, 600.0, 4.0))
 # A limiter, a pneumatic damper and a spring that stiffens, on head and frame.
 LAWS = (
@@ -80,7 +80,7 @@ SCENES: dict[str, tuple[tuple[Any, ...], Any, set[str]]] = {
     "strips that bend": (
         (replace(TWO, strips=BENDING), replace(paper.data(), strips=BENDING)),
         LINEAR,
-        {"contact_damping", "flexible_strips"},
+        {"contact_damping", "flexible_strips", "raked_strips"},
     ),
     "laws and controllers": (
         (replace(ROLLING, laws=LAWS), replace(paper.data(), laws=LAWS), TWO),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -69,7 +70,9 @@ def strips_of(table: StripsTable, spring: float = 0.0, damper: float = 0.0) -> S
             own.bending_stiffness_N_m2, own.spring_distance_m, own.modes, own.damping_ratio
         )
     spacing = table.spacing_m or 0.0
-    return Strips(table.number, spacing, table.length_m, suspension, pitch, flexure=flexure)
+    rake = math.radians(table.rake_deg)
+    length = table.length_m
+    return Strips(table.number, spacing, length, suspension, pitch, flexure=flexure, rake=rake)
 
 
 def _turning(inertia: float, distance: float, spring: float, damper: float) -> Turning:

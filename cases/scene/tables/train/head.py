@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
@@ -76,6 +77,12 @@ class StripsTable(Table):
         None, gt=0, le=3, description="along the track, between the springs below such a head"
     )
 
+    rake_deg: float = Field(
+        0.0,
+        ge=-45,
+        le=45,
+        description="angle between a strip and the cross-section, above 0 if its left end is ahead",
+    )
     flexure: FlexureTable | None = Field(
         None, description="how strips on springs of their own bend"
     )
@@ -103,6 +110,13 @@ class StripsTable(Table):
             for name in ("spacing_m", *_PITCH):
                 if getattr(self, name) is not None:
                     raise ValueError(f"must not have {name} with number = 1{TAKE_AWAY}")
+        if self.rake_deg and self.length_m is None:
+            raise ValueError("needs length_m for strips with rake_deg")
+        if self.rake_deg and self.pitch_inertia_kg_m2 is not None:
+            raise ValueError(
+                "must not have rake_deg with pitch_inertia_kg_m2, whose lever arms are those of "
+                f"strips that are square to the track{TAKE_AWAY}"
+            )
         for pair in (_SUSPENSION, _PITCH):
             given = [name for name in pair if getattr(self, name) is not None]
             if len(given) == 1:
@@ -121,8 +135,9 @@ class StripsTable(Table):
 
     @property
     def ahead(self) -> float:
-        """How far the outer strips are from the head's middle, along the track [m]."""
-        return 0.0 if self.spacing_m is None else 0.5 * self.spacing_m
+        """How far strips reach from the head's middle, along the track [m]."""
+        raked = math.tan(math.radians(abs(self.rake_deg))) * (self.length_m or 0.0)
+        return 0.5 * ((self.spacing_m or 0.0) + raked)
 
 
 class RollTable(Table):

@@ -228,6 +228,11 @@ class MultibodyTable(_Pressing):
                 "must not have strips.pitch_inertia_kg_m2, because the pitch of its head follows "
                 f"from bodies, joints and forces{TAKE_AWAY}"
             )
+        if self.strips.rake_deg:
+            raise ValueError(
+                "must not have strips.rake_deg, because its head is pressed where a strip "
+                f"that is square to the track is{TAKE_AWAY}"
+            )
         return self
 
     @model_validator(mode="after")
