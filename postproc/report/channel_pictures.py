@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.envelope import thinned
 from catenary.postproc.report.figures import COLOURS, colour, legend_above, stacked, tidy
-from catenary.postproc.report.plots import mark_line, travelled
+from catenary.postproc.report.plots import mark_line, still_marks, travelled
 from catenary.solver.time_loop.channels import (
     ARM,
     CHANNELS,
@@ -98,10 +98,8 @@ def _on_line(results: Results, channel: Channel) -> Figure:
     low, high = results.extremes(channel.name)
     figure, (axes,) = stacked(3.4, 1)
     mark_line(axes, results, float(np.min(x, initial=0.0)), float(np.max(x, initial=1.0)))
-    axes.vlines(
-        x, low, high, color=COLOURS[0], linewidth=1.6, capstyle="projecting",
-        label="range over the run",
-    )  # fmt: skip
+    axes.vlines(x, low, high, color=COLOURS[0], linewidth=1.6, label="range over the run")
+    still_marks(axes, x, low, high)
     tidy(axes, "position along the track [m]", _label(channel))
     legend_above(axes)
     return figure

@@ -282,16 +282,21 @@ def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
         droppers.highest,
         color=COLOURS[0],
         linewidth=1.6,
-        # A dropper whose force stays as it was is a dot.
-        capstyle="projecting",
         label="range over the run",
     )
+    still_marks(along, x, droppers.lowest, droppers.highest)
     slack = droppers.lowest <= 0.0
     along.plot(x[slack], droppers.lowest[slack], "v", color=LIMIT, ms=4, label="slackened")
     along.axhline(0.0, color=GREY, linewidth=0.8)
     tidy(along, "position along the track [m]", "dropper force [N]", "All droppers")
     legend_above(along)
     return figure
+
+
+def still_marks(axes: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
+    """Dashes where ranges are too small for a line that would be seen."""
+    still = high - low < 0.01 * (np.nanmax(high, initial=0.0) - np.nanmin(low, initial=0.0))
+    axes.plot(x[still], high[still], "_", color=COLOURS[0], ms=3.0)
 
 
 def static_line(results: Results) -> Figure:
@@ -313,7 +318,8 @@ def static_line(results: Results) -> Figure:
             1e3 * (height[shown] - level),
             color=colour(number),
             linewidth=1.5,
-            label="contact wire at rest" if len(profiles) == 1 else f"{name} at rest",
+            linestyle="--" if number else "-",
+            label=f"{name.replace('_', ' ')} at rest",
         )
     _mark_static(profile, results, float(start), float(end))
     tidy(
@@ -328,8 +334,13 @@ def static_line(results: Results) -> Figure:
         own = results.static("elasticity_of_wires")
         for number, name in enumerate(profiles):
             known = np.isfinite(own[:, number])
-            label = f"{name} alone"
-            compliance.plot(at[known], 1e3 * own[known, number], color=colour(number), label=label)
+            compliance.plot(
+                at[known],
+                1e3 * own[known, number],
+                color=colour(number),
+                linestyle="--" if number else "-",
+                label=f"{name.replace('_', ' ')} alone",
+            )
     look = (COLOURS[0], "elasticity") if len(profiles) == 1 else (GREY, "all contact wires")
     compliance.plot(at, 1e3 * lift, color=look[0], linewidth=1.5, label=look[1])
     if at.size:
