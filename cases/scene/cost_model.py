@@ -25,19 +25,24 @@ SCHEME_FACTOR = {"one_solve": 1.0, "fixed_point": 9.0, "ts_alpha2": 70.0}
 # A substep of a pantograph with all its bodies: 0.21 to 0.38 ms were measured with the paper's
 # seven, by the way of keeping joints.
 ALL_BODIES_SUBSTEP = 3.0e-4  # [s]
-# Processor time from the scene to the first step, measured with 9e5 nodes on a two-core machine.
-START_PER_NODE = 2.8e-5  # [s]
-# Resident memory of runs of ambrosio2012 on 25, 300, 1000 and 2000 spans, report included, within
-# 10 %: program and libraries, then per unknown.
-MEMORY_BASE = 3.85e8  # [B]
-MEMORY_PER_UNKNOWN = 2200.0  # [B]
+# Processor time from the scene to the first step, measured with 9e5 nodes of like spans and 9e4 of
+# 1000 spans of which no two are alike: matrices and factors are made once for each kind of span.
+START_PER_NODE = 1.0e-5  # [s]
+START_PER_OWN_NODE = 5.0e-5  # [s]
+# Resident memory of runs of ambrosio2012 on 25, 1000 and 2000 like spans and on 500 of which no two
+# are alike, report included, within 11 %: program and libraries, then per unknown.
+MEMORY_BASE = 3.6e8  # [B]
+MEMORY_PER_UNKNOWN = 800.0  # [B]
 # What a step adds, as the report takes the history of one pantograph after the other.
 MEMORY_PER_STEP = 40.0  # [B]
 
 
-def estimate_start(n_nodes: int) -> float:
-    """Processor time of mesh, line at rest and what steps it [s]."""
-    return START_PER_NODE * n_nodes
+def estimate_start(n_nodes: int, own: float = 0.0) -> float:
+    """Processor time of mesh, line at rest and what steps it [s].
+
+    ``own`` is the share of spans that are kinds of their own, which none before was like.
+    """
+    return (START_PER_NODE + START_PER_OWN_NODE * own) * n_nodes
 
 
 def estimate_march(

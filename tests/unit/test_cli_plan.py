@@ -12,9 +12,13 @@ from catenary.cases.run.needs import (
 )
 from catenary.cases.run.plan import make_plan, plan_text
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.checks.line.mesh_size import size_of
+from catenary.cases.scene.checks.line.mesh_size import Size, size_of
 from catenary.cases.scene.convert.problem import problem_of
-from catenary.cases.scene.cost_model import estimate_march, estimate_memory
+from catenary.cases.scene.cost_model import (
+    estimate_march,
+    estimate_memory,
+    estimate_start,
+)
 from catenary.cases.scene.load import load_scene
 from catenary.solver.window.choice import moving_share
 
@@ -47,6 +51,19 @@ def test_estimates_grow_with_size_steps_and_scheme() -> None:
     assert estimate_march(10_000, 2000, "one_solve") == pytest.approx(2 * small)
     assert estimate_march(10_000, 1000, "fixed_point") > small
     assert estimate_march(10_000, 1000, "one_solve", gusts=True) > small
+
+
+def test_kinds_of_spans_are_counted_and_lengthen_the_start() -> None:
+    def size(*changes: str) -> Size:
+        found = size_of(load_scene("ambrosio2012", ["line.n_spans=40", *changes]))
+        assert found is not None
+        return found
+
+    alike, two = size(), size(f"line.span_m={[50, 54] * 17 + [50]}")
+    cut = size("irregularities.dropper_lengths.standard_deviation_mm=5")
+    assert 1 <= alike.kinds <= 2 and two.kinds - alike.kinds in (0, 1) and cut.kinds == 40
+    starts = [estimate_start(own.nodes, own.kinds / own.spans) for own in (alike, cut)]
+    assert starts[1] > 3.0 * starts[0]
 
 
 def needs(*changes: str) -> Needs:

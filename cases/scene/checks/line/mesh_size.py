@@ -24,23 +24,26 @@ from catenary.solver.effects import all_effects as effects
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
 
-# 20 000 spans of ten gaps with ten elements each; their run takes 27 GB.
+# 20 000 spans of ten gaps with ten elements each; their run takes some 7 GB.
 MOST_NODES = 4_000_000
 # From here on a mesh takes longer than one waits without a word.
 MANY_NODES = 50_000
 
 
 class Size(NamedTuple):
-    """Number of spans, droppers, nodes of all wires, and unknowns of a line."""
+    """Number of spans, droppers, nodes of all wires, and unknowns of a line, and how many kinds of
+    spans there are."""
 
     spans: int
     droppers: int
     nodes: int
     unknowns: int
+    kinds: int
 
     def sentence(self) -> str:
         """What it is and what it takes, in one sentence."""
-        memory, start = estimate_memory(self.unknowns), estimate_start(self.nodes)
+        memory = estimate_memory(self.unknowns)
+        start = estimate_start(self.nodes, self.kinds / self.spans)
         return (
             f"{self.spans} spans and {self.droppers} droppers make {self.nodes} nodes and "
             f"{self.unknowns} unknowns: its start takes about {start:.0f} s and a "
@@ -95,7 +98,11 @@ def _size(scene: Scene, n_droppers: int, nodes: dict[str, int], wires: Sequence[
     chosen = (effect for name, effect in effects.registry().items() if switches[name])
     groups = effects.unknown_groups(chosen, wires)
     unknowns = sum(nodes[wire] * len(own) for group in groups for wire, own in group.items())
-    return Size(scene.line.n_spans, n_droppers, sum(nodes.values()), unknowns)
+    n_spans, irregular = scene.line.n_spans, scene.irregularities
+    kinds = len(set(span_lengths(scene.line)))
+    if irregular.contact_wire_height is not None or irregular.dropper_lengths is not None:
+        kinds = n_spans
+    return Size(n_spans, n_droppers, sum(nodes.values()), unknowns, kinds)
 
 
 def _sample(scene: Scene, lengths: tuple[float, ...]) -> tuple[Line, np.ndarray]:
