@@ -99,7 +99,7 @@ fuzz: setup ## random scenes: 4000 that run, 4000 refused, 50 sweeps, 25 killed,
 	FUZZ_SEED=$(SEED) FUZZ_PROCESSES=25 $(PYTEST) -q tests/regression/test_fuzz_processes.py
 	FUZZ_SEED=$(SEED) FUZZ_CASES=100 timeout 1800 mpirun -n 2 $(MPI_SHARED) $(MPI_PYTEST) -q tests/regression/test_fuzz.py
 
-long-runs: setup ## all bodies of a pantograph over 20 s and ten minutes, a run killed at random, 540 km
+long-runs: setup ## all bodies of a pantograph over 20 s and ten minutes, 1000 spans killed at random, 540 km
 	$(PYTEST) -q -s $(LONG_RUNS)
 
 test-paraview: setup ## open runs in the ParaView of this machine (Debian: paraview python3-paraview xvfb)

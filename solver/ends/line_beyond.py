@@ -88,13 +88,13 @@ def line_beyond(model: Model, side: int, held: np.ndarray) -> LineBeyond:
         other = begins[1] if side == END else begins[0]
         beside = _matrices(model, other, other + size, other, other + size)
         beside, _ = _without(beside, other, held, (size, size))
-        sideways = _sideways(model, start, size)
-        if _mirrored(own, beside, joins, sideways):
+        signs = sideways(model, start + np.arange(size))
+        if _mirrored(own, beside, joins, signs):
             # Counted from the end of the model, every second cross-section is the other way round.
             if side == START:
-                own, joined = own * sideways[:, None] * sideways, joined * sideways[:, None]
+                own, joined = own * signs[:, None] * signs, joined * signs[:, None]
             else:
-                joined = joined * sideways
+                joined = joined * signs
         span = span_matrices(own, joined, shared, _MOST_WIDE)
         unknowns, everything = at_end + shared, at_end + joins
         if everything[-1] >= last or not _same_places(model, everything, start + joins):
@@ -147,18 +147,16 @@ def _without(
     return whole[:, :, :size], whole[:, :, size:]
 
 
-def _sideways(model: Model, first: int, size: int) -> np.ndarray:
-    """-1 for lateral unknowns from ``first`` on, 1 for others, (size,)."""
+def sideways(model: Model, unknowns: np.ndarray) -> np.ndarray:
+    """-1 for lateral ones of some ``unknowns`` (m,), 1 for others. Not collective."""
     names = [name for name in _LATERAL if name in model.unknowns]
     every = np.arange(model.mesh.n_nodes)
     lateral = [model.dofs(every[model.numbering.has(every, name)], name) for name in names]
-    found = np.isin(first + np.arange(size), np.concatenate([np.zeros(0, int), *lateral]))
+    found = np.isin(unknowns, np.concatenate([np.zeros(0, int), *lateral]))
     return np.where(found, -1.0, 1.0)
 
 
-def _mirrored(
-    own: np.ndarray, beside: np.ndarray, at_mast: np.ndarray, sideways: np.ndarray
-) -> bool:
+def _mirrored(own: np.ndarray, beside: np.ndarray, at_mast: np.ndarray, signs: np.ndarray) -> bool:
     """Whether a span is the mirror image of the one beside it, the cross-section at the mast left
     out.
 
@@ -168,7 +166,7 @@ def _mirrored(
         If it is neither that nor of the same kind.
     """
     inner = np.setdiff1d(np.arange(own.shape[1]), at_mast)
-    image = own * sideways[:, None] * sideways
+    image = own * signs[:, None] * signs
     differences = []
     for ours in (own, image):
         pairs = zip(ours[:, inner][:, :, inner], beside[:, inner][:, :, inner], strict=True)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catenary.solver.ends.half_lines import Chain, chain_at, half_lines
-from catenary.solver.ends.line_beyond import END, shared_at, span_between
+from catenary.solver.ends.line_beyond import END, shared_at, sideways, span_between
 from catenary.solver.model.model import Model
 from catenary.solver.problem.ends import AbsorbingLayer, Periodic
 from catenary.solver.problem.problem import Damping
@@ -70,24 +70,47 @@ def end_reflection(
     # From the end inwards.
     masts = line.support_positions[:: -1 if side == END else 1]
     n_end = end.n_spans if isinstance(end, AbsorbingLayer) else 1
-    incoming = _chain(whole, masts[n_end + 1], masts[n_end], weights)
+    signs = _signs(whole, masts[n_end:], weights[:1])
+    incoming = _chain(whole, masts[n_end + 1], masts[n_end], weights, signs)
     after, before = half_lines(incoming)
     if isinstance(end, Periodic):
         answer = after
     else:
-        answer = _held(whole, model, side, masts[: n_end + 1], weights)
+        answer = _held(whole, model, side, masts[: n_end + 1], weights) * signs[:, None] * signs
     fading = _GROWTH + 0.5 * (damping.beta + damping.alpha * np.abs(s) ** 2)
     length = fading * abs(masts[n_end + 1] - masts[n_end])
     return _reflection(frequency, incoming, after, before, answer, length)
 
 
-def _chain(model: Model, inner: float, outer: float, weights: np.ndarray) -> Chain:
+def _signs(model: Model, masts: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """-1 for unknowns shared at a mast that are the other way round at the next one, 1 for others.
+
+    Lateral ones are so where spans are mirror images in turn, as those of a zig-zag: with the
+    cross-section at every second mast the other way round all spans are alike. ``masts`` are from
+    the end inwards.
+    """
+    unknowns, _ = span_between(model, *sorted(masts[:2]))
+    signs, none = sideways(model, unknowns), np.ones(unknowns.size)
+    if len(masts) < 3 or (signs > 0.0).all():
+        return none
+    ours, other = (_chain(model, masts[i + 1], masts[i], weights, none).next[0] for i in range(2))
+    image = other * signs[:, None] * signs
+    return signs if np.abs(ours - image).max() < np.abs(ours - other).max() else none
+
+
+def _chain(
+    model: Model, inner: float, outer: float, weights: np.ndarray, signs: np.ndarray | None = None
+) -> Chain:
     """A span towards an end, its first mast being the ``inner`` one; ``corner`` is that of its
-    first mast along the track."""
+    first mast along the track. Unknowns at the outer mast are multiplied by ``signs``."""
     chain = chain_at(span_between(model, min(inner, outer), max(inner, outer))[1], weights)
+    if signs is None:
+        signs = np.ones(chain.corner.shape[1])
+    both = signs[:, None] * signs
     if inner < outer:
-        return chain
-    return Chain(chain.corner, chain.end, chain.start, np.swapaxes(chain.next, 1, 2))
+        return Chain(chain.corner, chain.start, chain.end * both, chain.next * signs)
+    joined = np.swapaxes(chain.next * signs[:, None], 1, 2)
+    return Chain(chain.corner * both, chain.end, chain.start * both, joined)
 
 
 def _held(

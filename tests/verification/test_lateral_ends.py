@@ -16,12 +16,16 @@ from small_lines import HANGING, ac_simple_line, mesh_of, numerics, problem_of, 
 
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects.build_model import build
+from catenary.solver.ends.half_lines import chain_at, half_lines
+from catenary.solver.ends.line_beyond import END, START, span_between
 from catenary.solver.model.loads import ShapeLoad, table
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest.lateral_shape import LateralShape
 from catenary.solver.model.rest.rest_shape import Equilibrium
 from catenary.solver.problem.ends import EndCondition, Fixed, Periodic
+from catenary.solver.problem.problem import Damping
 from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.waves.end_reflection import end_reflection
 
 STEPS, DT, SPAN, SHORT, BESIDE = 500, 2e-3, 55.0, 4, 3
 EFFECTS = HANGING | {"lateral_motion", "structural_damping", "periodic_ends"}
@@ -103,6 +107,36 @@ def test_a_short_zig_zag_moves_as_the_middle_of_a_long_one(found: bool, within: 
     if not found:
         held = heights(struck(SHORT, HELD), STEPS, 0.0, SHORT * SPAN)
         assert np.abs(held - ours).max() > 0.1 * np.abs(ours).max()
+
+
+@pytest.mark.parametrize("side", [START, END])
+def test_waves_of_a_zig_zag_are_those_of_two_spans_of_it(side: int) -> None:
+    """Spans that are mirror images in turn have the group velocities of a line whose period is two
+    of them; an end that is held keeps the energy, and one that goes on sends nothing back."""
+    frequency = np.arange(3.0, 12.0, 1.5)
+    model = struck(5, HELD)
+    held = end_reflection(model, side, frequency)
+    goes_on = end_reflection(struck(5, GOES_ON), side, frequency)
+    growth = 1e-3
+    s = growth + 2j * np.pi * frequency
+    free = replace(
+        model, simulated=replace(model.simulated, damping=Damping(0.0, 0.0)),
+        constrained=model.numbering.missing,
+    )  # fmt: skip
+    chain = chain_at(
+        span_between(free, SPAN, 3.0 * SPAN)[1], np.stack([s**2, s, np.ones_like(s)], axis=1)
+    )
+    after, _ = half_lines(chain)
+    back = np.swapaxes(chain.next, 1, 2)
+    factors = np.linalg.eigvals(-np.linalg.solve(after - chain.end, back))
+    speed = -growth * 2.0 * SPAN / np.log(np.abs(factors))
+    for ours, of_two in zip(held.group_velocity, speed, strict=True):
+        expected = np.sort(of_two[of_two > 20.0])
+        check("group velocity", np.sort(ours[ours > 20.0]), expected, within=1e-3 * expected)
+    fast = held.group_velocity > 40.0
+    # Waves fade by exp(-1e-3 L / v) on the way, as those of a line that is level.
+    check("held", held.reflected[fast], 1.0, within=5e-3)
+    assert np.nanmax(goes_on.reflected) < 1e-8
 
 
 def test_masts_of_the_line_beyond_hold_the_messenger_wire_at_the_end() -> None:
