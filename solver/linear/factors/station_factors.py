@@ -154,10 +154,14 @@ def station_factors(
     besides: tuple[np.ndarray, np.ndarray] | None = NO_BESIDES
     if max(layout.widths) > NARROW and (unfit or numbers.nbytes > LARGE):
         layout = _sparse(layout, rows.blocks)
-        kinds, numbers, n_kinds, count = kinds_by_make_up(layout, make_up, pack)
+        kinds, numbers, n_kinds, _ = kinds_by_make_up(layout, make_up, pack)
         besides = _besides(layout, stations, rows)
-        halves = layout.packed_halves(factors[:, 0])
-        unfit = layout.varies and count != np.count_nonzero(halves) - lacked
+        # Halves hold some numbers twice, others of each make-up.
+        count = sum(
+            np.count_nonzero(part.packed(factors[make_up == number, 0], part.whole_terms))
+            for number, part in enumerate(layout.parts)
+        )
+        unfit = layout.varies and count != np.count_nonzero(factors[:, 0]) - lacked
     if unfit or besides is None:
         return None
     sharing = layout.changed(shares=True)
