@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +69,18 @@ def test_a_line_of_many_wires_has_a_line_of_speed_for_each() -> None:
     # What a line of many wires does not have is no row.
     names = {row["name"] for row in as_rows(theory)}
     assert "doppler_factor" in names and "amplification" not in names
+
+
+def test_without_a_train_nothing_is_drawn_that_moves_with_it() -> None:
+    theory = WaveTheory(SPEED, 100.0, (("contact_wire", 100.0),), 0.4, np.nan, np.nan, None, "")
+    with_train = travelling(0.5, 7.5)
+    blow = replace(with_train, position=np.zeros((with_train.time.size, 0)), struck=200.0)
+    drawn = [
+        {line.get_label() for line in pictures.wavenumbers(seen, theory).axes[0].get_lines()}
+        for seen in (with_train, blow)
+    ]
+    moving = "what moves with the train"
+    assert moving in drawn[0] and moving not in drawn[1]
 
 
 @pytest.mark.process

@@ -64,15 +64,16 @@ def picture(
         there = np.isfinite(end.reflected)
         fast = there & (end.group_velocity > speed)
         shown = np.maximum(end.reflected, _LEAST)
-        colour, marker = figures.COLOURS[number], "os"[number]
+        # The start is drawn larger, to be seen beneath an end that sends back as much.
+        colour, marker, size = figures.COLOURS[number], "os"[number], (26.0, 6.0)[number]
         name = f"{side}, {_name(kind)}"
         slow = there & ~fast
         axes.scatter(
-            frequency[slow], shown[slow], s=8.0, marker=marker, facecolors="none",
+            frequency[slow], shown[slow], s=size, marker=marker, facecolors="none",
             edgecolors=colour, linewidths=0.5, alpha=0.6,
         )  # fmt: skip
         axes.scatter(
-            frequency[fast], shown[fast], s=8.0, marker=marker, color=colour, linewidths=0,
+            frequency[fast], shown[fast], s=size, marker=marker, color=colour, linewidths=0,
             label=f"{name}: waves that outrun the train",
         )  # fmt: skip
     axes.scatter(

@@ -125,6 +125,7 @@ class Transmitted(NamedTuple):
     bands : (n, 2) pass bands of the periodic line [Hz]
     inside : share of the energy at the second station that lies in them, widened by what the record
         resolves [-]
+    distance : from the first station to the second one [m]
     """
 
     frequency: np.ndarray
@@ -132,6 +133,7 @@ class Transmitted(NamedTuple):
     second: np.ndarray
     bands: np.ndarray
     inside: float
+    distance: float
 
 
 def transmitted(theory: WaveTheory, seen: WavesSeen) -> Transmitted | None:
@@ -157,7 +159,10 @@ def transmitted(theory: WaveTheory, seen: WavesSeen) -> Transmitted | None:
     for low, high in bands:
         within |= (frequency > low - wide) & (frequency < high + wide)
     inside = float(second[within].sum() / second.sum())
-    return Transmitted(frequency, first / first.max(), second / second.max(), bands, inside)
+    distance = float(seen.x[columns[1]] - seen.x[columns[0]])
+    return Transmitted(
+        frequency, first / first.max(), second / second.max(), bands, inside, distance
+    )
 
 
 def _stations(seen: WavesSeen, length: float) -> tuple[int, int] | None:

@@ -96,10 +96,11 @@ def wavenumbers(seen: WavesSeen, theory: WaveTheory) -> Figure:
             )  # fmt: skip
         axes.plot([], [], ".", color=figures.COLOURS[0], label="waves of the periodic line")
     ends = np.array([0.0, _WIDEST])
-    axes.plot(
-        ends, theory.speed * ends / (2 * np.pi), color=figures.LIMIT, linewidth=1.0,
-        label="what moves with the train",
-    )  # fmt: skip
+    if seen.position.shape[1]:
+        axes.plot(
+            ends, theory.speed * ends / (2 * np.pi), color=figures.LIMIT, linewidth=1.0,
+            label="what moves with the train",
+        )  # fmt: skip
     for sign in (1.0, -1.0):
         axes.plot(
             sign * ends, theory.wave_speed * ends / (2 * np.pi), "--", color=figures.COLOURS[1],
@@ -107,7 +108,7 @@ def wavenumbers(seen: WavesSeen, theory: WaveTheory) -> Figure:
         )  # fmt: skip
     axes.set_xlim(-_WIDEST, _WIDEST)
     axes.set_ylim(0.0, HIGHEST)
-    figures.tidy(axes, "wavenumber [rad/m], positive with the train", "frequency [Hz]")
+    figures.tidy(axes, "wavenumber [rad/m], positive along the track", "frequency [Hz]")
     figures.legend_above(axes, 3)
     return figure
 
@@ -120,7 +121,7 @@ def transmission(found: Transmitted) -> Figure:
         axes.axvspan(low, high, color=figures.SHADE, zorder=0)
     for values, label, colour in (
         (found.first, "near the blow", figures.GREY),
-        (found.second, "many spans further", figures.COLOURS[0]),
+        (found.second, f"{found.distance:.0f} m further", figures.COLOURS[0]),
     ):
         axes.semilogy(
             found.frequency, np.maximum(values, 1e-12), color=colour, linewidth=1.0, label=label
@@ -141,10 +142,13 @@ def energy_parts(energy: EnergySeen, seen: WavesSeen) -> Figure:
     labels = (
         ("behind", "between", "ahead") if seen.position.shape[1] else ("before it", "", "beyond it")
     )
-    for part, label, number in zip((behind, between, ahead), labels, (0, 2, 1), strict=True):
+    # Both halves are alike on both sides of a blow: the one drawn last lets the other be seen.
+    looks = ((0, 2.4), (2, 1.2), (1, 1.0))
+    parts = behind, between, ahead
+    for part, label, (number, width) in zip(parts, labels, looks, strict=True):
         if label and part.any():
             over_time.plot(
-                energy.time, part, color=figures.COLOURS[number], linewidth=1.2, label=label
+                energy.time, part, color=figures.COLOURS[number], linewidth=width, label=label
             )
     over_time.plot(energy.time, energy.total, color="black", linewidth=0.9, label="all")
     over_time.set_ylim(bottom=0.0)
