@@ -102,6 +102,7 @@ def animate(
             numbers = chosen(snapshots.times, wish)
             pantographs = MovingPantographs(data, snapshots, shapes)
             from catenary.postproc.film import video
+            from catenary.postproc.film.line_view import SLACK
 
             pictures = tqdm(
                 _pictures(data, results, snapshots, numbers, wish, pantographs),
@@ -112,7 +113,7 @@ def animate(
                 file=sys.stderr,
             )
             files = folder / MP4, folder / GIF
-            count = video.write(pictures, SIZE, wish.rate, *files)
+            count = video.write(pictures, SIZE, wish.rate, *files, later=[SLACK])
             apart = float(np.diff(snapshots.times[numbers]).mean())
     return Film(files, count, 1.0 / (apart * wish.rate))
 

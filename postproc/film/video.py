@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -14,10 +14,17 @@ from catenary.solver.base.errors import InputError
 
 # A GIF has pictures of this width [px], and so many a second at most.
 _GIF_WIDTH, _GIF_RATE = 640, 12.5
+# Height of what adds a colour to the palette [px].
+_BAND = 8
 
 
 def write(
-    pictures: Iterable[np.ndarray], size: tuple[int, int], rate: float, mp4: Path, gif: Path
+    pictures: Iterable[np.ndarray],
+    size: tuple[int, int],
+    rate: float,
+    mp4: Path,
+    gif: Path,
+    later: Sequence[str] = (),
 ) -> int:
     """Write both films; returns how many pictures they were made of. Not collective.
 
@@ -27,6 +34,7 @@ def write(
     size : width and height [px], both even
     rate : pictures a second of the MP4
     mp4, gif : files, replaced when the new ones are whole
+    later : colours that the first picture may lack and others have
 
     Raises
     ------
@@ -35,7 +43,7 @@ def write(
     """
     parts = [path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}") for path in (mp4, gif)]
     try:
-        count, small = _write_mp4(pictures, size, rate, parts[0])
+        count, small = _write_mp4(pictures, size, rate, parts[0], later)
         small[0].save(
             parts[1], save_all=True, append_images=small[1:], loop=0, disposal=1,
             duration=round(1000.0 * _skipped(rate) / rate),
@@ -56,7 +64,11 @@ def _skipped(rate: float) -> int:
 
 
 def _write_mp4(
-    pictures: Iterable[np.ndarray], size: tuple[int, int], rate: float, path: Path
+    pictures: Iterable[np.ndarray],
+    size: tuple[int, int],
+    rate: float,
+    path: Path,
+    later: Sequence[str],
 ) -> tuple[int, list[Image.Image]]:
     """Number of pictures written, and those of the GIF."""
     writer = imageio_ffmpeg.write_frames(
@@ -74,9 +86,20 @@ def _write_mp4(
                 image = Image.fromarray(picture).resize((_GIF_WIDTH, height))
                 # One palette for all: pictures differ little, and flicker would show.
                 if palette is None:
-                    palette = image.quantize(128)
+                    palette = _with_colours(image, later).quantize(128)
                 small.append(image.quantize(palette=palette, dither=Image.Dither.NONE))
             count += 1
     finally:
         writer.close()
     return count, small
+
+
+def _with_colours(image: Image.Image, colours: Sequence[str]) -> Image.Image:
+    """A picture with bands of further colours below it."""
+    width, height = image.size
+    wider = Image.new("RGB", (width, height + _BAND * len(colours)))
+    wider.paste(image, (0, 0))
+    for number, colour in enumerate(colours):
+        low = height + _BAND * number
+        wider.paste(colour, (0, low, width, low + _BAND))
+    return wider

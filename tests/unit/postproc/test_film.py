@@ -10,11 +10,12 @@ import h5py
 import numpy as np
 import pytest
 import pyvista
+from PIL import Image
 
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.shape import BODY, HEAD, shape_of
 from catenary.postproc.files.checked import seal_attributes, set_attribute
-from catenary.postproc.film import animate, pantograph_shape, scale, train
+from catenary.postproc.film import animate, pantograph_shape, scale, train, video
 from catenary.postproc.film.animate import SIZE, Wish
 from catenary.postproc.film.film_data import FilmData, film_data
 from catenary.postproc.film.line_view import LineView
@@ -350,3 +351,16 @@ def test_droppers_that_are_missing_or_broke_are_not_drawn(folder: Path) -> None:
     x = data.points[data.droppers[:, 1], 0]
     np.testing.assert_allclose(x[~drawn[:, 0]], [60.0, 115.0])
     np.testing.assert_array_equal(drawn[:, 0], drawn[:, 1])
+
+
+def test_a_gif_has_colours_that_come_later(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    first = rng.integers(0, 100, (90, 160, 3), dtype=np.uint8)
+    second = first.copy()
+    second[20:60, 40:100] = (0xE0, 0x82, 0x14)
+    files = tmp_path / "film.mp4", tmp_path / "film.gif"
+    assert video.write([first, second], (160, 90), 10.0, *files, later=["#e08214"]) == 2
+    with Image.open(files[1]) as film:
+        film.seek(1)
+        shown = np.asarray(film.convert("RGB"))[200, 280].astype(int)
+    assert np.abs(shown - (0xE0, 0x82, 0x14)).max() < 12
