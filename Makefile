@@ -34,7 +34,7 @@ endif
 # The targets share .venv and two cores: one after the other, also under make -j.
 .NOTPARALLEL:
 .PHONY: help setup setup-newest compile update-versions run check test test-studies test-unit \
-    test-verification test-regression test-mpi bench long-runs fuzz test-paraview lint types format clean
+    test-verification test-regression test-mpi test-ranks bench long-runs fuzz test-paraview lint types format clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -83,8 +83,11 @@ test-regression: setup ## every case, shortened, against published ranges
 	$(PYTEST_SHARED) tests/regression
 
 test-mpi: setup ## the same answers on 2 and 3 ranks
-	timeout 1200 mpirun -n 2 $(MPI_SHARED) $(MPI_PYTEST) tests/mpi
-	timeout 1200 mpirun -n 3 $(MPI_SHARED) $(MPI_PYTEST) tests/mpi
+	timeout 1200 mpirun -n 2 $(MPI_SHARED) $(MPI_PYTEST) -m "not study" tests/mpi
+	timeout 1200 mpirun -n 3 $(MPI_SHARED) $(MPI_PYTEST) -m "not study" tests/mpi
+
+test-ranks: setup ## lines of all topologies and in all planes on 1, 2, 3, 5 and 8 ranks
+	timeout 3600 mpirun -n 8 $(MPI_SHARED) $(MPI_PYTEST) tests/mpi/test_rank_counts.py
 
 bench: setup ## what steps cost: against their floor, by phase, spans and ranks
 	@mkdir -p results

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from catenary.meshgen.curve import Curve
 from catenary.solver.model.elements import beam
 from catenary.solver.model.model import Model, wire_elements
 
@@ -54,10 +55,13 @@ def shape_of(course: np.ndarray, slope: np.ndarray, pairs: np.ndarray) -> np.nda
 def curve_rows(model: Model, wire: str) -> np.ndarray:
     """Strain of elements by lateral deflection in a curve, -c times its mean, (n, 4) [1/m], [-]:
     towards the centre a wire is shorter."""
-    pairs, curve = model.mesh.elements(wire), model.problem.line.curve
+    return rows_in_curve(model.problem.line.curve, model.mesh.x(model.mesh.elements(wire)))
+
+
+def rows_in_curve(curve: Curve | None, x: np.ndarray) -> np.ndarray:
+    """That of elements with ends at ``x`` (n, 2) [m], zero on straight track."""
     if curve is None:
-        return np.zeros((len(pairs), 4))
-    x = model.mesh.x(pairs)
+        return np.zeros((len(x), 4))
     length = np.diff(x, axis=1)
     curvature = curve.curvature_at(x.mean(axis=1))
     return np.asarray(-curvature[:, None] * beam.uniform_load(length[:, 0]) / length)

@@ -2,31 +2,56 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from axial_lines import ALONG, elastic_line
 from measuring import check
 from small_lines import mesh_of, problem_of
 
+from catenary.meshgen.curve import Curve
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.meshgen.topologies.line_data import LineData
 from catenary.postproc.record.snapshots.blocks import RecordedLine, blocks_of
 from catenary.postproc.record.snapshots.field_kinds import ALONG as U
-from catenary.postproc.record.snapshots.field_kinds import KINDS, SLOPE, UP
+from catenary.postproc.record.snapshots.field_kinds import ASIDE, KINDS, SLOPE, TURN, UP
 from catenary.postproc.record.snapshots.field_layout import FieldRecord, layout_of
 from catenary.postproc.record.snapshots.field_values import FieldValues, Gathered
 from catenary.solver.model.axial_elements import strain_rows, unknowns_along
 from catenary.solver.statics.equilibrium import find_form
 
 
-def test_a_snapshot_shows_what_the_stretch_adds() -> None:
+def staggered() -> LineData:
+    """A line with arms in a curve of 500 m."""
     line = elastic_line(2)
-    problem, mesh = problem_of(line, ALONG), mesh_of(line, 2)
+    return replace(
+        line,
+        steady_arm=replace(line.steady_arm, length=1.2),
+        stagger=(0.2, -0.2, 0.2),
+        curve=Curve(1 / 500, 0.05),
+    )
+
+
+@pytest.mark.parametrize(
+    ("line", "names", "effects"),
+    [
+        (elastic_line(2), (UP, SLOPE, U), ALONG),
+        (staggered(), (UP, SLOPE, ASIDE, TURN, U), ALONG | {"lateral_motion"}),
+    ],
+    ids=["upright", "three planes"],
+)
+def test_a_snapshot_shows_what_the_stretch_adds(
+    line: LineData, names: tuple[str, ...], effects: frozenset[str]
+) -> None:
+    problem, mesh = problem_of(line, effects), mesh_of(line, 2)
     model, form = find_form(problem, mesh)
     rng = np.random.default_rng(4)
-    motion = {(name, False): 1e-3 * rng.normal(size=(1, mesh.n_nodes)) for name in (UP, SLOPE, U)}
+    motion = {(name, False): 1e-3 * rng.normal(size=(1, mesh.n_nodes)) for name in names}
     state = np.zeros(model.n_dofs)
     for (name, _), values in motion.items():
         state[model.dofs(np.arange(mesh.n_nodes), name)] = values[0]
-    recorded = RecordedLine.of(problem.line, mesh, form.slope)
+    recorded = RecordedLine.of(problem.line, mesh, form.slope, form.lateral)
     points = mesh.points.copy()
     points[:, 2] = form.height
     values = FieldValues(recorded, points)
@@ -51,3 +76,4 @@ def test_a_line_without_that_motion_sends_none_for_its_tension() -> None:
     kind = KINDS["tension"]
     assert kind.motions_of(("w", "theta_y")) == []
     assert len(kind.motions_of(("w", "theta_y", "u"))) == 3
+    assert len(kind.motions_of(("w", "theta_y", "v", "theta_z", "u"))) == 5

@@ -7,7 +7,9 @@ that follow from round-off and from the methods stand in `hard_checks`.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import Literal
 
@@ -76,8 +78,8 @@ class HardCase(Table):
     force_below_N: float = Field(1e3, gt=0, description="no contact force is greater")
     uplift_below_m: float = Field(0.3, gt=0, description="no contact lifts the wire by more")
     refined: bool = Field(True, description="whether halved steps converge within the run")
-    fixed_point: Literal["agrees", "breaks"] = Field(
-        "agrees", description="what the paper's correction does"
+    fixed_point: Literal["agrees", "breaks", "left out"] = Field(
+        "agrees", description="what the paper's correction does, if it is run"
     )
     energy_gain: float = Field(
         1e-9, gt=0, description="most that the line's energy may gain beyond the work done on it, "
@@ -116,12 +118,43 @@ class HardCase(Table):
         return scene
 
 
+class HardLine(Table):
+    """A line under which each of the conditions is a case, ``LINE_CONDITION``."""
+
+    name: str = Field(min_length=1, description="its name")
+    what: str = Field(min_length=1, description="what it is")
+    set: list[str] = Field(description="assignments that make it")
+    without: list[str] = Field(
+        default_factory=list, description="conditions that mean nothing on it"
+    )
+
+
 class Collection(Table):
     """The whole table."""
 
     base: str = Field(description="the shipped case that all are variants of")
     common: list[str] = Field(description="assignments of all")
     cases: list[HardCase] = Field(min_length=1, description="the cases")
+    lines: list[HardLine] = Field(default_factory=list, description="lines of other kinds")
+    conditions: list[HardCase] = Field(
+        default_factory=list, description="what each of these lines is put under"
+    )
+
+    def all_cases(self) -> list[HardCase]:
+        """The cases, and each line under each condition unless a case has that name."""
+        listed = {case.name for case in self.cases}
+        return [*self.cases, *(case for case in self._crossed() if case.name not in listed)]
+
+    def _crossed(self) -> Iterator[HardCase]:
+        for line, condition in product(self.lines, self.conditions):
+            if condition.name not in line.without:
+                yield condition.model_copy(
+                    update={
+                        "name": f"{line.name}_{condition.name}",
+                        "what": f"{line.what}: {condition.what}",
+                        "set": [*line.set, *condition.set],
+                    }
+                )
 
 
 @cache
@@ -139,7 +172,7 @@ def collection() -> Collection:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
         raise InputError(f"{TABLE}: {place}: {first['msg']}") from error
-    names = [case.name for case in found.cases]
+    names = [case.name for case in found.all_cases()]
     if len(set(names)) != len(names):
         raise InputError(f"{TABLE} has two cases of one name")
     return found
@@ -153,7 +186,7 @@ def hard_cases(names: list[str] | None = None) -> list[HardCase]:
     InputError
         If there is none of such a name.
     """
-    cases = {case.name: case for case in collection().cases}
+    cases = {case.name: case for case in collection().all_cases()}
     for name in names or []:
         if name not in cases:
             raise InputError(f"there is no hard case {name}; there are {', '.join(cases)}")

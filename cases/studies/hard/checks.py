@@ -72,7 +72,8 @@ def _check_alone(case: HardCase, comm: Any, short: bool) -> list[Criterion]:
     if case.refined and not short:
         quartered = hard_runs.run(_rest(case, comm, short, 2), comm)
         found.append(_refined(case, base, halved, quartered))
-    found.append(_correction(case, base, comm, short))
+    if case.fixed_point != "left out":
+        found.append(_correction(case, base, comm, short))
     return [*found, *_needs(case, rest, base)]
 
 

@@ -1,7 +1,6 @@
 """Runs of hard cases, watched: histories, and the energy that the line gains beyond its input.
 
-Newmark's method has an energy balance of its own (S. Krenk, Comput. Methods Appl. Mech. Engrg. 195
-(2006) 6110-6124), in which numerical damping only takes: see `LineBalance`. Contact forces are
+The balance is `LineBalance`, in which numerical damping only takes. Contact forces and gusts are
 loads in it, whose work is summed with the method's weights. So contact that is lost or regained
 makes no energy, however the force jumps, and what rises was made by droppers that switch, at most
 `Watched.one_switch` each.
@@ -9,26 +8,23 @@ makes no energy, however the force jumps, and what rises was made by droppers th
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import spsolve
 
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.hard.balance import LineBalance
 from catenary.solver.base.parallel import on_root
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.matrices import stiffness_matrix, whole_matrix
-from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
-from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.incidents import in_steps
-from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.observers import Stage, StepView
@@ -51,8 +47,8 @@ class Watched:
     time : (n,) [s]; position, force, height, wire : (n, n_pantographs) [m], [N], [m], [m]
     on_wires : (n, n_pantographs n_wires) force on each contact wire [N]; no columns if there is one
     taut : (n, n_droppers) whether a dropper carries anything; only on one rank
-    energy : (n,) of the line [J]; work : (n,) of the contact forces on it since the start [J];
-        both empty without ``with_work``
+    energy : (n,) of the line [J]; work : (n,) of the contact forces and gusts on it since the start
+        [J]; both empty without ``with_work``
     damping_terms : (n,) what numerical damping adds to the energy in the balance [J], see
         `LineBalance`; empty like these
     one_switch : the most that one dropper may have made in one switch [J], see `LineBalance`
@@ -101,89 +97,6 @@ class Watched:
     def switches(self) -> np.ndarray:
         """Droppers that slackened or tightened in each step, shape (n - 1,)."""
         return np.asarray((self.taut[1:] != self.taut[:-1]).sum(axis=1))
-
-
-class LineBalance:
-    """Newmark's energy balance of the line, and what one switch of a dropper adds to it.
-
-    With step h, d = beta - gamma / 2 and the line's M, C and K, each step changes
-
-        v.Mv / 2 + u.Ku / 2 + h^2 d a.Ma / 2 + h (gamma - 1/2) (v.Cv + h^2 d a.Ca) / 2
-
-    by the work (u_n+1 - u_n) . ((1 - gamma) f_n + gamma f_n+1) of the loads f, less
-
-        (gamma - 1/2) (Du.K Du + h^2 d Da.M Da) + h w.C w + h^3 d ((gamma - 1/2)^2 - d / 4) Da.C Da
-
-    where D is the change in the step and w = (v_n + v_n+1) / 2 + h d Da / 2. None of it is negative
-    if gamma >= 1/2 and 0 <= d <= 4 (gamma - 1/2)^2. The terms beyond the energy are
-    `damping_terms`; average acceleration has none. A slack dropper has no part in C.
-
-    **A dropper that slackens** from its tension k a to a gap b, a + b being its change of length
-    in the step, stored k a^2 / 2 and does the work (1 - gamma) k a (a + b). With a + b = h e' that
-    makes at most (1 - gamma)^2 k (h e')^2 / 2; one that tightens makes nothing. The same holds for
-    an uplift stop that opens or closes.
-
-    Integrators other than Newmark's are balanced like average acceleration. After incidents the
-    terms are those of the line as it was.
-    """
-
-    def __init__(self, model: Model, problem: Problem) -> None:
-        numerics = problem.numerics
-        newmark = numerics.integrator == "newmark"
-        dt, gamma = numerics.dt, numerics.gamma if newmark else 0.5
-        excess = numerics.beta - 0.5 * gamma if newmark else 0.0
-        self.weights = (1.0 - gamma, gamma)
-        # Recorded forces of a kinematic contact are means by these weights already.
-        self.recorded_means = isinstance(problem.contact, KinematicLaw)
-        self._terms: list[tuple[str, csr_matrix]] = []
-        if gamma != 0.5 or excess != 0.0:
-            damping = whole_matrix(model, damping=0.5 * dt * (gamma - 0.5))
-            of_acceleration = whole_matrix(model, mass=0.5) + damping
-            self._terms = [
-                ("velocity", damping),
-                ("acceleration", dt**2 * excess * of_acceleration),
-            ]
-        self._ends = model.dofs(model.mesh.droppers)
-        released = (1.0 - model.simulated.kept_ratio) * model.released_damping
-        of_velocity = 0.5 * dt * (gamma - 0.5) * released
-        self._slack = [
-            ("velocity", of_velocity),
-            ("acceleration", dt**2 * excess * of_velocity),
-        ]
-        self._share = 0.5 * model.dropper_stiffness * ((1.0 - gamma) * dt) ** 2
-        self._arms = model.dofs(model.mesh.steady_arms)
-        stops = [arms.kind.stop_stiffness for arms in problem.line.steady_arms]
-        self._stop_share = 0.5 * max(stops, default=0.0) * ((1.0 - gamma) * dt) ** 2
-
-    def damping_terms(self, states: Mapping[str, np.ndarray], taut: np.ndarray) -> np.ndarray:
-        """What numerical damping adds to the energy of states (k, n_dofs) each [J], shape (k,).
-
-        ``taut`` (k, n_droppers) are the droppers that carry anything.
-        """
-        found = np.zeros(taut.shape[0])
-        for of, matrix in self._terms:
-            found += np.einsum("ij,ij->i", states[of], (matrix @ states[of].T).T)
-        for of, factors in self._slack:
-            found -= np.where(taut, 0.0, self._between(states[of]) ** 2) @ factors
-        return found
-
-    def one_switch(self, velocity: np.ndarray, switched: np.ndarray) -> float:
-        """The most that one dropper makes [J] at velocities (k, n_dofs) after the steps in which
-        those ``switched`` (k, n_droppers) slackened or tightened."""
-        made = self._share * self._between(velocity) ** 2
-        return float(made[switched].max(initial=0.0))
-
-    def one_stop(self, velocity: np.ndarray, switched: np.ndarray) -> float:
-        """The same of uplift stops, ``switched`` (k, n_arms), or (k, 0) without them."""
-        if not switched.shape[1]:
-            return 0.0
-        made = self._stop_share * velocity[:, self._arms] ** 2
-        return float(made[switched].max(initial=0.0))
-
-    def _between(self, values: np.ndarray) -> np.ndarray:
-        """Upper less lower end of each dropper, (k, n) of (k, n_dofs)."""
-        upper, lower = self._ends.T
-        return np.asarray(values[:, upper] - values[:, lower])
 
 
 class Watcher:
@@ -286,6 +199,7 @@ class Watcher:
         done = np.zeros(k)
         for weight, part in zip(balance.weights, (slice(None, -1), slice(1, None)), strict=True):
             done[1:] += weight * (pushed[part] * np.take_along_axis(moved, dofs[part], 1)).sum(1)
+        done[1:] += balance.work_of_loads(np.concatenate(self._times)[-k:], moved)
         done[0] = self._work[-1] if seen else 0.0
         taut = self._channel("dropper_force", k) > 0.0
         switched = taut[1:] != taut[:-1]

@@ -57,8 +57,8 @@ def draw(found: StabilityMap) -> Figure:
     word = "a coupling is stable below its line;\nabove both lines only the implicit one is"
     left.text(0.03, 0.03, word, transform=left.transAxes, va="bottom", fontsize="small")
     figure.suptitle(
-        f"{found.case}: stability of the couplings; the wire meets a force with "
-        f"{found.wire_mass:.2g} kg",
+        f"{found.case}: stability of the couplings while contact lasts and droppers are taut (the "
+        f"linear system);\nthe wire meets a force with {found.wire_mass:.2g} kg",
         x=0.01,
         ha="left",
         fontsize="medium",

@@ -11,8 +11,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from catenary.meshgen.curve import Curve
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import DROPPERS, LineMesh
+from catenary.solver.model.rest.lateral_shape import LateralShape
 
 CLAMPS, ARMS, MASTS = "clamps", "steady_arms", "masts"
 # Parts of a line that are no wires.
@@ -37,6 +39,8 @@ class RecordedLine:
     slope : (n_nodes,) dw/dx of the wires at rest, empty if not known
     bending_stiffness : of the wires by name [N m2]
     axial_stiffness : EA of the wires whose stretch is known [N]
+    lateral : of the wires at rest sideways, None without lateral motion
+    curve : of the track, None if it is straight
     """
 
     wires: Mapping[str, np.ndarray]
@@ -48,9 +52,13 @@ class RecordedLine:
     slope: np.ndarray = field(default_factory=lambda: np.zeros(0))
     bending_stiffness: Mapping[str, float] = field(default_factory=dict)
     axial_stiffness: Mapping[str, float] = field(default_factory=dict)
+    lateral: LateralShape | None = None
+    curve: Curve | None = None
 
     @classmethod
-    def of(cls, line: Line, mesh: LineMesh, slope: np.ndarray) -> RecordedLine:
+    def of(
+        cls, line: Line, mesh: LineMesh, slope: np.ndarray, lateral: LateralShape | None = None
+    ) -> RecordedLine:
         """That of a line with its mesh."""
         return cls(
             mesh.wires,
@@ -62,6 +70,8 @@ class RecordedLine:
             slope,
             {wire.name: wire.bending_stiffness for wire in line.wires},
             {own.name: own.axial_stiffness for own in line.wires if own.axial_stiffness},
+            lateral,
+            line.curve,
         )
 
 

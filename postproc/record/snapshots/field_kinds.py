@@ -16,9 +16,9 @@ from catenary.postproc.record.snapshots.blocks import Block
 
 _Count = TypeVar("_Count", int, np.ndarray)
 
-# Unknowns of a node that fields are made of: upward and lateral displacement, slope dw/dx, and
-# displacement along the track.
-UP, ASIDE, SLOPE, ALONG = "w", "v", "theta_y", "u"
+# Unknowns of a node that fields are made of: upward and lateral displacement, slopes dw/dx and
+# dv/dx, and displacement along the track.
+UP, ASIDE, SLOPE, TURN, ALONG = "w", "v", "theta_y", "theta_z", "u"
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ KINDS: dict[str, FieldKind] = {
             "N",
             "tension of the wire ahead of the point, with what its stretch adds where wires move "
             "along the track",
-            motions=((UP, False), (SLOPE, False), (ALONG, False)),
+            motions=tuple((name, False) for name in (UP, SLOPE, ASIDE, TURN, ALONG)),
             only_with=ALONG,
             of_wires=True,
         ),

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from catenary.postproc.record.snapshots.blocks import Block, RecordedLine
-from catenary.postproc.record.snapshots.field_kinds import ALONG, ASIDE, SLOPE, UP, FieldKind
+from catenary.postproc.record.snapshots.field_kinds import (
+    ALONG,
+    ASIDE,
+    SLOPE,
+    TURN,
+    UP,
+    FieldKind,
+)
 from catenary.postproc.record.snapshots.field_layout import Slots
-from catenary.solver.model.axial_elements import slope_rows
+from catenary.solver.model.axial_elements import rows_in_curve, slope_rows
 from catenary.solver.time_loop.row_kernels import take_points
 
 
@@ -46,6 +53,7 @@ class FieldValues:
         self._slope = line.slope if line.slope.size else np.zeros(len(points))
         self._stiffness = line.bending_stiffness
         self._axial = line.axial_stiffness
+        self._lateral, self._curve = line.lateral, line.curve
 
     def of(self, kind: FieldKind, slots: Slots, first: int, known: Gathered) -> np.ndarray:
         """Values of a field in a block at snapshots from number ``first`` on, one after another.
@@ -87,20 +95,33 @@ class FieldValues:
         tension = np.stack(known.tension)[:, nodes]
         if (ALONG, False) not in known.motions or axial is None:
             return tension
-        up, slope, along = (known.motions[name, False][:, nodes] for name in (UP, SLOPE, ALONG))
+        along = known.motions[ALONG, False][:, nodes]
         length = np.diff(block.points[:, 0])
         joined = np.ones(length.size, dtype=bool)
         joined[block.breaks - 1] = False
-        shape = _ends(self._height[None, nodes], self._slope[None, nodes])
-        rows = slope_rows(np.where(joined, length, 1.0), shape[0])
         strain = np.diff(along, axis=1) / np.where(joined, length, np.inf)
-        strain += np.where(joined, (rows * _ends(up, slope)).sum(axis=2), 0.0)
+        whole = np.where(joined, length, 1.0)
+        for names, at_rest, more in self._planes(block.points[:, 0], nodes, whole):
+            rows = slope_rows(whole, _ends(*(part[None, nodes] for part in at_rest))[0]) + more
+            moved = _ends(*(known.motions[name, False][:, nodes] for name in names))
+            strain += np.where(joined, (rows * moved).sum(axis=2), 0.0)
         gained = axial * strain
         tension[:, :-1] += gained
         # The last point of a piece has no element ahead of it.
         last = np.append(block.breaks, nodes.size) - 1
         tension[:, last] += gained[:, last - 1]
         return tension
+
+    def _planes(
+        self, x: np.ndarray, nodes: np.ndarray, length: np.ndarray
+    ) -> Iterator[tuple[tuple[str, str], tuple[np.ndarray, np.ndarray], np.ndarray]]:
+        """Unknowns, place and slope at rest of each plane of a wire with nodes at ``x`` (n,), and
+        what a curve adds to the strain of its elements (n - 1, 4)."""
+        yield (UP, SLOPE), (self._height, self._slope), np.zeros((nodes.size - 1, 4))
+        if self._lateral is not None:
+            ends = np.stack([x[:-1], x[:-1] + length], axis=1)
+            at_rest = self._lateral.y, self._lateral.slope
+            yield (ASIDE, TURN), at_rest, rows_in_curve(self._curve, ends)
 
     def _bending_moment(self, block: Block, known: Gathered) -> np.ndarray:
         nodes = block.nodes

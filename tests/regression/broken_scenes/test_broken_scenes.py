@@ -56,6 +56,14 @@ ASSIGNMENTS = {
     "damping without its effect": (["contact.damping_N_s_per_m=10"], "effects.contact_damping"),
     "effect without its damping": (["effects.contact_damping=true"], "needs a value"),
     "effect without its ratio": (["effects.residual_dropper_stiffness=true"], "needs a value"),
+    "stiffness of a stop that is none": (
+        ["line.steady_arm.uplift_stop_stiffness_N_per_m=1e5"],
+        "has an uplift_stop_stiffness_N_per_m, but no uplift_stop_m; give both, or neither",
+    ),
+    "uplift stop below the wire": (
+        ["line.steady_arm.uplift_stop_m=-0.1"],
+        "line.steady_arm.uplift_stop_m is -0.1 on the command line (--set); it must be greater",
+    ),
     "ratio without its effect": (["line.dropper.residual_stiffness_ratio=0.01"], "acts only with"),
     "ratio of one": (["line.dropper.residual_stiffness_ratio=1"], "must be less than 1"),
     "dropper outside its span": (["line.dropper.positions_m=[10, 61]"], "between 0 and 60 m"),
