@@ -20,7 +20,10 @@ from catenary.solver.model.unknowns.stations import SAME_STATION
 DECAY = 1e-16
 # The probes look at two places of the line; spans differ, so take this much more.
 _MARGIN = 1.25
+# How far to either side probes look at first [m]: twice as far whenever that is not enough.
 _WINDOW = 400.0
+# Share of a window within which columns must decay, so that its ends have no part in that.
+_SEEN = 0.9
 # How far around the longest element loads are tried, about a span to either side [m].
 _NEAR = 75.0
 
@@ -30,16 +33,21 @@ def reach(model: Model, coefficients: tuple[float, float, float]) -> float:
 
     ``coefficients`` are those of M, K and C in A. Solves with A on windows of the line, for loads
     in the middle and at the gaps' ends around the longest element: every element takes its share
-    of the decay, so that this needs more way where elements are long. Returns the length of the
-    line if a column does not decay within its window.
+    of the decay, so that this needs more way where elements are long. Windows grow until columns
+    decay within them: bending waves within a span or two, waves along wires in 18 steps of their
+    way. Returns the length of the line if a column does not decay on it.
     """
     positions = np.sort(model.mesh.points[:, 0])
     total = float(positions[-1] - positions[0])
     furthest = 0.0
     for place, loads in (_in_the_middle(positions), _around_the_longest(positions)):
-        found, seen = _reach_of(loads, place, model, coefficients, positions)
-        if found > 0.9 * seen:
-            return total
+        window = _WINDOW
+        found, seen = _reach_of(loads, place, model, coefficients, positions, window)
+        while found > _SEEN * seen:
+            if window >= total:
+                return total
+            window *= 2.0
+            found, seen = _reach_of(loads, place, model, coefficients, positions, window)
         furthest = max(furthest, found)
     return min(total, _MARGIN * furthest)
 
@@ -67,12 +75,14 @@ def _reach_of(
     model: Model,
     coefficients: tuple[float, float, float],
     positions: np.ndarray,
+    window: float,
 ) -> tuple[float, float]:
     """Largest reach of loads at stations [m], and the least way that was looked at [m].
 
-    The window lies around ``place``. At an end of the line only one side is there to be seen.
+    The window lies around ``place``, ``window`` [m] to either side. At an end of the line only one
+    side is there to be seen.
     """
-    first, last = model.numbering.within(place - _WINDOW, place + _WINDOW)
+    first, last = model.numbering.within(place - window, place + window)
     parts = list(iterate_entries(model, first, last, *coefficients))
     rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
     inside = (columns >= first) & (columns < last)
@@ -86,7 +96,7 @@ def _reach_of(
     furthest, seen = 0.0, np.inf
     for station in loads:
         ahead, behind = float(positions[-1] - station), float(station - positions[0])
-        seen = min(seen, _WINDOW - abs(station - place), max(ahead, behind))
+        seen = min(seen, window - abs(station - place), max(ahead, behind))
         for load in np.flatnonzero((np.abs(x - station) <= SAME_STATION) & ~empty):
             unit = np.zeros(last - first)
             unit[load] = 1.0

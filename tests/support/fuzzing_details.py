@@ -67,6 +67,10 @@ def _carriage(rng: random.Random, words: Words) -> None:
         words[f"{table}.static_force_by_speed"] = [[5.0, 60.0], [400.0, rng.uniform(60.0, 250.0)]]
     if f"{table}.strips.flexure.modes" in words:
         words[f"{table}.strips.flexure.damping_ratio"] = rng.uniform(0.0, 0.1)
+    strips = f"{table}.strips"
+    if f"{strips}.length_m" in words and f"{strips}.pitch_inertia_kg_m2" not in words:
+        words[f"{strips}.rake_deg"] = rng.uniform(-20.0, 20.0)
+        words["effects.raked_strips"] = rng.choice(["true", "false"])
     if f"{table}.regulation.measures" in words:
         words[f"{table}.regulation.from_s"] = rng.uniform(0.0, 0.5)
     if rng.random() < 0.5:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from axial_lines import elastic_wires
 from measuring import COMM, line_alone, matrix_of
 from scipy.sparse import identity
 from scipy.sparse import linalg as sparse_linalg
@@ -84,6 +85,21 @@ def test_a_line_too_short_for_the_decay_is_taken_whole() -> None:
     line = bare_wires(20.0)
     model = build(problem_of(line, BARE), mesh_of(line, 20), np.zeros(0))
     assert reach(model, (1.0, 0.25 * 4e-3**2, 2e-3)) == 20.0
+
+
+def test_waves_along_wires_reach_far_but_not_over_the_whole_line() -> None:
+    """At 8 ms a wave along a wire of c = 3700 m/s goes 29 m; A^-1 decays by e in half of that, and
+    by 1e-16 in 37 times that, more than the first window shows."""
+    wires = elastic_wires(2400.0)
+    model = build(problem_of(wires, BARE | {"axial_motion"}), mesh_of(wires, 400), np.zeros(0))
+    coefficients = (1.0, 0.25 * 8e-3**2, 4e-3)
+    found = reach(model, coefficients)
+    assert 400.0 < found < 900.0
+    x = positions(model)
+    rows = np.flatnonzero((x > 1100.0) & (x < 1120.0))
+    columns = np.abs(inverse_columns(model, coefficients, rows))
+    outside = np.abs(x[:, None] - x[rows]) > found
+    assert (np.where(outside, columns, 0.0).max(axis=0) <= DECAY * columns.max(axis=0)).all()
 
 
 def test_droppers_far_apart_do_not_lengthen_the_reach() -> None:
