@@ -70,20 +70,25 @@ def run(
 
     comm, scene, arguments = begin(read, verbose, lambda scene: scene)
     from catenary.cases.run.describe.arrivals import arrival_warnings
+    from catenary.cases.run.one_rank import on_as_many
     from catenary.cases.run.runner import run_case
 
     def warn() -> None:
         for text in arrival_warnings(scene):
             console.warn(text)
 
-    result = run_case(
+    result = on_as_many(
         scene,
-        out,
         comm,
-        force=force,
-        petsc_options=arguments,
-        tell=_teller(out),
-        ready=warn,
+        lambda ranks: run_case(
+            scene,
+            out,
+            ranks,
+            force=force,
+            petsc_options=arguments,
+            tell=_teller(out),
+            ready=warn,
+        ),
     )
     return _end(result, out, strict)
 
@@ -134,16 +139,21 @@ def restart(
         return extended_scene(config, str(results.path), until_m, evaluate), options
 
     comm, scene, arguments = begin(read, verbose, lambda scene: scene)
+    from catenary.cases.run.one_rank import on_as_many
     from catenary.cases.run.runner import restart_case
 
-    result = restart_case(
+    result = on_as_many(
         scene,
-        folder,
         comm,
-        petsc_options=arguments,
-        tell=_teller(folder),
-        force=force,
-        extends=until_m is not None,
+        lambda ranks: restart_case(
+            scene,
+            folder,
+            ranks,
+            petsc_options=arguments,
+            tell=_teller(folder),
+            force=force,
+            extends=until_m is not None,
+        ),
     )
     return _end(result, folder, strict)
 

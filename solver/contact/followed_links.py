@@ -13,6 +13,7 @@ from catenary.solver.contact.line_response import Coupled
 from catenary.solver.contact.link_kernels import Followed
 from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_integrator import LineIntegrator
+from catenary.solver.linear.column_pieces import columns_of
 from catenary.solver.linear.unit_responses import ShortColumns
 from catenary.solver.model.switching_links import LinkArrays, LinkTable
 
@@ -93,14 +94,6 @@ class FollowedLinks:
         return [(self.links.unknowns[acting].ravel(), forces.ravel())]
 
 
-def link_columns(table: LinkTable, line: LineIntegrator) -> ShortColumns:
-    """Columns of A^-1 for unit compensations of all links. Collective."""
-    unknowns, weights, law = table.arrays
-    return line.responses.columns(
-        unknowns[:, None], weights[:, None], law["place"], table.half_length
-    )
-
-
 def no_links() -> Coupled:
     """A line without links that switch."""
     return Coupled(np.zeros((0, 1)), np.zeros(0), np.zeros(0, dtype=bool), np.zeros(0))
@@ -114,41 +107,55 @@ class LinkCoupling:
 
     Attributes
     ----------
+    columns : of A^-1 for unit compensations of all links
     coupled : Coupled, whose band are the G_de; without any link on other ranks
     """
 
-    def __init__(
-        self,
-        comm: Any,
-        followed: FollowedLinks,
-        columns: ShortColumns,
-        line: LineIntegrator,
-    ) -> None:
+    def __init__(self, comm: Any, followed: FollowedLinks, line: LineIntegrator) -> None:
         self.coupled = no_links()
-        table = followed.table
-        unknowns, weights, law = followed.local
-        x = law["place"]
-        distance = columns.reach + 2.0 * table.half_length.max(initial=0.0)
-        n = x.size
-        far = np.searchsorted(x, x + distance, side="right") - 1 - np.arange(n)
-        half = int(far.max(initial=0))
-        band = np.zeros((n, 2 * half + 1))
-        per_acceleration = np.zeros(n)
+        self._followed, table = followed, followed.table
+        unknowns, weights, law = table.arrays
+        self._per_acceleration = np.zeros(law.size)
         own = law[followed.numbers]
-        per_acceleration[followed.numbers] = own["stiffness"] * line.position_factor
-        per_acceleration[followed.numbers] += own["damping"] * line.velocity_factor
+        self._per_acceleration[followed.numbers] = own["stiffness"] * line.position_factor
+        self._per_acceleration[followed.numbers] += own["damping"] * line.velocity_factor
+        self._band: np.ndarray | None = None
+        places = unknowns[:, None], weights[:, None], law["place"], table.half_length
+        operators = line.operators.in_pieces
+        self.columns = columns_of(line.responses, operators, places, self._couple)
+        band = self._band_of(self.columns)
+        if comm.size > 1:
+            band = comm.reduce(band, root=0)
+        if band is not None:
+            released, slackens = table.arrays.law["released"].copy(), table.slackens
+            self.coupled = Coupled(band, released, slackens, np.zeros(law.size))
+
+    def _band_of(self, columns: ShortColumns) -> np.ndarray:
+        """The array of the G_de, zero until their columns are there."""
+        if self._band is None:
+            x = self._followed.table.arrays.law["place"]
+            far = np.searchsorted(x, x + self._distance(columns), side="right") - 1
+            half = int((far - np.arange(x.size)).max(initial=0))
+            self._band = np.zeros((x.size, 2 * half + 1))
+        return self._band
+
+    def _distance(self, columns: ShortColumns) -> float:
+        """How far from a link others are coupled with it [m]."""
+        return float(columns.reach + 2.0 * self._followed.table.half_length.max(initial=0.0))
+
+    def _couple(self, columns: ShortColumns, which: np.ndarray) -> None:
+        """Work out the G_de of the links e ``which`` have their columns now."""
+        unknowns, weights, law = self._followed.local
+        x, band = law["place"], self._band_of(columns)
+        distance, half = self._distance(columns), band.shape[1] // 2
+        per_acceleration = self._per_acceleration
         for apart in range(-half, half + 1):
             # Links e whose compensation acts on the link that is so many further.
-            e = slice(max(0, -apart), n - max(0, apart))
-            d = slice(e.start + apart, e.stop + apart)
+            e = which[(which + apart >= 0) & (which + apart < x.size)]
+            d = e + apart
             seen = unknowns[d] - columns.start[e, None]
             inside = (seen >= 0) & (seen < columns.width[e, None])
             at = np.where(inside, columns.at[e, None] + seen, 0)
             answer = np.where(inside, columns.data[at] if columns.data.size else 0.0, 0.0)
             near = per_acceleration[d] * (np.abs(x[d] - x[e]) <= distance)
             band[e, apart + half] = near * (weights[d] * answer).sum(axis=1)
-        if comm.size > 1:
-            band = comm.reduce(band, root=0)
-        if band is not None:
-            released, slackens = table.arrays.law["released"].copy(), table.slackens
-            self.coupled = Coupled(band, released, slackens, np.zeros(n))

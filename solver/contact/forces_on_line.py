@@ -13,11 +13,12 @@ from catenary.solver.contact import contact_kernels
 from catenary.solver.contact.contact_kernels import Answers, Gains
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
 from catenary.solver.contact.crossing_kernels import no_sideways
-from catenary.solver.contact.followed_links import FollowedLinks, LinkCoupling, link_columns
+from catenary.solver.contact.followed_links import FollowedLinks, LinkCoupling
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact.wires_across import WiresAcross
 from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.linear.unit_responses import NO_COLUMNS, STRETCH
+from catenary.solver.linear.column_pieces import columns_of
+from catenary.solver.linear.unit_responses import NO_COLUMNS, STRETCH, ShortColumns
 from catenary.solver.model.model import Model
 from catenary.solver.model.switching_links import LinkTable
 from catenary.solver.statics.equilibrium import Equilibrium
@@ -69,8 +70,8 @@ class ForcesOnLine:
         columns = NO_COLUMNS
         self.link_coupling: LinkCoupling | None = None
         if table.switches:
-            columns = link_columns(table, line)
-            self.link_coupling = LinkCoupling(comm, self.links, columns, line)
+            self.link_coupling = LinkCoupling(comm, self.links, line)
+            columns = self.link_coupling.columns
         n, n_local = candidates.place.size, line.ownership.n_local
         self._contact_place = candidates.place
         self._touches = self.wires.on_wires(candidates.wire, candidates.half_length)
@@ -187,9 +188,14 @@ class ForcesOnLine:
         begin, end = range_of_run[0], range_of_run[1] + STRETCH
         ranges = (self.wires.nodes_between(begin, end, k) for k in range(self.wires.n_wires))
         chosen = np.concatenate([np.arange(first, last) for first, last in ranges])
-        dofs = self.wires.dofs[chosen][:, :, None]
-        found = self.line.responses.columns(dofs, free[dofs], self.wires.x[chosen])
-        nodes = self.wires.nodes
-        nodes["begin"][chosen], nodes["at"][chosen] = found.start, found.at
-        nodes["width"][chosen] = found.width
+        dofs, nodes = self.wires.dofs[chosen][:, :, None], self.wires.nodes
+
+        def put(found: ShortColumns, which: np.ndarray) -> None:
+            """Let nodes know of the columns of some."""
+            mine = chosen[which]
+            nodes["begin"][mine], nodes["at"][mine] = found.start[which], found.at[which]
+            nodes["width"][mine] = found.width[which]
+
+        line, places = self.line, (dofs, free[dofs], self.wires.x[chosen])
+        found = columns_of(line.responses, line.operators.in_pieces, places, put)
         return found.data, found.reach

@@ -28,7 +28,8 @@ def build(
     ``broken`` (n_droppers,) bool, droppers that carry nothing beside those that the problem has;
     ``gap`` (n_droppers,) what droppers that are slack at rest lack to be taut [m]; none if not
     given. ``form`` is the shape at rest, where it is known: before it is found wires are straight
-    and droppers upright. ``before`` is a model of the same problem and mesh that has numbers.
+    and droppers upright. ``before`` is a model of the same problem and mesh, made with the same
+    ``form``, whose numbers and wires are taken over.
     """
     active = effects.active(problem)
     if before is None:
@@ -53,7 +54,7 @@ def build(
         model.broken |= broken
     model.dropper_gap = np.zeros(mesh.droppers.shape[0]) if gap is None else gap
     model.terms_of = {effect.name: 0 for effect in active}
-    builder = ModelBuilder(model)
+    builder = ModelBuilder(model, before)
     for effect in active:
         if effect.build is not None:
             effect.build(builder)

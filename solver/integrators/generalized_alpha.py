@@ -26,6 +26,7 @@ from catenary.solver.integrators import alpha_kernels
 from catenary.solver.integrators.alpha_kernels import AlphaFactors
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps
+from catenary.solver.linear.operator_pieces import WantedPieces
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.problem.integrator_parameters import Integration
@@ -42,11 +43,18 @@ class GeneralizedAlphaLine(LineIntegrator):
     """
 
     def __init__(
-        self, comm: Any, model: Model, ownership: Ownership, dt: float, integration: Integration
+        self,
+        comm: Any,
+        model: Model,
+        ownership: Ownership,
+        dt: float,
+        integration: Integration,
+        wanted: WantedPieces | None = None,
     ) -> None:
         beta, gamma, mass_weight, force_weight = integration
         ratio = (1.0 - force_weight) / (1.0 - mass_weight)
-        super().__init__(comm, model, ownership, ratio * beta * dt**2, ratio * gamma * dt)
+        factors = ratio * beta * dt**2, ratio * gamma * dt
+        super().__init__(comm, model, ownership, *factors, wanted)
         self._known = aligned_arrays.zeros(ownership.n_local, 4)
         self._by = AlphaFactors(
             dt=dt,

@@ -23,6 +23,7 @@ from catenary.solver.integrators.line_loads import LineLoads
 from catenary.solver.integrators.line_state import AlphaSteps, LineState, PredictedLineState, Steps
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.linear.decay_length import reach
+from catenary.solver.linear.operator_pieces import WantedPieces
 from catenary.solver.linear.step_operators import LineOperators, Loads
 from catenary.solver.linear.unit_responses import UnitResponses, Windows
 from catenary.solver.model.model import Model
@@ -48,6 +49,10 @@ class LineIntegrator(ABC):
     solution : the displacement as a PETSc vector, once ``fill_solution`` has filled it
     detour : why ``keep_ahead`` could not, None if it could; the same on all ranks
     window : MovingWindow, None if all stations move
+
+    Parameters
+    ----------
+    wanted : which part of the line steps need at a time, None if all of it
     """
 
     def __init__(
@@ -57,6 +62,7 @@ class LineIntegrator(ABC):
         ownership: Ownership,
         position_factor: float,
         velocity_factor: float,
+        wanted: WantedPieces | None = None,
     ) -> None:
         self._comm = comm
         self.ownership = ownership
@@ -64,7 +70,12 @@ class LineIntegrator(ABC):
         self.velocity_factor = velocity_factor
         coefficients = (1.0, self.position_factor, self.velocity_factor)
         self.windows = Windows(model.numbering, reach(model, coefficients))
-        self.operators = LineOperators(comm, model, ownership, coefficients, self.windows)
+        in_pieces = None
+        if wanted is not None:
+            in_pieces = wanted.pieces_of(model, coefficients, self.windows.reach)
+        self.operators = LineOperators(
+            comm, model, ownership, coefficients, self.windows, in_pieces
+        )
         like = self.operators.like
         self.responses = UnitResponses(comm, model, ownership, coefficients, self.windows, like)
         self._proportional = model.damping_is_proportional
@@ -208,6 +219,11 @@ class LineIntegrator(ABC):
         assert self._passes is not None
         self.window = window
         self._passes.open(window.arrays, *self._links)
+
+    def provide(self, way: float) -> None:
+        """Have what steps need until contacts are a ``way`` [m] further. Not collective."""
+        if self.window is not None:
+            self.window.provide(way)
 
     def free_step(self) -> None:
         """Take the step without contacts and slack droppers: in two passes, or by ``predict``,

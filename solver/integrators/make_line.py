@@ -15,6 +15,7 @@ from catenary.solver.integrators.detour import (
 from catenary.solver.integrators.generalized_alpha import GeneralizedAlphaLine
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.newmark import NewmarkLine
+from catenary.solver.linear.operator_pieces import WantedPieces
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.problem.integrator_parameters import NEWMARK, integration_of
@@ -27,18 +28,20 @@ def make_line(
     ownership: Ownership,
     numerics: Numerics,
     only_free: bool = True,
+    wanted: WantedPieces | None = None,
 ) -> LineIntegrator:
     """The line with the method that the numerics ask for. Collective.
 
     Parameters
     ----------
     only_free : whether its steps will all be free ones, not taken in parts
+    wanted : which part of the line they need at a time, None if all of it
     """
     if numerics.integrator == NEWMARK:
-        line: LineIntegrator = NewmarkLine(comm, model, ownership, numerics)
+        line: LineIntegrator = NewmarkLine(comm, model, ownership, numerics, wanted)
     else:
         chosen = integration_of(numerics.integrator, numerics.spectral_radius)
-        line = GeneralizedAlphaLine(comm, model, ownership, numerics.dt, chosen)
+        line = GeneralizedAlphaLine(comm, model, ownership, numerics.dt, chosen, wanted)
     if only_free:
         line.keep_ahead()
     reason = method_detour(numerics)

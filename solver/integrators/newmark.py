@@ -7,6 +7,7 @@ from typing import Any
 from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.line_state import PredictedLineState, Steps
+from catenary.solver.linear.operator_pieces import WantedPieces
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.problem.problem import Numerics
@@ -15,9 +16,16 @@ from catenary.solver.problem.problem import Numerics
 class NewmarkLine(LineIntegrator):
     """The line by Newmark's method: sigma = beta dt^2, tau = gamma dt. Collective to make."""
 
-    def __init__(self, comm: Any, model: Model, ownership: Ownership, numerics: Numerics) -> None:
+    def __init__(
+        self,
+        comm: Any,
+        model: Model,
+        ownership: Ownership,
+        numerics: Numerics,
+        wanted: WantedPieces | None = None,
+    ) -> None:
         dt, beta, gamma = numerics.dt, numerics.beta, numerics.gamma
-        super().__init__(comm, model, ownership, beta * dt**2, gamma * dt)
+        super().__init__(comm, model, ownership, beta * dt**2, gamma * dt, wanted)
         self._dt = dt
         self._predict_position = 0.5 * dt**2 * (1.0 - 2.0 * beta)
         self._predict_velocity = dt * (1.0 - gamma)

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from catenary.solver.linear.unique_rows import digests
-from catenary.solver.model.model import Model
+from catenary.solver.model.model import Block, Model
 
 # Odd numbers without a pattern: of Knuth's linear congruential generator and of SplitMix64.
 _RATIO = 6364136223846793005
@@ -26,32 +26,37 @@ class LikeStations:
 
     Attributes
     ----------
+    first : the first of them
     marks : (n,) uint64 of each
+
+    Parameters
+    ----------
+    first, last : range of stations that have marks, all of the line if not given
     """
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, first: int = 0, last: int | None = None) -> None:
         numbering = model.numbering
-        starts = numbering.starts
-        n = starts.size - 1
+        last = numbering.starts.size - 1 if last is None else last
+        starts = numbering.starts[first : last + 1]
+        self.first, n = first, last - first
+        low, high = int(starts[0]), int(starts[-1])
         station = np.repeat(np.arange(n), np.diff(starts))
-        held = np.zeros(model.n_dofs, dtype=np.int64)
-        held[model.constrained] = 1
+        held = np.zeros(high - low, dtype=np.int64)
+        constrained = model.constrained_between(low, high) - low
+        held[constrained] = 1
         # What tells unknowns of a station from each other: their place in it, and whether one is
         # held.
-        name = (2 * (np.arange(model.n_dofs) - starts[station]) + held).astype(np.uint64)
-        self.marks = _mixed(numbering.make_up.astype(np.uint64))
-        self.marks += _sums(station[model.constrained], _mixed(name[model.constrained]), n)
+        name = (2 * (np.arange(low, high) - starts[station]) + held).astype(np.uint64)
+        self.marks = _mixed(numbering.make_up[first:last].astype(np.uint64))
+        self.marks += _sums(station[constrained], _mixed(name[constrained]), n)
         for number, block in enumerate(model.blocks):
-            if not block.dofs.size:
+            dofs, kind, table = _elements_between(block, low, high)
+            if not dofs.size:
                 continue  # of no element, as droppers that a line does not have
-            # Which terms there are follows from the number of the block.
-            terms = (block.mass, block.stiffness, block.damping)
-            parts = [term.reshape(len(term), -1) for term in terms if term is not None]
-            rows = np.concatenate(parts, axis=1)
-            of_kind = _mixed(digests(rows) + np.uint64(number + 1))
-            at, own = station[block.dofs], name[block.dofs]
+            of_kind = _mixed(digests(table) + np.uint64(number + 1))
+            at, own = station[dofs - low], name[dofs - low]
             apart = (at - at.min(axis=1, keepdims=True)).astype(np.uint64)
-            element = of_kind[block.kind]
+            element = of_kind[kind]
             for column in range(at.shape[1]):
                 element = _mixed(element + own[:, column] + (apart[:, column] << np.uint64(16)))
             for column in range(at.shape[1]):
@@ -61,6 +66,7 @@ class LikeStations:
         """A number (k,) uint64 for each stretch from station ``first`` (k,) to before ``last``
         (k,), the same for stretches of the same marks."""
         sums, inverse = self._sums
+        first, last = first - self.first, last - self.first
         return (sums[last] - sums[first]) * inverse[first]
 
     @cached_property
@@ -72,6 +78,22 @@ class LikeStations:
         sums = np.zeros(n + 1, dtype=np.uint64)
         np.cumsum(self.marks * np.cumprod(ratio)[:n], out=sums[1:])
         return sums, np.cumprod(inverse)
+
+
+def _elements_between(block: Block, low: int, high: int) -> tuple[np.ndarray, ...]:
+    """Unknowns (k, m) of the elements that have all of theirs from ``low`` to before ``high``, the
+    kind (k,) of each, and a row with all numbers of each kind: which terms these are follows from
+    the block."""
+    terms = [term for term in (block.mass, block.stiffness, block.damping) if term is not None]
+    near = block.near(low, high)
+    dofs, kind = block.dofs[near], block.kind[near]
+    inside = (dofs >= low).all(axis=1) & (dofs < high).all(axis=1)
+    if not inside.all():
+        dofs, kind = dofs[inside], kind[inside]
+    if len(dofs) < len(block.dofs):
+        used, kind = np.unique(kind, return_inverse=True)
+        terms = [term[used] for term in terms]
+    return dofs, kind, np.concatenate([term.reshape(len(term), -1) for term in terms], axis=1)
 
 
 def _mixed(numbers: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.linear.halo import Subdomain
 from catenary.solver.linear.like_stations import LikeStations
+from catenary.solver.linear.operator_pieces import OperatorPieces
 from catenary.solver.linear.sections import Sections
 from catenary.solver.linear.station_layout import Layout
 from catenary.solver.linear.station_products import (
@@ -38,9 +39,10 @@ class LineProducts:
     ----------
     model : Model
     domain : Subdomain, whose rows are multiplied
-    like : marks of the line's stations
+    like : marks of the line's stations, None if ``in_pieces`` has some
     padded : what products by stations read, with one station more at both ends
     read : a vector around the same without these
+    in_pieces : what makes products of a part of the line only, None if they are of all of it
 
     Attributes
     ----------
@@ -53,11 +55,12 @@ class LineProducts:
         domain: Subdomain,
         padded: np.ndarray,
         read: PETSc.Vec,
-        like: LikeStations,
+        like: LikeStations | None,
+        in_pieces: OperatorPieces | None = None,
     ) -> None:
         self._model, self._domain, self._padded, self._read = model, domain, padded, read
-        self._like = like
-        self.layout: Layout | None = None
+        self._like, self._in_pieces = like, in_pieces
+        self.layout: Layout | None = None if in_pieces is None else in_pieces.layout
         self._stiffness: StationRows | None = None  # kept until its product is made
         self._matrices: dict[str, PETSc.Mat] = {}
         self._products: dict[str, StationProduct | None] = {}
@@ -101,6 +104,9 @@ class LineProducts:
         """The product with M, K or C by stations; None if there is none. A ``damped`` one subtracts
         a product with C."""
         key = f"damped {name}" if damped else name
+        if key not in self._products and self._in_pieces is not None:
+            damping = _COEFFICIENTS["damping"] if damped else None
+            self._products[key] = self._in_pieces.product(_COEFFICIENTS[name], damping)
         if key not in self._products:
             rows = None
             if self.layout is not None and self._domain.size:
@@ -159,6 +165,7 @@ class LineProducts:
 
     @cached_property
     def _like_rows(self) -> LikeRows:
+        assert self._like is not None
         return LikeRows(self._model, self._like, self._domain.low, self._domain.high)
 
     def _sections(self, low: int, high: int) -> Sections:

@@ -76,6 +76,7 @@ class PartSolver:
     layout, stations : of its stations, None if our own factors cannot be used
     rows : the same as ``part`` by stations, if it is known
     turns : whether the place where our own elimination ends may be moved
+    factors : our own, if they are there already
 
     Attributes
     ----------
@@ -92,11 +93,12 @@ class PartSolver:
         stations: Sections | None = None,
         rows: StationRows | None = None,
         turns: bool = False,
+        factors: StationFactors | None = None,
     ) -> None:
         self._part, self._in_stations = part, in_stations
         self._prefix = PREFIX if is_whole else PART_PREFIX
-        self.factors: StationFactors | None = None
-        if layout is not None and not _is_given(f"{self._prefix}pc_"):
+        self.factors = factors
+        if factors is None and layout is not None and not _is_given(f"{self._prefix}pc_"):
             matrix = part() if rows is None else rows
             self.factors = station_factors(matrix, layout, own.start, own.stop, stations, turns)
         self._made: list[Callable[[], object]] = []  # what frees PETSc's objects
@@ -269,6 +271,11 @@ def wants_distributed_solver() -> bool:
         name.startswith((f"{PREFIX}ksp_", f"{PREFIX}pc_")) and not name.startswith(_LOOKS)
         for name in PETSc.Options().getAll()
     )
+
+
+def wants_own_solver() -> bool:
+    """Whether PETSc's options ask nothing of the solver of a whole line."""
+    return not _is_given(*(f"{PREFIX}{kind}_" for kind in ("ksp", "pc", "mat")))
 
 
 def wants_view() -> bool:

@@ -190,33 +190,41 @@ def station_product(
     factor has a whole cross-section more at both ends than the matrix has ``columns``, which are
     alike if not given. None if the matrix joins what the layout does not.
     """
-    numbers: list[tuple[np.ndarray, str]] = []
-    rows: StationRows | None = None
-    for part, sign in ((matrix, 1.0), (damping, -1.0)):
-        if part is None:
-            continue
-        found = rows_of(part, first, columns)
-        if found is None:
-            return None
-        rows = rows or found
-        for place, terms in ((1, "own_terms"), (0, "beside_terms"), (2, "beside_terms")):
-            numbers.append((sign * found.blocks[place], terms))
-    assert rows is not None
+    rows = rows_of(matrix, first, columns)
+    damped = None if damping is None else rows_of(damping, first, columns)
+    if rows is None or (damping is not None and damped is None):
+        return None
     n_rows = rows.kinds.size
     if columns is None:
         columns = Sections.alike(first + n_rows + 1, layout.pitch)
     stations = columns.padded()
+    packed = packed_rows(layout, rows, damped, stations.make_up[first + 1 : first + 1 + n_rows])
+    if packed is None:
+        return None
+    return StationProduct(layout, stations.places(), *packed[:2], first + 1, packed[2])
+
+
+def packed_rows(
+    layout: Layout, rows: StationRows, damping: StationRows | None, make_up: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, int] | None:
+    """Kinds and numbers of stations as ``StationProduct`` keeps them, and how many kinds there are.
+
+    ``make_up`` (n,) of the stations; None if the matrices join what the layout does not.
+    """
+    numbers: list[tuple[np.ndarray, str]] = []
+    for part, sign in ((rows, 1.0), (damping, -1.0)):
+        if part is not None:
+            for place, terms in ((1, "own_terms"), (0, "beside_terms"), (2, "beside_terms")):
+                numbers.append((sign * part.blocks[place], terms))
 
     def pack(part: Layout, which: slice | np.ndarray) -> np.ndarray:
         packed = [part.packed(blocks[which], getattr(part, terms)) for blocks, terms in numbers]
         return np.concatenate(packed, axis=1)
 
-    make_up = stations.make_up[first + 1 : first + 1 + n_rows][rows.chosen]
-    kinds, packed, n_kinds, count = kinds_by_make_up(layout, make_up, pack)
+    kinds, packed, n_kinds, count = kinds_by_make_up(layout, make_up[rows.chosen], pack)
     if count != sum(np.count_nonzero(blocks) for blocks, _ in numbers):
         return None
-    of_row = kinds[rows.kinds]
-    return StationProduct(layout, stations.places(), of_row, packed, first + 1, n_kinds)
+    return kinds[rows.kinds], packed, n_kinds
 
 
 @inner

@@ -31,6 +31,13 @@ class StationRows(NamedTuple):
     chosen: np.ndarray
     blocks: np.ndarray
 
+    def part(self, stations: slice) -> StationRows:
+        """The rows of a range of the stations."""
+        used, first, kinds = np.unique(self.kinds[stations], return_index=True, return_inverse=True)
+        order = np.argsort(first)
+        kinds = np.argsort(order).astype(np.int32)[kinds]
+        return StationRows(kinds, first[order], self.blocks[:, used[order]])
+
 
 def rows_of(
     matrix: sparse.bsr_matrix | StationRows, first: int = 0, columns: Sections | None = None
@@ -59,7 +66,7 @@ class LikeRows:
         self._model = model
         self._stations = Sections.of(model.numbering, 0, model.numbering.size)
         self._first, last = model.numbering.stations_over(low, high)
-        marks = like.marks[self._first : last].copy()
+        marks = like.marks[self._first - like.first : last - like.first].copy()
         # What is beyond the ends may be cut off: the rows there are no others'.
         marks[:1] += np.uint64(1)
         marks[-1:] += np.uint64(2)
@@ -104,8 +111,7 @@ class LikeRows:
         number[stations - stations[0]] = np.arange(stations.size)
         wanted = np.repeat(number >= 0, np.diff(numbering.starts[stations[0] : stations[-1] + 2]))
         parts = list(iterate_entries(model, int(begin), int(end), *coefficients, wanted))
-        held = model.constrained
-        held = held[np.searchsorted(held, begin) : np.searchsorted(held, end)]
+        held = model.constrained_between(int(begin), int(end))
         held = held[wanted[held - begin]]
         parts.append((held, held, np.full(held.size, held_diagonal)))
         rows, others, values = (np.concatenate(part) for part in zip(*parts, strict=True))

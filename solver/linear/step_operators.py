@@ -21,6 +21,7 @@ from catenary.solver.linear.factors.station_factors import StationFactors
 from catenary.solver.linear.halo import Halo, Subdomain
 from catenary.solver.linear.like_stations import LikeStations
 from catenary.solver.linear.line_products import LineProducts
+from catenary.solver.linear.operator_pieces import OperatorPieces
 from catenary.solver.linear.petsc_solvers import (
     DIRECT,
     PREFIX,
@@ -69,13 +70,16 @@ class LineOperators:
     ownership : Ownership
     coefficients : of M, K and C in A
     windows : Windows, whose reach is that of A^-1
+    in_pieces : what makes products and factors of a part of the line, on one rank; if None all of
+        it has some
 
     Attributes
     ----------
     factor : (n_local,) what products multiply: this rank's part, to be filled in
     answer : (n_local,) this rank's part of the last solution
     domain : Subdomain
-    like : marks of the line's stations
+    like : marks of the line's stations, None if it is in pieces
+    in_pieces : as given
     """
 
     # None on a rank that owns nothing.
@@ -92,14 +96,21 @@ class LineOperators:
         ownership: Ownership,
         coefficients: tuple[float, float, float],
         windows: Windows,
+        in_pieces: OperatorPieces | None = None,
     ) -> None:
         self._comm = comm
         self._model = model
         self._ownership = ownership
         self._coefficients = coefficients
-        self.like = LikeStations(model)
+        self.in_pieces = in_pieces
+        self.like = LikeStations(model) if in_pieces is None else None
         self._block, self._pad = model.numbering.block, model.numbering.width
         self._product_event, self._solve_event = event("LineProduct"), event("LineSolve")
+        if in_pieces is not None:
+            # What is solved for is verified piece by piece.
+            self._solve_apart(windows)
+            self._products.prepare()
+            return
         if comm.size > 1 and wants_distributed_solver():
             self._solve_together(windows)
             residual = self.residual()
@@ -318,8 +329,8 @@ class LineOperators:
             owned = self.domain.owned
             products, stations = self._products, Sections.of(self._model.numbering, low, high)
             own = slice(*np.searchsorted(stations.starts, [owned.start, owned.stop]).tolist())
-            operator = None
-            if self._in_stations:
+            operator, pieces = None, self.in_pieces
+            if self._in_stations and pieces is None:
                 operator = products.find_layout(self._coefficients)
             whole = self._comm.size == 1
             turns = whole and self._model.problem.window.moves
@@ -328,7 +339,9 @@ class LineOperators:
                 return part_of(self._model, rows, rows, self._coefficients, 1.0, self._block)
 
             solver = PartSolver(
-                assembled, own, self._in_stations, whole, products.layout, stations, operator, turns
+                *(assembled, own, self._in_stations, whole, products.layout, stations, operator),
+                turns,
+                None if pieces is None else pieces.factors.factors,
             )
             self._solver, is_direct = solver, solver.is_direct
             if operator is not None and solver.factors is not None:
@@ -387,7 +400,8 @@ class LineOperators:
         ]
         self._read_domain = read_domain.vector
         self._vectors = (*here, *(pair.vector for pair in solved))
-        self._products = LineProducts(self._model, domain, self._read_padded, self._read, self.like)
+        read_here = self._read_padded, self._read
+        self._products = LineProducts(self._model, domain, *read_here, self.like, self.in_pieces)
         self.factor, self.answer = read[domain.owned_of_read], answer[domain.owned]
         self._halo = Halo(self._comm, own, read_low, read)
         self._loaded_halo = Halo(self._comm, own, low, loaded)

@@ -88,7 +88,7 @@ class UnitResponses:
     comm : mpi4py communicator
     model, ownership : of the line
     coefficients : of M, K and C in A
-    like : marks of the line's stations, found here if not given
+    like : marks of the line's stations, found where needed if not given
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class UnitResponses:
         windows: Windows,
         like: LikeStations | None = None,
     ) -> None:
-        self._like = LikeStations(model) if like is None else like
+        self._like = like
         self._comm, self._model, self._ownership = comm, model, ownership
         self._coefficients, self.windows = coefficients, windows
 
@@ -123,24 +123,47 @@ class UnitResponses:
         RunBroken
             On all ranks, if a column does not vanish outside of its window.
         """
+        places, reach = self.places(dofs, weights, x, half_length)
+        like = LikeStations(self._model) if self._like is None else self._like
+        at, data = self.solve(places, like, reach)
+        return ShortColumns(places.begin, at, places.width, data, reach)
+
+    def places(
+        self,
+        dofs: np.ndarray,
+        weights: np.ndarray,
+        x: np.ndarray,
+        half_length: np.ndarray | None = None,
+    ) -> tuple[Places, float]:
+        """Places of ``columns``, and the reach of their windows [m]. Collective."""
         half = np.zeros(x.size) if half_length is None else half_length
         windows = self.windows
         if windows.reach > _LONG and x.size:
             windows = windows._replace(reach=self._felt(dofs, weights, x, half))
-        places = _Places.of(windows, self._ownership, dofs, weights, x, half)
-        chosen, kinds = self._kinds(places)
-        size = places.width[chosen] * dofs.shape[1]
+        places = Places.of(windows, self._ownership, dofs, weights, x, half)
+        return places, windows.reach
+
+    def solve(
+        self, places: Places, like: LikeStations, reach: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Where the columns of ``places`` begin, and their numbers, as ``ShortColumns`` has them.
+
+        Collective; ``like`` are marks of all stations that the windows of these reach, which is
+        ``reach`` [m]. Raises as ``columns``.
+        """
+        chosen, kinds = self._kinds(places, like)
+        size = places.width[chosen] * places.dofs.shape[1]
         at = np.concatenate([np.zeros(1, np.int64), np.cumsum(size)])
         data = np.zeros(at[-1])
         leak = 0.0
-        for stretch in _stretches(x, chosen):
-            leak = max(leak, self._solve(places, chosen[stretch], at[stretch], data))
+        for stretch in _stretches(places.x, chosen):
+            leak = max(leak, self._fill(places, chosen[stretch], at[stretch], data))
         if self._comm.allreduce(leak, op=MPI.MAX) > _LEAK:
             raise RunBroken(
-                "the response to a point load does not decay within "
-                f"{windows.reach:.0f} m; give the scene a smaller numerics.dt_s"
+                f"the response to a point load does not decay within {reach:.0f} m; give the scene "
+                "a smaller numerics.dt_s"
             )
-        return ShortColumns(places.begin, at[kinds], places.width, data, windows.reach)
+        return at[kinds], data
 
     def _felt(
         self, dofs: np.ndarray, weights: np.ndarray, x: np.ndarray, half: np.ndarray
@@ -175,10 +198,10 @@ class UnitResponses:
             raise RunBroken("the step operator cannot be factored: it is not positive") from error
         return np.ascontiguousarray(answers.T)
 
-    def _kinds(self, places: _Places) -> tuple[np.ndarray, np.ndarray]:
+    def _kinds(self, places: Places, like: LikeStations) -> tuple[np.ndarray, np.ndarray]:
         """Places of which each has columns of its own, and which of these each place shares."""
         starts = self.windows.numbering.starts
-        marks = self._like.fingerprints(places.first, places.last)
+        marks = like.fingerprints(places.first, places.last)
         low, n = starts[places.first], places.x.size
         rows = [
             marks >> np.uint64(32),
@@ -190,9 +213,7 @@ class UnitResponses:
         ]
         return kinds_of(np.stack([row.astype(float) for row in rows], axis=1))
 
-    def _solve(
-        self, places: _Places, chosen: np.ndarray, at: np.ndarray, data: np.ndarray
-    ) -> float:
+    def _fill(self, places: Places, chosen: np.ndarray, at: np.ndarray, data: np.ndarray) -> float:
         """Fill in the columns of ``chosen`` places; how much of one is outside of its window,
         relative to its peak."""
         owned = chosen[places.width[chosen] > 0]
@@ -221,8 +242,7 @@ class UnitResponses:
     def _banded(self, first: int, last: int) -> np.ndarray:
         """Lower bands of A for the unknowns from ``first`` to before ``last``."""
         parts = list(iterate_entries(self._model, first, last, *self._coefficients))
-        held = self._model.constrained
-        held = held[np.searchsorted(held, first) : np.searchsorted(held, last)]
+        held = self._model.constrained_between(first, last)
         parts.append((held, held, np.ones(held.size)))
         rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
         lower = (columns <= rows) & (columns >= first)
@@ -233,7 +253,7 @@ class UnitResponses:
         return np.asarray(flat).reshape(bands, n)
 
 
-class _Places(NamedTuple):
+class Places(NamedTuple):
     """Where columns are wanted, and their windows.
 
     ``first`` and ``last`` (n,) are stations of the windows; ``begin`` and ``width`` (n,) the local
@@ -258,7 +278,7 @@ class _Places(NamedTuple):
         weights: np.ndarray,
         x: np.ndarray,
         half: np.ndarray,
-    ) -> _Places:
+    ) -> Places:
         numbering, to_side = windows.numbering, half + windows.reach
         first, last = numbering.stations_within(x - to_side, x + to_side)
         low, high = (
@@ -266,6 +286,10 @@ class _Places(NamedTuple):
             for station in (first, last)
         )
         return cls(dofs, weights, x, half, first, last, low - ownership.first, high - low)
+
+    def of_numbers(self, which: np.ndarray) -> Places:
+        """Some of them."""
+        return Places(*(part[which] for part in self))
 
 
 def _stretches(x: np.ndarray, chosen: np.ndarray) -> list[np.ndarray]:

@@ -18,10 +18,15 @@ _LEVEL = ("u", "v")
 
 
 class ModelBuilder:
-    """Collects terms of effects; ``finish`` gives the model."""
+    """Collects terms of effects; ``finish`` gives the model.
 
-    def __init__(self, model: Model) -> None:
-        self.model = model
+    Parameters
+    ----------
+    before : a model of the same problem, mesh and shape, whose wires are taken over
+    """
+
+    def __init__(self, model: Model, before: Model | None = None) -> None:
+        self.model, self._before = model, before
         self.problem: Problem = model.problem
         self.mesh = model.mesh
         self._hanging: list[tuple[np.ndarray, np.ndarray]] = []
@@ -30,19 +35,24 @@ class ModelBuilder:
 
     def add_wire(self, wire: str, unknowns: tuple[str, str] = ("w", "theta_y")) -> None:
         """Bending and tension of a wire in the plane of two unknowns; its mass and weight."""
+        if self._before is not None:
+            number = len(self.model.blocks)
+            self.add_block(self._before.blocks[number])
+            if number in self._before.hanging_wires:
+                self._hang(number, *self._before.hanging_wires[number])
+            return
         dofs, length = wire_elements(self.model, wire, unknowns)
         data = self.problem.line.wire(wire)
         tension = self.model.tension_of(wire)
-        # Length and tension as one number, of which NumPy finds those that are alike.
-        alike, kind = np.unique(length + 1j * tension, return_inverse=True)
-        mass = beam.mass(alike.real, data.mass_per_length)
-        stiffness = beam.stiffness(alike.real, data.bending_stiffness, alike.imag)
+        lengths, tensions, kind = beam.alike(length, tension)
+        mass = beam.mass(lengths, data.mass_per_length)
+        stiffness = beam.stiffness(lengths, data.bending_stiffness, tensions)
         load = data.mass_per_length * beam.uniform_load(length)
         if data.worn:
             section, bending = data.left_of(self.mesh.x(self.mesh.elements(wire)))
             worn = section < 1.0
             # Each worn element is a kind of its own, after those that are alike.
-            kind[worn] = alike.size + np.arange(np.count_nonzero(worn))
+            kind[worn] = lengths.size + np.arange(np.count_nonzero(worn))
             own, left = length[worn], section[worn, None, None]
             bent = beam.stiffness(own, data.bending_stiffness, 0.0)
             pulled = beam.stiffness(own, 0.0, tension[worn])
@@ -51,7 +61,12 @@ class ModelBuilder:
             load *= section[:, None]
         self.add_block(Block(wire, dofs, kind, mass, stiffness, of_shape=True))
         if unknowns[0] == "w":
-            self._hanging.append((dofs.ravel(), load.ravel()))
+            self._hang(len(self.model.blocks) - 1, dofs.ravel(), load.ravel())
+
+    def _hang(self, number: int, dofs: np.ndarray, load: np.ndarray) -> None:
+        """Let a wire of block ``number`` weigh on unknowns (n,), with masses (n,)."""
+        self.model.hanging_wires[number] = dofs, load
+        self._hanging.append((dofs, load))
 
     def add_springs(
         self, component: str, nodes: np.ndarray, unknown: str, stiffness: float | np.ndarray

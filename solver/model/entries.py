@@ -23,8 +23,6 @@ def iterate_entries(
     Only rows in [first, last), of these ``wanted`` (last - first,) ones if that is given; rows and
     columns of constrained unknowns are left out.
     """
-    free = np.ones(model.n_dofs, dtype=bool)
-    free[model.constrained] = False
     for block in model.blocks:
         alpha, beta = model.damping_of(block.component)
         near = block.near(first, last)
@@ -42,9 +40,18 @@ def iterate_entries(
             matrix += (stiffness + damping * alpha) * block.stiffness[kind]
         if block.damping is not None:
             matrix += damping * block.damping[kind]
+        moves = _free(model, dofs)
         rows = np.broadcast_to(dofs[:, :, None], matrix.shape)
         columns = np.broadcast_to(dofs[:, None, :], matrix.shape)
-        keep = (rows >= first) & (rows < last) & free[rows] & free[columns]
+        keep = (rows >= first) & (rows < last) & moves[:, :, None] & moves[:, None, :]
         if wanted is not None:
             keep[keep] = wanted[rows[keep] - first]
         yield rows[keep], columns[keep], matrix[keep]
+
+
+def _free(model: Model, dofs: np.ndarray) -> np.ndarray:
+    """Which of some unknowns are not held, shape as ``dofs``; they stand close to each other."""
+    low, high = int(dofs.min()), int(dofs.max()) + 1
+    free = np.ones(high - low, dtype=bool)
+    free[model.constrained_between(low, high) - low] = False
+    return np.asarray(free[dofs - low])

@@ -84,6 +84,7 @@ class Model:
     droppers : those of the mesh, in its order; they only pull where they may slacken
     hanging_at_arms : (n_arms,) what of each arm's mass hangs at its wire [kg]
     form : the shape at rest that matrices are made about, None before it is found
+    hanging_wires : by the number of a wire's block, unknowns and masses by which it weighs
     terms_of : effect name -> number of terms, laws and lifted limits that it contributes
     """
 
@@ -106,6 +107,7 @@ class Model:
     hanging_at_arms: np.ndarray = field(default_factory=lambda: np.zeros(0))
     missing: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
     dropper_gap: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    hanging_wires: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
     @property
     def unknowns(self) -> tuple[str, ...]:
@@ -121,6 +123,11 @@ class Model:
     def n_unknowns(self) -> int:
         """How many unknowns all nodes have."""
         return self.numbering.n_unknowns
+
+    def constrained_between(self, low: int, high: int) -> np.ndarray:
+        """Numbers of ``constrained``, which ascend, from ``low`` to before ``high``."""
+        held = self.constrained
+        return held[np.searchsorted(held, low) : np.searchsorted(held, high)]
 
     def dofs(self, nodes: np.ndarray, unknown: str = "w") -> np.ndarray:
         """Numbers of one unknown at mesh nodes, shape as ``nodes``; ValueError if one has none."""

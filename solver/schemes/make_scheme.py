@@ -25,7 +25,7 @@ from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.schemes.ts_alpha2 import TSAlpha2
 from catenary.solver.statics.after_incidents import ChangedLine
 from catenary.solver.statics.equilibrium import Equilibrium
-from catenary.solver.window.moving_window import MovingWindow
+from catenary.solver.window.moving_window import MovingWindow, wanted_pieces
 from catenary.solver.window.where_possible import refuse_window
 
 
@@ -69,7 +69,10 @@ class SchemeFactory:
         # Droppers may have another tension in the first rest than they had then.
         own, numerics = replace(self, form=changed.form), problem.numerics
         in_parts = numerics.scheme != "one_solve" or numerics.coupling == "explicit"
-        line = make_line(comm, model, self.ownership, numerics, not in_parts)
+        wanted = wanted_pieces(problem, model, pantographs.candidates.place)
+        if comm.size > 1 or pantographs.across.size:
+            wanted = None
+        line = make_line(comm, model, self.ownership, numerics, not in_parts, wanted)
         laws = model.simulated
         trailing = max(placement.behind for placement in train.placements)
         # A kinematic contact ends depths through their rates.
@@ -118,6 +121,7 @@ class SchemeFactory:
             links.links.unknowns,
             links.moving,
             line.passes.known,
+            line.operators.in_pieces,
         )
         line.open_window(window)
 

@@ -72,6 +72,7 @@ class OneSolve:
         line, interaction, events = self.interaction.line, self.interaction, self._events
         events["LineColumns"].begin()
         self.pantographs.move_to(time)
+        line.provide(0.0)
         interaction.place()
         events["LineColumns"].end()
         events["LineFree"].begin()

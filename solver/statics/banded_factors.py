@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg import lapack
 
+from catenary.solver.statics.band_kernels import add_elements
 from catenary.solver.statics.sparse_sum import Part
 
 
@@ -50,18 +51,12 @@ class BandedFactors:
         for dofs, _ in parts:
             reach = max(reach, int(np.ptp(dofs, axis=1).max(initial=0)))
         self._reach = reach
-        free, known = np.ones(size), np.zeros(size)
-        free[given], known[given] = 0.0, values
+        free, known = np.ones(size, dtype=bool), np.zeros(size)
+        free[given], known[given] = False, values
         self.from_given = np.zeros(size)
         bands = np.zeros((3 * reach + 1, size), order="F")
         for dofs, matrices in parts:
-            for j, column in enumerate(dofs.T):
-                is_given = free[column] == 0.0
-                for i, row in enumerate(dofs.T):
-                    entries = matrices[:, i, j]
-                    _add(bands, 2 * reach + row - column, column, entries * free[column])
-                    held = row[is_given], (entries * known[column])[is_given]
-                    np.add.at(self.from_given, *held)
+            add_elements(bands, reach, dofs, matrices, free, known, self.from_given)
         np.add.at(bands, (2 * reach + rows - columns, columns), numbers)
         self._factors, self._pivots, info = lapack.dgbtrf(bands, reach, reach, overwrite_ab=True)
         if info != 0:
@@ -72,11 +67,3 @@ class BandedFactors:
         reach = self._reach
         solution, _ = lapack.dgbtrs(self._factors, reach, reach, right, self._pivots)
         return np.asarray(solution)
-
-
-def _add(bands: np.ndarray, band: np.ndarray, column: np.ndarray, numbers: np.ndarray) -> None:
-    """Add numbers to bands; along a wire no column comes twice."""
-    if (np.diff(column) > 0).all():
-        bands[band, column] += numbers
-    else:
-        np.add.at(bands, (band, column), numbers)

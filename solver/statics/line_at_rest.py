@@ -73,6 +73,9 @@ def line_at_rest_on_all(
         On all ranks, if there is no equilibrium with all droppers taut.
     """
 
+    if comm.size == 1:
+        return on_root(comm, alone(lambda: line_at_rest(problem, mesh)), takes_long=True)
+
     def work() -> tuple[np.ndarray, np.ndarray, Equilibrium, Elasticity]:
         rest = line_at_rest(problem, mesh)
         return rest.model.dropper_lengths, rest.model.dropper_gap, rest.form, rest.lift

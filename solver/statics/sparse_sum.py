@@ -21,8 +21,8 @@ def wire_parts(model: Model, at: np.ndarray) -> list[Part]:
         length = mesh.x(second) - mesh.x(first)
         dofs = np.stack([at[first], at[first] + 1, at[second], at[second] + 1], axis=1)
         tension = wire.tension_at(0.5 * (mesh.x(first) + mesh.x(second)))
-        alike, kind = np.unique(length + 1j * tension, return_inverse=True)
-        stiffness = beam.stiffness(alike.real, wire.bending_stiffness, alike.imag)
+        lengths, tensions, kind = beam.alike(length, tension)
+        stiffness = beam.stiffness(lengths, wire.bending_stiffness, tensions)
         parts.append((dofs, stiffness[kind]))
     return parts
 

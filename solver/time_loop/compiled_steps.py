@@ -33,9 +33,10 @@ from catenary.solver.time_loop.step_kernels import (
 )
 from catenary.solver.time_loop.step_views import Showing
 from catenary.solver.window.moving_columns import MovedStations
+from catenary.solver.window.moving_window import MOST_STEPS
 
 # What rows of a block may take, so that it stays in the caches [B], and the most of them.
-_BLOCK_BYTES, _MOST_ROWS = 2**19, 512
+_BLOCK_BYTES, _MOST_ROWS = 2**19, MOST_STEPS
 # Rows of a block at least, if what moves is a part of the line only.
 _ROWS_OF_PART = 64
 # The same of motions that are kept. A step of a line of which not one fits takes far longer than
@@ -127,6 +128,9 @@ class CompiledSteps:
         if self._loads is not None:
             n_steps = self._loads.cover(times)
             times = times[:n_steps]
+        line, speed = self._scheme.interaction.line, float(scheme.pantographs.speed)
+        scheme.pantographs.move_to(step * self._dt)
+        line.provide(speed * n_steps * self._dt)
         self._moved.begin(step)
         self._kept.motion_of[:n_steps] = -1
         self._kept.used[0] = 0

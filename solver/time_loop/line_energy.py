@@ -88,9 +88,33 @@ class LineEnergy:
                 product.multiply_rows(0, int(self._rows[1]), padded[1 - row], self._force)
                 self._sums[row, 0] = self._force @ motion[1 - row]
             return
+        assert self._line.window is not None
+        together = max(1, (self._line.window.most_rows - 2) // self._size)
         first, last = begin // self._size, -(-end // self._size)
+        for part in range(first, last, together):
+            self._sum_parts(padded, motion, part, min(part + together, last))
+
+    def _sum_parts(
+        self,
+        padded: tuple[np.ndarray, ...],
+        motion: tuple[np.ndarray, np.ndarray],
+        first: int,
+        last: int,
+    ) -> None:
+        """Sum the parts from ``first`` to before ``last``."""
+        assert self._products is not None and self._line.window is not None
+        window = self._line.window
+        if not window.has_rows(*self._rows[[first, last]].tolist()):
+            # Of what has not moved no rows are needed.
+            own = slice(*self._starts[[first, last]].tolist())
+            self._sums[:, first:last] = 0.0
+            moved = own.start + np.flatnonzero((motion[0][own] != 0) | (motion[1][own] != 0))
+            if not moved.size:
+                return
+            first, last = np.searchsorted(self._starts, moved[[0, -1]], side="right") + (-1, 0)
         begin, end = self._rows[[first, last]].tolist()
         own = slice(*self._starts[[first, last]].tolist())
+        window.provide_rows(begin, end)
         for row, product in enumerate(self._products[:2]):
             # The kinetic energy is that of the velocity.
             factor, values = padded[1 - row], motion[1 - row][own]

@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
+from catenary.solver.base.errors import RunBroken
 from catenary.solver.linear.factors.station_factors import StationFactors
+from catenary.solver.linear.operator_pieces import OperatorPieces, WantedPieces
 from catenary.solver.model.loads import Load
 from catenary.solver.model.model import Model
+from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.window import EXACT, WindowChoice
 from catenary.solver.window import window_kernels
-from catenary.solver.window.window_kernels import IS_FRESH, STEP, WindowArrays
+from catenary.solver.window.where_possible import why_no_window
+from catenary.solver.window.window_kernels import IS_FRESH, LEAST, STEP, WindowArrays
 
 logger = logging.getLogger(__name__)
 
 # Steps from one look to the next.
 EVERY = 8
+# Steps between which what is ahead may be made.
+MOST_STEPS = 512
+# Stations around a window whose rows the energy reads.
+_AROUND = 192
 
 
 class MovingWindow:
@@ -39,6 +48,7 @@ class MovingWindow:
     links : (m, k) unknowns of each link, in the order along the track
     moving_links : (2,) int, filled with the first that may switch and the one after the last
     known : what the motion keeps besides x, y and z, or nothing
+    operators : of a line in pieces, None if it is whole
     """
 
     def __init__(
@@ -52,6 +62,7 @@ class MovingWindow:
         links: np.ndarray,
         moving_links: np.ndarray,
         known: np.ndarray,
+        operators: OperatorPieces | None = None,
     ) -> None:
         assert factors.turning is not None
         numbering = model.numbering
@@ -88,7 +99,11 @@ class MovingWindow:
             known=known,
         )
         self.arrays.ranges[2, 1] = len(links)
-        self._tell_growth()
+        self._operators = operators
+        # First station of the pieces that are there and the one after the last.
+        self._covered = 0, 0
+        if operators is None:
+            self._tell_growth()
 
     def _tell_growth(self) -> None:
         """Say so where ends of the window stand much further out than was asked for."""
@@ -103,6 +118,86 @@ class MovingWindow:
                 further,
                 "motion asks for" if self.arrays.rule[0] > 0.0 else "spans",
             )
+
+    def provide(self, way: float) -> None:
+        """Have what steps need until contacts are a ``way`` [m] further, at most ``MOST_STEPS``.
+
+        Raises
+        ------
+        RunBroken
+            If the window can end nowhere near, or the line cannot be factored there.
+        """
+        if self._operators is None:
+            return
+        arrays = self.arrays
+        first, last = float(arrays.contacts.min()), float(arrays.contacts.max()) + way
+        masts, n = arrays.masts, arrays.low.size
+        spans = np.interp([first, last], masts, np.arange(masts.size))
+        spans += -arrays.rule[1], arrays.rule[2]
+        behind, ahead = np.interp(spans, np.arange(masts.size), masts)
+        begin, end = 0, n
+        if spans[0] > 0.0:
+            begin = int(np.searchsorted(arrays.high, min(behind, first - arrays.margin)))
+        if spans[1] < masts.size - 1:
+            place = max(ahead, last + arrays.margin)
+            end = int(np.searchsorted(arrays.low, place, side="right"))
+        begin, end = max(0, min(begin, end - LEAST)), min(n, max(end, begin + LEAST))
+        if not arrays.state[IS_FRESH]:
+            begin, end = min(begin, int(arrays.ends[2])), max(end, int(arrays.ends[3]))
+        if not self._is_covered(begin - _AROUND, end + _AROUND):
+            self._cover(begin, end)
+
+    def provide_rows(self, begin: int, end: int) -> None:
+        """Have products with the rows of stations from ``begin`` to before ``end``."""
+        if not self.has_rows(begin, end):
+            self._have(begin, end)
+
+    def has_rows(self, begin: int, end: int) -> bool:
+        """Whether there are products with these rows."""
+        return self._operators is None or self._is_covered(begin, end)
+
+    @property
+    def most_rows(self) -> int:
+        """Stations that ``provide_rows`` may be asked for at once."""
+        if self._operators is None:
+            return int(self.arrays.low.size)
+        pieces = self._operators.pieces
+        return pieces.size * (pieces.n_slots - 1)
+
+    def _is_covered(self, begin: int, end: int) -> bool:
+        n = self.arrays.low.size
+        return self._covered[0] <= max(0, begin) and min(n, end) <= self._covered[1]
+
+    def _cover(self, begin: int, end: int) -> None:
+        """Have the stations from ``begin`` to before ``end``, and where a window of these ends."""
+        assert self._operators is not None
+        pieces, (begins, ends) = self._operators.pieces, self.arrays.edges
+        first, last, n = begin, end, self.arrays.low.size
+        while True:
+            first, last = max(0, first - _AROUND), min(n, last + _AROUND)
+            if last - first > pieces.size * (pieces.n_slots - 1):
+                raise RunBroken(
+                    f"elements near {self.arrays.low[begin]:.0f} m are so short for the time step "
+                    "that a window cannot end there; take a smaller mesh.elements_per_gap or "
+                    "numerics.dt_s"
+                )
+            self._have(first, last)
+            low, high = self._covered
+            first = min(first, int(begins[begin])) if begins[begin] >= 0 else low - 1
+            last = max(last, int(ends[end])) if ends[end] <= n else high + 1
+            if self._is_covered(first, last):
+                return
+
+    def _have(self, begin: int, end: int) -> None:
+        """Have pieces with the stations from ``begin`` to before ``end``, and mark where windows in
+        them begin and end: beyond the line, where none does in these pieces."""
+        assert self._operators is not None
+        factors, (begins, ends) = self._operators.factors, self.arrays.edges
+        low, high = self._covered = self._operators.pieces.cover(begin, end)
+        number = np.arange(low, high + 1)
+        begins[number] = np.maximum.accumulate(np.where(factors.can_begin[number], number, -1))
+        backwards = np.where(factors.can_end[number], number, begins.size)[::-1]
+        ends[number] = np.minimum.accumulate(backwards)[::-1]
 
     @property
     def unknowns(self) -> tuple[int, int]:
@@ -142,6 +237,23 @@ class MovingWindow:
     def _open(self, begin: int, end: int) -> None:
         """Make the window that from station ``begin`` to ``end``, and touch no motion."""
         window_kernels.turn_to(self.arrays, begin, end)
+
+
+def wanted_pieces(problem: Problem, model: Model, contacts: np.ndarray) -> WantedPieces | None:
+    """What steps with a window need of a line at a time, None if that is not known beforehand.
+
+    ``contacts`` (n,) are where they are [m]. Not collective.
+    """
+    window, masts = problem.window, np.array(problem.line.support_positions, dtype=float)
+    if not window.moves or window.by_motion > 0.0 or why_no_window(problem) or model.loads:
+        return None
+    n_spans = math.ceil(window.spans_behind) + math.ceil(window.spans_ahead) + 2
+    if n_spans >= masts.size:
+        return None
+    train = problem.train
+    moving = float((masts[n_spans:] - masts[:-n_spans]).max() + np.ptp(contacts))
+    ahead = MOST_STEPS * problem.numerics.dt * train.speed
+    return WantedPieces(moving, ahead, 2 * _AROUND + LEAST)
 
 
 def _places_of(model: Model, loads: Sequence[Load]) -> np.ndarray:

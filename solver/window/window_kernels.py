@@ -25,7 +25,7 @@ _C = 2.62206
 _A, _B = 1.0 - 16.0 / _C**3, (1.0 - 17.0 / _C**3) / _C**2
 _TAKEN = 0.98
 # Stations of the smallest window.
-_LEAST = 64
+LEAST = 64
 
 
 class WindowArrays(NamedTuple):
@@ -127,8 +127,8 @@ def look(window, motion):
         ahead = place_of_span(window.masts, span_of(window.masts, last) + rule[2])
         begin = min(begin, np.searchsorted(window.high, behind))
         end = max(end, np.searchsorted(window.low, ahead, side="right"))
-    end = window.edges[1, min(n, max(end, begin + _LEAST))]
-    begin = window.edges[0, max(0, min(begin, end - _LEAST))]
+    end = window.edges[1, min(n, max(end, begin + LEAST))]
+    begin = window.edges[0, max(0, min(begin, end - LEAST))]
     move(window, motion, begin, end)
     if rule[3] > 0.0:
         fade(window, motion, first, last)

@@ -53,24 +53,30 @@ def turn(kinds, turning, before, middle):
     kinds[middle] = here[middle // MIDDLES]
 
 
-def edges(
-    whole: np.ndarray, eliminated: np.ndarray, towards_end: np.ndarray, towards_start: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Where steps of a part of the line may begin and end, from each station outwards, (n + 1,).
+def softened(whole: np.ndarray, eliminated: np.ndarray) -> np.ndarray:
+    """Whether steps of a part of the line may end at stations (k,).
 
     What is beyond is held, but the factors let it give way by its mass and stiffness D. That leaves
     M + tau C - D in place of M + tau C there, which must not become negative: it does where
     elements are so short that the step operator A is mostly stiffness. D is what A has more than
     the block S after elimination; all eigenvalues of S^-1 A are to be below 2.
 
-    ``whole`` (k, b, b) and ``eliminated`` (k, b, b) are A and S^-1 of each factor; ``towards_end``
-    and ``towards_start`` (n,) those of each station by elimination to either side.
+    ``whole`` (k, b, b) and ``eliminated`` (k, b, b) are A and S^-1 of each.
+    """
+    traces = np.einsum("kij,kji->k", eliminated, whole)
+    return np.asarray(traces - whole.shape[1] < _SOFTENED)
+
+
+def edges(towards_end: np.ndarray, towards_start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where steps of a part of the line may begin and end, from each station outwards, (n + 1,).
+
+    ``towards_end`` and ``towards_start`` (n,) are what ``softened`` says of each station after
+    elimination to either side.
     """
     n = towards_end.size
     number = np.arange(n + 1)
-    softened = np.einsum("kij,kji->k", eliminated, whole) - whole.shape[1] < _SOFTENED
-    can_begin = np.append(softened[towards_end], True)
-    can_end = np.append(True, softened[towards_start])
+    can_begin = np.append(towards_end, True)
+    can_end = np.append(True, towards_start)
     can_begin[0] = can_end[n] = True
     begins = np.maximum.accumulate(np.where(can_begin, number, 0))
     ends = np.minimum.accumulate(np.where(can_end, number, n)[::-1])[::-1]

@@ -21,6 +21,7 @@ from catenary.solver.linear.factors.meeting_station import (
     MIDDLES,
     Turning,
     edges,
+    softened,
     turn,
 )
 from catenary.solver.linear.factors.substitution import Factored, solve
@@ -129,56 +130,106 @@ def station_factors(
     n = rows.kinds.size
     high = n if high is None else high
     stations = Sections.alike(n, layout.pitch) if stations is None else stations
-    # Factors join all of a plane, whatever matrices join: the same kernels serve them all.
-    layout = Layout(layout.widths, make_ups=layout.make_ups)
+    rows, lacks = completed(rows, stations)
+    found = FoundFactors.of(rows, None if turns else (low + high) // 2)
+    packed = _packed(layout, stations, rows, lacks, found)
+    if packed is None:
+        return None
+    layout, kinds, numbers, n_kinds, besides = packed
+    of_station = kinds[found.numbers]
+    if not turns:
+        return StationFactors(layout, stations, of_station, numbers, low, high, n_kinds, besides)
+    soft = softened(rows.blocks[1][found.kinds], found.factors[:, 0])[found.numbers]
+    begins, ends = edges(soft[:n], soft[n : 2 * n])
+    turning = Turning(of_station[:n], of_station[n : 2 * n], of_station[2 * n :], begins, ends)
+    of_station = of_station[:n].copy()
+    return StationFactors(
+        layout, stations, of_station, numbers, low, high, n_kinds, besides, turning
+    )
+
+
+def layout_of_factors(
+    layout: Layout, stations: Sections, rows: StationRows, share: float
+) -> Layout | None:
+    """The layout that suits factors of a matrix by rows, for any middle.
+
+    ``share`` is how much of them is read in a step. None as for ``station_factors``.
+    """
+    rows, lacks = completed(rows, stations)
+    packed = _packed(layout, stations, rows, lacks, FoundFactors.of(rows, None), share)
+    return None if packed is None else packed[0]
+
+
+def completed(rows: StationRows, stations: Sections) -> tuple[StationRows, np.ndarray]:
+    """Rows with a unit diagonal for what ``stations`` lack, and what those of each kind do."""
     lacks, blocks = stations.missing()[rows.chosen], rows.blocks
     if lacks.any():
         number, lacking = np.nonzero(lacks)
         blocks = blocks.copy()
         blocks[1, number, lacking, lacking] = 1.0
         rows = rows._replace(blocks=blocks)
-    found = _Found.of(rows, None if turns else (low + high) // 2)
-    factors, make_up = found.factors, stations.make_up[rows.chosen][found.kinds]
+    return rows, lacks
 
-    def pack(part: Layout, rows: slice | np.ndarray) -> np.ndarray:
-        if part.sparse:
-            return part.packed_halves(factors[rows, 0])
-        n_blocks = 2 if part.shares else 3
-        packed = part.packed(factors[rows, :n_blocks], part.whole_terms)
-        return packed.reshape(packed.shape[0], n_blocks * part.whole_terms.sources.size)
 
-    kinds, numbers, n_kinds, count = kinds_by_make_up(layout, make_up, pack)
-    lacked = lacks[found.kinds].sum() if layout.varies else 0
-    # Where elimination joins what a station lacks.
-    unfit = layout.varies and count != np.count_nonzero(factors) - lacked
+def _packed(
+    layout: Layout,
+    stations: Sections,
+    rows: StationRows,
+    lacks: np.ndarray,
+    found: FoundFactors,
+    share: float = 1.0,
+) -> tuple[Layout, np.ndarray, np.ndarray, int, tuple[np.ndarray, np.ndarray]] | None:
+    """Layout, kinds of factors, their numbers, how many there are, and ``besides``, as
+    ``StationFactors`` keeps them; ``share`` of them is read in a step."""
+    # Factors join all of a plane, whatever matrices join: the same kernels serve them all.
+    layout = Layout(layout.widths, make_ups=layout.make_ups)
+    make_up = stations.make_up[rows.chosen][found.kinds]
+    kinds, numbers, n_kinds, unfit = packed_factors(layout, make_up, lacks, found)
     besides: tuple[np.ndarray, np.ndarray] | None = NO_BESIDES
-    if max(layout.widths) > NARROW and (unfit or numbers.nbytes > LARGE):
+    if max(layout.widths) > NARROW and (unfit or share * numbers.nbytes > LARGE):
         layout = _sparse(layout, rows.blocks)
-        kinds, numbers, n_kinds, _ = kinds_by_make_up(layout, make_up, pack)
-        besides = _besides(layout, stations, rows)
-        # Halves hold some numbers twice, others of each make-up.
-        count = sum(
-            np.count_nonzero(part.packed(factors[make_up == number, 0], part.whole_terms))
-            for number, part in enumerate(layout.parts)
-        )
-        unfit = layout.varies and count != np.count_nonzero(factors[:, 0]) - lacked
+        kinds, numbers, n_kinds, unfit = packed_factors(layout, make_up, lacks, found)
+        besides = besides_of(layout, stations, rows)
     if unfit or besides is None:
         return None
     sharing = layout.changed(shares=True)
-    if numbers.nbytes > LARGE and sharing.shares and not (layout.varies or layout.sparse):
+    if share * numbers.nbytes > LARGE and sharing.shares and not (layout.varies or layout.sparse):
         layout = sharing
-        kinds, numbers, n_kinds, _ = kinds_by_make_up(layout, make_up, pack)
-    of_station = kinds[found.numbers]
-    if not turns:
-        return StationFactors(layout, stations, of_station, numbers, low, high, n_kinds, besides)
-    begins, ends = edges(
-        blocks[1][found.kinds], factors[:, 0], found.numbers[:n], found.numbers[n : 2 * n]
-    )
-    turning = Turning(of_station[:n], of_station[n : 2 * n], of_station[2 * n :], begins, ends)
-    of_station = of_station[:n].copy()
-    return StationFactors(
-        layout, stations, of_station, numbers, low, high, n_kinds, besides, turning
-    )
+        kinds, numbers, n_kinds, _ = packed_factors(layout, make_up, lacks, found)
+    return layout, kinds, numbers, n_kinds, besides
+
+
+def packed_blocks(layout: Layout, factors: np.ndarray) -> np.ndarray:
+    """Numbers (m, k) of ``factors`` (m, 3, b, b) as ``StationFactors`` keeps them."""
+    if layout.sparse:
+        return layout.packed_halves(factors[:, 0])
+    n_blocks = 2 if layout.shares else 3
+    packed = layout.packed(factors[:, :n_blocks], layout.whole_terms)
+    return packed.reshape(packed.shape[0], n_blocks * layout.whole_terms.sources.size)
+
+
+def packed_factors(
+    layout: Layout, make_up: np.ndarray, lacks: np.ndarray, found: FoundFactors
+) -> tuple[np.ndarray, np.ndarray, int, bool]:
+    """Kinds of factors, their numbers and how many there are; see ``kinds_by_make_up``. The last
+    is whether elimination joins what a station lacks: ``lacks`` (k, b) says what each kind of
+    station does, ``make_up`` (m,) which make-up each factor is of."""
+
+    def pack(part: Layout, rows: slice | np.ndarray) -> np.ndarray:
+        return packed_blocks(part, found.factors[rows])
+
+    kinds, numbers, n_kinds, count = kinds_by_make_up(layout, make_up, pack)
+    if not layout.varies:
+        return kinds, numbers, n_kinds, False
+    n_blocks = 1 if layout.sparse else 2 if layout.shares else 3
+    if layout.sparse:
+        # Halves hold some numbers twice, others of each make-up.
+        count = sum(
+            np.count_nonzero(part.packed(found.factors[make_up == number, 0], part.whole_terms))
+            for number, part in enumerate(layout.parts)
+        )
+    all_of_them = np.count_nonzero(found.factors[:, :n_blocks])
+    return kinds, numbers, n_kinds, count != all_of_them - lacks[found.kinds].sum()
 
 
 def _sparse(layout: Layout, blocks: np.ndarray) -> Layout:
@@ -204,7 +255,7 @@ def _strands(joined: np.ndarray) -> tuple[tuple[int, ...], ...]:
     return tuple(tuple(np.flatnonzero(of_set == n).tolist()) for n in range(n_sets))
 
 
-def _besides(
+def besides_of(
     layout: Layout, stations: Sections, rows: StationRows
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Kinds of the blocks between stations and their numbers, as ``StationFactors`` keeps them;
@@ -219,7 +270,7 @@ def _besides(
     return (kinds[rows.kinds], numbers) if count == joined else None
 
 
-class _Found(NamedTuple):
+class FoundFactors(NamedTuple):
     """Factors (m, 3, b, b), the kind of station (m,) of each, and ``numbers`` of those that the
     stations have: (n,) in order for a given middle; for any middle (n,) before it, (n,) behind it,
     and of those where it may be. Factors stand in the order of these numbers."""
@@ -229,7 +280,7 @@ class _Found(NamedTuple):
     numbers: np.ndarray
 
     @classmethod
-    def of(cls, rows: StationRows, middle: int | None) -> _Found:
+    def of(cls, rows: StationRows, middle: int | None) -> FoundFactors:
         """All factors of the matrix with these rows; of one ``middle``, or of all if it is None."""
         kinds, blocks, n = rows.kinds, rows.blocks, rows.kinds.size
         meeting = np.arange(0, n, MIDDLES) if middle is None else np.array([middle])

@@ -8,6 +8,17 @@ from __future__ import annotations
 import numpy as np
 
 
+def alike(length: np.ndarray, tension: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lengths (k,) [m] and tensions (k,) [N] of elements that are not alike, and which of these
+    each of all elements (n,) is."""
+    if not tension.size or (tension == tension[0]).all():
+        lengths, kind = np.unique(length, return_inverse=True)
+        return lengths, np.full(lengths.size, tension[0] if tension.size else 0.0), kind
+    # Length and tension as one number.
+    found, kind = np.unique(length + 1j * tension, return_inverse=True)
+    return found.real.copy(), found.imag.copy(), kind
+
+
 def stiffness(
     length: np.ndarray, bending_stiffness: float, tension: float | np.ndarray
 ) -> np.ndarray:

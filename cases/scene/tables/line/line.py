@@ -70,7 +70,7 @@ class LineTable(Table):
         description="which wires the line has: " + ", ".join(registered()),
     )
     n_spans: int = Field(ge=1, le=20_000, description="number of spans from anchor to anchor")
-    span_m: Annotated[list[Span], OneOrMore, Field(min_length=1, max_length=2000)] = Field(
+    span_m: Annotated[list[Span], OneOrMore, Field(min_length=1, max_length=20_000)] = Field(
         description="span length, or a list of span lengths that is repeated"
     )
     contact_height_m: float = Field(

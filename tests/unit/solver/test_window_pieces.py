@@ -1,0 +1,136 @@
+"""A long line whose matrices, factors and columns are made by pieces, as a window needs them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from measuring import History, check, start_march
+from small_lines import ac_simple_line, mesh_of, numerics, problem_of, train
+from stitched_line import stitched_line
+
+from catenary.solver.base.errors import RunBroken
+from catenary.solver.linear import pieces
+from catenary.solver.linear.factors import factor_pieces, station_factors
+from catenary.solver.problem.problem import Damping, Problem
+from catenary.solver.problem.window import BOUNDED, WindowChoice
+from catenary.solver.window import moving_window
+
+SPEED, START, SPANS = 70.0, 330.0, 60
+WINDOW = WindowChoice(BOUNDED, None, 2, 2, 1.0)
+# Forces are some 100 N; pieces differ from the whole by the order of sums.
+ROUND_OFF = 1e-9
+
+
+def scene(seconds: float, line: Any = None, **changes: Any) -> tuple[Problem, Any]:
+    line = ac_simple_line(SPANS) if line is None else line
+    run = train(SPEED, START, START + SPEED * seconds, raise_time=0.2)
+    return replace(problem_of(line, train=run, **changes), window=WINDOW), mesh_of(line, 2)
+
+
+def histories(problem: Problem, mesh: Any) -> tuple[History, Any, list[tuple[float, float]]]:
+    march, _ = start_march(problem, mesh)
+    energies: list[tuple[float, float]] = []
+    history = History(
+        lambda view: energies.append(view.energies()) if view.step % 50 == 0 else None
+    )
+    with march:
+        outcome = march.run([history])
+    assert outcome.outcome == "done", outcome.outcome
+    return history, march._line.operators.in_pieces, energies  # noqa: SLF001
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pieces so small that a train comes across many of them."""
+    monkeypatch.setattr(pieces, "_SIZE", 32)
+    monkeypatch.setattr(moving_window, "_AROUND", 16)
+
+
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize(
+    ("seconds", "changes"),
+    [
+        (5.0, {}),
+        (1.0, {"numerics": numerics(1e-3, integrator="hht", spectral_radius=0.8)}),
+        (1.0, {"damping": Damping(2e-3, 0.0, {"droppers": (1e-4, 0.0)})}),
+        (1.0, {"line": stitched_line(SPANS)}),
+    ],
+    ids=["newmark", "hht", "components", "make-ups"],
+)
+def test_pieces_give_what_the_whole_line_gives(
+    seconds: float, changes: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem, mesh = scene(seconds, **changes)
+    found, operators, energies = histories(problem, mesh)
+    n_pieces, n_slots = operators.pieces.edges.size - 1, operators.pieces.n_slots
+    print(n_pieces, "pieces,", n_slots, "slots")
+    assert n_pieces > n_slots
+    monkeypatch.setattr(pieces.Pieces, "are_few", True)
+    whole, none, whole_energies = histories(problem, mesh)
+    assert none is None
+    for channel in ("contact_force", "head_height", "arm_uplift", "dropper_force"):
+        expected = whole[channel]
+        check(channel, found[channel], expected, within=ROUND_OFF * np.abs(expected).max())
+    largest = np.abs(whole_energies).max()
+    check("energies", np.array(energies), np.array(whole_energies), within=ROUND_OFF * largest)
+
+
+@pytest.mark.usefixtures("small")
+def test_a_march_in_pieces_goes_on_after_a_restart_as_if_nothing_had_happened() -> None:
+    problem, mesh = scene(3.0)
+    kept: list[Any] = []
+    energies: list[tuple[float, float]] = []
+
+    def look(view: Any) -> None:
+        if view.step == 2403:
+            kept.append(view.checkpoint())
+        if view.step >= 2403 and view.step % 20 == 0:
+            energies.append(view.energies())
+
+    whole, rest = History(look), History(look)
+    march, _ = start_march(problem, mesh)
+    with march:
+        march.run([whole])
+    first, energies = energies, []
+    again, _ = start_march(problem, mesh)
+    with again:
+        again.restore(kept[0])
+        again.run([rest])
+    assert np.array_equal(rest["contact_force"], whole["contact_force"][2403:])
+    assert len(first) == 30
+    check("energies", np.array(energies), np.array(first), within=1e-12 * np.abs(first).max())
+
+
+@pytest.mark.usefixtures("small")
+def test_a_piece_where_no_window_can_end_breaks_the_run_in_words(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem, mesh = scene(0.1)
+    monkeypatch.setattr(
+        factor_pieces, "softened", lambda whole, _: np.zeros(len(whole), dtype=bool)
+    )
+    march, _ = start_march(problem, mesh)
+    with march:
+        outcome = march.run([])
+    assert "so short for the time step that a window cannot end there" in outcome.outcome
+
+
+@pytest.mark.usefixtures("small")
+def test_factors_of_pieces_may_be_shared_and_must_be_finite(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem, mesh = scene(1.0)
+    apart, _, _ = histories(problem, mesh)
+    monkeypatch.setattr(station_factors, "LARGE", 0)
+    shared, operators, _ = histories(problem, mesh)
+    assert operators.factors.factors.layout.shares
+    expected = apart["contact_force"]
+    check("force", shared["contact_force"], expected, within=ROUND_OFF * expected.max())
+    factors, made = operators.factors, operators.pieces.first()
+    rows = operators.rows_of(made)
+    broken = rows._replace(blocks=np.full_like(rows.blocks, np.nan))
+    with pytest.raises(RunBroken, match="singular or not finite"):
+        factors.make(made, broken)
