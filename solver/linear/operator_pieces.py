@@ -99,7 +99,8 @@ class OperatorPieces:
         that of ``damping``. Of pieces that are made after this."""
         layout = self.layout
         if damping is not None:
-            layout = with_damping(layout, joined_by(self._model, self._stations, damping))
+            joined = joined_by(self._model, damping)
+            layout = with_damping(layout, None if joined is None else joined[0])
         stations, pieces = self._stations.padded(), self.pieces
         sets = 1 if damping is None else 2
         widths = tuple(
@@ -107,7 +108,7 @@ class OperatorPieces:
             for part in layout.parts
         )
         table = Slots(pieces.n_slots, pieces.size, widths, layout.varies)
-        kinds = np.zeros(self._stations.size, dtype=table.kind)
+        kinds: np.ndarray = np.zeros(self._stations.size, dtype=table.kind)
         product = StationProduct(layout, stations.places(), kinds, table.numbers, 1, 0)
         self._products.append((table, product, of, damping))
         return product
@@ -159,13 +160,13 @@ def layouts_of(
     """Layouts of products and of factors, the latter by the first piece of the line; None if there
     are none. ``n_needed`` stations are read in a step."""
     stations = Sections.of(model.numbering, 0, model.numbering.size)
-    operator = joined_by(model, stations, coefficients)
-    stiffness = joined_by(model, stations, (0.0, 1.0, 0.0))
-    mass = joined_by(model, stations, (1.0, 0.0, 0.0))
-    if operator is None or stiffness is None or mass is None:
+    joined = joined_by(model, coefficients, (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
+    if joined is None:
         return None
+    operator, stiffness, mass = joined
     make_ups = stations.make_ups if stations.varies else ()
-    layout = layout_of(operator, stiffness, make_ups)
+    # Products with M, for energies, are of the same layout.
+    layout = layout_of(operator, stiffness | mass, make_ups)
     if layout is None:
         return None
     piece = pieces.first()
@@ -192,26 +193,44 @@ def _residual(rows: StationRows, layout: Layout, stations: Sections) -> float:
     return float(np.linalg.norm(answer - load) / np.linalg.norm(load))
 
 
-def joined_by(model: Model, stations: Sections, of: Coefficients) -> np.ndarray | None:
-    """Which places of a cross-section a sum of M, K and C may join, (3, 1, b, b): to the station
-    before, within one, and to the one after; None if it joins stations further apart."""
+def joined_by(model: Model, *sums: Coefficients) -> list[np.ndarray] | None:
+    """Which places of a cross-section each of some sums of M, K and C may join, (3, 1, b, b): to
+    the station before, within one, and to the one after; None if stations further apart are."""
+    stations = Sections.of(model.numbering, 0, model.numbering.size)
+    station, place = places_of(np.arange(model.numbering.size), stations)
     width = stations.width
-    joined = np.zeros((3, width, width), dtype=bool)
-    joined[1][np.diag_indices(width)] = True
+    result = [np.zeros((3, width, width), dtype=bool) for _ in sums]
+    for joined in result:
+        joined[1][np.diag_indices(width)] = True
     for block in model.blocks:
-        alpha, beta = model.damping_of(block.component)
-        m, k, c = of
-        terms = ((block.mass, m + c * beta), (block.stiffness, k + c * alpha), (block.damping, c))
-        given = [(term != 0.0).any(axis=0) for term, share in terms if term is not None and share]
-        if not given or not block.dofs.size:
+        if not block.dofs.size:
             continue
-        at, place = places_of(block.dofs.ravel(), stations)
-        at, place = at.reshape(block.dofs.shape), place.reshape(block.dofs.shape)
-        for i, j in zip(*np.nonzero(np.logical_or.reduce(given)), strict=True):
-            step = at[:, j] - at[:, i]
-            if np.abs(step).max() > 1:
-                return None
-            flat = ((step + 1) * width + place[:, i]) * width + place[:, j]
-            found = np.bincount(flat, minlength=joined.size).reshape(joined.shape)
-            joined |= found > 0
-    return joined[:, None]
+        at, where = _kinds_of_elements(station, place, block.dofs, width)
+        alpha, beta = model.damping_of(block.component)
+        for joined, (m, k, c) in zip(result, sums, strict=True):
+            terms = ((block.mass, m + c * beta), (block.stiffness, k + c * alpha))
+            given = [
+                (term != 0.0).any(axis=0)
+                for term, share in (*terms, (block.damping, c))
+                if term is not None and share
+            ]
+            pairs = np.nonzero(np.logical_or.reduce(given)) if given else ()
+            for i, j in zip(*pairs, strict=True):
+                step = at[:, j] - at[:, i]
+                if np.abs(step).max() > 1:
+                    return None
+                joined[step + 1, where[:, i], where[:, j]] = True
+    return [joined[:, None] for joined in result]
+
+
+def _kinds_of_elements(
+    station: np.ndarray, place: np.ndarray, dofs: np.ndarray, width: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Stations and places of the unknowns of one element of each kind, both (k, m)."""
+    apart = station[dofs] - station[dofs[:, :1]]
+    low, high = int(apart.min()), int(apart.max())
+    code, size = np.zeros(len(dofs), dtype=np.int64), (high - low + 1) * width
+    for column in range(dofs.shape[1]):
+        code = code * size + (apart[:, column] - low) * width + place[dofs[:, column]]
+    _, first = np.unique(code, return_index=True)
+    return station[dofs[first]], place[dofs[first]]

@@ -57,9 +57,10 @@ class FactorPieces:
             widths = tuple(2 * numbers.shape[1] for numbers in kept)
             self._besides = Slots(pieces.n_slots, size, widths, layout.varies)
             besides = np.zeros(n, dtype=self._besides.kind), self._besides.numbers
-        to_end, to_start, kinds = (np.zeros(n, dtype=self._blocks.kind) for _ in range(3))
-        here, edges = np.zeros(-(-n // MIDDLES), kinds.dtype), np.zeros((2, n + 1), dtype=np.int64)
-        self._turning = Turning(to_end, to_start, here, *edges)
+        kinds: np.ndarray = np.zeros(n, dtype=self._blocks.kind)
+        here: np.ndarray = np.zeros(-(-n // MIDDLES), dtype=kinds.dtype)
+        edges = np.zeros((2, n + 1), dtype=np.int64)
+        self._turning = Turning(kinds.copy(), kinds.copy(), here, *edges)
         self.factors = StationFactors(
             layout, stations, kinds, self._blocks.numbers, 0, n, 0, besides, self._turning
         )

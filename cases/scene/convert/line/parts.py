@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.tables.line.droppers import DropperTable, HangingTable
 from catenary.cases.scene.tables.line.free import FreeDroppersTable
@@ -80,9 +78,10 @@ def pre_sag_of(kind: DropperTable, span: float, positions: tuple[float, ...]) ->
             return tuple(length_from_mm(value) for value in pattern.pre_sag_mm)
     if not kind.pre_sag_mid_mm or len(positions) < 3:
         return (0.0,) * len(positions)
-    x = np.asarray(positions)
-    across = (2 * x - x[0] - x[-1]) / (x[-1] - x[0])
-    return tuple(float(v) for v in length_from_mm(kind.pre_sag_mid_mm) * (1 - across**2))
+    # Plain numbers: a long line may have as many lengths as spans.
+    first, last, sag = positions[0], positions[-1], length_from_mm(kind.pre_sag_mid_mm)
+    across = [(2 * x - first - last) / (last - first) for x in positions]
+    return tuple(sag * (1 - place * place) for place in across)
 
 
 def staggered(given: list[float], n_spans: int) -> tuple[float, ...]:
