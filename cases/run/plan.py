@@ -12,16 +12,17 @@ from catenary.cases.run.describe.ends import end_sentences
 from catenary.cases.run.describe.incidents import incident_facts
 from catenary.cases.run.describe.pantographs import kind_lines
 from catenary.cases.run.file_sizes import FileSizes
-from catenary.cases.run.needs import needs_with_mesh, simulated_time
+from catenary.cases.run.needs import Needs, needs_with_mesh, simulated_time
 from catenary.cases.run.recording import extent_of
 from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.cost_model import estimate_march
 from catenary.cases.scene.scene import Scene
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.effects.effect import Effect
 from catenary.solver.problem.problem import Numerics, Problem, n_halvings
-from catenary.solver.window.choice import window_sentence
+from catenary.solver.window.choice import moving_share, window_sentence
 
 if TYPE_CHECKING:
     from catenary.meshgen.mesh import LineMesh
@@ -69,6 +70,7 @@ class Plan:
     halved : sentence on steps that adapt, empty if none do
     slack : what a slack dropper does, in words; empty if no dropper slackens
     window : which part of the line moves, in words; empty if all of it
+    moving : how much that is, and what a step of it costs, in words
     memory : estimate of the resident memory on one rank [B]
     march : estimate of the wall time of the time loop on one rank [s]
     files : sizes of the files
@@ -105,6 +107,7 @@ class Plan:
     halved: str
     slack: str
     window: str
+    moving: str
     simulated: float
     memory: float
     march: float
@@ -184,11 +187,33 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
         halved=_halved(problem.numerics),
         slack=_slack(problem),
         window=window_sentence(problem),
+        moving=_moving(problem, needs, numbering.n_unknowns),
         simulated=simulated_time(problem),
         memory=needs.memory,
         march=needs.march,
         files=needs.files,
         recorded=needs.recording.sentences(dt),
+    )
+
+
+def _moving(problem: Problem, needs: Needs, n_dofs: int) -> str:
+    """How much of the line moves with a window, and what that is worth."""
+    window = problem.window
+    if not window.moves:
+        return ""
+    share, n_spans = moving_share(problem), problem.line.support_positions.size - 1
+    step = needs.march / needs.n_steps
+    whole = step * estimate_march(n_dofs, 1, problem.numerics.scheme)
+    whole /= estimate_march(round(share * n_dofs), 1, problem.numerics.scheme)
+    spans = max(1, round(share * n_spans))
+    grows = ""
+    if window.by_motion > 0.0:
+        grows = "; it grows with the waves, up to the whole line where these do not fade"
+    elif share * n_spans > window.spans_ahead + window.spans_behind + 1.0:
+        grows = "; it holds the way from the first pantograph to the last one as well"
+    return (
+        f"{spans} of {counted(n_spans, 'span')} on the mean of the run: {1e6 * step:.0f} us a step "
+        f"in place of {1e6 * whole:.0f} (estimate){grows}"
     )
 
 
@@ -253,7 +278,7 @@ def plan_text(plan: Plan) -> str:
         *([("slower", plan.detour)] if plan.detour else []),
         *([("slack", f"of a slack dropper, {plan.slack}")] if plan.slack else []),
         *([("adapted", plan.halved)] if plan.halved else []),
-        *([("window", plan.window)] if plan.window else []),
+        *([("window", plan.window), ("moving", plan.moving)] if plan.window else []),
         ("memory", f"about {plan.memory / 1e6:.0f} MB on one rank (estimate)"),
         (
             "march",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from catenary.cases.run.needs import (
@@ -85,6 +87,20 @@ def test_a_window_is_estimated_by_what_moves() -> None:
     exact = load_scene("ambrosio2012", ["line.n_spans=100", "window.mode=exact"])
     assert 0.05 < moving_share(problem_of(exact)) < 1.0
     assert moving_share(problem_of(load_scene("ambrosio2012"))) == 1.0
+
+
+def test_a_plan_says_how_much_of_a_line_moves() -> None:
+    """The default window of the light line: 13 spans, and the one that the train is in."""
+    light = "line.n_spans=100", "line.damping.alpha_s=0.00275", "train.end_m=4000"
+    bounded = make_plan(load_scene("ambrosio2012", [*light, "window.mode=bounded"]))
+    found = re.search(r"^(\d+) of 100 spans .* (\d+) us a step in place of (\d+)", bounded.moving)
+    assert found, bounded.moving
+    spans, step, whole = map(int, found.groups())
+    assert 12 <= spans <= 14 and 2 * step < whole
+    assert "grows" not in bounded.moving
+    exact = make_plan(load_scene("ambrosio2012", [*light, "window.mode=exact"]))
+    assert "grows with the waves" in exact.moving
+    assert make_plan(load_scene("ambrosio2012", light)).moving == ""
 
 
 def test_flushes_of_a_window_are_as_rare_as_what_moves_is_small() -> None:
