@@ -53,3 +53,30 @@ def test_forty_spans_are_enough_where_waves_hardly_fade() -> None:
     print(usual)
     assert usual.spans == 40.0
     assert usual.history < 0.1 and abs(usual.sigma) < 0.01
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("behind", [(), (200.0,)], ids=["one", "two"])
+@pytest.mark.parametrize(
+    ("case", "name", "words"),
+    [
+        ("ambrosio2012", "lumped", ()),
+        ("ambrosio2012", "lumped", ("line.damping.alpha_s=0.00275",)),
+        ("en50318_2002", "reference", ()),
+        ("ac_simple", "three_masses", ()),
+    ],
+    ids=["average", "light", "en50318", "ac_simple"],
+)
+def test_the_window_that_the_program_chooses_is_good_enough(
+    case: str, name: str, words: tuple[str, ...], behind: tuple[float, ...]
+) -> None:
+    """Window against full line on 100 spans: history within 0.5 % of sigma, sigma within 0.1 %."""
+    train = [f"{{name='{name}'}}", *(f"{{name='{name}',behind_m={way:g}}}" for way in behind)]
+    scene = load_scene(
+        case,
+        ("line.n_spans=100", f"train.pantographs=[{','.join(train)}]", "train.start_m=1200",
+         "evaluation.from_m=2600", "evaluation.to_m=3800", *words),
+    )  # fmt: skip
+    (usual,) = (one for one in window_error.curve_of("", scene, [20]).errors if one.is_default)
+    print(case, words, behind, usual)
+    assert usual.history < 0.5 and abs(usual.sigma) < 0.1

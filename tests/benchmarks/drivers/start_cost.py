@@ -1,6 +1,9 @@
 """Prints processor time and memory of the start of a long line, part by part.
 
-python -m mpi4py start_cost.py SPANS
+python -m mpi4py start_cost.py SPANS [window] [unlike]
+
+With ``window`` some spans move with the train only; ``unlike`` spans are 50 to 58 m long, no two of
+one length.
 """
 
 from __future__ import annotations
@@ -9,6 +12,7 @@ import resource
 import sys
 from dataclasses import replace
 
+import numpy as np
 from mpi4py import MPI
 from step_cost import peak_memory, room
 
@@ -21,7 +25,19 @@ from catenary.solver.time_loop.march import March
 STEPS = 20
 
 
-def main(n_spans: int) -> None:
+def words_of(n_spans: int, *kinds: str) -> list[str]:
+    """Settings of the scene."""
+    words = [f"line.n_spans={n_spans}", *room(n_spans)]
+    if "window" in kinds:
+        words += ["window.mode=bounded", "line.damping.alpha_s=0.00275"]
+    if "unlike" in kinds:
+        drawn = np.random.default_rng(1).permutation(n_spans) / n_spans
+        lengths = (50.0 + 8.0 * drawn[: n_spans - 5]).round(5).tolist()
+        words += [f"line.span_m={lengths}", "line.dropper.spacing_m=6"]
+    return words
+
+
+def main(n_spans: int, *kinds: str) -> None:
     spent = 0.0
 
     def told(part: str) -> None:
@@ -32,7 +48,7 @@ def main(n_spans: int) -> None:
         spent = now
 
     told("imports")
-    scene = load_scene("ambrosio2012", [f"line.n_spans={n_spans}", *room(n_spans)])
+    scene = load_scene("ambrosio2012", words_of(n_spans, *kinds))
     problem = problem_of(scene)
     train = problem.train
     end = train.start + STEPS * problem.numerics.dt * train.speed
@@ -49,4 +65,4 @@ def main(n_spans: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]))
+    main(int(sys.argv[1]), *sys.argv[2:])
