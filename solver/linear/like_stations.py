@@ -7,6 +7,7 @@ of one mark have the same rows, and stretches whose marks are the same have the 
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 
 import numpy as np
@@ -93,7 +94,8 @@ def _elements_between(block: Block, low: int, high: int) -> tuple[np.ndarray, ..
     if len(dofs) < len(block.dofs):
         used, kind = np.unique(kind, return_inverse=True)
         terms = [term[used] for term in terms]
-    return dofs, kind, np.concatenate([term.reshape(len(term), -1) for term in terms], axis=1)
+    rows = [term.reshape(len(term), math.prod(term.shape[1:])) for term in terms]
+    return dofs, kind, np.hstack(rows)
 
 
 def _mixed(numbers: np.ndarray) -> np.ndarray:
