@@ -16,7 +16,7 @@ PARTS := meshgen solver mbs postproc cases
 RESULT := results/ambrosio2012
 SEED ?= 1
 LONG_RUNS := $(wildcard tests/benchmarks/test_multibody_*.py) tests/benchmarks/test_killed_runs.py \
-    tests/benchmarks/test_long_line.py
+    tests/benchmarks/test_long_line.py tests/benchmarks/test_exact_window.py
 
 # Open MPI starts neither as root nor with more ranks than cores unless told to; other MPI
 # libraries know neither option.
@@ -100,9 +100,10 @@ fuzz: setup ## random scenes: 4000 that run, 4000 refused, 50 sweeps, 25 killed,
 	FUZZ_SEED=$(SEED) FUZZ_DAMAGE=2000 $(PYTEST) -q tests/unit/postproc/test_postproc_damage.py
 	FUZZ_SEED=$(SEED) FUZZ_SWEEPS=50 $(PYTEST) -q tests/regression/test_fuzz_sweeps.py
 	FUZZ_SEED=$(SEED) FUZZ_PROCESSES=25 $(PYTEST) -q tests/regression/test_fuzz_processes.py
+	FUZZ_SEED=$(SEED) FUZZ_WINDOWS=300 $(PYTEST) -q tests/regression/test_fuzz_windows.py
 	FUZZ_SEED=$(SEED) FUZZ_CASES=100 timeout 1800 mpirun -n 2 $(MPI_SHARED) $(MPI_PYTEST) -q tests/regression/test_fuzz.py
 
-long-runs: setup ## all bodies of a pantograph over 20 s and ten minutes, 1000 spans killed at random, 540 km
+long-runs: setup ## all bodies of a pantograph over 20 s and ten minutes, 1000 spans killed, exact windows, 540 km
 	$(PYTEST) -q -s $(LONG_RUNS)
 
 test-paraview: setup ## open runs in the ParaView of this machine (Debian: paraview python3-paraview xvfb)

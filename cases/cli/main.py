@@ -15,7 +15,7 @@ import typer
 from catenary.cases.cli import run, plan, line, results  # noqa: F401
 from catenary.cases.cli.studies import sweep, accuracy, hard  # noqa: F401
 from catenary.cases.cli import pantograph  # noqa: F401
-from catenary.cases.cli.studies import stability, waves  # noqa: F401
+from catenary.cases.cli.studies import stability, waves, scaling  # noqa: F401
 from catenary.cases.cli import lists  # noqa: F401
 
 # isort: on

@@ -39,6 +39,9 @@ def state_to_continue(result: Path, beyond_end: bool = False) -> dict[str, Any]:
                 f"the run in {result} is done; there is nothing to continue, unless --until-m says "
                 "where it is to end"
             )
+        excitation = results.attributes.get("excitation")
+        if excitation:
+            raise _refusal(result, f"{excitation['says']} excites its line, not a train")
         state = results.checkpoint
         half_before = (state["step"] - 0.5) * results.dt
     # A table that is written to may be damaged where the report does not read it.

@@ -127,15 +127,15 @@ def simulated_time(problem: Problem) -> float:
     return (train.end - train.start) / train.speed
 
 
-def needs_before_meshing(scene: Scene) -> Needs | None:
+def needs_before_meshing(scene: Scene, problem: Problem | None = None) -> Needs | None:
     """What a run needs, known from its scene alone; None if that brings its own mesh.
 
-    Not collective.
+    Not collective. ``problem`` is the scene's unless another one is run on its line.
     """
     size = size_of(scene)
     if size is None:
         return None
-    problem = problem_of(scene)
+    problem = problem or problem_of(scene)
     extent = extent_before_meshing(problem.line, size.nodes)
     return needs_of(scene, problem, extent, size.unknowns)
 

@@ -110,16 +110,23 @@ class Recording:
         return [text for name, text in self.sentences(dt).items() if chosen[name]]
 
 
-def recording_of(output: OutputTable, problem: Problem, extent: Extent, n_steps: int) -> Recording:
+def recording_of(
+    output: OutputTable,
+    problem: Problem,
+    extent: Extent,
+    n_steps: int,
+    usual_s: float = FIELD_EVERY,
+) -> Recording:
     """What a run of a problem records. Not collective.
 
     Parameters
     ----------
     output : the scene's table
     n_steps : steps after step 0
+    usual_s : from one snapshot to the next where neither the table nor their size decides [s]
     """
     fields = _field_record(output, problem)
-    field_every, by_size = _field_every(output, problem, fields, extent, n_steps)
+    field_every, by_size = _field_every(output, problem, fields, extent, n_steps, usual_s)
     train = train_of(problem)
     end_x = np.array([end.x for end in gauge_places(problem, train.moves_along)])
     places = {
@@ -189,6 +196,7 @@ def _field_every(
     fields: FieldRecord,
     extent: Extent,
     n_steps: int,
+    usual_s: float,
 ) -> tuple[int | None, bool]:
     """Steps between two snapshots, None for none, and whether their size has made them rarer."""
     dt = problem.numerics.dt
@@ -196,7 +204,7 @@ def _field_every(
         return cadence(output.field_every_m / problem.train.speed, dt), False
     if output.field_every_s is not None:
         return cadence(output.field_every_s, dt), False
-    usual = cadence(FIELD_EVERY, dt) or 1
+    usual = cadence(usual_s, dt) or 1
     share = shown_share(fields, problem, n_steps)
     most = max(1.0, WHOLE_UP_TO / (share * snapshot_bytes(fields, extent)))
     needed = int(np.ceil(n_steps / most))

@@ -25,6 +25,7 @@ from catenary.cases.result_folder.output_folder import (
 )
 from catenary.cases.run.continuing import refuse_other_run, state_to_continue
 from catenary.cases.run.describe.header import header_of
+from catenary.cases.run.excited_run import ExcitedRun
 from catenary.cases.run.needs import (
     flush_cadence,
     needs_before_meshing,
@@ -32,7 +33,7 @@ from catenary.cases.run.needs import (
     run_size,
 )
 from catenary.cases.run.performance import Phases, performance
-from catenary.cases.run.recording import extent_of, recording_of
+from catenary.cases.run.recording import FIELD_EVERY, extent_of, recording_of
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
@@ -82,6 +83,7 @@ def run_case(
     ready: Callable[[], None] = lambda: None,
     only_summary: bool = False,
     large: bool | None = None,
+    excited: ExcitedRun | None = None,
 ) -> RunOutcome:
     """Simulate a scene and write results, fields and report into ``out_dir``. Collective.
 
@@ -95,6 +97,7 @@ def run_case(
     ready : called on all ranks when folder and size of the run have been judged
     only_summary : of the report write ``summary.json`` alone, which costs no time
     large : whether a run may pass the bounds on its size; as ``force`` if not given
+    excited : what sets the line into motion in place of the scene's train
 
     Raises
     ------
@@ -106,7 +109,9 @@ def run_case(
         If files cannot be written.
     """
     allowed = force if large is None else large
-    order = _Order(scene, out_dir, comm, petsc_options, tell, None, only_summary, ready)
+    order = _Order(
+        scene, out_dir, comm, petsc_options, tell, None, only_summary, ready, excited=excited
+    )
     with held(out_dir, comm, f"catenary run {scene.case.name}"):
         on_root(comm, lambda: prepare(out_dir, force))
         return _run(order, lambda size: check_size(out_dir, size, allowed))
@@ -154,6 +159,7 @@ class _Order:
     only_summary: bool
     ready: Callable[[], None] = lambda: None
     extends: bool = False
+    excited: ExcitedRun | None = None
 
     @property
     def resume(self) -> bool:
@@ -176,13 +182,16 @@ def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
     left = f"{order.result} is as it was" if order.resume else "nothing was written"
     with ExitStack() as stack:
         with Phase(comm, "the line was read", left) as phase:
-            problem = problem_of(scene)
-            on_root(comm, phase.alone(lambda: _judge_before_meshing(scene, judge)))
+            excited = order.excited
+            problem = problem_of(scene) if excited is None else excited.problem
+            on_root(comm, phase.alone(lambda: _judge_before_meshing(scene, problem, judge)))
             order.ready()
             at_rest = _at_rest(scene, problem, comm, phases, phase, judge)
+            if excited is not None:
+                excited.excite(at_rest)
             header: Header | None = None
             if comm.rank == 0:
-                header = header_of(scene, problem, at_rest, order.petsc_options)
+                header = header_of(scene, problem, at_rest, order.petsc_options, excited)
             if order.resume:
                 on_root(comm, lambda: _refuse_other_run(order, header, problem))
             phase.next("the line was distributed")
@@ -208,8 +217,8 @@ def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
     return result
 
 
-def _judge_before_meshing(scene: Scene, judge: Callable[[RunSize], None]) -> None:
-    needs = needs_before_meshing(scene)
+def _judge_before_meshing(scene: Scene, problem: Problem, judge: Callable[[RunSize], None]) -> None:
+    needs = needs_before_meshing(scene, problem)
     if needs is not None:
         judge(run_size(needs))
 
@@ -253,7 +262,9 @@ def _observers(
     """
     comm, dt, output = order.comm, problem.numerics.dt, order.scene.output
     begun_for = comm.bcast(_begun_for(order) if comm.rank == 0 else None) or n_steps
-    recording = recording_of(output, problem, extent_of(at_rest.mesh), begun_for)
+    excited = order.excited
+    usual = FIELD_EVERY if excited is None else excited.snapshot_every
+    recording = recording_of(output, problem, extent_of(at_rest.mesh), begun_for, usual)
     for sentence in recording.told(dt):
         logger.info(sentence)
     flush_every = output.flush_every_steps or flush_cadence(
@@ -291,6 +302,8 @@ def _observers(
     half_lengths = [place.data.strips.half_length for place in problem.train.placements]
     if "lateral_motion" in problem.effects and np.isfinite(half_lengths).any():
         first.append(StripWatch(half_lengths))
+    if excited is not None:
+        first += excited.watching(at_rest)
     return [*first, progress, recorder], recorder
 
 

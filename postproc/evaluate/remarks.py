@@ -46,6 +46,7 @@ def remarks(results: Results) -> list[str]:
     Files of earlier formats lack the facts that some of them need, and have fewer.
     """
     return [
+        *_about_excitation(results),
         *results.attributes.get("arrivals", {}).get("warnings", []),
         *(sentence(p) for p in lateral_ranges(results) if p.left),
         *_about_incidents(results),
@@ -55,6 +56,17 @@ def remarks(results: Results) -> list[str]:
         *_about_iterations(results),
         *_about_sizes(results),
         *_about_gusts(results),
+    ]
+
+
+def _about_excitation(results: Results) -> list[str]:
+    """That there is no train, of which forces could be judged."""
+    facts = results.attributes.get("excitation")
+    if not facts:
+        return []
+    return [
+        f"The line is excited by {facts['says']}, without a train: nothing is judged, and contact "
+        "forces are zero."
     ]
 
 

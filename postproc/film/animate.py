@@ -264,8 +264,9 @@ def _words(data: FilmData, projection: Projection, row: int) -> str:
     scale = projection.scale
     stretched = "widths" if projection.view is View.PLAN else "heights"
     forces = ", ".join(f"{force:.0f} N" for force in data.force[row])
+    speed = f"{3.6 * data.speed:.0f} km/h   " if data.speed else ""
     return (
-        f"t = {data.time[row]:.2f} s   {3.6 * data.speed:.0f} km/h   {forces}   "
+        f"t = {data.time[row]:.2f} s   {speed}{forces}   "
         f"{stretched} x {scale.size:g}, motion x {scale.motion:g}"
     )
 

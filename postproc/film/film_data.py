@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate import filters
 from catenary.postproc.read.results import Results
 from catenary.solver.base.errors import InputError
+from catenary.solver.waves.excitation import Excitation, MovingForce, excitation_of_facts
 
 # A place that is that near to the end of a wire is on it [m].
 _NEAR = 1e-6
@@ -36,6 +37,8 @@ class FilmData:
     position, force, filtered, head_height : (n, p) [m], [N], [N] below 20 Hz, [m]; filtered is all
         NaN where the record is too coarse for it
     names : of the pantographs
+    excitation : what sets the line into motion in place of a train, whose place and force then
+        stand in place of those of a pantograph; None with a train
     """
 
     title: str
@@ -53,6 +56,7 @@ class FilmData:
     filtered: np.ndarray
     head_height: np.ndarray
     names: list[str]
+    excitation: Excitation | None = None
 
     @property
     def n_pantographs(self) -> int:
@@ -103,7 +107,7 @@ def film_data(results: Results) -> FilmData:
         raise InputError(f"{results.path} holds no step, of which a film could be made")
     force = results.channel("contact_force")
     points, droppers = results.line("node_points"), results.line("droppers")
-    return FilmData(
+    data = FilmData(
         str(results.attributes.get("title", "")),
         results.fact("speed"),
         points,
@@ -119,6 +123,23 @@ def film_data(results: Results) -> FilmData:
         _filtered(force, results.dt),
         results.channel("head_height"),
         results.pantograph_names(),
+    )
+    facts = results.attributes.get("excitation")
+    return _excited(data, excitation_of_facts(facts), results.dt) if facts else data
+
+
+def _excited(data: FilmData, excitation: Excitation, dt: float) -> FilmData:
+    """The same of a line that an excitation sets into motion."""
+    position, force = (of(data.time)[:, None] for of in (excitation.place, excitation.value))
+    return replace(
+        data,
+        speed=excitation.speed if isinstance(excitation, MovingForce) else 0.0,
+        position=position,
+        force=force,
+        filtered=_filtered(force, dt),
+        head_height=data.rest_height(position[:, 0])[:, None],
+        names=[excitation.kind],
+        excitation=excitation,
     )
 
 

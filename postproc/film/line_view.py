@@ -209,6 +209,8 @@ class LineView:
 
     def _show_train(self, row: int) -> None:
         """Put the coaches under their pantographs."""
+        if self._data.excitation is not None:
+            return
         begin, end = coaches(self._data.position[row]).T
         low, high = self.foot - 1.0, self.foot
         if self._projection.view is View.PLAN:
@@ -246,6 +248,8 @@ class LineView:
             drawn = self._projection.seen(np.array(rails), 0.0, 2.0)
             mesh = pyvista.PolyData(drawn, lines=segments(np.array([[0, 1], [2, 3]])))
             plotter.add_mesh(mesh, color=TRACK, line_width=2, lighting=False)
+        if data.excitation is not None:
+            return
         n = len(coaches(data.position[0]))
         faces = np.column_stack([np.full(n, 4), np.arange(4 * n).reshape(n, 4)])
         self._coaches = pyvista.PolyData(np.zeros((4 * n, 3)), faces=faces.ravel())

@@ -18,6 +18,8 @@ from catenary.postproc.film.snapshots import Snapshots
 LOWER_ARM, UPPER_ARM, HALF_HEAD, HALF_STRIP = 1.55, 1.95, 0.45, 0.8
 # How far the foot stands ahead of the head, towards the knee [m].
 _FOOT_AHEAD = 0.6
+# Length of what is drawn of a force that is no pantograph's, and half its width [m].
+_STEM, _HALF_STROKE = 0.5, 0.25
 
 
 class Schematic:
@@ -46,8 +48,24 @@ class Schematic:
         return Pose(rest, now)
 
 
+class Stroke:
+    """What is drawn where an excitation acts: a stem up to the wire, with a plate on it."""
+
+    cells = np.array([[0, 1], [2, 3], [4, 5]])
+    kinds = np.array([BODY, HEAD, HEAD])
+    below = BELOW_HEAD
+
+    def pose(self, places: np.ndarray, base: float, head: float, wire: float) -> Pose:
+        """Where the points are: under the wire at rest, as what strikes is not simulated."""
+        points = np.zeros((6, 3))
+        points[0, 2] = -_STEM
+        points[[2, 3], 0] = points[[4, 5], 1] = -_HALF_STROKE, _HALF_STROKE
+        points[:, 2] += wire
+        return Pose(points, points.copy())
+
+
 class MovingPantographs:
-    """All pantographs of a run. Not collective.
+    """All pantographs of a run, or what stands for them. Not collective.
 
     Attributes
     ----------
@@ -61,7 +79,9 @@ class MovingPantographs:
         self._data, self._snapshots = data, snapshots
         contact = float(np.median(data.points[data.wires[data.contact], 2]))
         known = snapshots.n_pantographs == data.n_pantographs
-        if shapes is None or len(shapes) != data.n_pantographs or not known:
+        if data.excitation is not None:
+            shapes = [Stroke()]
+        elif shapes is None or len(shapes) != data.n_pantographs or not known:
             shapes = [Schematic(contact - BELOW_HEAD)] * data.n_pantographs
         self.shapes = list(shapes)
         self.roof = contact - max(one.below for one in self.shapes)
@@ -74,7 +94,8 @@ class MovingPantographs:
         known = self._snapshots.pantographs(number)
         found = []
         for p, one in enumerate(self.shapes):
-            base, places = known[p] if p < len(known) else (0.0, np.zeros(0))
+            there = p < len(known) and data.excitation is None
+            base, places = known[p] if there else (0.0, np.zeros(0))
             pose = one.pose(places, base, float(data.head_height[row, p]), float(wire[p]))
             x = np.array([data.position[row, p], 0.0, 0.0])
             found.append(Pose(pose.rest + x, pose.now + x))

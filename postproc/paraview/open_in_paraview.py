@@ -67,8 +67,7 @@ def write_script(
                 os.replace(part, target / SCRIPT)
             except OSError as error:
                 raise InputError(f"{target} cannot be written: {error}") from error
-    scene = [files.pantographs, files.forces, files.train, files.track]
-    return [target / SCRIPT, *scene, vtkhdf]
+    return [target / SCRIPT, *files.files, vtkhdf]
 
 
 def _script(settings: dict[str, object]) -> str:
@@ -93,7 +92,9 @@ def _settings(
     numbers = np.arange(times.size)
     scale = picture.scale(data, snapshots, numbers, motion)
     colours = picture.colours(snapshots, numbers)
-    arrow = _ARROW * scale.size * room_above(data) / max(float(data.force.mean()), 1.0)
+    # A blow is over soon: its largest force, not its mean, is to fit.
+    usual = data.force.mean() if data.excitation is None else np.abs(data.force).max()
+    arrow = _ARROW * scale.size * room_above(data) / max(float(usual), 1.0)
     first = data.row_at(float(times[0]))
     kinds = {int(kind) for shape in pantographs.shapes for kind in shape.kinds}
     return {
@@ -101,7 +102,7 @@ def _settings(
         "line": "../fields.xdmf",
         "pantographs": scenery.PANTOGRAPHS,
         "forces": scenery.FORCES,
-        "train": scenery.TRAIN,
+        "train": scenery.TRAIN if data.excitation is None else "",
         "track": scenery.TRACK,
         "blocks": [[name, _kind(name, data)] for name in snapshots.parts],
         "names": data.names,

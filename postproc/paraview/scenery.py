@@ -26,12 +26,18 @@ _HALF_GAUGE = 0.75
 
 @dataclass(frozen=True)
 class Scenery:
-    """Files that were written, XDMF all of them."""
+    """Files that were written, XDMF all of them; no train where an excitation stands for it."""
 
     pantographs: Path
     forces: Path
-    train: Path
     track: Path
+    train: Path | None
+
+    @property
+    def files(self) -> list[Path]:
+        """All of them."""
+        train = [] if self.train is None else [self.train]
+        return [self.pantographs, self.forces, *train, self.track]
 
 
 def write(
@@ -54,13 +60,15 @@ def write(
     rails, lines_of_rails = track(data)
     cells, number, kind = _lines_of(pantographs)
     n_points = sum(int(shape.cells.max()) + 1 for shape in pantographs.shapes)
+    has_train = data.excitation is None
     n_corners = len(boxes(data.position[0], pantographs.roof))
     with h5py.File(folder / NUMBERS, "w") as file:
         file["track/points"], file["track/cells"] = rails, lines_of_rails
         file["pantographs/cells"] = cells
         file["pantographs/number"], file["pantographs/kind"] = number, kind
         starts = 8 * np.arange(n_corners // 8)[:, None, None]
-        file["train/faces"] = (starts + FACES).reshape(-1, 4).astype(np.int32)
+        if has_train:
+            file["train/faces"] = (starts + FACES).reshape(-1, 4).astype(np.int32)
         for k, time in enumerate(times.tolist()):
             row, name = data.row_at(time), _name(k)
             poses = pantographs.poses(k)
@@ -74,8 +82,10 @@ def write(
             force = np.zeros((p, 3), dtype="<f4")
             force[:, 2] = data.force[row]
             file[f"forces/force/{name}"] = force
-            file[f"train/points/{name}"] = boxes(data.position[row], pantographs.roof)
-    files = Scenery(*(folder / name for name in (PANTOGRAPHS, FORCES, TRAIN, TRACK)))
+            if has_train:
+                file[f"train/points/{name}"] = boxes(data.position[row], pantographs.roof)
+    train = folder / TRAIN if has_train else None
+    files = Scenery(folder / PANTOGRAPHS, folder / FORCES, folder / TRACK, train)
     of_cell = "".join(
         _field(name, "Scalar", "Cell", f"{len(cells)}", f"pantographs/{name}", True)
         for name in ("number", "kind")
@@ -93,7 +103,8 @@ def write(
         grids[1].append((time, dots, places, _vector("forces", name, p) + force_at))
         grids[2].append((time, faces, _points(f"train/points/{name}", n_corners), ""))
     for path, own in zip((files.pantographs, files.forces, files.train), grids, strict=True):
-        _write_text(path, own)
+        if path is not None:
+            _write_text(path, own)
     standing = _cells("Polyline", "track/cells", 2, 2)
     _write_text(files.track, [(None, standing, _points("track/points", 4), "")])
     return files

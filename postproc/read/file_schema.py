@@ -14,6 +14,7 @@ from catenary.meshgen.wires import Role
 from catenary.postproc.channels.line_record import LineRecord, from_table
 from catenary.postproc.standards.en50367 import EDITIONS, SYSTEMS
 from catenary.solver.time_loop import channels
+from catenary.solver.waves.excitation import excitation_of_facts
 
 # Beyond these sizes a recorded value is damage, by unit; the march itself ends a run whose contact
 # force passes 1e9 N.
@@ -161,6 +162,13 @@ def _arrivals(value: Any) -> bool:
     )
 
 
+def _excitation(value: Any) -> bool:
+    try:
+        return not value or bool(excitation_of_facts(value))
+    except (KeyError, TypeError, ValueError):
+        return False
+
+
 def _wires(value: Any) -> bool:
     roles = {role.value for role in Role}
     return isinstance(value, dict) and bool(value) and set(map(str, value.values())) <= roles
@@ -197,6 +205,7 @@ ATTRIBUTES: dict[str, Attribute] = {
     "defects": Attribute("a list of sentences", _defects, True, []),
     "incidents": Attribute("a list of times with sentences", _incidents, True, []),
     "arrivals": Attribute("facts of waves from the ends, with sentences", _arrivals, True, {}),
+    "excitation": Attribute("what sets the line into motion", _excitation, True, {}),
     "wires": Attribute("a table of roles", _wires, True, SIMPLE_CATENARY),
     "petsc_options": Attribute("a list", lambda v: isinstance(v, list), True, []),
     "n_strips": Attribute(

@@ -66,6 +66,7 @@ def summarise(
         "defects": attributes.get("defects", []),
         "incidents": attributes.get("incidents", []),
         "arrivals": attributes.get("arrivals", {}),
+        "excitation": attributes.get("excitation") or None,
         "droppers": {
             "n_slackened": statistics.droppers.n_slackened,
             "max_force_N": statistics.droppers.maximum,

@@ -56,7 +56,7 @@ def on_root(comm: Any, work: Callable[[], T], *, takes_long: bool = False) -> T:
             error = caught
     if comm.size > 1:
         if takes_long:
-            _sleep_until_all_are_here(comm)
+            wait_for_all(comm)
         result, carried = comm.bcast((result, _portable(error)), root=0)
         if carried is not None:
             raise error if error is not None else carried
@@ -65,7 +65,8 @@ def on_root(comm: Any, work: Callable[[], T], *, takes_long: bool = False) -> T:
     return result
 
 
-def _sleep_until_all_are_here(comm: Any) -> None:
+def wait_for_all(comm: Any) -> None:
+    """Sleep until all ranks have come here. Collective."""
     arrival = comm.Ibarrier()
     while not arrival.Test():
         time.sleep(_NAP)

@@ -1,23 +1,18 @@
 """What sets a contact wire into motion in place of a train: a force that moves, a pulse, a hammer.
 
-Each is a load in time on the wire's elements, whose shape functions share a force at a point among
-the unknowns of its two nodes.
+Data only, and what result files say of it; ``excitation_load`` makes loads of it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
-from scipy import sparse
 
-from catenary.solver.base.compiled import compiled
-from catenary.solver.model.elements.shape_functions import shape_values
-from catenary.solver.model.loads import FieldLoad, Load, ShapeLoad, table
-from catenary.solver.model.model import Model
-
-# Points in time by which half a sine or a whole cosine is drawn.
-_POINTS = 41
+FORCE, PULSE, HAMMER = "force", "pulse", "hammer"
+KINDS = (FORCE, PULSE, HAMMER)
 
 
 @dataclass(frozen=True)
@@ -38,11 +33,28 @@ class MovingForce:
     speed: float
     rise: float
 
+    @property
+    def kind(self) -> str:
+        """One of ``KINDS``."""
+        return FORCE
+
+    def place(self, time: np.ndarray) -> np.ndarray:
+        """Where it is at times (n,) [s], shape (n,) [m]."""
+        return self.start + self.speed * time
+
     def value(self, time: np.ndarray) -> np.ndarray:
         """Its value at times (n,) [s], shape (n,) [N]."""
         share = np.clip(time / self.rise, 0.0, 1.0) if self.rise > 0.0 else np.ones_like(time)
         grown = 0.5 * (1.0 - np.cos(np.pi * share))
         return self.force * grown * np.cos(2.0 * np.pi * self.frequency * time)
+
+    def says(self) -> str:
+        """It in words."""
+        varies = f" cos(2 pi {self.frequency:g} Hz t)" if self.frequency else ""
+        return (
+            f"a force of {self.force:g} N{varies} from {self.start:g} m on at "
+            f"{3.6 * self.speed:.4g} km/h"
+        )
 
 
 @dataclass(frozen=True)
@@ -68,6 +80,31 @@ class Blow:
         """Integral of the force over time [N s]."""
         return self.peak * self.duration * (2.0 / np.pi if self.hammer else 0.5)
 
+    @property
+    def kind(self) -> str:
+        """One of ``KINDS``."""
+        return HAMMER if self.hammer else PULSE
+
+    def place(self, time: np.ndarray) -> np.ndarray:
+        """Where it is at times (n,) [s], shape (n,) [m]."""
+        return np.full(np.shape(time), self.at)
+
+    def shape(self, share: np.ndarray) -> np.ndarray:
+        """The force after shares (n,) of the duration, over its peak."""
+        inside = np.clip(share, 0.0, 1.0)
+        return np.asarray(np.sin(np.pi * inside) ** (1 if self.hammer else 2))
+
+    def value(self, time: np.ndarray) -> np.ndarray:
+        """Its value at times (n,) [s], shape (n,) [N]."""
+        return self.peak * self.shape(time / self.duration)
+
+    def says(self) -> str:
+        """It in words."""
+        return (
+            f"a {self.kind} of {self.impulse:.4g} N s at {self.at:g} m within {self.duration:g} s, "
+            f"up to {self.peak:.4g} N"
+        )
+
 
 Excitation = MovingForce | Blow
 
@@ -77,53 +114,26 @@ def hammer(at: float, impulse: float, duration: float) -> Blow:
     return Blow(at, duration, 0.5 * np.pi * impulse / duration, True)
 
 
-def load_of(excitation: Excitation, model: Model, interval: float) -> Load:
-    """The load that an excitation is on the first contact wire. Not collective.
+def as_facts(excitation: Excitation) -> dict[str, Any]:
+    """All of an excitation, plain enough for JSON; `excitation_of_facts` takes it back."""
+    return {"kind": excitation.kind, **asdict(excitation), "says": excitation.says()}
 
-    Parameters
-    ----------
-    interval : between times at which a force that moves is found; linear between them. Time steps
-        are best [s]
+
+def excitation_of_facts(facts: Mapping[str, Any]) -> Excitation:
+    """The excitation of facts as `as_facts` makes them.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        If they are none.
     """
-    nodes = model.contact_nodes
-    x = model.mesh.x(nodes)
-    unknowns = np.stack([model.dofs(nodes), model.dofs(nodes, "theta_y")], axis=1).ravel()
-    if isinstance(excitation, Blow):
-        values = np.zeros((1, unknowns.size))
-        spread(x, np.array([excitation.at]), np.array([excitation.peak]), 0, values)
-        acts = np.flatnonzero(values[0])
-        share = np.linspace(0.0, 1.0, _POINTS)
-        shape = np.sin(np.pi * share) if excitation.hammer else np.sin(np.pi * share) ** 2
-        course = table(list(excitation.duration * share), list(shape))
-        return ShapeLoad(unknowns[acts], values[0, acts], course)
-
-    def fill(first: int, part: slice, slices: np.ndarray) -> None:
-        times = interval * (first + np.arange(slices.shape[0]))
-        places = excitation.start + excitation.speed * times
-        slices[:] = 0.0
-        spread(x, places, excitation.value(times), part.start, slices)
-
-    return FieldLoad(unknowns, sparse.identity(unknowns.size, format="csr"), interval, fill)
-
-
-@compiled
-def spread(x, places, forces, first, loads):  # type: ignore[no-untyped-def]
-    """Add forces at single places to loads on deflections and slopes of nodes.
-
-    Parameters
-    ----------
-    x : (n,) nodes of a wire, ascending [m]
-    places, forces : (m,) [m], [N]; what lies beyond the ends is left out
-    first : number of the unknown that the first column stands for: w and theta of each node in turn
-    loads : (m, k) a row for each force [N], [N m]
-    """
-    for i in range(places.size):
-        if places[i] < x[0] or places[i] > x[-1]:
-            continue
-        e = min(max(np.searchsorted(x, places[i], side="right") - 1, 0), x.size - 2)
-        length = x[e + 1] - x[e]
-        shares = shape_values((places[i] - x[e]) / length, length)
-        for j in range(4):
-            column = 2 * e + j - first
-            if 0 <= column < loads.shape[1]:
-                loads[i, column] += forces[i] * shares[j]
+    if facts["kind"] not in KINDS or not isinstance(facts["says"], str):
+        raise ValueError(f"{facts['kind']} is no excitation")
+    own: type[MovingForce | Blow] = MovingForce if facts["kind"] == FORCE else Blow
+    names = (name for name in own.__dataclass_fields__ if name != "hammer")
+    numbers = {name: float(facts[name]) for name in names}
+    if not np.isfinite(list(numbers.values())).all() or numbers.get("duration", 1.0) <= 0.0:
+        raise ValueError("an excitation has finite numbers")
+    if own is MovingForce:
+        return MovingForce(**numbers)
+    return Blow(**numbers, hammer=facts["kind"] == HAMMER)

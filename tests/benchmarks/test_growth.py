@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from program import MPIRUN
+from program import MPIRUN, catenary
 
 needs_mpirun = pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
 _first: dict[str, Any] = {}
@@ -35,10 +35,6 @@ TURNS, STEPS_OF_A_TURN = 160, 30_000
 SHARES = (100, 300, 1000)
 # Two neighbours, a sum and a broadcast; a rank whose droppers may slacken tells of them besides.
 MOST_MESSAGES = 2 + 2 + 1
-PREDICTED_RANKS = (64, 512, 4096)
-# Numbers of a step's reduction and broadcast with one contact, and of a neighbour's overlap of one
-# span, 90 stations of 4 unknowns; 8 bytes each.
-REDUCED, REPLIED, OVERLAP = 8, 68, 360
 
 
 def driver(name: str, *arguments: object, ranks: int = 1) -> dict[str, Any]:
@@ -148,29 +144,11 @@ def test_messages_of_a_step(benchmark: Any) -> None:
 
 
 @needs_mpirun
-def test_prediction_for_many_ranks(benchmark: Any) -> None:
-    predict(driver("step_cost.py", 1000, STEPS[1000]), driver("ping.py", ranks=2))
+def test_prediction_for_many_ranks(benchmark: Any, tmp_path: Path) -> None:
+    """From messages between two ranks, and beside the exchange on eight that share the cores."""
+    for ranks in (2, 8):
+        words = "scaling", "ambrosio2012", "--set", "line.n_spans=10000"
+        done = catenary(*words, cwd=tmp_path, ranks=ranks)
+        assert done.code == 0, done.stderr
+        print(f"\n\n{done.stdout}")
     keep(benchmark, {})
-
-
-def predict(one: dict[str, Any], wire: dict[str, float]) -> None:
-    """A prediction for many ranks from one rank's step and a message's latency and bandwidth.
-
-    Work is shared; a step exchanges ghosts and overlaps with two neighbours at once, and sums up
-    and broadcasts over a tree of log2 ranks. Nothing of it was measured on so many ranks.
-    """
-
-    def message(numbers: int) -> float:
-        return 1e6 * (wire["latency_s"] + 8 * numbers * wire["s_per_byte"])
-
-    work, per_unknown = one["us_per_step"], one["us_per_step"] / one["unknowns"]
-    print(f"\nmessage: {1e6 * wire['latency_s']:.2f} us and "
-          f"{1e-9 / wire['s_per_byte']:.1f} GB/s between two ranks of this machine")  # fmt: skip
-    print("prediction for 10 000 spans, us a step:")
-    for ranks in PREDICTED_RANKS:
-        share = 10 * work / ranks + 2 * OVERLAP * per_unknown
-        talk = 2 * message(4) + 2 * message(OVERLAP)
-        tree = np.log2(ranks) * (message(REDUCED) + message(REPLIED))
-        total = share + talk + tree
-        print(f"  {ranks:5} ranks {total:8.0f} (line {share:.0f}, neighbours {talk:.0f}, "
-              f"tree {tree:.0f}), efficiency {100 * 10 * work / ranks / total:.0f} %")  # fmt: skip

@@ -11,7 +11,8 @@ from catenary.solver.base.errors import InputError
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.loads import FieldLoad, ShapeLoad
 from catenary.solver.problem.problem import Problem
-from catenary.solver.waves.excitation import Blow, MovingForce, hammer, load_of
+from catenary.solver.waves.excitation import Blow, MovingForce, hammer
+from catenary.solver.waves.excitation_load import load_of
 
 LENGTH = 60.0
 

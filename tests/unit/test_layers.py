@@ -52,7 +52,8 @@ ROOMS = {
         "scene.cost_model", "scene.checks", "scene.load", "terminal", "process",
         "result_folder", "run",
         "studies.sweep", "studies.pantograph", "studies.accuracy", "studies.hard",
-        "studies.stability", "studies.choice", "studies.waves", "studies.case_study",
+        "studies.scaling", "studies.stability", "studies.choice", "studies.waves",
+        "studies.case_study",
         "ambrosio2012", "cli",
     ),
 }  # fmt: skip

@@ -9,6 +9,7 @@ from catenary.cases.run.describe.arrivals import arrival_facts
 from catenary.cases.run.describe.defects import defect_facts
 from catenary.cases.run.describe.incidents import incident_facts
 from catenary.cases.run.describe.pantographs import header_words
+from catenary.cases.run.excited_run import ExcitedRun
 from catenary.cases.run.plan import effect_rows
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.scene import Scene
@@ -20,7 +21,11 @@ from catenary.solver.window.choice import window_sentence
 
 
 def header_of(
-    scene: Scene, problem: Problem, at_rest: LineAtRest, petsc_options: Sequence[str]
+    scene: Scene,
+    problem: Problem,
+    at_rest: LineAtRest,
+    petsc_options: Sequence[str],
+    excited: ExcitedRun | None = None,
 ) -> Header:
     """Header of the result file of a run. Not collective.
 
@@ -29,9 +34,15 @@ def header_of(
     problem : of the scene
     at_rest : its line in equilibrium
     petsc_options : the options that PETSc was started with, for the record
+    excited : what sets the line into motion in place of the scene's train
     """
     on, off = effect_rows(scene, problem)
     line = problem.line
+    if excited is not None:
+        by_what = excited.attributes()
+    else:
+        words, arrivals = header_words(scene, problem), arrival_facts(scene, problem)
+        by_what = {"pantographs": words, "arrivals": arrivals}
     return Header(
         attributes={
             "case": scene.case.name,
@@ -39,10 +50,9 @@ def header_of(
             "n_dofs": at_rest.model.n_unknowns,
             "system": scene.evaluation.system,
             "edition": scene.evaluation.edition,
-            "pantographs": header_words(scene, problem),
             "defects": defect_facts(scene, problem),
             "incidents": incident_facts(scene, problem),
-            "arrivals": arrival_facts(scene, problem),
+            **by_what,
             "window": window_sentence(problem),
             "versions": versions(),
             "config": resolved(scene),

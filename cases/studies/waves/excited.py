@@ -6,7 +6,7 @@ the line's own, droppers that slacken included.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -18,13 +18,21 @@ from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Placement, Problem, Train
+from catenary.solver.problem.window import BOUNDED
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.observers import Stage, StepView
-from catenary.solver.waves.excitation import Blow, Excitation, MovingForce, hammer, load_of
+from catenary.solver.waves.excitation import (
+    FORCE,
+    HAMMER,
+    PULSE,
+    Blow,
+    Excitation,
+    MovingForce,
+    hammer,
+)
+from catenary.solver.waves.excitation_load import load_of
 
-FORCE, PULSE, HAMMER = "force", "pulse", "hammer"
-KINDS = (FORCE, PULSE, HAMMER)
 # A whole (1 - cosine) / 2 of 0.1 s has most of its waves below 20 Hz, half a sine of 0.02 s below
 # 75 Hz [s].
 DURATIONS = {PULSE: 0.1, HAMMER: 0.02}
@@ -68,7 +76,7 @@ def excitation_of(kind: str, asked: Asked, problem: Problem, dt: float) -> Excit
 
     Parameters
     ----------
-    kind : one of `KINDS`
+    kind : one of `excitation.KINDS`
     dt : time step, which a blow lasts ten times at least [s]
 
     Raises
@@ -95,6 +103,11 @@ def excitation_of(kind: str, asked: Asked, problem: Problem, dt: float) -> Excit
             )
         force = train.placements[0].static_force if asked.force is None else asked.force
         return MovingForce(force, frequency, train.start, train.speed, train.raise_time)
+    if problem.window.mode == BOUNDED:
+        raise InputError(
+            f"window.mode is bounded, which lets move what is near a train, but a {kind} has none: "
+            "take exact, or off"
+        )
     duration = DURATIONS[kind] if asked.duration is None else asked.duration
     if not 10 * dt <= duration <= 10.0:
         raise InputError(
@@ -138,10 +151,16 @@ def without_train(problem: Problem, excitation: Excitation) -> Problem:
     )
 
 
-class _Watch:
-    """Observer that hands over the uplift of all nodes at every so many steps."""
+class Watch:
+    """Observer that shows the uplift of all nodes at every so many steps.
 
-    def __init__(self, every: int, seen: Callable[[float, np.ndarray], None]) -> None:
+    Parameters
+    ----------
+    every : steps from one time to the next
+    seen : what it is shown to
+    """
+
+    def __init__(self, every: int, seen: Sequence[NodeMotion]) -> None:
         self._every, self._seen = every, seen
 
     def start(self, stage: Stage) -> None:
@@ -168,13 +187,16 @@ class _Watch:
         if view.step % self._every == 0:
             uplift = np.empty(self._nodes.size)
             uplift[self._nodes] = view.node_uplift()
-            self._seen(view.time, uplift)
+            for one in self._seen:
+                one.add(view.time, uplift)
 
     def finish(self, outcome: str) -> None:
         """Nothing is left to do."""
 
 
-def march(rest: LineAtRest, excitation: Excitation, every: float, seen: list[NodeMotion]) -> None:
+def march(
+    rest: LineAtRest, excitation: Excitation, every: float, seen: Sequence[NodeMotion]
+) -> None:
     """March to the end and show the motion each ``every`` seconds. Serial.
 
     Raises
@@ -184,12 +206,7 @@ def march(rest: LineAtRest, excitation: Excitation, every: float, seen: list[Nod
     """
     dt = rest.problem.numerics.dt
     rest.model.loads.append(load_of(excitation, rest.model, dt))
-
-    def show(time: float, uplift: np.ndarray) -> None:
-        for one in seen:
-            one.add(time, uplift)
-
     with March(MPI.COMM_SELF, *rest) as run:
-        outcome = run.run([_Watch(max(1, round(every / dt)), show)])
+        outcome = run.run([Watch(max(1, round(every / dt)), seen)])
     if outcome.outcome != "done":
         raise RunBroken(outcome.outcome)

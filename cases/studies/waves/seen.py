@@ -11,6 +11,7 @@ import numpy as np
 from catenary.postproc.film.film_data import FilmData
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.solver.base.errors import InputError
+from catenary.solver.waves.excitation import Excitation, MovingForce
 
 # Distance of points along the wire between which the motion is interpolated [m].
 _STEP = 0.5
@@ -144,4 +145,13 @@ def waves_seen(
         uplift = snapshots.uplift(number)
         for one in (wire, *others):
             one.add(time, uplift)
+    if data.excitation is not None:
+        return wire.seen(*course_of(data.excitation))
     return wire.seen(lambda times: data.position[[data.row_at(t) for t in times.tolist()]])
+
+
+def course_of(excitation: Excitation) -> tuple[Callable[[np.ndarray], np.ndarray], float]:
+    """Where an excitation moves, as `WireMotion.seen` takes it: a blow stays at its place."""
+    if isinstance(excitation, MovingForce):
+        return lambda times: excitation.place(times)[:, None], np.nan
+    return lambda times: np.zeros((times.size, 0)), excitation.at

@@ -6,8 +6,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from mpi4py import MPI
 
 from catenary.cases.result_folder.output_folder import refuse_earlier
+from catenary.cases.run.excited_run import ExcitedRun
+from catenary.cases.run.runner import run_case
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.origin import Origin
@@ -16,9 +19,15 @@ from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.output import as_csv
 from catenary.cases.studies.waves import ends, obstacles, pictures
 from catenary.cases.studies.waves.energy import EnergyMotion, EnergySeen
-from catenary.cases.studies.waves.excited import Asked, excitation_of, march, without_train
+from catenary.cases.studies.waves.excited import Asked, Watch, excitation_of, without_train
 from catenary.cases.studies.waves.measured import measured_rows, transmitted
-from catenary.cases.studies.waves.seen import WavesSeen, WireMotion, places_of, waves_seen
+from catenary.cases.studies.waves.seen import (
+    WavesSeen,
+    WireMotion,
+    course_of,
+    places_of,
+    waves_seen,
+)
 from catenary.cases.studies.waves.theory import WaveTheory, wave_theory
 from catenary.postproc.files.disk import write_all
 from catenary.postproc.film.film_data import FilmData, film_data
@@ -26,9 +35,10 @@ from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.read.guard import examined
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import figures
-from catenary.solver.base.errors import InputError
+from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.statics.elasticity import middle_span
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
+from catenary.solver.time_loop.observers import Observer
 from catenary.solver.waves.excitation import MovingForce
 
 Row = dict[str, Any]
@@ -68,15 +78,20 @@ def study_waves(folder: Path) -> Studied:
             energy = EnergyMotion(rest, _numbers_in(data, rest))
             seen = waves_seen(data, snapshots, [energy])
     theory = wave_theory(problem, rest)
-    return _write(folder, theory, rest, seen, energy.seen(), data.supports, "train")
+    what = "train"
+    if data.excitation is not None:
+        what = "force" if isinstance(data.excitation, MovingForce) else "blow"
+    return _write(folder, theory, rest, seen, energy.seen(), data.supports, what)
 
 
 def study_excited(scene: Scene, kind: str, asked: Asked, folder: Path, force: bool) -> Studied:
-    """March a line without its train under an excitation, and write what is seen. Serial.
+    """Run a line without its train under an excitation, and write what is seen of its waves.
+
+    The folder then has the files of a run. Serial.
 
     Parameters
     ----------
-    kind : of the excitation, see `excited.KINDS`
+    kind : of the excitation, see `excitation.KINDS`
     folder : new, or empty, unless ``force`` is given
 
     Raises
@@ -90,19 +105,26 @@ def study_excited(scene: Scene, kind: str, asked: Asked, folder: Path, force: bo
     excitation = excitation_of(kind, asked, problem, problem.numerics.dt)
     refuse_earlier(folder, force)
     refuse_table(folder / TABLE, force)
-    rest = line_at_rest(without_train(problem, excitation), mesh_of(scene))
-    wire = WireMotion(rest.model.contact_nodes, rest.model.contact_x)
-    energy = EnergyMotion(rest)
     moves = isinstance(excitation, MovingForce)
-    march(rest, excitation, SNAPSHOT_EVERY if moves else BLOW_EVERY, [wire, energy])
-    if isinstance(excitation, MovingForce):
-        start, speed = excitation.start, excitation.speed
-        seen = wire.seen(lambda times: (start + speed * times)[:, None])
-    else:
-        seen = wire.seen(lambda times: np.zeros((times.size, 0)), excitation.at)
+    every = SNAPSHOT_EVERY if moves else BLOW_EVERY
+    found: list[tuple[LineAtRest, WireMotion, EnergyMotion]] = []
+
+    def watching(rest: LineAtRest) -> list[Observer]:
+        wire = WireMotion(rest.model.contact_nodes, rest.model.contact_x)
+        found.append((rest, wire, EnergyMotion(rest)))
+        return [Watch(max(1, round(every / problem.numerics.dt)), found[-1][1:])]
+
+    run = ExcitedRun(without_train(problem, excitation), excitation, every, watching)
+    outcome = run_case(
+        scene, folder, MPI.COMM_SELF, force=force, only_summary=True, excited=run
+    ).outcome
+    if outcome != "done":
+        raise RunBroken(outcome)
+    ((rest, wire, energy),) = found
     theory = wave_theory(problem, rest)
     supports = problem.line.support_positions[1:-1]
     what = "force" if moves else "blow"
+    seen = wire.seen(*course_of(excitation))
     return _write(folder, theory, rest, seen, energy.seen(), supports, what)
 
 

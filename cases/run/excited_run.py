@@ -1,0 +1,45 @@
+"""A run whose line something other than its train sets into motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from catenary.cases.run.describe.ends import end_sentences
+from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.line_at_rest import LineAtRest
+from catenary.solver.time_loop.observers import Observer
+from catenary.solver.waves.excitation import Excitation, as_facts
+from catenary.solver.waves.excitation_load import load_of
+
+
+@dataclass(frozen=True)
+class ExcitedRun:
+    """What such a run is, beside its scene.
+
+    Attributes
+    ----------
+    problem : of the scene, with what stands aside in place of its train
+    excitation : of the contact wire
+    snapshot_every : from one snapshot to the next where the scene does not say so [s]
+    watching : what watches the march beside the recorder, of a line at rest
+    """
+
+    problem: Problem
+    excitation: Excitation
+    snapshot_every: float
+    watching: Callable[[LineAtRest], Sequence[Observer]]
+
+    def excite(self, rest: LineAtRest) -> None:
+        """Put the excitation on a line at rest. Not collective."""
+        rest.model.loads.append(load_of(self.excitation, rest.model, self.problem.numerics.dt))
+
+    def attributes(self) -> dict[str, Any]:
+        """What the result file says of it, in place of what it says of a train."""
+        says = self.excitation.says()
+        return {
+            "excitation": as_facts(self.excitation),
+            "pantographs": [{"kind": self.excitation.kind, "model": "none", "description": says}],
+            "arrivals": {"ends": list(end_sentences(self.problem))},
+        }

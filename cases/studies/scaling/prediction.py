@@ -1,0 +1,178 @@
+"""Time of a step on many ranks: the line shared out, and messages by latency and bandwidth.
+
+A step on p ranks of a line of n unknowns, c [s] each, takes
+
+    t(p) = t0 + c (n / p + 2 o) + 2 m(o) + log2(p) (m(share) + m(reply)),   p > 1,
+
+with t0 for contacts, pantographs and steps taken one by one on rank 0, o unknowns of overlap to
+each of two neighbours, m(k) = latency + k / bandwidth. Reductions and broadcasts run over a tree.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from catenary.cases.run.needs import needs_with_mesh
+from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.cost_model import STEP_OVERHEAD
+from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.scaling.messages import Sizes, Wire
+from catenary.solver.base.errors import InputError
+from catenary.solver.effects.build_model import numbering_of
+
+# Bytes of a number; numbers before the answers in a share, before the forces in a reply, and links
+# with their compensations that a reply has room for.
+_BYTES, _FLAGS, _HEAD, _LINKS = 8, 4, 4, 32
+MOST_RANKS = 1_000_000
+# What steps take longer that are taken one by one, as on several ranks, and not in blocks: measured
+# on lines of 25 to 1000 spans before and after there were blocks [s].
+_ONE_BY_ONE = 1e-5
+
+
+class Work(NamedTuple):
+    """A step on one rank.
+
+    Attributes
+    ----------
+    unknowns, spans : of the line
+    step : time of a step on one rank [s]
+    fixed : what of it does not go with the length of the line [s]
+    sizes : of messages on several ranks
+    """
+
+    unknowns: int
+    spans: int
+    step: float
+    fixed: float
+    sizes: Sizes
+
+    @property
+    def overlap(self) -> float:
+        """Unknowns that a rank solves for beyond its own to each side: about a span."""
+        return self.unknowns / self.spans
+
+
+class Predicted(NamedTuple):
+    """A step on a number of ranks: whole, and its parts [s]."""
+
+    ranks: int
+    line: float
+    neighbours: float
+    tree: float
+    fixed: float
+
+    @property
+    def step(self) -> float:
+        """All of it [s]."""
+        return self.line + self.neighbours + self.tree + self.fixed
+
+    @property
+    def messages(self) -> float:
+        """What of it are messages [s]."""
+        return self.neighbours + self.tree
+
+
+def parse_ranks(text: str) -> list[int]:
+    """Numbers of ranks ``a,b,...``, ascending.
+
+    Raises
+    ------
+    InputError
+        If it has another form, or names one twice.
+    """
+    try:
+        values = [int(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if not values or not 1 <= min(values) <= max(values) <= MOST_RANKS or _twice(values):
+        raise InputError(
+            f"--ranks {text} must be whole numbers from 1 to {MOST_RANKS}, each once, as a,b,..., "
+            "e.g. 64,512,4096"
+        )
+    return sorted(values)
+
+
+def _twice(values: Sequence[int]) -> bool:
+    return len(set(values)) < len(values)
+
+
+def work_of(scene: Scene) -> Work:
+    """What a step of a scene takes on one rank, by the estimate of ``catenary plan``, and its
+    messages on several. Not collective."""
+    problem, mesh = problem_of(scene), mesh_of(scene)
+    needs = needs_with_mesh(scene, mesh)
+    n_unknowns, n_spans = numbering_of(problem, mesh).n_unknowns, problem.line.n_spans
+    contacts = sum(len(place.data.strip_offsets) for place in problem.train.placements)
+    share = _FLAGS + 2 * contacts * (1 + contacts)
+    reply = _HEAD + contacts + 2 * _LINKS
+    sizes = Sizes(
+        _BYTES * math.ceil(n_unknowns / n_spans), _BYTES * share, _BYTES * reply
+    )  # fmt: skip
+    step = needs.march / needs.n_steps
+    return Work(n_unknowns, n_spans, step, min(STEP_OVERHEAD, step), sizes)
+
+
+def predict(work: Work, wire: Wire, ranks: int) -> Predicted:
+    """A step on so many ranks, each with a core of its own."""
+    each = (work.step - work.fixed) / work.unknowns
+    if ranks == 1:
+        return Predicted(1, each * work.unknowns, 0.0, 0.0, work.fixed)
+    sizes, levels = work.sizes, math.log2(ranks)
+    return Predicted(
+        ranks,
+        each * (work.unknowns / ranks + 2.0 * work.overlap),
+        2.0 * wire.message(sizes.neighbour),
+        levels * (wire.message(sizes.share) + wire.message(sizes.reply)),
+        work.fixed + _ONE_BY_ONE,
+    )
+
+
+def as_text(
+    work: Work,
+    wire: Wire,
+    ranks: Sequence[int],
+    measured_wire: bool,
+    exchange: tuple[int, float, float] | None,
+) -> str:
+    """The prediction for a terminal.
+
+    Parameters
+    ----------
+    measured_wire : whether latency and bandwidth are measured between ranks 0 and 1
+    exchange : number of ranks that there are, and times of a step's messages on them as
+        `messages.time_of_exchange` gives them [s]; None on one rank
+    """
+    speed = 1e-9 / wire.per_byte if wire.per_byte > 0.0 else math.inf
+    how = "between ranks 0 and 1 of this machine" if measured_wire else "as given"
+    lines = [
+        f"{work.spans} spans, {work.unknowns} unknowns: {1e6 * work.step:.0f} us a step on one "
+        "rank (estimate of plan)",
+        f"a message takes {1e6 * wire.latency:.2f} us and {speed:.3g} GB/s ({how}); a rank sends "
+        f"{work.sizes.neighbour} B to each neighbour and {work.sizes.share} B to rank 0, which "
+        f"answers with {work.sizes.reply} B",
+        "",
+        f"{'ranks':>8}{'us a step':>11}{'line':>8}{'neighbours':>12}{'tree':>8}"
+        f"{'rank 0':>8}{'efficiency':>12}",
+    ]
+    one = predict(work, wire, 1).step
+    for number in ranks:
+        found = predict(work, wire, number)
+        parts = (found.line, found.neighbours, found.tree, found.fixed)
+        told = "".join(
+            f"{1e6 * value:>{w}.1f}" for value, w in zip(parts, (8, 12, 8, 8), strict=True)
+        )
+        share = 100.0 * one / (number * found.step)
+        lines.append(f"{number:8}{1e6 * found.step:11.1f}{told}{share:10.3g} %")
+    if exchange is not None:
+        there, fastest, half = exchange
+        expected = 1e6 * predict(work, wire, there).messages
+        lines += [
+            "",
+            f"measured, all messages of a step on the {there} ranks that there are: "
+            f"{1e6 * fastest:.1f} us at best, {1e6 * half:.1f} us in half of the blocks; predicted "
+            f"with a core for each: {expected:.1f} us",
+        ]
+    return "\n".join(lines)

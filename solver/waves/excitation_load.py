@@ -1,0 +1,69 @@
+"""The load that an excitation is on a contact wire.
+
+The shape functions of an element share a force at a point among the unknowns of its two nodes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from catenary.solver.base.compiled import compiled
+from catenary.solver.model.elements.shape_functions import shape_values
+from catenary.solver.model.loads import FieldLoad, Load, ShapeLoad, table
+from catenary.solver.model.model import Model
+from catenary.solver.waves.excitation import Blow, Excitation
+
+# Points in time by which half a sine or a whole cosine is drawn.
+_POINTS = 41
+
+
+def load_of(excitation: Excitation, model: Model, interval: float) -> Load:
+    """The load that an excitation is on the first contact wire. Not collective.
+
+    Parameters
+    ----------
+    interval : between times at which a force that moves is found; linear between them. Time steps
+        are best [s]
+    """
+    nodes = model.contact_nodes
+    x = model.mesh.x(nodes)
+    unknowns = np.stack([model.dofs(nodes), model.dofs(nodes, "theta_y")], axis=1).ravel()
+    if isinstance(excitation, Blow):
+        values = np.zeros((1, unknowns.size))
+        spread(x, np.array([excitation.at]), np.array([excitation.peak]), 0, values)
+        acts = np.flatnonzero(values[0])
+        share = np.linspace(0.0, 1.0, _POINTS)
+        course = table(list(excitation.duration * share), list(excitation.shape(share)))
+        return ShapeLoad(unknowns[acts], values[0, acts], course)
+
+    def fill(first: int, part: slice, slices: np.ndarray) -> None:
+        times = interval * (first + np.arange(slices.shape[0]))
+        places = excitation.place(times)
+        slices[:] = 0.0
+        spread(x, places, excitation.value(times), part.start, slices)
+
+    return FieldLoad(unknowns, sparse.identity(unknowns.size, format="csr"), interval, fill)
+
+
+@compiled
+def spread(x, places, forces, first, loads):  # type: ignore[no-untyped-def]
+    """Add forces at single places to loads on deflections and slopes of nodes.
+
+    Parameters
+    ----------
+    x : (n,) nodes of a wire, ascending [m]
+    places, forces : (m,) [m], [N]; what lies beyond the ends is left out
+    first : number of the unknown that the first column stands for: w and theta of each node in turn
+    loads : (m, k) a row for each force [N], [N m]
+    """
+    for i in range(places.size):
+        if places[i] < x[0] or places[i] > x[-1]:
+            continue
+        e = min(max(np.searchsorted(x, places[i], side="right") - 1, 0), x.size - 2)
+        length = x[e + 1] - x[e]
+        shares = shape_values((places[i] - x[e]) / length, length)
+        for j in range(4):
+            column = 2 * e + j - first
+            if 0 <= column < loads.shape[1]:
+                loads[i, column] += forces[i] * shares[j]

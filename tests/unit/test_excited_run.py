@@ -1,0 +1,145 @@
+"""A run without a train, which a blow or a force excites: its files, and what is made of them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from measuring import check
+from mpi4py import MPI
+
+from catenary.cases.run.continuing import state_to_continue
+from catenary.cases.run.excited_run import ExcitedRun
+from catenary.cases.run.runner import run_case
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.load import load_scene
+from catenary.cases.studies.waves.excited import Asked, Watch, excitation_of, without_train
+from catenary.cases.studies.waves.seen import WavesSeen, WireMotion, course_of, waves_seen
+from catenary.postproc.film import animate
+from catenary.postproc.film.film_data import film_data
+from catenary.postproc.film.pantograph_shape import MovingPantographs
+from catenary.postproc.film.snapshots import Snapshots
+from catenary.postproc.paraview import open_in_paraview
+from catenary.postproc.read.file_schema import ATTRIBUTES
+from catenary.postproc.read.results import Results
+from catenary.postproc.report.report import write_report
+from catenary.solver.base.errors import InputError
+from catenary.solver.statics.line_at_rest import LineAtRest
+from catenary.solver.waves.excitation import Blow, MovingForce, as_facts, excitation_of_facts
+
+# HDF5's files are examined by a process of its own.
+pytestmark = pytest.mark.process
+
+AT, FORCE, EVERY = 160.0, 120.0, 0.02
+SHORT = ("line.n_spans=6", "train.start_m=130", "train.end_m=170", "train.raise_time_s=0.1",
+         "evaluation.from_m=140", "evaluation.to_m=165",
+         "train.pantographs=[{name='three_masses'}]")  # fmt: skip
+
+
+def excited(folder: Path, kind: str, asked: Asked, *words: str) -> WavesSeen:
+    """Run a case under an excitation; what was seen in memory meanwhile."""
+    scene = load_scene("ac_simple", (*SHORT, *words))
+    problem = problem_of(scene)
+    excitation = excitation_of(kind, asked, problem, problem.numerics.dt)
+    seen: list[WireMotion] = []
+
+    def watching(rest: LineAtRest) -> list[Watch]:
+        seen.append(WireMotion(rest.model.contact_nodes, rest.model.contact_x))
+        return [Watch(round(EVERY / problem.numerics.dt), seen)]
+
+    run = ExcitedRun(without_train(problem, excitation), excitation, EVERY, watching)
+    done = run_case(scene, folder, MPI.COMM_SELF, only_summary=True, excited=run)
+    assert done.outcome == "done"
+    return seen[0].seen(*course_of(excitation))
+
+
+@pytest.fixture(scope="module")
+def struck(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, WavesSeen]:
+    folder = tmp_path_factory.mktemp("struck")
+    return folder, excited(folder, "hammer", Asked(at=AT, impulse=5.0, duration=0.05))
+
+
+def test_a_blow_leaves_the_files_of_a_run(struck: tuple[Path, WavesSeen]) -> None:
+    """Its snapshots are, in single precision, what was seen in memory."""
+    folder, seen = struck
+    with Results(folder) as results:
+        data = film_data(results)
+        facts = results.attributes["excitation"]
+        assert (results.channel("contact_force") == 0.0).all()
+        assert results.extremes("dropper_force")[1].max() > 0.0
+        with Snapshots(folder, len(data.points)) as snapshots:
+            again = waves_seen(data, snapshots)
+    assert again.struck == AT and again.position.shape[1] == 0
+    np.testing.assert_allclose(again.time, seen.time)
+    largest = np.abs(seen.uplift).max()
+    assert largest > 1e-3
+    check("uplift", again.uplift, seen.uplift, within=1e-6 * largest)
+    blow = Blow(AT, 0.05, 0.5 * np.pi * 5.0 / 0.05, True)
+    assert excitation_of_facts(facts) == blow
+    # A film and ParaView show the blow where a pantograph would stand.
+    assert data.names == ["hammer"] and (data.position == AT).all()
+    row = data.row_at(0.025)
+    assert data.force[row, 0] == pytest.approx(blow.peak, rel=1e-3)
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["excitation"]["says"].startswith("a hammer of 5 N s at 160 m")
+
+
+def test_nothing_continues_a_blow_as_a_run_of_its_train(struck: tuple[Path, WavesSeen]) -> None:
+    with pytest.raises(InputError, match="a hammer of .* excites its line, not a train"):
+        state_to_continue(struck[0] / "run.h5", True)
+
+
+def test_paraview_shows_a_blow_without_a_train(struck: tuple[Path, WavesSeen]) -> None:
+    script, *files = open_in_paraview.write_script(struck[0], None)
+    names = {path.name for path in files}
+    assert {"pantographs.xdmf", "forces.xdmf", "track.xdmf"} < names
+    assert "train.xdmf" not in names and '"train": ""' in script.read_text()
+
+
+@pytest.mark.study
+def test_report_and_film_of_a_blow_have_no_train(struck: tuple[Path, WavesSeen]) -> None:
+    folder, _ = struck
+    report = write_report(folder, folder)
+    assert "excited by a hammer" in (folder / "report.html").read_text()
+    assert report.verdict is None
+    with Results(folder) as results:
+        data = film_data(results)
+        with Snapshots(folder, len(data.points)) as snapshots:
+            shapes = MovingPantographs(data, snapshots, None)
+            numbers = np.array([1, 2])
+            made = animate._pictures(data, results, snapshots, numbers, animate.Wish(), shapes)
+            first, second = list(made)
+    assert (first != second).any()
+
+
+def test_a_force_that_moves_is_seen_on_its_course(tmp_path: Path) -> None:
+    seen = excited(tmp_path, "force", Asked(force=FORCE, frequency=2.0), "output.field_every_s=0.1")
+    with Results(tmp_path) as results:
+        data = film_data(results)
+        with Snapshots(tmp_path, len(data.points)) as snapshots:
+            # The scene's own cadence.
+            again = waves_seen(data, snapshots)
+            assert np.diff(snapshots.times) == pytest.approx(0.1)
+    assert isinstance(data.excitation, MovingForce)
+    np.testing.assert_allclose(data.position[:, 0], 130.0 + data.speed * data.time)
+    np.testing.assert_allclose(data.force[:, 0], data.excitation.value(data.time))
+    np.testing.assert_allclose(again.position[:, 0], data.excitation.place(again.time))
+    assert np.abs(seen.uplift).max() > 1e-3
+
+
+def test_facts_of_an_excitation_are_checked_when_they_are_read() -> None:
+    sound = as_facts(MovingForce(1.0, 0.0, 10.0, 50.0, 0.1))
+    declared = ATTRIBUTES["excitation"]
+    assert declared.sound({}) and declared.sound(sound)
+    for broken in ({"kind": "bell"}, {"speed": "fast"}, {"force": float("nan")}, {"says": 3}):
+        assert not declared.sound({**sound, **broken})
+    assert not declared.sound([1])
+
+
+def test_a_window_of_spans_around_a_train_is_refused_for_a_blow() -> None:
+    scene = load_scene("ac_simple", (*SHORT, "window.mode=bounded"))
+    problem = problem_of(scene)
+    with pytest.raises(InputError, match="window.mode is bounded.*a pulse has none"):
+        excitation_of("pulse", Asked(), problem, problem.numerics.dt)

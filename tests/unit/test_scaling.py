@@ -1,0 +1,86 @@
+"""The prediction for many ranks: its formula, its messages, what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from mpi4py import MPI
+from program import MPIRUN, catenary
+from typer.testing import CliRunner
+
+from catenary.cases.cli.main import app
+from catenary.cases.scene.load import load_scene
+from catenary.cases.studies.scaling import messages, prediction
+from catenary.cases.studies.scaling.messages import Sizes, Wire
+from catenary.cases.studies.scaling.prediction import Work, as_text, predict
+from catenary.solver.base.errors import InputError
+from catenary.solver.contact.line_response import Bounds, LineResponse
+from catenary.solver.contact_problem.force_exchange import Exchange
+
+WIRE = Wire(2e-6, 1e-10)
+# 1000 spans of 100 unknowns, 10 ns each, and 20 us whatever the line.
+WORK = Work(100_000, 1000, 1020e-6, 20e-6, Sizes(800, 64, 552))
+
+
+def test_a_step_on_many_ranks_is_the_line_shared_out_and_messages() -> None:
+    found = predict(WORK, WIRE, 64)
+    assert found.line == pytest.approx(1e-8 * (100_000 / 64 + 200))
+    assert found.neighbours == pytest.approx(2 * (2e-6 + 800e-10))
+    assert found.tree == pytest.approx(6 * (4e-6 + 616e-10))
+    assert found.step == pytest.approx(
+        found.line + found.neighbours + found.tree + 20e-6 + prediction._ONE_BY_ONE
+    )
+    alone = predict(WORK, WIRE, 1)
+    assert alone.step == pytest.approx(WORK.step) and alone.messages == 0.0
+
+
+def test_messages_are_as_long_as_those_of_a_march() -> None:
+    """Of the exchange of a step with one contact and with two."""
+    for n, more in ((1, ""), (2, ",{name='lumped',behind_m=30}")):
+        words = [f"train.pantographs=[{{name='lumped'}}{more}]", "train.start_m=200"]
+        sizes = prediction.work_of(load_scene("ambrosio2012", words)).sizes
+        bounds = Bounds(*LineResponse(n, 1).bounds)
+        exchange = Exchange(MPI.COMM_SELF, n, False, bounds)
+        assert sizes.share == exchange.share.summed.nbytes
+        assert sizes.reply == exchange._answer.nbytes
+
+
+def test_one_rank_exchanges_nothing_and_times_nothing() -> None:
+    assert messages.wire_between(MPI.COMM_SELF) is None
+    fastest, half = messages.time_of_exchange(MPI.COMM_SELF, WORK.sizes)
+    assert 0.0 < fastest <= half < 1e-3
+    text = as_text(WORK, WIRE, [1, 64], False, None)
+    assert "as given" in text and "100 %" in text and "measured" not in text
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ([], "on one rank no message can be timed"),
+        (["--latency-us", "2"], "belong together"),
+        (["--latency-us", "0", "--bandwidth-GB-per-s", "10"], "must be above 0"),
+        (["--ranks", "0,4"], "--ranks 0,4 must be whole numbers"),
+        (["--ranks", "4,4"], "each once"),
+        (["--ranks", "many"], "e.g. 64,512,4096"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_sentence(words: list[str], says: str) -> None:
+    done = CliRunner().invoke(app, ["scaling", "ambrosio2012", *words])
+    assert done.exit_code == 2 and says in done.stderr and done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("text", ["64", "1,4096"])
+def test_ranks_are_whole_numbers(text: str) -> None:
+    assert prediction.parse_ranks(text) == [int(part) for part in text.split(",")]
+    with pytest.raises(InputError):
+        prediction.parse_ranks(text + ",")
+
+
+@pytest.mark.process
+@pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
+def test_ranks_time_their_messages_and_one_tells(tmp_path: Path) -> None:
+    done = catenary("scaling", "ambrosio2012", "--ranks", "2,64", cwd=tmp_path, ranks=3)
+    assert done.code == 0, done.stderr
+    assert "between ranks 0 and 1 of this machine" in done.stdout
+    assert done.stdout.count("on the 3 ranks that there are") == 1
