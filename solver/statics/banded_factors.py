@@ -11,7 +11,6 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg import lapack
 
-from catenary.solver.statics.band_kernels import add_elements
 from catenary.solver.statics.sparse_sum import Part
 
 
@@ -50,6 +49,9 @@ class BandedFactors:
         reach = int(np.abs(rows - columns).max(initial=0))
         for dofs, _ in parts:
             reach = max(reach, int(np.ptp(dofs, axis=1).max(initial=0)))
+        # Compiled loops are not for a scene that is checked and nothing more.
+        from catenary.solver.statics.band_kernels import add_elements
+
         self._reach = reach
         free, known = np.ones(size, dtype=bool), np.zeros(size)
         free[given], known[given] = False, values
