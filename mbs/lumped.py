@@ -30,7 +30,7 @@ from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import HeadState
 from catenary.mbs.lumped_data import LumpedData, chain_matrix
 from catenary.mbs.vehicle.base_motion import BaseMotion
-from catenary.solver.base.bound import bound
+from catenary.solver.base.kernels.bound import bound
 
 
 class LumpedPantograph(SteppedHead):

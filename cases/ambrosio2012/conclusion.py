@@ -8,7 +8,7 @@ from typing import Any
 
 from catenary.cases.ambrosio2012 import figures, ranking, ringing, search, statements
 from catenary.cases.ambrosio2012.statements import AVERAGE, DAMPINGS, LIGHT, Force, Run, Runs, Slack
-from catenary.cases.ambrosio2012.study import (
+from catenary.cases.ambrosio2012.variations import (
     VARIED,
     run_name,
     searched,

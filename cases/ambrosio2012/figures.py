@@ -14,7 +14,7 @@ from catenary.cases.ambrosio2012.statements import AVERAGE, LIGHT, SINGLE, Force
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import histogram
 from catenary.postproc.read.results import Results
-from catenary.postproc.report import figures
+from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_report import StudyFigure
 
 # damping -> train -> folder of its result file

@@ -19,7 +19,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.postproc.report.study_report import StudyTable
 from catenary.solver.model.matrices import stiffness_matrix, whole_matrix
 from catenary.solver.model.model import Model
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 
 class Band(NamedTuple):

@@ -41,7 +41,7 @@ def check(
     from catenary.cases.run.describe.pantographs import kind_lines
     from catenary.cases.run.scene_mesh import mesh_of
     from catenary.cases.scene.convert.problem import problem_of
-    from catenary.solver.statics.equilibrium import find_form
+    from catenary.solver.statics.form_finding.equilibrium import find_form
 
     problem = problem_of(scene)
     mesh = mesh_of(scene)
@@ -141,14 +141,14 @@ def static(
         tables = (".csv",) if registration else (".csv", ".json")
         new_file(out, tables if over is None else (".png", ".svg"), force)
     if over is not None:
-        from catenary.cases.run.temperatures import range_of, temperatures
+        from catenary.cases.run.at_rest.temperatures import range_of, temperatures
 
         differences = range_of(over)
         console.say(temperatures(load(case, assignments, extras), differences, out))
         return
     scene = load(case, assignments, extras)
+    from catenary.cases.run.at_rest.static_table import static_table
     from catenary.cases.run.describe.defects import defect_facts
-    from catenary.cases.run.static_table import static_table
     from catenary.cases.scene.convert.problem import problem_of
 
     table, problem = static_table(scene), problem_of(scene)
@@ -162,7 +162,7 @@ def static(
     console.say(terminal_text.static_text(table, problem.line, shortest))
     warmer = problem.along.warmer
     if warmer and {"axial_motion", "temperature"} <= problem.effects:
-        from catenary.cases.run.temperatures import temperatures
+        from catenary.cases.run.at_rest.temperatures import temperatures
 
         console.say("")
         console.say(temperatures(scene, [warmer], None))

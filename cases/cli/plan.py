@@ -101,7 +101,7 @@ def plan(
         if value is not None:
             raise InputError(f"{option} belongs to plan --cost; give both")
     scene = load(case, assignments, extras, shortened)
-    from catenary.cases.run.plan import make_plan, plan_text
+    from catenary.cases.run.planning.plan import make_plan, plan_text
 
     console.say(plan_text(make_plan(scene)))
     return console.DONE

@@ -222,8 +222,8 @@ def submit(
     import subprocess
 
     from catenary.cases.process.petsc_options import split_extras
-    from catenary.cases.run.plan import make_plan
-    from catenary.cases.run.slurm_script import Job, slurm_script
+    from catenary.cases.run.planning.plan import make_plan
+    from catenary.cases.run.planning.slurm_script import Job, slurm_script
     from catenary.cases.scene.load import load_scene
 
     refuse_impossible(out)

@@ -6,7 +6,7 @@ import logging
 import os
 from pathlib import Path
 
-from catenary.solver.base import loop_cache
+from catenary.solver.base.kernels import loop_cache
 
 VARIABLE = "MPLCONFIGDIR"
 

@@ -9,7 +9,7 @@ from typing import Any
 from catenary.cases.run.describe.ends import end_sentences
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest
-from catenary.solver.time_loop.observers import Observer
+from catenary.solver.time_loop.views.observers import Observer
 from catenary.solver.waves.excitation import Excitation, as_facts
 from catenary.solver.waves.excitation_load import load_of
 

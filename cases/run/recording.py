@@ -15,10 +15,10 @@ from catenary.postproc.channels.line_record import GZIP, NONE, LineRecord, says
 from catenary.postproc.record.snapshots.field_kinds import USUAL_FIELDS
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.solver.effects.all_effects import simulated
-from catenary.solver.effects.axial_effects import moves_along
+from catenary.solver.effects.shipped.axial_effects import moves_along
 from catenary.solver.model.gauges import gauge_places
 from catenary.solver.problem.problem import Problem
-from catenary.solver.time_loop import channels
+from catenary.solver.time_loop.views import channels
 
 if TYPE_CHECKING:
     from catenary.cases.scene.tables.run.output import OutputTable

@@ -24,15 +24,15 @@ from catenary.cases.result_folder.output_folder import (
     prepare,
 )
 from catenary.cases.run.continuing import refuse_other_run, state_to_continue
-from catenary.cases.run.describe.header import header_of
 from catenary.cases.run.excited_run import ExcitedRun
-from catenary.cases.run.needs import (
+from catenary.cases.run.header import header_of
+from catenary.cases.run.performance import Phases, performance
+from catenary.cases.run.planning.needs import (
     flush_cadence,
     needs_before_meshing,
     needs_with_mesh,
     run_size,
 )
-from catenary.cases.run.performance import Phases, performance
 from catenary.cases.run.recording import FIELD_EVERY, extent_of, recording_of
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
@@ -52,7 +52,7 @@ from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all
 from catenary.solver.time_loop.march import March, Outcome
-from catenary.solver.time_loop.observers import Observer
+from catenary.solver.time_loop.views.observers import Observer
 
 logger = logging.getLogger("catenary.runner")
 

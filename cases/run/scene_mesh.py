@@ -71,8 +71,8 @@ def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
     # Matplotlib takes long to import.
     from catenary.cases.run.describe.defects import defect_facts
     from catenary.cases.scene.convert.problem import problem_of
-    from catenary.postproc.report.line_drawing import Mark, draw_line
-    from catenary.solver.statics.equilibrium import find_form
+    from catenary.postproc.report.pictures.line_drawing import Mark, draw_line
+    from catenary.solver.statics.form_finding.equilibrium import find_form
 
     problem, mesh = problem_of(scene), mesh_of(scene)
     _, form = find_form(problem, mesh)

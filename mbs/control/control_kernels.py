@@ -19,7 +19,7 @@ from catenary.mbs.control.control_arrays import (
     TIME,
     WAITING,
 )
-from catenary.solver.base.compiled import compiled, in_line
+from catenary.solver.base.kernels.compiled import compiled, in_line
 
 # Part of a step by which a sample may come early: times are sums.
 _EARLY = 1e-6

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.mbs.head.law_kernels import settle
-from catenary.solver.base.compiled import compiled, in_line
-from catenary.solver.base.inverse import invert
+from catenary.solver.base.kernels.compiled import compiled, in_line
+from catenary.solver.base.kernels.inverse import invert
 
 # Columns of a row of what a head depends on in a step besides its state. A chain of lumped masses
 # has the first three alone, the forces on its last mass and on its head [N] and, of a regulated

@@ -24,8 +24,8 @@ from catenary.mbs.head.head_kernels import (
     RaisedHead,
 )
 from catenary.mbs.head.laws import LawArrays
-from catenary.solver.base.compiled import in_line
-from catenary.solver.base.pointers import address_of, cube_at, numbers_at, table_at_address
+from catenary.solver.base.kernels.compiled import in_line
+from catenary.solver.base.kernels.pointers import address_of, cube_at, numbers_at, table_at_address
 
 # Models, as `head_kernels` steps them.
 LUMPED, REDUCED, LAWFUL = 0, 1, 2

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.base.compiled import compiled
-from catenary.solver.base.inverse import invert
+from catenary.solver.base.kernels.compiled import compiled
+from catenary.solver.base.kernels.inverse import invert
 
 # Segments of tables mostly settle in two rounds; what goes round in circles is left there.
 _MAX_ROUNDS = 20

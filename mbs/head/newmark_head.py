@@ -18,7 +18,7 @@ from catenary.mbs.head.laws import LawsInPlace, in_place
 from catenary.mbs.head.strips import HeadParts
 from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import HeadState
-from catenary.solver.base.bound import bound
+from catenary.solver.base.kernels.bound import bound
 
 
 class SteppedHead(ABC):

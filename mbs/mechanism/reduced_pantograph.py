@@ -42,8 +42,8 @@ from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.vehicle.base_motion import BaseMotion
-from catenary.solver.base.bound import bound
 from catenary.solver.base.errors import RunBroken
+from catenary.solver.base.kernels.bound import bound
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ import numpy as np
 
 from catenary.meshgen.hardware import Clamps, Droppers, SteadyArms, Supports
 from catenary.meshgen.line import Line
-from catenary.meshgen.topologies.expected_sag import Loads, sag_between
 from catenary.meshgen.topologies.free_data import FreeDroppers, FreeLink, FreeWire
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.topologies.registry import register
+from catenary.meshgen.topologies.sag import Loads, sag_between
 from catenary.meshgen.wires import End, Piece, Profile, Role, Wire
 from catenary.solver.base.errors import InputError
 

@@ -16,7 +16,7 @@ from catenary.meshgen.wires import Role, Wire
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.problem.contact_laws import ContactLaw, HertzLaw, LinearLaw
 from catenary.solver.problem.integrator_parameters import Integration, integration_of
-from catenary.solver.time_loop.channels import PANTOGRAPH, RUN
+from catenary.solver.time_loop.views.channels import PANTOGRAPH, RUN
 from catenary.solver.wind.spectra import PEAK
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from catenary.postproc.channels.facts import FACTS
 
 if TYPE_CHECKING:
     from catenary.solver.statics.elasticity import Elasticity
-    from catenary.solver.statics.equilibrium import Equilibrium
+    from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 
 REQUIRED_ATTRIBUTES = (
     "case",

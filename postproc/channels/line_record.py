@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from catenary.solver.time_loop import channels
+from catenary.solver.time_loop.views import channels
 
 NONE, GZIP = "none", "gzip"
 # Level 4 was not smaller than level 1 on the forces of droppers, and slower.

@@ -14,8 +14,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from catenary.postproc.files.checked import FORMAT_BOUNDS
 from catenary.postproc.files.disk_errors import reason, remedy
+from catenary.postproc.files.hdf5.checked import FORMAT_BOUNDS
 from catenary.postproc.files.own_files import part_of
 from catenary.postproc.files.trimming import trimmed
 from catenary.solver.base.errors import RunBroken

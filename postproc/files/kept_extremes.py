@@ -11,8 +11,8 @@ from collections.abc import Mapping
 import h5py
 import numpy as np
 
-from catenary.postproc.files.array_writes import put_array
-from catenary.postproc.files.checked import seal_arrays, sum_is_kept
+from catenary.postproc.files.hdf5.array_writes import put_array
+from catenary.postproc.files.hdf5.checked import seal_arrays, sum_is_kept
 
 GROUP, ROWS = "extremes", "rows"
 _SLOTS = ("0", "1")

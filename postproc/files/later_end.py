@@ -14,8 +14,10 @@ from pathlib import Path
 import h5py
 
 from catenary.postproc.channels.header import Header
-from catenary.postproc.files.array_writes import put_array
-from catenary.postproc.files.checked import (
+from catenary.postproc.files.disk import as_attribute
+from catenary.postproc.files.disk_errors import reason
+from catenary.postproc.files.hdf5.array_writes import put_array
+from catenary.postproc.files.hdf5.checked import (
     ATTRIBUTE_SUMS,
     FORMAT_BOUNDS,
     seal_arrays,
@@ -23,8 +25,6 @@ from catenary.postproc.files.checked import (
     set_attribute,
     text_of,
 )
-from catenary.postproc.files.disk import as_attribute
-from catenary.postproc.files.disk_errors import reason
 from catenary.postproc.files.own_files import part_of
 from catenary.postproc.files.result_file import INTERRUPTED
 from catenary.solver.base.errors import RunBroken

@@ -11,7 +11,7 @@ import re
 import time
 from pathlib import Path
 
-from catenary.solver.time_loop.channels import CHANNELS, ENERGIES
+from catenary.solver.time_loop.views.channels import CHANNELS, ENERGIES
 
 logger = logging.getLogger("catenary.record")
 

@@ -21,24 +21,24 @@ import numpy as np
 from catenary.postproc.channels.facts import FACTS
 from catenary.postproc.channels.header import Header
 from catenary.postproc.channels.line_record import GZIP, GZIP_LEVEL, LineRecord
-from catenary.postproc.files.array_writes import append_rows, grow, put_array
-from catenary.postproc.files.checked import (
+from catenary.postproc.files.disk import MARGIN, abandon, as_attribute, check_in_place, reserve
+from catenary.postproc.files.hdf5.array_writes import append_rows, grow, put_array
+from catenary.postproc.files.hdf5.checked import (
     FORMAT_BOUNDS,
     create_checked,
     seal_arrays,
     seal_attributes,
     set_attribute,
 )
-from catenary.postproc.files.chunk_shapes import Chunk, chunks_of, room_of
-from catenary.postproc.files.disk import MARGIN, abandon, as_attribute, check_in_place, reserve
+from catenary.postproc.files.hdf5.chunk_shapes import Chunk, chunks_of, room_of
+from catenary.postproc.files.hdf5.shortening import DamagedClock, rows_before, shorten
+from catenary.postproc.files.hdf5.windowed_rows import write_window
 from catenary.postproc.files.kept_extremes import drop_extremes, extremes_at, store_extremes
 from catenary.postproc.files.own_files import part_of
-from catenary.postproc.files.shortening import DamagedClock, rows_before, shorten
 from catenary.postproc.files.trimming import trimmed
-from catenary.postproc.files.windowed_rows import write_window
-from catenary.solver.time_loop import channels
-from catenary.solver.time_loop.channels import Channel
-from catenary.solver.time_loop.observers import Stage
+from catenary.solver.time_loop.views import channels
+from catenary.solver.time_loop.views.channels import Channel
+from catenary.solver.time_loop.views.observers import Stage
 
 logger = logging.getLogger("catenary.results")
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from catenary.postproc.files.checked import text_of
+from catenary.postproc.files.hdf5.checked import text_of
 from catenary.postproc.read.guard import survives
 from catenary.postproc.record.snapshots.blocks import ARMS, OTHER_PARTS
 from catenary.postproc.record.snapshots.fields_file import FORMAT, PLACES, SIZES

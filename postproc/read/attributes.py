@@ -7,7 +7,7 @@ from typing import Any
 
 import h5py
 
-from catenary.postproc.files.checked import ATTRIBUTE_SUMS, broken_seals, text_of
+from catenary.postproc.files.hdf5.checked import ATTRIBUTE_SUMS, broken_seals, text_of
 from catenary.postproc.read.file_schema import ATTRIBUTES, REQUIRED
 
 # What HDF5 and h5py raise at a damaged file.

@@ -7,7 +7,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from catenary.postproc.files.checked import sum_is_kept, text_of
+from catenary.postproc.files.hdf5.checked import sum_is_kept, text_of
 from catenary.postproc.read.attributes import HDF5_ERRORS
 
 

@@ -9,9 +9,9 @@ import h5py
 import numpy as np
 
 from catenary.postproc.channels.facts import FACTS, NONE, WIRE, Fact
-from catenary.postproc.files.checked import sum_is_kept
+from catenary.postproc.files.hdf5.checked import sum_is_kept
 from catenary.postproc.read.attributes import HDF5_ERRORS
-from catenary.solver.time_loop.channels import PANTOGRAPH, RUN
+from catenary.solver.time_loop.views.channels import PANTOGRAPH, RUN
 
 # Without these there is no report.
 _ESSENTIAL = ("time_step", "speed", "wave_speed")

@@ -13,7 +13,7 @@ from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.line_record import LineRecord, from_table
 from catenary.postproc.standards.en50367 import EDITIONS, SYSTEMS
-from catenary.solver.time_loop import channels
+from catenary.solver.time_loop.views import channels
 from catenary.solver.waves.excitation import excitation_of_facts
 
 # Beyond these sizes a recorded value is damage, by unit; the march itself ends a run whose contact

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 
 from catenary.meshgen.wires import Role
-from catenary.postproc.files.checked import text_of
+from catenary.postproc.files.hdf5.checked import text_of
 from catenary.postproc.files.kept_extremes import extremes_at
 from catenary.postproc.files.result_file import COMPLETE, FORMAT
 from catenary.postproc.read.attributes import HDF5_ERRORS, read_attributes

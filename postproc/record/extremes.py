@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from catenary.postproc.record.column_gather import ColumnGather
-from catenary.solver.base.bound import bound
-from catenary.solver.time_loop.row_kernels import take_extremes
+from catenary.solver.base.kernels.bound import bound
+from catenary.solver.time_loop.views.row_kernels import take_extremes
 
 
 class Extremes:

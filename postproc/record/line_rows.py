@@ -11,8 +11,8 @@ from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.record.column_gather import ColumnGather
 from catenary.postproc.record.extremes import Extremes
 from catenary.postproc.record.kept_rows import KeptRows
-from catenary.solver.time_loop import channels
-from catenary.solver.time_loop.observers import Stage
+from catenary.solver.time_loop.views import channels
+from catenary.solver.time_loop.views.observers import Stage
 
 
 class LineRows(NamedTuple):

@@ -19,7 +19,7 @@ import numpy as np
 from tqdm import tqdm
 
 from catenary.postproc.files.result_file import DONE
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 logger = logging.getLogger("catenary.progress")
 

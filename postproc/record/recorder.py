@@ -21,8 +21,8 @@ from catenary.postproc.record.column_gather import next_flush
 from catenary.postproc.record.line_rows import LineGather, LineRows
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.base.parallel import on_root
-from catenary.solver.time_loop import channels
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views import channels
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 _NEVER = 2**62
 # Single steps of which the line's channels are taken in together.

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 logger = logging.getLogger("catenary.strips")
 

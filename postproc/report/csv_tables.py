@@ -9,7 +9,7 @@ import numpy as np
 
 from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.read.results import Results
-from catenary.solver.time_loop import channels
+from catenary.solver.time_loop.views import channels
 
 # Steps that are written at once.
 _ROWS = 10_000

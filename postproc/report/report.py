@@ -142,25 +142,30 @@ def judge(results: Results, statistics: RunStatistics) -> list[Criterion]:
 
 def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
     # A summary alone does without Matplotlib.
-    from catenary.postproc.report import (
+    from catenary.postproc.report.pictures import (
         channel_pictures,
         figures,
+        force_pictures,
         lateral_picture,
+        line_pictures,
         plan_view,
-        plots,
     )
 
     drawn: list[tuple[str, str, Figure | None]] = []
     if results.n_rows("time") > 1:
         drawn.append(
-            ("contact_force", "Contact force along the track.", plots.contact_force(results))
+            (
+                "contact_force",
+                "Contact force along the track.",
+                force_pictures.contact_force(results),
+            )
         )
         if results.several_strips:
             caption = "Shares of the collector strips in the contact force, below 20 Hz."
-            drawn.append(("strip_forces", caption, plots.strip_forces(results)))
+            drawn.append(("strip_forces", caption, force_pictures.strip_forces(results)))
         if results.has("contact_wire_force"):
             caption = "Shares of the contact wires in the contact force, below 20 Hz."
-            drawn.append(("wire_forces", caption, plots.wire_forces(results)))
+            drawn.append(("wire_forces", caption, force_pictures.wire_forces(results)))
         if results.has("lateral_place"):
             caption = "Lateral place of the contact wires on the strips."
             drawn.append(("lateral_place", caption, lateral_picture.lateral_places(results)))
@@ -169,12 +174,12 @@ def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
                 (
                     "statistics",
                     "Contact force in the evaluation stretch.",
-                    plots.force_statistics(results, statistics),
+                    force_pictures.force_statistics(results, statistics),
                 ),
                 (
                     "histogram",
                     "Distribution of the contact force in the evaluation stretch.",
-                    plots.force_histogram(results, statistics),
+                    force_pictures.force_histogram(results, statistics),
                 ),
             ]
         if statistics.supports.x.size:
@@ -183,16 +188,20 @@ def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
                 (
                     "uplift",
                     "Uplift of the contact wire at the steady arms.",
-                    plots.arm_uplift(results, statistics, limit),
+                    line_pictures.arm_uplift(results, statistics, limit),
                 )
             )
         if statistics.droppers.x.size:
-            drawn.append(("droppers", "Dropper forces.", plots.dropper_force(results, statistics)))
+            drawn.append(
+                ("droppers", "Dropper forces.", line_pictures.dropper_force(results, statistics))
+            )
     drawn += channel_pictures.channel_pictures(results)
-    drawn.append(("static", "Profile and elasticity of the line.", plots.static_line(results)))
+    drawn.append(
+        ("static", "Profile and elasticity of the line.", line_pictures.static_line(results))
+    )
     caption = "The line at rest from above, and its steady arms."
     drawn.append(("plan_view", caption, plan_view.plan_view(results)))
-    drawn.append(("energy", "Energies of the line.", plots.energies(results)))
+    drawn.append(("energy", "Energies of the line.", line_pictures.energies(results)))
     return [_Picture(name, text, figures.png(f)) for name, text, f in drawn if f is not None]
 
 

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.files.disk import plain, write_all
-from catenary.postproc.report import figures
+from catenary.postproc.report.pictures import figures
 
 REPRODUCED, NOT_REPRODUCED, UNDECIDED = "reproduced", "not reproduced", "cannot be decided"
 _TEMPLATES = Path(__file__).parent / "templates"

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.compiled import in_line
+from catenary.solver.base.kernels.compiled import in_line
 from catenary.solver.contact.link_kernels import watch
 from catenary.solver.integrators.state_kernels import displacement_at, velocity_at
 from catenary.solver.model.elements.shape_functions import shape_slopes, shape_values

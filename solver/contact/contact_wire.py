@@ -12,7 +12,7 @@ from catenary.solver.contact.contact_kernels import NODE, SLIP, TOUCH, WireShape
 from catenary.solver.contact.running_surface import surface_samples
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
-from catenary.solver.statics.equilibrium import Equilibrium
+from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 
 
 class Candidates(NamedTuple):

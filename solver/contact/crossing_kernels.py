@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.compiled import in_line
+from catenary.solver.base.kernels.compiled import in_line
 from catenary.solver.integrators.state_kernels import displacement_at, velocity_at
 
 

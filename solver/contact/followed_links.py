@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from catenary.solver.base.bound import bound
+from catenary.solver.base.kernels.bound import bound
 from catenary.solver.contact.line_response import Coupled
 from catenary.solver.contact.link_kernels import Followed
 from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.linear.column_pieces import columns_of
+from catenary.solver.linear.pieces.column_pieces import columns_of
 from catenary.solver.linear.unit_responses import ShortColumns
 from catenary.solver.model.switching_links import LinkArrays, LinkTable
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from catenary.solver.base.bound import bound
+from catenary.solver.base.kernels.bound import bound
 from catenary.solver.contact import contact_kernels
 from catenary.solver.contact.contact_kernels import Answers, Gains
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
@@ -17,11 +17,11 @@ from catenary.solver.contact.followed_links import FollowedLinks, LinkCoupling
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact.wires_across import WiresAcross
 from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.linear.column_pieces import columns_of
+from catenary.solver.linear.pieces.column_pieces import columns_of
 from catenary.solver.linear.unit_responses import NO_COLUMNS, STRETCH, ShortColumns
 from catenary.solver.model.model import Model
 from catenary.solver.model.switching_links import LinkTable
-from catenary.solver.statics.equilibrium import Equilibrium
+from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 
 
 class ForcesOnLine:

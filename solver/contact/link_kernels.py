@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.compiled import in_line
+from catenary.solver.base.kernels.compiled import in_line
 from catenary.solver.model.switching_links import LinkArrays
 
 

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from catenary.solver.base.bound import bound
+from catenary.solver.base.kernels.bound import bound
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.crossing_kernels import Sideways, find_across
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.model.model import Model
-from catenary.solver.statics.equilibrium import Equilibrium
+from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 
 
 class WiresAcross:

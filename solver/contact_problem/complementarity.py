@@ -26,10 +26,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.bound import bound
 from catenary.solver.base.errors import NotConverged, RunBroken
-from catenary.solver.contact.head_states import Heads
+from catenary.solver.base.kernels.bound import bound
 from catenary.solver.contact.line_response import Affine, Coupled, LineResponse, affine
+from catenary.solver.contact.train.head_states import Heads
 from catenary.solver.contact_problem import complementarity_kernels
 from catenary.solver.contact_problem.complementarity_kernels import SmallProblem, Unknowns
 from catenary.solver.contact_problem.law_tangents import LawInSteps

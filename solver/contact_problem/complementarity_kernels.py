@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.compiled import compiled, in_line
+from catenary.solver.base.kernels.compiled import compiled, in_line
 from catenary.solver.contact.line_response import Affine, Bounds, Coupled, Rows
 
 

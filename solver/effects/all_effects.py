@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Set
 from dataclasses import replace
 
-from catenary.solver.effects import (  # noqa: F401  (registers)
+from catenary.solver.effects.effect import Effect, NamedWire, registered
+from catenary.solver.effects.shipped import (  # noqa: F401  (registers)
     air_effects,
     axial_effects,
     defect_effects,
@@ -14,7 +15,6 @@ from catenary.solver.effects import (  # noqa: F401  (registers)
     pantograph_effects,
     vertical_effects,
 )
-from catenary.solver.effects.effect import Effect, NamedWire, registered
 from catenary.solver.model.unknowns.registry import Group
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated

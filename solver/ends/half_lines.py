@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.compiled import compiled
 from catenary.solver.base.errors import InputError
+from catenary.solver.base.kernels.compiled import compiled
 
 # Coupling over diagonal at which the rest of a half line is round-off, squared in another pass; and
 # the most passes: spans are 2^40 times as long then.

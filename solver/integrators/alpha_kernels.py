@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from catenary.solver.base.compiled import compiled
+from catenary.solver.base.kernels.compiled import compiled
 
 
 class AlphaFactors(NamedTuple):

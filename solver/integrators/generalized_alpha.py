@@ -20,13 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from catenary.solver.base import aligned_arrays
-from catenary.solver.base.bound import bound
+from catenary.solver.base.kernels import aligned_arrays
+from catenary.solver.base.kernels.bound import bound
 from catenary.solver.integrators import alpha_kernels
 from catenary.solver.integrators.alpha_kernels import AlphaFactors
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps
-from catenary.solver.linear.operator_pieces import WantedPieces
+from catenary.solver.linear.pieces.operator_pieces import WantedPieces
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.problem.integrator_parameters import Integration

@@ -14,16 +14,16 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from catenary.solver.base import aligned_arrays
+from catenary.solver.base.kernels import aligned_arrays
 from catenary.solver.base.parallel import total
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.detour import LIBRARY, PARTS, Detour
-from catenary.solver.integrators.line_loads import LineLoads
 from catenary.solver.integrators.line_state import AlphaSteps, LineState, PredictedLineState, Steps
+from catenary.solver.integrators.loads.line_loads import LineLoads
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.linear.decay_length import reach
-from catenary.solver.linear.operator_pieces import WantedPieces
+from catenary.solver.linear.pieces.operator_pieces import WantedPieces
 from catenary.solver.linear.step_operators import LineOperators, Loads
 from catenary.solver.linear.unit_responses import UnitResponses, Windows
 from catenary.solver.model.model import Model

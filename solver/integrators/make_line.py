@@ -15,7 +15,7 @@ from catenary.solver.integrators.detour import (
 from catenary.solver.integrators.generalized_alpha import GeneralizedAlphaLine
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.newmark import NewmarkLine
-from catenary.solver.linear.operator_pieces import WantedPieces
+from catenary.solver.linear.pieces.operator_pieces import WantedPieces
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.problem.integrator_parameters import NEWMARK, integration_of

@@ -7,7 +7,7 @@ from typing import Any
 from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.line_state import PredictedLineState, Steps
-from catenary.solver.linear.operator_pieces import WantedPieces
+from catenary.solver.linear.pieces.operator_pieces import WantedPieces
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.problem.problem import Numerics

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.compiled import compiled, in_line
+from catenary.solver.base.kernels.compiled import compiled, in_line
 
 
 @compiled

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.base.bound import bound
-from catenary.solver.base.compiled import compiled, inner
-from catenary.solver.base.pointers import borrowed
+from catenary.solver.base.kernels.bound import bound
+from catenary.solver.base.kernels.compiled import compiled, inner
+from catenary.solver.base.kernels.pointers import borrowed
 from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps, PredictedLineState, Steps
 from catenary.solver.integrators.state_kernels import reserves_within
 from catenary.solver.linear.factors.substitution import (
@@ -22,7 +22,7 @@ from catenary.solver.linear.factors.substitution import (
     meet,
     solved,
 )
-from catenary.solver.linear.lanes import (
+from catenary.solver.linear.stations.lanes import (
     add,
     add_scaled,
     is_by_mass,
@@ -33,8 +33,8 @@ from catenary.solver.linear.lanes import (
     widened,
     zero,
 )
-from catenary.solver.linear.make_ups import by_make_up
-from catenary.solver.linear.station_products import read_station, row_sums
+from catenary.solver.linear.stations.make_ups import by_make_up
+from catenary.solver.linear.stations.station_products import read_station, row_sums
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
 from catenary.solver.window.window_kernels import NO_WINDOW, WindowArrays, look

@@ -8,18 +8,18 @@ import numpy as np
 
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.linear.halo import Subdomain
-from catenary.solver.linear.like_stations import LikeStations
-from catenary.solver.linear.operator_pieces import OperatorPieces
-from catenary.solver.linear.sections import Sections
-from catenary.solver.linear.station_layout import Layout
-from catenary.solver.linear.station_products import (
+from catenary.solver.linear.pieces.operator_pieces import OperatorPieces
+from catenary.solver.linear.stations.like_stations import LikeStations
+from catenary.solver.linear.stations.sections import Sections
+from catenary.solver.linear.stations.station_layout import Layout
+from catenary.solver.linear.stations.station_products import (
     StationProduct,
     joining,
     layout_of,
     station_product,
     with_damping,
 )
-from catenary.solver.linear.station_rows import LikeRows, StationRows
+from catenary.solver.linear.stations.station_rows import LikeRows, StationRows
 from catenary.solver.model.matrices import as_petsc, part_of
 from catenary.solver.model.model import Model
 

@@ -19,9 +19,9 @@ from scipy import sparse
 from catenary.solver.base.errors import InputError
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.linear.factors.station_factors import StationFactors, station_factors
-from catenary.solver.linear.sections import Sections
-from catenary.solver.linear.station_layout import Layout
-from catenary.solver.linear.station_rows import StationRows
+from catenary.solver.linear.stations.sections import Sections
+from catenary.solver.linear.stations.station_layout import Layout
+from catenary.solver.linear.stations.station_rows import StationRows
 from catenary.solver.model.matrices import as_petsc
 from catenary.solver.model.partition import Ownership
 

@@ -13,15 +13,12 @@ import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
-from catenary.solver.base import aligned_arrays
 from catenary.solver.base.errors import NotConverged, RunBroken
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.base.petsc_events import event
 from catenary.solver.linear.factors.station_factors import StationFactors
 from catenary.solver.linear.halo import Halo, Subdomain
-from catenary.solver.linear.like_stations import LikeStations
 from catenary.solver.linear.line_products import LineProducts
-from catenary.solver.linear.operator_pieces import OperatorPieces
 from catenary.solver.linear.petsc_solvers import (
     DIRECT,
     PREFIX,
@@ -31,15 +28,23 @@ from catenary.solver.linear.petsc_solvers import (
     wants_distributed_solver,
     wants_view,
 )
-from catenary.solver.linear.sections import Sections
-from catenary.solver.linear.station_layout import WIDEST
-from catenary.solver.linear.station_products import StationProduct
+from catenary.solver.linear.pieces.operator_pieces import OperatorPieces
+from catenary.solver.linear.stations.like_stations import LikeStations
+from catenary.solver.linear.stations.sections import Sections
+from catenary.solver.linear.stations.station_layout import WIDEST
+from catenary.solver.linear.stations.station_products import StationProduct
+from catenary.solver.linear.step_arrays import StepArrays
 from catenary.solver.linear.unit_responses import Windows
 from catenary.solver.model.matrices import columns_of, part_of
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 
 logger = logging.getLogger(__name__)
+_TOGETHER = (
+    "solving on each rank by itself leaves a residual of %.1e; taking PETSc's distributed solver "
+    "instead"
+)
+_ITERATING = "the solver leaves a residual of %.1e in one application; iterating with GMRES"
 
 Loads = list[tuple[np.ndarray, np.ndarray]]
 
@@ -118,21 +123,14 @@ class LineOperators:
             self._solve_apart(windows)
             residual = self.residual()
             if not residual <= DIRECT and comm.size > 1:
-                logger.warning(
-                    "solving on each rank by itself leaves a residual of %.1e; taking PETSc's "
-                    "distributed solver instead",
-                    residual,
-                )
+                logger.warning(_TOGETHER, residual)
                 self.destroy()
                 self._solve_together(windows)
                 residual = self.residual()
         if not np.isfinite(residual):
             raise RunBroken("the step operator cannot be factored: it is singular or not finite")
         if residual > DIRECT and self._is_direct:
-            logger.warning(
-                "the solver leaves a residual of %.1e in one application; iterating with GMRES",
-                residual,
-            )
+            logger.warning(_ITERATING, residual)
             if self._solver is not None:
                 self._solver.iterate()
             self._is_direct = False
@@ -157,15 +155,15 @@ class LineOperators:
             return None
         if solver.factors is None or not self._is_direct:
             return None
-        read = self._read_padded
-        rates = self._rate_padded if damped else read
+        arrays, read = self._arrays, self._arrays.padded
+        rates = arrays.padded_rates if damped else read
         by_mass = 0.0
         # Beyond the ends of a window the state is not zero, which A^-1 A x would need.
         if shares is not None and not self._model.problem.window.moves:
             instead = self._products.instead_of_stiffness(*shares)
             if instead is not None:
                 product, by_mass = instead, 1.0 / shares[1]
-        return ByStations(product, solver.factors, read, rates, self._solution.array, by_mass)
+        return ByStations(product, solver.factors, read, rates, arrays.solution.array, by_mass)
 
     @property
     def station_widths(self) -> tuple[int, ...]:
@@ -203,20 +201,21 @@ class LineOperators:
     def multiply_stiffness(self) -> None:
         """Make K ``factor`` the internal force. Right after ``exchange``. Not collective."""
         self._product_event.begin()
-        self._products.multiply("stiffness", self._force.array, self._force_here)
+        self._products.multiply("stiffness", self._arrays.force.array, self._arrays.force_here)
         self._product_event.end()
 
     def add_damping(self) -> None:
         """Add C ``factor`` to the internal force. Right after ``exchange``. Not collective."""
-        self._products.multiply("damping", self._loaded.array, self._loaded_here)
-        self._force.array[:] += self._loaded.array
+        arrays = self._arrays
+        self._products.multiply("damping", arrays.loaded.array, arrays.loaded_here)
+        arrays.force.array[:] += arrays.loaded.array
 
     def add_force(self, force: np.ndarray) -> None:
         """Add a force on all that is solved for, shape (domain.size,) [N], to the internal force.
 
         Not collective.
         """
-        self._force.array[:] += force
+        self._arrays.force.array[:] += force
 
     def solve(self, loads: Loads | None = None) -> None:
         """Make ``answer`` that to the internal force and to ``loads``. Collective with loads.
@@ -229,10 +228,10 @@ class LineOperators:
         RunBroken
             On all ranks, if an iteration does not converge; a direct solver was verified.
         """
-        right = self._force
+        right = self._arrays.force
         if loads is not None:
-            right, owned = self._loaded, self.domain.owned
-            right.array[owned] = self._force.array[owned]
+            right, owned = self._arrays.loaded, self.domain.owned
+            right.array[owned] = self._arrays.force.array[owned]
             for dofs, values in loads:
                 np.add.at(right.array[owned], dofs, values)
             self._loaded_halo.exchange()
@@ -247,9 +246,10 @@ class LineOperators:
         """
         low, high = self.domain.low, self.domain.high
         here = (dofs >= low) & (dofs < high)
-        self._loaded.array[:] = 0.0
-        np.add.at(self._loaded.array, dofs[here] - low, coefficients[here])
-        self._solve(self._loaded)
+        loaded = self._arrays.loaded
+        loaded.array[:] = 0.0
+        np.add.at(loaded.array, dofs[here] - low, coefficients[here])
+        self._solve(loaded)
         return self.answer
 
     def square(self, name: str) -> float:
@@ -257,8 +257,9 @@ class LineOperators:
         self.exchange()
         if not self.domain.size:
             return 0.0
-        self._products.multiply(name, self._loaded.array, self._loaded_here)
-        return float(self._loaded.array[self.domain.owned] @ self.factor)
+        arrays = self._arrays
+        self._products.multiply(name, arrays.loaded.array, arrays.loaded_here)
+        return float(arrays.loaded.array[self.domain.owned] @ self.factor)
 
     def by_rows(self) -> tuple[StationProduct, StationProduct, int] | None:
         """Products with M and K by stations, of this rank alone, and how much longer than the
@@ -274,21 +275,21 @@ class LineOperators:
 
         Overwrites ``factor`` and ``answer``.
         """
-        owned = self.domain.owned
+        owned, arrays, loaded = self.domain.owned, self._arrays, self._arrays.loaded
         load = np.cos(1.0 + 3.7 * np.arange(self.domain.low, self.domain.high))
-        self._loaded.array[:] = load
-        self._solve(self._loaded)
+        loaded.array[:] = load
+        self._solve(loaded)
         self.factor[:] = self.answer
         self.answer[:] = 0.0
         self.exchange()
         if self._checked is not None:
             low, size = self.domain.low - self.domain.read_low, self.domain.size
             # Beyond what is solved for the operator has no entries.
-            read = self._read_padded[low : low + size + 2 * self._pad]
-            self._checked.multiply(read, self._loaded.array)
+            read = arrays.padded[low : low + size + 2 * self._pad]
+            self._checked.multiply(read, loaded.array)
         elif self._solver is not None:
-            self._solver.matrix.mult(self._read_domain, self._loaded.vector)
-        missing = self._loaded.array[owned] - load[owned]
+            self._solver.matrix.mult(arrays.read_domain, loaded.vector)
+        missing = loaded.array[owned] - load[owned]
         squares = np.array([missing @ missing, load[owned] @ load[owned]])
         self._comm.Allreduce(MPI.IN_PLACE, squares)
         return float(np.sqrt(squares[0] / squares[1]))
@@ -297,13 +298,10 @@ class LineOperators:
     def rate(self) -> np.ndarray:
         """(n_local,) what products with C multiply in two passes: this rank's part, to be filled
         in. Collective when first asked for."""
-        pad, domain = self._pad, self.domain
+        rates, domain = self._arrays.rates, self.domain
         if self._rate_halo is None:
-            self._rate_padded = aligned_arrays.zeros(self._read_padded.size, 6)
-            read = self._rate_padded[pad : self._rate_padded.size - pad]
-            self._rate_halo = Halo(self._comm, self._ownership, domain.read_low, read)
-        read = self._rate_padded[pad : self._rate_padded.size - pad]
-        return read[domain.owned_of_read]
+            self._rate_halo = Halo(self._comm, self._ownership, domain.read_low, rates)
+        return rates[domain.owned_of_read]
 
     @property
     def traffic(self) -> tuple[int, int]:
@@ -315,7 +313,7 @@ class LineOperators:
         for halo in (self._halo, self._loaded_halo, self._rate_halo):
             if halo is not None:
                 halo.destroy()
-        for held in (self._solver, self._products, *self._vectors):
+        for held in (self._solver, self._products, self._arrays):
             if held is not None:
                 held.destroy()
 
@@ -325,8 +323,7 @@ class LineOperators:
         self._make_arrays(low, high, PETSc.COMM_SELF)
         is_direct = True
         if self.domain.size:
-            rows = (low, high)
-            owned = self.domain.owned
+            rows, owned = (low, high), self.domain.owned
             products, stations = self._products, Sections.of(self._model.numbering, low, high)
             own = slice(*np.searchsorted(stations.starts, [owned.start, owned.stop]).tolist())
             operator, pieces = None, self.in_pieces
@@ -376,40 +373,21 @@ class LineOperators:
         return places.whole(min(near[0], coupled[0]), max(near[1], coupled[1]))
 
     def _make_arrays(self, low: int, high: int, comm: Any) -> None:
-        """Arrays for [low, high) and what products over it read, and vectors that wrap them.
-
-        Nothing in the loop makes or copies arrays. An array asked from a vector would keep it, and
-        the communicator, alive beyond ``destroy``.
-        """
-        own, pad = self._ownership, self._pad
-        read_low, read_high = self._model.numbering.whole(*columns_of(self._model, (low, high)))
+        """Arrays for [low, high), products over it, and the halos of both."""
+        own, model = self._ownership, self._model
+        read_low, read_high = model.numbering.whole(*columns_of(model, (low, high)))
         self.domain = domain = Subdomain(own.first, own.last, low, high, read_low, read_high)
-        # Products by stations read one more at both ends, which is zero where the line ends.
-        self._read_padded = aligned_arrays.zeros(read_high - read_low + 2 * pad, 0)
-        read = self._read_padded[pad : pad + read_high - read_low]
-        answer, force = aligned_arrays.zeros(domain.size, 1), aligned_arrays.zeros(domain.size, 2)
-        loaded = aligned_arrays.zeros(domain.size, 3)
-        # What products fill is this rank's, what is solved for perhaps the line's: two views.
-        self._read, self._force_here, self._loaded_here = here = [
-            PETSc.Vec().createWithArray(array, comm=PETSc.COMM_SELF)
-            for array in (read, force, loaded)
-        ]
-        self._force, self._loaded, self._solution, read_domain = solved = [
-            Wrapped(array, PETSc.Vec().createWithArray(array, size=(domain.size, None), comm=comm))
-            for array in (force, loaded, answer, read[low - read_low : high - read_low])
-        ]
-        self._read_domain = read_domain.vector
-        self._vectors = (*here, *(pair.vector for pair in solved))
-        read_here = self._read_padded, self._read
-        self._products = LineProducts(self._model, domain, *read_here, self.like, self.in_pieces)
-        self.factor, self.answer = read[domain.owned_of_read], answer[domain.owned]
-        self._halo = Halo(self._comm, own, read_low, read)
-        self._loaded_halo = Halo(self._comm, own, low, loaded)
+        self._arrays = arrays = StepArrays(domain, self._pad, comm)
+        here = domain, arrays.padded, arrays.read_here
+        self._products = LineProducts(model, *here, self.like, self.in_pieces)
+        self.factor, self.answer = arrays.factor, arrays.answer
+        self._halo = Halo(self._comm, own, read_low, arrays.read)
+        self._loaded_halo = Halo(self._comm, own, low, arrays.loaded.array)
         self._rate_halo = None
 
     def _solve(self, right: Wrapped) -> None:
         if self._solver is not None:
-            self._solver.solve(right, self._solution)
+            self._solver.solve(right, self._arrays.solution)
         if not self._is_direct:
             reason = 0 if self._solver is None else self._solver.failure
             reason = self._comm.allreduce(reason, op=MPI.MIN)

@@ -13,10 +13,10 @@ import numpy as np
 from mpi4py import MPI
 from scipy import linalg
 
-from catenary.solver.base.compiled import compiled
 from catenary.solver.base.errors import RunBroken
-from catenary.solver.linear.like_stations import LikeStations
-from catenary.solver.linear.unique_rows import kinds_of
+from catenary.solver.base.kernels.compiled import compiled
+from catenary.solver.linear.stations.like_stations import LikeStations
+from catenary.solver.linear.stations.unique_rows import kinds_of
 from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership

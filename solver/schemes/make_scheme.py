@@ -8,7 +8,7 @@ from typing import Any
 
 from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.forces_on_line import ForcesOnLine
-from catenary.solver.contact.pantographs import Pantographs
+from catenary.solver.contact.train.pantographs import Pantographs
 from catenary.solver.contact_problem.coupling import make_coupling
 from catenary.solver.contact_problem.law_tangents import law_in_steps
 from catenary.solver.integrators.line_integrator import LineIntegrator
@@ -23,8 +23,8 @@ from catenary.solver.schemes.monolithic_system import WholeSystem
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.schemes.ts_alpha2 import TSAlpha2
-from catenary.solver.statics.after_incidents import ChangedLine
-from catenary.solver.statics.equilibrium import Equilibrium
+from catenary.solver.statics.changed_line.after_incidents import ChangedLine
+from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 from catenary.solver.window.moving_window import MovingWindow, wanted_pieces
 from catenary.solver.window.where_possible import refuse_window
 

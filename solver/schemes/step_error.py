@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.base.bound import bound
+from catenary.solver.base.kernels.bound import bound
 from catenary.solver.schemes import step_error_kernels
 from catenary.solver.schemes.step_error_kernels import Past, Tried
 

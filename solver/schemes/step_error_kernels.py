@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.compiled import compiled
+from catenary.solver.base.kernels.compiled import compiled
 
 
 class Past(NamedTuple):

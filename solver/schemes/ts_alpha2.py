@@ -14,7 +14,7 @@ import numpy as np
 from catenary.solver.base.errors import InputError, NotConverged
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.contact.forces_on_line import ForcesOnLine
-from catenary.solver.contact.pantographs import Pantographs
+from catenary.solver.contact.train.pantographs import Pantographs
 from catenary.solver.linear.petsc_solvers import PREFIX
 from catenary.solver.problem.integrator_parameters import GENERALIZED_ALPHA, NEWMARK, integration_of
 from catenary.solver.problem.problem import Numerics

@@ -15,7 +15,7 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.elasticity import Elasticity, elasticity, middle_span
-from catenary.solver.statics.equilibrium import Equilibrium, find_form
+from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form
 
 
 class LineAtRest(NamedTuple):

@@ -13,7 +13,7 @@ from catenary.solver.model.model import Model
 from catenary.solver.model.rest.rest_shape import Equilibrium
 from catenary.solver.model.wire_ends import WireEnd, ends_of
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 
 @dataclass(frozen=True)

@@ -12,16 +12,15 @@ from typing import Any
 import numpy as np
 
 from catenary.mbs.head.head_records import drive_width
-from catenary.solver.base.bound import bound
+from catenary.solver.base.kernels.bound import bound
+from catenary.solver.base.kernels.pointers import HeldCall, address_of, can_hold_calls
 from catenary.solver.base.petsc_events import event
-from catenary.solver.base.pointers import HeldCall, address_of, can_hold_calls
 from catenary.solver.contact.line_response import affine
 from catenary.solver.contact_problem.complementarity_kernels import SmallProblem
 from catenary.solver.contact_problem.coupling import Implicit
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.time_loop import step_kernels
-from catenary.solver.time_loop.observers import StepView
 from catenary.solver.time_loop.step_kernels import (
     FULL,
     N_COUNTS,
@@ -31,7 +30,8 @@ from catenary.solver.time_loop.step_kernels import (
     KeptMotions,
     Steps,
 )
-from catenary.solver.time_loop.step_views import Showing
+from catenary.solver.time_loop.views.observers import StepView
+from catenary.solver.time_loop.views.step_views import Showing
 from catenary.solver.window.moving_columns import MovedStations
 from catenary.solver.window.moving_window import MOST_STEPS
 

@@ -21,11 +21,11 @@ from mpi4py import MPI
 
 from catenary.meshgen.wires import Role
 from catenary.solver.base.errors import CatenaryError, InputError, RunBroken
-from catenary.solver.base.flush_to_zero import flushed
 from catenary.solver.base.freed_memory import give_back
+from catenary.solver.base.kernels.flush_to_zero import flushed
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.contact.contact_wire import ContactWires
-from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
+from catenary.solver.contact.train.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.integrators.detour import Detour, tell
 from catenary.solver.linear.petsc_solvers import wants_single_steps, wants_solution
@@ -36,7 +36,7 @@ from catenary.solver.problem.problem import Problem, steps_of
 from catenary.solver.schemes.adaptive_steps import StepLevels
 from catenary.solver.schemes.make_scheme import Parts, SchemeFactory
 from catenary.solver.schemes.scheme import Scheme
-from catenary.solver.statics.after_incidents import (
+from catenary.solver.statics.changed_line.after_incidents import (
     ChangedLine,
     acceleration_jump,
     changed_line,
@@ -44,14 +44,14 @@ from catenary.solver.statics.after_incidents import (
     unchanged,
 )
 from catenary.solver.statics.elasticity import Elasticity
-from catenary.solver.statics.equilibrium import Equilibrium
-from catenary.solver.time_loop.audience import Audience
+from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 from catenary.solver.time_loop.compiled_steps import compiled_steps
-from catenary.solver.time_loop.observers import Observer
 from catenary.solver.time_loop.petsc_ts import ts_of
 from catenary.solver.time_loop.single_steps import single_steps_of
-from catenary.solver.time_loop.step_views import Showing
 from catenary.solver.time_loop.ts_stepper import Stepper
+from catenary.solver.time_loop.views.audience import Audience
+from catenary.solver.time_loop.views.observers import Observer
+from catenary.solver.time_loop.views.step_views import Showing
 from catenary.solver.window.moving_columns import MovingColumns
 
 
@@ -247,7 +247,7 @@ class March:
         self._happened, self._ahead = incidents, happening[len(past) :]
         time = self._first_step * self._problem.numerics.dt
         self._pantographs.move_to(time)
-        self._showing.restore(checkpoint)
+        self._showing.checkpoints.restore(checkpoint)
         self._showing.cross(time, found=True)
 
     def run(

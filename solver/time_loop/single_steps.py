@@ -16,7 +16,7 @@ from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
 
 if TYPE_CHECKING:
-    from catenary.solver.time_loop.row_layout import RowLayout
+    from catenary.solver.time_loop.views.row_layout import RowLayout
 
 
 class _Stepped(NamedTuple):

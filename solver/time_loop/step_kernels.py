@@ -11,11 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.mbs.head import head_records
-from catenary.solver.base.compiled import compiled, in_line
-from catenary.solver.base.pointers import borrowed, call_held, numbers_at
-from catenary.solver.contact import contact_kernels, output_kernels
+from catenary.solver.base.kernels.compiled import compiled, in_line
+from catenary.solver.base.kernels.pointers import borrowed, call_held, numbers_at
+from catenary.solver.contact import contact_kernels
 from catenary.solver.contact.crossing_kernels import find_across
-from catenary.solver.contact.place_kernels import move_contacts
+from catenary.solver.contact.train import output_kernels
+from catenary.solver.contact.train.place_kernels import move_contacts
 from catenary.solver.contact_problem import complementarity_kernels
 from catenary.solver.contact_problem.complementarity_kernels import SmallProblem
 from catenary.solver.contact_problem.law_tangents import ReportedForces

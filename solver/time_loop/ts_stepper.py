@@ -8,9 +8,9 @@ from collections.abc import Callable
 from catenary.solver.base.errors import NotConverged, RunBroken
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.schemes.scheme import Scheme
-from catenary.solver.time_loop.audience import Audience
 from catenary.solver.time_loop.compiled_steps import CompiledSteps
-from catenary.solver.time_loop.step_views import Showing
+from catenary.solver.time_loop.views.audience import Audience
+from catenary.solver.time_loop.views.step_views import Showing
 
 # Wall time of a block [s], after which a wish to stop is seen, and steps of the first one.
 _BLOCK_TIME, _FIRST_BLOCK = 0.05, 16

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from catenary.solver.base.compiled import compiled
+from catenary.solver.base.kernels.compiled import compiled
 from catenary.solver.model.elements.shape_functions import shape_values
 from catenary.solver.model.loads import FieldLoad, Load, ShapeLoad, table
 from catenary.solver.model.model import Model

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.base.compiled import compiled
+from catenary.solver.base.kernels.compiled import compiled
 
 
 @compiled

@@ -10,7 +10,7 @@ import numpy as np
 
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.linear.factors.station_factors import StationFactors
-from catenary.solver.linear.operator_pieces import OperatorPieces, WantedPieces
+from catenary.solver.linear.pieces.operator_pieces import OperatorPieces, WantedPieces
 from catenary.solver.model.loads import Load
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Problem

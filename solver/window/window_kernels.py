@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.compiled import compiled, in_line
+from catenary.solver.base.kernels.compiled import compiled, in_line
 from catenary.solver.linear.factors.meeting_station import middle_of, turn
 
 # Numbers of ``WindowArrays.state``.

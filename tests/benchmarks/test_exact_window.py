@@ -20,7 +20,7 @@ from catenary.cases.scene.load import load_scene
 from catenary.solver.problem.window import EXACT, OFF, WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 SPANS = int(os.environ.get("CATENARY_SPANS", "1000"))
 SECONDS = float(os.environ.get("CATENARY_SECONDS", "60"))

@@ -18,7 +18,7 @@ from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.partition import distribute
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 ROUNDS, CALLS = 60, 60
 # Spans of 50 to 58 m, no two alike, but for the five of the transition.

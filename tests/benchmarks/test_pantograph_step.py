@@ -25,7 +25,7 @@ from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.mbs.vehicle.irregularity import Irregularity
 from catenary.mbs.vehicle.motion_sources import VehicleMotion
 from catenary.solver.statics.elasticity import elasticity, middle_span
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 from catenary.solver.time_loop.march import March
 
 CASE = "ambrosio2012"

@@ -18,7 +18,7 @@ from catenary.cases.scene.load import load_scene
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 ENERGY_EVERY = 20
 ROUNDS, WAY = 4, 600.0

@@ -13,7 +13,7 @@ from small_lines import mesh_of, numerics, problem_of, train
 from catenary.solver.problem.along_track import AlongTrack, Tensioner
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest, line_at_rest_on_all
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 COMM = MPI.COMM_WORLD
 AGAIN = 40  # the step to go on from

@@ -15,7 +15,7 @@ from catenary.solver.model.partition import distribute
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 COMM = MPI.COMM_WORLD
 WAYS = {

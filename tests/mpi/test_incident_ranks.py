@@ -24,10 +24,10 @@ from catenary.solver.base.parallel import on_root
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 WORLD = MPI.COMM_WORLD
 # See test_same_answers.py.

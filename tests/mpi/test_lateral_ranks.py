@@ -12,7 +12,7 @@ from catenary.mbs.head.strips import Turning
 from catenary.meshgen.curve import Curve
 from catenary.solver.statics.line_at_rest import line_at_rest_on_all
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 COMM = MPI.COMM_WORLD
 

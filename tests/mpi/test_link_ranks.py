@@ -13,9 +13,9 @@ from stops import LEANING_LINKS, STOP_FORCE, UPLIFT_STOP
 
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
-from catenary.solver.time_loop import channels
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views import channels
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 COMM = MPI.COMM_WORLD
 

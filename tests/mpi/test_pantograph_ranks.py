@@ -21,7 +21,7 @@ from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 # The parallel solve leaves a relative residual of 1e-16 a step, which grows at most in proportion
 # over some hundred steps; as in test_same_answers.py.

@@ -27,7 +27,7 @@ from catenary.postproc.record.snapshots.blocks import RecordedLine
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.base.errors import RunBroken
-from catenary.solver.time_loop.observers import NodeMotion, Stage, StepView, row_of
+from catenary.solver.time_loop.views.observers import NodeMotion, Stage, StepView, row_of
 
 COMM = MPI.COMM_WORLD
 N_STEPS, DT = 130, 1e-3

@@ -23,7 +23,7 @@ from catenary.solver.base.errors import InputError
 from catenary.solver.base.parallel import on_root
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 # The parallel solve leaves a relative residual of 1e-16 a step; over some thousand steps of a
 # lightly damped line that grows at most in proportion, and 1e-9 leaves room for a run ten times

@@ -21,7 +21,7 @@ from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.problem import Problem, steps_of
 from catenary.solver.statics.line_at_rest import line_at_rest_on_all
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 # As in `test_same_answers`.
 TOLERANCE = 1e-9

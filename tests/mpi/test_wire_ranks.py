@@ -12,7 +12,7 @@ from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.solver.problem.incidents import DropperBreak, TensionLoss
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 COMM = MPI.COMM_WORLD
 INCIDENTS = frozenset({"dropper_break", "tension_loss"})

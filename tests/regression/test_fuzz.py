@@ -36,7 +36,7 @@ from catenary.cases.studies.hard.runs import Watched
 from catenary.solver.base.errors import InputError
 from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.incidents import DropperBreak
-from catenary.solver.statics.after_incidents import dropper_at
+from catenary.solver.statics.changed_line.after_incidents import dropper_at
 
 pytestmark = pytest.mark.study
 

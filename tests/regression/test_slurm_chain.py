@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from program import assert_same_histories, catenary
 
-from catenary.cases.run.slurm_script import Job, limit_minutes, slurm_script
+from catenary.cases.run.planning.slurm_script import Job, limit_minutes, slurm_script
 from catenary.postproc.read.results import Results
 from catenary.solver.base.errors import InputError
 

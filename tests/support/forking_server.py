@@ -21,9 +21,10 @@ PACKAGES = (
     "pydantic", "scipy.integrate", "scipy.interpolate", "scipy.optimize", "scipy.signal",
     "scipy.sparse.linalg", "tqdm", "typer",
     # Of the program, with what they import:
-    "catenary.cases.run.file_sizes", "catenary.cases.run.scene_mesh", "catenary.cases.scene.load",
+    "catenary.cases.run.planning.file_sizes", "catenary.cases.run.scene_mesh",
+    "catenary.cases.scene.load",
     "catenary.postproc.evaluate.filters", "catenary.solver.contact_problem.coupling",
-    "catenary.solver.statics.equilibrium", "catenary.solver.time_loop.step_kernels",
+    "catenary.solver.statics.form_finding.equilibrium", "catenary.solver.time_loop.step_kernels",
 )  # fmt: skip
 
 

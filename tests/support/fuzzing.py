@@ -6,10 +6,11 @@ import random
 from dataclasses import dataclass
 
 from fuzzing_broken import INCIDENTS, a_way
-from fuzzing_more import SLACK_DAMPINGS, as_assignments, mechanism, put_more
 from fuzzing_nonsense import nonsense
+from fuzzing_parts import SLACK_DAMPINGS, mechanism, put_more
 from fuzzing_planes import put_planes
 from fuzzing_topologies import put_topology
+from fuzzing_words import as_assignments
 
 BASE = "en50318_2002"
 N_STEPS = 200
@@ -57,7 +58,7 @@ def sound_scene(
 ) -> RandomScene:
     """A scene that is sound by what the documents say, of any seed.
 
-    It runs for ``n_steps``; with ``wide`` it has parts of `fuzzing_more`.
+    It runs for ``n_steps``; with ``wide`` it has parts of `fuzzing_parts`.
     """
     return RandomScene(seed, as_assignments(_words(seed, n_steps, wide)))
 

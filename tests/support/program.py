@@ -22,7 +22,7 @@ import numpy as np
 from forked_program import forks
 
 from catenary.postproc.read.results import Results
-from catenary.solver.time_loop.channels import CHANNELS
+from catenary.solver.time_loop.views.channels import CHANNELS
 
 MPIRUN = shutil.which("mpirun")
 # For anything that is to end by itself [s]: the first of a fresh clone compiles for half a minute,

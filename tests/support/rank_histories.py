@@ -11,7 +11,7 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 
 class Histories:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from catenary.solver.linear.sections import Sections, neighbours
-from catenary.solver.linear.station_layout import Layout
-from catenary.solver.linear.station_products import layout_of
+from catenary.solver.linear.stations.sections import Sections, neighbours
+from catenary.solver.linear.stations.station_layout import Layout
+from catenary.solver.linear.stations.station_products import layout_of
 
 # Unknowns of stations, plane by plane, whose loops shipped cases need in any case. Loops of others
 # take some seconds each to compile, and are left to whole studies.

@@ -6,13 +6,13 @@ import re
 
 import pytest
 
-from catenary.cases.run.needs import (
+from catenary.cases.run.planning.needs import (
     LEAST_FLUSH,
     Needs,
     flush_cadence,
     needs_before_meshing,
 )
-from catenary.cases.run.plan import make_plan, plan_text
+from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.checks.line.mesh_size import Size, size_of
 from catenary.cases.scene.convert.problem import problem_of

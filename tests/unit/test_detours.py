@@ -9,8 +9,8 @@ import pytest
 from measuring import start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.cases.run.needs import needs_with_mesh
-from catenary.cases.run.plan import make_plan, plan_text
+from catenary.cases.run.planning.needs import needs_with_mesh
+from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.run.scene_mesh import mesh_of as mesh_of_scene
 from catenary.cases.scene.convert.problem import problem_of as problem_of_scene
 from catenary.cases.scene.cost_model import (

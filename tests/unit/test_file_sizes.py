@@ -9,8 +9,13 @@ import pytest
 import typer
 from mpi4py import MPI
 
-from catenary.cases.run.needs import Kept, needs_before_meshing, needs_with_mesh, total_size
-from catenary.cases.run.plan import make_plan, plan_text
+from catenary.cases.run.planning.needs import (
+    Kept,
+    needs_before_meshing,
+    needs_with_mesh,
+    total_size,
+)
+from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.run.runner import run_case
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.cost_model import estimate_memory

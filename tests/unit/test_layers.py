@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import functools
+import graphlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,11 +22,11 @@ MAY_IMPORT = {
     "cases": set(PARTS),
 }
 LEAVES = {
-    "catenary.solver.base.bound",
-    "catenary.solver.base.compiled",
-    "catenary.solver.base.inverse",
-    "catenary.solver.base.loop_cache",
-    "catenary.solver.base.pointers",
+    "catenary.solver.base.kernels.bound",
+    "catenary.solver.base.kernels.compiled",
+    "catenary.solver.base.kernels.inverse",
+    "catenary.solver.base.kernels.loop_cache",
+    "catenary.solver.base.kernels.pointers",
     "catenary.solver.base.errors",
     "catenary.solver.base.python_signals",
     "catenary.solver.base.parallel",
@@ -221,6 +222,88 @@ def first_line(path: Path) -> str:
     return text.split("\n\n")[0].replace("\n", " ").replace("``", "`").rstrip(".")
 
 
+def inner_rooms(part: str) -> list[Path]:
+    """Folders within the rooms of a part."""
+    rooms = {ROOT / part / room.replace(".", "/") for room in ROOMS[part]}
+    folders = {path.parent for path in FILES if path.is_relative_to(ROOT / part)}
+    return sorted(
+        folder for folder in folders if folder not in rooms and rooms & set(folder.parents)
+    )
+
+
+def without_types(tree: ast.Module) -> ast.Module:
+    """A file without what it imports for type checkers."""
+    kept = [
+        node
+        for node in tree.body
+        if not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
+    ]
+    return ast.Module(kept, [])
+
+
+def circles_in(folder: Path) -> list[str] | None:
+    """Files and sub-packages of a folder that import each other in a circle, None if none do.
+
+    What only type checkers import does not count.
+    """
+    arrows: dict[str, set[str]] = {}
+    place = "catenary." + ".".join(folder.relative_to(ROOT).parts)
+    depth = place.count(".") + 1
+    for path in folder.rglob("*.py"):
+        own = path.relative_to(folder).with_suffix("").parts[0]
+        for module in imports_in(without_types(tree_of(path))):
+            if is_within(module, place) and module != place:
+                other = module.split(".")[depth]
+                if own != other:
+                    arrows.setdefault(own, set()).add(other)
+    try:
+        graphlib.TopologicalSorter(arrows).prepare()
+    except graphlib.CycleError as error:
+        return list(error.args[1])
+    return None
+
+
+@pytest.mark.parametrize(
+    "folder",
+    sorted({path.parent.parent for path in FILES if path.name == "__init__.py"} - {ROOT}),
+    ids=lambda path: str(path.relative_to(ROOT)),
+)
+def test_files_and_folders_of_a_folder_import_each_other_one_way(folder: Path) -> None:
+    assert circles_in(folder) is None
+
+
+MOST_FILES, MOST_LINES = 13, 400
+
+
+@pytest.mark.parametrize(
+    "folder", sorted({path.parent for path in FILES}), ids=lambda path: str(path.relative_to(ROOT))
+)
+def test_a_folder_has_about_a_dozen_files(folder: Path) -> None:
+    assert len([path for path in folder.glob("*.py") if path.stem != "__init__"]) <= MOST_FILES
+
+
+def test_a_file_is_read_in_one_sitting() -> None:
+    tests = (ROOT / "tests").rglob("*.py")
+    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in FILES}
+    lengths |= {path: len(path.read_text(encoding="utf-8").splitlines()) for path in tests}
+    long = {str(path.relative_to(ROOT)): n for path, n in lengths.items() if n > MOST_LINES}
+    assert long == {}
+
+
+def table_below(title: str) -> list[tuple[str, str]]:
+    """Rows of the table of folders and files below a title of the architecture page."""
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    section = page.split(f"\n### {title}", 1)[1].split("\n#", 1)[0]
+    rows = [line.strip("| ").split(" | ", 1) for line in section.splitlines() if "| `" in line]
+    return [(name.strip("`"), text) for name, text in rows]
+
+
+def test_the_architecture_page_lists_folders_within_rooms() -> None:
+    inner = [folder for part in PARTS for folder in inner_rooms(part)]
+    expected = [(f"{path.relative_to(ROOT)}/", first_line(path)) for path in inner]
+    assert table_below("Folders within these") == expected
+
+
 @pytest.mark.parametrize("part", [part for part in PARTS if ROOMS[part]])
 def test_the_architecture_page_lists_the_rooms_from_above_to_below(part: str) -> None:
     expected = []
@@ -229,7 +312,4 @@ def test_the_architecture_page_lists_the_rooms_from_above_to_below(part: str) ->
         name = f"{room.replace('.', '/')}/" if path.is_dir() else f"{room.replace('.', '/')}.py"
         if not path.is_dir() or (path / "__init__.py").exists():  # not a case's folder
             expected.append((name, first_line(path if path.is_dir() else path.with_suffix(".py"))))
-    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    section = page.split(f"\n### {part}: ", 1)[1].split("\n#", 1)[0]
-    rows = [line.strip("| ").split(" | ", 1) for line in section.splitlines() if "| `" in line]
-    assert [(name.strip("`"), text) for name, text in rows] == expected
+    assert table_below(f"{part}: ") == expected

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from catenary.cases.process import matplotlib_folder
-from catenary.solver.base import loop_cache
+from catenary.solver.base.kernels import loop_cache
 
 
 @pytest.fixture(autouse=True)

@@ -23,8 +23,8 @@ from catenary.postproc.files.result_file import FORMAT
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
 from catenary.solver.time_loop import march as time_loop
-from catenary.solver.time_loop import row_layout
-from catenary.solver.time_loop.channels import (
+from catenary.solver.time_loop.views import row_layout
+from catenary.solver.time_loop.views.channels import (
     CHANNELS,
     DROPPER,
     ENERGIES,

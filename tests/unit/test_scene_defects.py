@@ -7,7 +7,7 @@ import math
 import pytest
 
 from catenary.cases.run.describe.defects import defect_facts
-from catenary.cases.run.plan import make_plan, plan_text
+from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.convert.line.line import line_data_of

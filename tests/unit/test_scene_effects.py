@@ -8,7 +8,7 @@ from dataclasses import fields
 
 import pytest
 
-from catenary.cases.run.plan import effect_rows
+from catenary.cases.run.planning.plan import effect_rows
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.keys.keys import known_keys

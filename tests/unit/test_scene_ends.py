@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from catenary.cases.run.describe.arrivals import arrival_facts
-from catenary.cases.run.plan import make_plan, plan_text
+from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.solver.base.errors import InputError

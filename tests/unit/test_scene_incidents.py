@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from catenary.cases.run.describe.incidents import incident_facts
-from catenary.cases.run.plan import make_plan, plan_text
+from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.origin import Origin

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from free_tables import as_free
 
-from catenary.cases.run.plan import effect_rows
+from catenary.cases.run.planning.plan import effect_rows
 from catenary.cases.scene.convert.line.line import line_data_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.origin import Origin

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from measuring import check
 
+from catenary.cases.run.at_rest.static_table import static_table
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.run.static_table import static_table
 from catenary.cases.scene.convert.line.line import line_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.faults import SceneError

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.cases.run.plan import make_plan, plan_text
+from catenary.cases.run.planning.plan import make_plan, plan_text
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.solver.base.errors import InputError

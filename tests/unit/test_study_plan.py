@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from catenary.cases.ambrosio2012.conclusion import changes_of
-from catenary.cases.ambrosio2012.study import read_table, searched, variants
+from catenary.cases.ambrosio2012.study import variants
+from catenary.cases.ambrosio2012.variations import read_table, searched
 from catenary.cases.cli.main import app
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.input.case_files import shipped

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
 from catenary.cases.result_folder import output_folder
-from catenary.cases.run.needs import needs_before_meshing
+from catenary.cases.run.planning.needs import needs_before_meshing
 from catenary.cases.run.runner import run_case
 from catenary.cases.studies.sweep.axis_words import STATISTICS_IN_WORDS, key_in_words
 from catenary.cases.studies.sweep.done_before import read_record, read_summary

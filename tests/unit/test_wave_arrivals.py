@@ -9,7 +9,7 @@ import pytest
 from measuring import check
 
 from catenary.cases.run.describe.arrivals import arrival_facts, wave_line
-from catenary.cases.run.wave_arrivals import (
+from catenary.cases.run.describe.wave_arrivals import (
     Course,
     WaveLine,
     arrivals,

@@ -27,7 +27,7 @@ from catenary.solver.model.links.links import between_nodes, law
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 STIFFNESS = 1.5e4  # [N/m]
 NAME = "spare_link"

@@ -30,7 +30,7 @@ from catenary.solver.base.errors import InputError
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.schemes.monolithic_system import WholeSystem
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 NOMINAL_HEIGHT = 5.52
 START, SPEED = 43.0, 80.0

@@ -10,11 +10,11 @@ from small_lines import mesh_of, train
 
 from catenary.meshgen.line import Line
 from catenary.solver.contact.contact_wire import ContactWires
-from catenary.solver.contact.pantographs import nominal_height_rule
+from catenary.solver.contact.train.pantographs import nominal_height_rule
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.elasticity import Elasticity, elasticity, middle_span
-from catenary.solver.statics.equilibrium import Equilibrium, find_form
+from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form
 
 
 def at_rest(line: Line) -> tuple[Model, Equilibrium]:

@@ -21,7 +21,7 @@ from small_lines import (
 
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.model.matrices import stiffness_matrix
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 EPS = np.finfo(float).eps
 

@@ -17,7 +17,7 @@ from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.model.elements.shape_functions import shape_values
 from catenary.solver.problem.problem import Damping
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 LIFT = 300.0
 

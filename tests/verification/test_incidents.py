@@ -35,8 +35,8 @@ from catenary.solver.problem.incidents import (
     in_steps,
 )
 from catenary.solver.problem.problem import Damping, Problem, Train
-from catenary.solver.statics.after_incidents import changed_line
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.changed_line.after_incidents import changed_line
+from catenary.solver.statics.form_finding.equilibrium import find_form
 from catenary.solver.statics.line_at_rest import line_at_rest
 
 EPS = np.finfo(float).eps

@@ -16,8 +16,8 @@ from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.problem.along_track import AlongTrack
 from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
 from catenary.solver.problem.problem import Damping
-from catenary.solver.statics.after_incidents import changed_line
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.changed_line.after_incidents import changed_line
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 INCIDENTS = {"dropper_break", "tension_loss"}
 LATERAL = WHOLE | INCIDENTS | {"lateral_motion"}

@@ -22,7 +22,7 @@ from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.loads import ShapeLoad, along
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Damping, Problem
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 NAME = "lateral_wind"
 PLANE = ("v", "theta_z")

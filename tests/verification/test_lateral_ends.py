@@ -24,7 +24,7 @@ from catenary.solver.model.rest.lateral_shape import LateralShape
 from catenary.solver.model.rest.rest_shape import Equilibrium
 from catenary.solver.problem.ends import EndCondition, Fixed, Periodic
 from catenary.solver.problem.problem import Damping
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 from catenary.solver.waves.end_reflection import end_reflection
 
 STEPS, DT, SPAN, SHORT, BESIDE = 500, 2e-3, 55.0, 4, 3

@@ -22,7 +22,7 @@ from catenary.meshgen.wires import Conductor
 from catenary.solver.base.errors import InputError
 from catenary.solver.model.rest.lateral_shape import LateralShape
 from catenary.solver.statics.elasticity import elasticity
-from catenary.solver.statics.equilibrium import Equilibrium, find_form
+from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form
 
 # Of an element, what it takes off a chord at a kink.
 ROUNDED = 0.12

@@ -16,8 +16,8 @@ from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.links.links import at_places
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.equilibrium import find_form
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 LATERAL = frozenset({"lateral_motion"})
 ROLL = Turning(2.0, 470.0, 60.0)

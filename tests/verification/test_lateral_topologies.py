@@ -15,8 +15,8 @@ from catenary.cases.scene.load import load_scene
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Damping, Problem
-from catenary.solver.statics.equilibrium import Equilibrium, find_form
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 EPS = np.finfo(float).eps
 _TWIN = ["line.topology=twin_messenger", "line.twin={spacing_m=0.1,droppers='pairs'}"]

@@ -28,7 +28,7 @@ from catenary.solver.problem.defects import (
 )
 from catenary.solver.problem.irregularities import Heights, Irregularities, LengthErrors
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.equilibrium import Equilibrium, find_form
+from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form
 
 SLACKENING = frozenset({"dropper_slackening"})
 EFFECTS = frozenset(

@@ -23,7 +23,7 @@ from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import StepView
+from catenary.solver.time_loop.views.observers import StepView
 
 COMMON = (
     "line.n_spans=4",

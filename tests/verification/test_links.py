@@ -34,10 +34,10 @@ from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.links.links import BOTH, PULLS, at_nodes, law
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.schemes.monolithic_system import WholeSystem
-from catenary.solver.statics.equilibrium import find_form
-from catenary.solver.time_loop import channels
+from catenary.solver.statics.form_finding.equilibrium import find_form
 from catenary.solver.time_loop import march as time_loop
-from catenary.solver.time_loop.observers import StepView
+from catenary.solver.time_loop.views import channels
+from catenary.solver.time_loop.views.observers import StepView
 
 KINDS = (UPLIFT_STOP, LEANING_LINKS)
 

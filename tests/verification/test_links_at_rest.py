@@ -12,7 +12,7 @@ from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.links.links import at_nodes, law
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 PULL, PLACE = 80.0, 86.75
 

@@ -23,7 +23,7 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.model.matrices import stiffness_matrix
 from catenary.solver.problem.ends import AbsorbingLayer, Fixed, Periodic
 from catenary.solver.problem.problem import Damping, Numerics, Problem
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 GOES_ON = Periodic(), Periodic()
 STEPS, DT, SHORT, BESIDE = 1500, 2e-3, 4, 5

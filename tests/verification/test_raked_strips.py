@@ -14,11 +14,11 @@ from small_lines import EN_PANTOGRAPH, WHOLE, en50318_line, mesh_of, numerics, p
 from catenary.mbs.head.strips import Strips
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.contact.contact_wire import ContactWires
-from catenary.solver.contact.place_kernels import move_contacts
-from catenary.solver.contact.raked_strips import leads_of
+from catenary.solver.contact.train.place_kernels import move_contacts
+from catenary.solver.contact.train.raked_strips import leads_of
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 RAKE = math.radians(20.0)
 NAMES = WHOLE | {"raked_strips"}

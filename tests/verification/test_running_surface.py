@@ -18,7 +18,7 @@ from catenary.solver.problem.irregularities import (
     Irregularities,
     LengthErrors,
 )
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 WAVY = BARE | {"gravity", "running_surface", "contact_loss", "kink"}
 

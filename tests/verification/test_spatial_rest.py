@@ -20,7 +20,7 @@ from catenary.solver.problem.along_track import AlongTrack
 from catenary.solver.problem.irregularities import Irregularities, LengthErrors
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.wind import Wind
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 SPATIAL = HANGING_ALONG | {"lateral_motion", "dropper_lengths", "wind"}
 ALPHA = 1.7e-5

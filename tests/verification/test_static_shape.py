@@ -21,7 +21,7 @@ from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.base.errors import InputError
 from catenary.solver.statics.elasticity import middle_span
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 GRAVITY = 9.81
 EPS = np.finfo(float).eps

@@ -26,7 +26,7 @@ from catenary.solver.base.errors import InputError
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest.rest_shape import Equilibrium
 from catenary.solver.problem.along_track import AlongTrack, Tensioner
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 ALPHA = 1.7e-5
 EPS = np.finfo(float).eps

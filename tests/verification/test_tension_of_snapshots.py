@@ -19,7 +19,7 @@ from catenary.postproc.record.snapshots.field_kinds import ASIDE, KINDS, SLOPE, 
 from catenary.postproc.record.snapshots.field_layout import FieldRecord, layout_of
 from catenary.postproc.record.snapshots.field_values import FieldValues, Gathered
 from catenary.solver.model.axial_elements import strain_rows, unknowns_along
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 
 def staggered() -> LineData:

@@ -8,8 +8,8 @@ from measuring import check, march, registered
 from small_lines import BARE, mesh_of, numerics, problem_of, train
 
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.solver.effects.axial_effects import CREEP
 from catenary.solver.effects.effect import Effect
+from catenary.solver.effects.shipped.axial_effects import CREEP
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.loads import ShapeLoad
 from catenary.solver.problem.along_track import AlongTrack, Tensioner

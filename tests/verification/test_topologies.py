@@ -22,7 +22,7 @@ from catenary.meshgen.topologies.twin import second
 from catenary.meshgen.wires import Conductor, Role
 from catenary.solver.model.elements import beam
 from catenary.solver.statics.elasticity import elasticity
-from catenary.solver.statics.equilibrium import Equilibrium, find_form
+from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form
 
 GRAVITY = 9.81
 TWIN = Twin(0.06, False)

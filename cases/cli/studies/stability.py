@@ -39,7 +39,7 @@ def stability_map(
     from catenary.cases.studies.stability.picture import draw
     from catenary.cases.studies.sweep.output import as_csv
     from catenary.postproc.files.disk import write_all
-    from catenary.postproc.report import figures
+    from catenary.postproc.report.pictures import figures
 
     refuse_impossible(out)
     if (out / TABLE).exists() and not force:

@@ -6,7 +6,7 @@ import math
 from typing import Any, NamedTuple
 
 from catenary.cases.run.describe.ends import end_sentences, end_warnings, lets_waves_out
-from catenary.cases.run.wave_arrivals import (
+from catenary.cases.run.describe.wave_arrivals import (
     SHORT_RUN_IN,
     Arrivals,
     Course,

@@ -26,7 +26,7 @@ from catenary.cases.studies.accuracy.markdown import run_in_words, uncertainty_t
 from catenary.cases.studies.accuracy.runs import Measured
 from catenary.cases.studies.sweep import output as sweep_output
 from catenary.postproc.files.disk import plain, write_all
-from catenary.postproc.report import figures
+from catenary.postproc.report.pictures import figures
 
 TABLE, RECORD, PAGE = "accuracy.csv", "accuracy.json", "accuracy.md"
 PICTURE = "work_precision.png"

@@ -16,7 +16,7 @@ from catenary.solver.base.errors import RunBroken
 from catenary.solver.problem.problem import steps_of
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 _NEVER = 2**62
 

@@ -12,7 +12,14 @@ from matplotlib.figure import Figure
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.studies.pantograph.study import PantographStudy, fit_error
 from catenary.postproc.files.disk import write_whole
-from catenary.postproc.report.figures import COLOURS, LIGHT, legend_above, new_figure, png, tidy
+from catenary.postproc.report.pictures.figures import (
+    COLOURS,
+    LIGHT,
+    legend_above,
+    new_figure,
+    png,
+    tidy,
+)
 from catenary.solver.base.errors import InputError, RunBroken
 
 HEADER = "frequency_hz,receptance_real_m_per_N,receptance_imag_m_per_N"

@@ -14,7 +14,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from catenary.cases.run.needs import needs_with_mesh
+from catenary.cases.run.planning.needs import needs_with_mesh
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.cost_model import STEP_OVERHEAD

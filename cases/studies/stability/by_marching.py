@@ -17,7 +17,7 @@ from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 # Depth at the start [m]: exchanges settle to a share of it that is more than the round-off of
 # heights of 5 m, 1e-15 m.

@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 
 from catenary.cases.scene.tables.run.numerics import MAX_DT
 from catenary.cases.studies.stability.map import Limit, StabilityMap
-from catenary.postproc.report import figures
+from catenary.postproc.report.pictures import figures
 
 _MARKERS = {"explicit": "o", "iterated": "s", "fixed_point": "^"}
 _STABLE, _ONLY_IMPLICIT = "#eef3e6", "#fbeee6"

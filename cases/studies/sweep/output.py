@@ -21,7 +21,7 @@ from catenary.cases.studies.sweep.variants import NAMES
 from catenary.postproc.evaluate.wording import fixed
 from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.files.disk import plain, write_all
-from catenary.postproc.report import figures
+from catenary.postproc.report.pictures import figures
 
 TABLE, RECORD, PICTURE = "sweep.csv", "sweep.json", "sweep.png"
 PLOTTED = ("mean_N", "std_N", "max_N", "min_N", "max_uplift_mm")

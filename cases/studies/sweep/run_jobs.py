@@ -18,7 +18,7 @@ from catenary.cases.result_folder.output_folder import (
     refuse_earlier,
     refuse_impossible,
 )
-from catenary.cases.run.needs import Kept, total_size
+from catenary.cases.run.planning.needs import Kept, total_size
 from catenary.cases.run.runner import RESULT, run_case
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.studies.sweep.done_before import read_record, read_summary, record_text

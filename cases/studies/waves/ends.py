@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.cases.studies.waves.theory import HIGHEST
-from catenary.postproc.report import figures
+from catenary.postproc.report.pictures import figures
 from catenary.solver.base.errors import InputError
 from catenary.solver.ends.line_beyond import SIDES
 from catenary.solver.problem.ends import AbsorbingLayer, EndCondition, Periodic

@@ -21,7 +21,7 @@ from catenary.solver.problem.problem import Placement, Problem, Train
 from catenary.solver.problem.window import BOUNDED
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 from catenary.solver.waves.excitation import (
     FORCE,
     HAMMER,

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from catenary.cases.studies.waves.bench import HALF, Bench, measured
 from catenary.cases.studies.waves.theory import HIGHEST
-from catenary.postproc.report import figures
+from catenary.postproc.report.pictures import figures
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.waves.scattering import change_of_wire, scattered

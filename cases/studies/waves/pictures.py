@@ -10,7 +10,7 @@ from catenary.cases.studies.waves.energy import EnergySeen
 from catenary.cases.studies.waves.measured import Transmitted
 from catenary.cases.studies.waves.seen import WavesSeen, places_of
 from catenary.cases.studies.waves.theory import HIGHEST, WaveTheory
-from catenary.postproc.report import figures
+from catenary.postproc.report.pictures import figures
 
 # Share of velocities that the scale of colours covers, and what is drawn of a spectrum [-].
 _COVERED, _DECADES = 0.995, 4.0

@@ -28,7 +28,7 @@ from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant, VariedKey, product, slug
 from catenary.cases.studies.waves.theory import WaveTheory
 from catenary.postproc.files.disk import write_all
-from catenary.postproc.report import figures
+from catenary.postproc.report.pictures import figures
 from catenary.solver.base.errors import InputError
 
 RUNS, TABLE, PICTURE, PERIODS = "runs", "separations.csv", "separations.png", "periods.csv"

@@ -34,11 +34,11 @@ from catenary.postproc.film.film_data import FilmData, film_data
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.read.guard import examined
 from catenary.postproc.read.results import Results
-from catenary.postproc.report import figures
+from catenary.postproc.report.pictures import figures
 from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.statics.elasticity import middle_span
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
-from catenary.solver.time_loop.observers import Observer
+from catenary.solver.time_loop.views.observers import Observer
 from catenary.solver.waves.excitation import MovingForce
 
 Row = dict[str, Any]

@@ -22,12 +22,12 @@ from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.output import as_csv
 from catenary.postproc.evaluate.filters import low_pass
 from catenary.postproc.files.disk import write_all
-from catenary.postproc.report import figures
+from catenary.postproc.report.pictures import figures
 from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.problem.window import WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 from catenary.solver.window.choice import estimated_error, spans_of_window
 
 TABLE, PICTURE = "window_error.csv", "window_error.png"

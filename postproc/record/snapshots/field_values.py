@@ -18,7 +18,7 @@ from catenary.postproc.record.snapshots.field_kinds import (
 )
 from catenary.postproc.record.snapshots.field_layout import Slots
 from catenary.solver.model.axial_elements import rows_in_curve, slope_rows
-from catenary.solver.time_loop.row_kernels import take_points
+from catenary.solver.time_loop.views.row_kernels import take_points
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from catenary.postproc.record.snapshots.field_values import FieldValues, Gathere
 from catenary.postproc.record.snapshots.fields_file import FieldsFile, LineSize
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.base.parallel import on_root
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 _MAX_BUFFER = 32 * 1024 * 1024
 

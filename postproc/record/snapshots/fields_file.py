@@ -18,9 +18,9 @@ import h5py
 import numpy as np
 from h5py import h5d, h5p, h5s, h5t
 
-from catenary.postproc.files.array_writes import put_array
-from catenary.postproc.files.checked import set_attribute, text_of
 from catenary.postproc.files.disk import MARGIN, check_in_place, opened, reserve, write_at
+from catenary.postproc.files.hdf5.array_writes import put_array
+from catenary.postproc.files.hdf5.checked import set_attribute, text_of
 from catenary.postproc.files.own_files import part_of
 from catenary.postproc.read.guard import survives
 from catenary.postproc.record.snapshots.blocks import Block

@@ -14,14 +14,14 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from catenary.postproc.files.array_writes import (
+from catenary.postproc.files.disk import appears_whole
+from catenary.postproc.files.hdf5.array_writes import (
     group_in_order,
     put_array,
     put_attribute,
     whole_array,
 )
-from catenary.postproc.files.checked import text_of
-from catenary.postproc.files.disk import appears_whole
+from catenary.postproc.files.hdf5.checked import text_of
 from catenary.postproc.record.snapshots.field_kinds import KINDS
 
 SUFFIX = ".vtkhdf"

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.compiled import compiled, inner
-from catenary.solver.base.inverse import invert
+from catenary.solver.base.kernels.compiled import compiled, inner
+from catenary.solver.base.kernels.inverse import invert
 
 # Of blocks number by number: expressions of whole arrays take Numba ten times as long to compile.
 # Factors that there is room for at first.

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.compiled import compiled
+from catenary.solver.base.kernels.compiled import compiled
 
 # Where elimination may end at several places, it may at every so many stations.
 MIDDLES = 16

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from catenary.solver.base.bound import bound
+from catenary.solver.base.kernels.bound import bound
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.linear.factors.elimination import eliminate_stations, join
 from catenary.solver.linear.factors.meeting_station import (
@@ -25,10 +25,10 @@ from catenary.solver.linear.factors.meeting_station import (
     turn,
 )
 from catenary.solver.linear.factors.substitution import Factored, solve
-from catenary.solver.linear.sections import Sections
-from catenary.solver.linear.station_layout import Layout
-from catenary.solver.linear.station_products import kinds_by_make_up
-from catenary.solver.linear.station_rows import StationRows, rows_of
+from catenary.solver.linear.stations.sections import Sections
+from catenary.solver.linear.stations.station_layout import Layout
+from catenary.solver.linear.stations.station_products import kinds_by_make_up
+from catenary.solver.linear.stations.station_rows import StationRows, rows_of
 
 # Bytes of factors from which on they share blocks: more would leave no room for the state in a
 # cache next to a processor, of 1 to 2 MB; a product with a transpose waits some longer.

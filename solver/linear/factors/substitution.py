@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.compiled import compiled, inner
-from catenary.solver.base.pointers import borrowed
-from catenary.solver.linear.lane_products import (
+from catenary.solver.base.kernels.compiled import compiled, inner
+from catenary.solver.base.kernels.pointers import borrowed
+from catenary.solver.linear.stations.lane_products import (
     add_beside,
     add_symmetric,
     add_transposed,
@@ -17,7 +17,7 @@ from catenary.solver.linear.lane_products import (
     sums_from,
     total_of,
 )
-from catenary.solver.linear.lanes import (
+from catenary.solver.linear.stations.lanes import (
     beside_size,
     half_size,
     is_sparse,
@@ -29,8 +29,14 @@ from catenary.solver.linear.lanes import (
     widened,
     zero,
 )
-from catenary.solver.linear.make_ups import Places, block_at, by_make_up, make_up_of, start_of
-from catenary.solver.linear.station_layout import Layout
+from catenary.solver.linear.stations.make_ups import (
+    Places,
+    block_at,
+    by_make_up,
+    make_up_of,
+    start_of,
+)
+from catenary.solver.linear.stations.station_layout import Layout
 
 
 class Factored(NamedTuple):

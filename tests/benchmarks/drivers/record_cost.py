@@ -24,7 +24,7 @@ from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop import march
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 SCENE = ("ambrosio2012", ["train.start_m=310", 'train.pantographs=[{name="lumped"}]'])
 

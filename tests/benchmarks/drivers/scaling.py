@@ -25,7 +25,7 @@ from step_cost import room
 from catenary.cases.scene.load import load_scene
 from catenary.cases.studies.hard.runs import at_rest
 from catenary.solver.time_loop.march import March
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 WORLD = MPI.COMM_WORLD
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from catenary.solver.base.bound import bound
+from catenary.solver.base.kernels.bound import bound
 
 
 def scale(values, factors, by):  # type: ignore[no-untyped-def]

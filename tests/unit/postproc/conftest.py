@@ -24,8 +24,8 @@ from catenary.postproc.record.snapshots.blocks import RecordedLine
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Numerics, Placement, Problem, Train
 from catenary.solver.statics.elasticity import Elasticity
-from catenary.solver.statics.equilibrium import Equilibrium
-from catenary.solver.time_loop.observers import Observer, Stage, StepView, row_of
+from catenary.solver.statics.form_finding.equilibrium import Equilibrium
+from catenary.solver.time_loop.views.observers import Observer, Stage, StepView, row_of
 
 N_SPANS, SPAN = 16, 50.0
 DROPPERS = tuple(5.0 + 5.0 * k for k in range(9))

@@ -13,11 +13,12 @@ import pytest
 from scipy import signal
 
 from catenary.postproc.evaluate import filters
-from catenary.postproc.files import block_reading
+from catenary.postproc.files.hdf5 import block_reading
 from catenary.postproc.files.kept_extremes import store_extremes
 from catenary.postproc.files.result_file import COMPLETE
 from catenary.postproc.read.results import Results
-from catenary.postproc.report import csv_tables, envelope
+from catenary.postproc.report import csv_tables
+from catenary.postproc.report.pictures import envelope
 
 
 @pytest.mark.parametrize("shape", [(1,), (2,), (300,), (150_000,), (70_000, 2)])

@@ -13,7 +13,7 @@ from catenary.postproc.channels.line_record import GZIP, LineRecord
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.snapshots.fields import FieldRecorder
-from catenary.solver.time_loop.observers import BlockObserver, MotionObserver
+from catenary.solver.time_loop.views.observers import BlockObserver, MotionObserver
 
 
 def drive_by_blocks(march: Any, *observers: BlockObserver, first: int, most: int) -> list[int]:

@@ -27,11 +27,12 @@ from catenary.postproc.channels.header import (
     wire_roles,
 )
 from catenary.postproc.evaluate.error_indicators import indicate
-from catenary.postproc.files.checked import seal_attributes
+from catenary.postproc.files.hdf5.checked import seal_attributes
 from catenary.postproc.film.film_data import film_data
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
-from catenary.postproc.report import csv_tables, plots
+from catenary.postproc.report import csv_tables
+from catenary.postproc.report.pictures import force_pictures
 from catenary.postproc.report.report import write_report
 from catenary.solver.problem.problem import Damping
 from catenary.solver.statics.line_at_rest import line_at_rest
@@ -120,7 +121,7 @@ def test_the_force_on_each_wire_is_recorded_told_and_drawn(
         np.testing.assert_allclose(shares.sum(axis=1), force[:, 0], rtol=1e-13, atol=1e-10)
         assert results.wire_columns() == [{FIRST: 0, SECOND: 1}]
         rows = list(csv.reader(io.StringIO(csv_tables.pantographs_csv(results))))
-        curves = {line.get_label() for line in plots.wire_forces(results).axes[0].lines}
+        curves = {line.get_label() for line in force_pictures.wire_forces(results).axes[0].lines}
     assert {"contact wire", "contact wire 2"} <= curves
     for number, name in enumerate((FIRST, SECOND)):
         column = rows[0].index(f"{name} contact_wire_force [N]")

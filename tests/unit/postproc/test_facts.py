@@ -24,13 +24,13 @@ from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.postproc.channels.facts import FACTS, WIRE, facts_of
 from catenary.postproc.evaluate.error_indicators import as_table, indicate
 from catenary.postproc.evaluate.statistics import evaluate
-from catenary.postproc.files.checked import seal_arrays
+from catenary.postproc.files.hdf5.checked import seal_arrays
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.report import write_report
 from catenary.solver.base.errors import InputError
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw
 from catenary.solver.problem.problem import Damping, Placement, Problem
-from catenary.solver.time_loop.channels import PANTOGRAPH, RUN
+from catenary.solver.time_loop.views.channels import PANTOGRAPH, RUN
 
 ROOT = Path(__file__).parents[3]
 # Keys of tables that the head of a result file has itself: when an incident happens.

@@ -14,7 +14,7 @@ from PIL import Image
 
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.shape import BODY, HEAD, shape_of
-from catenary.postproc.files.checked import seal_attributes, set_attribute
+from catenary.postproc.files.hdf5.checked import seal_attributes, set_attribute
 from catenary.postproc.film import animate, pantograph_shape, scale, train, video
 from catenary.postproc.film.animate import SIZE, Wish
 from catenary.postproc.film.film_data import FilmData, film_data

@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.record.line_rows import LineGather
-from catenary.solver.time_loop.observers import Stage
+from catenary.solver.time_loop.views.observers import Stage
 from catenary.solver.window.moving_columns import Columns, MovingColumns
 
 N, SPEED, BLOCK = 40, 3.0, 7

@@ -13,7 +13,7 @@ from catenary.postproc.channels.line_record import GZIP, LineRecord, from_table,
 from catenary.postproc.evaluate import statistics
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
-from catenary.solver.time_loop.channels import Train, line_channels_of_all
+from catenary.solver.time_loop.views.channels import Train, line_channels_of_all
 
 N_STEPS, FLUSH = 3000, 400
 # A train on a line without stops, whose wires do not move along the track.

@@ -13,7 +13,7 @@ import pytest
 
 from catenary.postproc.record.progress import Progress, duration
 from catenary.solver.base.parallel import set_up_logging
-from catenary.solver.time_loop.observers import Stage
+from catenary.solver.time_loop.views.observers import Stage
 
 RANK_0 = types.SimpleNamespace(rank=0)
 DT = 1e-3

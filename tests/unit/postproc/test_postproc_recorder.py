@@ -20,7 +20,7 @@ from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.report.summary import real_time_factor
 from catenary.solver.base.errors import InputError, RunBroken
-from catenary.solver.time_loop import channels
+from catenary.solver.time_loop.views import channels
 
 CONFTEST = Path(__file__).with_name("conftest.py")
 

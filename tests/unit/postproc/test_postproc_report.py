@@ -16,7 +16,8 @@ import pytest
 
 from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.read.results import Results
-from catenary.postproc.report import csv_tables, plots
+from catenary.postproc.report import csv_tables
+from catenary.postproc.report.pictures import line_pictures
 from catenary.postproc.report.report import write_report
 from catenary.solver.base.errors import InputError
 
@@ -157,7 +158,7 @@ def test_pictures_are_pictures(report_folder: Path) -> None:
 
 def test_static_picture_shows_three_spans_and_the_span_of_the_elasticity(run_folder: Path) -> None:
     with Results(run_folder) as results:
-        profile, elasticity = plots.static_line(results).axes
+        profile, elasticity = line_pictures.static_line(results).axes
     assert profile.get_xlim() == pytest.approx((350.0, 500.0), abs=3.0)
     assert elasticity.get_xlim() == pytest.approx((400.0, 450.0), abs=1.0)
 

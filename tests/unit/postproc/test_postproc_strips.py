@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from catenary.postproc.read.results import Results
-from catenary.postproc.report import csv_tables, plots
+from catenary.postproc.report import csv_tables
+from catenary.postproc.report.pictures import force_pictures
 from catenary.postproc.report.report import write_report
 
 
@@ -41,7 +42,7 @@ def test_each_strip_has_a_column(tmp_path: Path, with_strips: Any, record_run: A
         np.testing.assert_array_equal(one, force[:, :1])
         np.testing.assert_allclose(two, force[:, 1:] * [0.6, 0.4], rtol=1e-15)
         rows = list(csv.reader(io.StringIO(csv_tables.pantographs_csv(results))))
-        figure = plots.strip_forces(results)
+        figure = force_pictures.strip_forces(results)
         assert len(figure.axes) == 1
     heads = [head for head in rows[0] if "strip" in head]
     assert heads == ["trailing strip 1 strip_force [N]", "trailing strip 2 strip_force [N]"]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numba import typeof
 
-from catenary.solver.base.bound import _type_of
+from catenary.solver.base.kernels.bound import _type_of
 
 
 class Pair(NamedTuple):

@@ -24,11 +24,11 @@ from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.vehicle.irregularity import Irregularity
 from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
-from catenary.solver.base import pointers
 from catenary.solver.base.errors import RunBroken
+from catenary.solver.base.kernels import pointers
 from catenary.solver.contact_problem import complementarity
 from catenary.solver.effects.effect import Effect
-from catenary.solver.integrators import line_loads
+from catenary.solver.integrators.loads import line_loads
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.loads import (
     FieldLoad,
@@ -43,7 +43,7 @@ from catenary.solver.problem.problem import Placement, Problem
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.time_loop import march as time_loop
 from catenary.solver.time_loop.march import Outcome
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 
 LINE = replace(ac_simple_line(4), stagger=(0.2, -0.2, 0.2, -0.2, 0.2))
 TWO = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0))

@@ -7,11 +7,11 @@ import pytest
 from mpi4py import MPI
 
 from catenary.solver.base.errors import InputError
-from catenary.solver.integrators import memory_kernels
-from catenary.solver.integrators.end_memory import EndMemories
-from catenary.solver.integrators.line_loads import LineLoads
 from catenary.solver.integrators.line_state import LineState
-from catenary.solver.integrators.memory_kernels import NEAR
+from catenary.solver.integrators.loads import memory_kernels
+from catenary.solver.integrators.loads.end_memory import EndMemories
+from catenary.solver.integrators.loads.line_loads import LineLoads
+from catenary.solver.integrators.loads.memory_kernels import NEAR
 from catenary.solver.linear.halo import Subdomain
 from catenary.solver.model.loads import MemoryLoad, ShapeLoad
 

@@ -18,7 +18,7 @@ from small_lines import BARE, mesh_of
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.effects.build_model import build
 from catenary.solver.problem.problem import Damping
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 
 @pytest.fixture(scope="module")

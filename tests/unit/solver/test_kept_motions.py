@@ -15,10 +15,11 @@ from catenary.solver.contact_problem import complementarity
 from catenary.solver.problem.incidents import TensionLoss
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.window import BOUNDED, EXACT, WindowChoice
-from catenary.solver.time_loop import compiled_steps, line_energy, step_views
+from catenary.solver.time_loop import compiled_steps
 from catenary.solver.time_loop import march as time_loop
-from catenary.solver.time_loop.observers import Stage, StepView
-from catenary.solver.time_loop.shown_motion import ShownMotion
+from catenary.solver.time_loop.views import line_energy, step_views
+from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.shown_motion import ShownMotion
 
 N_STEPS, EVERY = 250, 7
 

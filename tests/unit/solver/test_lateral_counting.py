@@ -12,7 +12,7 @@ from counted_effects import (
 from small_lines import BARE, mesh_of
 
 from catenary.meshgen.mesh import LineMesh
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 
 @pytest.fixture(scope="module")

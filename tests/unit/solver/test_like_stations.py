@@ -10,12 +10,12 @@ from measuring import COMM, matrix_of
 from small_lines import HANGING, ac_simple_line, mesh_of, problem_of
 
 from catenary.solver.linear.decay_length import reach
-from catenary.solver.linear.like_stations import LikeStations
+from catenary.solver.linear.stations.like_stations import LikeStations
 from catenary.solver.linear.unit_responses import ShortColumns, UnitResponses, Windows
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Damping
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 DAMPED = HANGING | {"structural_damping"}
 # M, K and C in A for steps of 0.2 ms: columns reach less than a span.

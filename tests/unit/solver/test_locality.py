@@ -30,7 +30,7 @@ from catenary.solver.linear.unit_responses import UnitResponses, Windows
 from catenary.solver.model.model import Model
 from catenary.solver.model.unknowns.registry import Unknowns
 from catenary.solver.problem.problem import Damping
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 DAMPED = HANGING | {"structural_damping"}
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from numba import __version__ as numba_version
 
-from catenary.solver.base import loop_cache
+from catenary.solver.base.kernels import loop_cache
 
 LOOP = "from catenary.solver.sizes import SIZE\n@compiled\ndef loop(x):\n    return x + SIZE\n"
 COMPILE = """
@@ -154,7 +154,7 @@ def test_loops_of_other_sources_go_after_a_month(machine: Path) -> None:
 def test_numbas_own_folder_is_left_to_others(monkeypatch: pytest.MonkeyPatch) -> None:
     import numba
 
-    from catenary.solver.base.compiled import compiled
+    from catenary.solver.base.kernels.compiled import compiled
 
     monkeypatch.setattr(numba.config, "CACHE_DIR", "somewhere")
     compiled(chosen)

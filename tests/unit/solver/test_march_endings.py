@@ -16,7 +16,7 @@ from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.loads import FunctionLoad
 from catenary.solver.problem.problem import Problem
-from catenary.solver.time_loop.observers import StepView
+from catenary.solver.time_loop.views.observers import StepView
 
 LINE = en50318_line(3)
 BREAKS_AT = 0.0105

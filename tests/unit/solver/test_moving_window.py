@@ -22,7 +22,7 @@ from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.problem.window import BOUNDED, EXACT, WindowChoice
 from catenary.solver.time_loop import compiled_steps
 from catenary.solver.time_loop import march as time_loop
-from catenary.solver.time_loop.observers import Stage, StepView
+from catenary.solver.time_loop.views.observers import Stage, StepView
 from catenary.solver.window.moving_columns import MovedStations, columns_of
 from catenary.solver.window.where_possible import refuse_window
 from catenary.solver.window.window_kernels import take_in

@@ -11,7 +11,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from catenary.solver.linear.petsc_solvers import PartSolver, Wrapped
-from catenary.solver.linear.station_layout import Layout
+from catenary.solver.linear.stations.station_layout import Layout
 
 N_STATIONS = 12
 
@@ -56,7 +56,7 @@ def test_a_solver_that_nobody_destroyed_does_not_crash_the_end_of_python() -> No
     """PETSc is finalised after Python, and cannot free what is written in Python then."""
     code = (
         "import numpy as np; from scipy import sparse; "
-        "from catenary.solver.linear.station_layout import Layout; "
+        "from catenary.solver.linear.stations.station_layout import Layout; "
         "from catenary.solver.linear.petsc_solvers import PartSolver; "
         "whole = sparse.identity(8).tobsr((4, 4)); "
         "kept = PartSolver(lambda: whole, slice(0, 2), True, True, Layout((4,))); "

@@ -10,9 +10,9 @@ from scipy.sparse.linalg import spsolve
 
 from catenary.solver.linear.factors import station_factors as module
 from catenary.solver.linear.factors.station_factors import station_factors
-from catenary.solver.linear.sections import neighbours
-from catenary.solver.linear.station_layout import WIDEST, Layout
-from catenary.solver.linear.station_products import layout_of, station_product
+from catenary.solver.linear.stations.sections import neighbours
+from catenary.solver.linear.stations.station_layout import WIDEST, Layout
+from catenary.solver.linear.stations.station_products import layout_of, station_product
 
 RNG = np.random.default_rng(7)
 # Sums of a dozen products of numbers of order one; solves lose a few digits to the condition, 1e2.

@@ -17,11 +17,11 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.solver.integrators import detour
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
 from catenary.solver.problem.problem import Problem
-from catenary.solver.time_loop import channels
 from catenary.solver.time_loop import march as time_loop
-from catenary.solver.time_loop.channels import RUN, Channel
 from catenary.solver.time_loop.march import Outcome
 from catenary.solver.time_loop.single_steps import REASONS, single_steps_of
+from catenary.solver.time_loop.views import channels
+from catenary.solver.time_loop.views.channels import RUN, Channel
 
 LINE = ac_simple_line(4)
 SPRING = LinearLaw(5e4, 0.0)

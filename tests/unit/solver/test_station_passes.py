@@ -11,7 +11,7 @@ from catenary.solver.integrators.line_state import LineState, PredictedLineState
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.linear.factors import station_factors as module
 from catenary.solver.linear.factors.station_factors import station_factors
-from catenary.solver.linear.station_products import station_product
+from catenary.solver.linear.stations.station_products import station_product
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.switching_links import RESERVE, LinkArrays
 

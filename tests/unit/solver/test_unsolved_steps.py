@@ -16,8 +16,8 @@ from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, trai
 
 from catenary.solver.base.errors import InputError, NotConverged, RunBroken
 from catenary.solver.contact.followed_links import no_links
-from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import LineResponse
+from catenary.solver.contact.train.head_states import Heads
 from catenary.solver.contact_problem.complementarity import InnerProblem
 from catenary.solver.contact_problem.coupling import Explicit
 from catenary.solver.contact_problem.law_tangents import (
@@ -28,7 +28,7 @@ from catenary.solver.contact_problem.law_tangents import (
 )
 from catenary.solver.problem.contact_laws import HertzLaw, LinearLaw
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 from catenary.solver.time_loop.march import Outcome
 
 LINE = en50318_line(2)

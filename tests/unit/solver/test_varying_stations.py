@@ -9,8 +9,8 @@ import pytest
 from repeating_line import holding, lacking, line, sections_of
 
 from catenary.solver.linear.factors.station_factors import StationFactors, station_factors
-from catenary.solver.linear.sections import neighbours
-from catenary.solver.linear.station_products import (
+from catenary.solver.linear.stations.sections import neighbours
+from catenary.solver.linear.stations.station_products import (
     StationProduct,
     layout_of,
     station_product,

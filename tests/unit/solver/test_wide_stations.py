@@ -20,7 +20,7 @@ from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Damping, Numerics
 from catenary.solver.problem.window import WindowChoice
-from catenary.solver.statics.equilibrium import find_form
+from catenary.solver.statics.form_finding.equilibrium import find_form
 
 STEPS = 40
 # As in test_lines_in_two_passes; x / s of a right-hand side by M is known to a rounding of itself,

@@ -12,8 +12,8 @@ from small_lines import ac_simple_line, mesh_of, numerics, problem_of, train
 from stitched_line import stitched_line
 
 from catenary.solver.base.errors import RunBroken
-from catenary.solver.linear import pieces
-from catenary.solver.linear.factors import factor_pieces, station_factors
+from catenary.solver.linear.factors import station_factors
+from catenary.solver.linear.pieces import factor_pieces, pieces
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.problem.window import BOUNDED, WindowChoice
 from catenary.solver.window import moving_window

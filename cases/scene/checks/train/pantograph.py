@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from catenary.cases.scene.convert.train.pantograph import wanted_force
+from catenary.cases.scene.convert.train.static_force import wanted_force
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.input.origin import shown
 from catenary.cases.scene.keys.error_sentences import refusal

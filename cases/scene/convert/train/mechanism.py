@@ -10,7 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from catenary.cases.scene.convert.train.pantograph import strips_of, wanted_force
+from catenary.cases.scene.convert.train.head import strips_of
+from catenary.cases.scene.convert.train.static_force import wanted_force
 from catenary.cases.scene.tables.train import mechanism as schema
 from catenary.cases.scene.tables.train.pantograph import MultibodyTable
 from catenary.cases.scene.tables.units import angle_from_deg, speed_from_km_h

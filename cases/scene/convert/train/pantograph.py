@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from catenary.cases.scene.convert.train.aerodynamics import uplift_of
+from catenary.cases.scene.convert.train.head import strips_of, turning_of
 from catenary.cases.scene.convert.train.laws import laws_of
-from catenary.cases.scene.tables.train.head import StripsTable
+from catenary.cases.scene.convert.train.static_force import wanted_force
 from catenary.cases.scene.tables.train.pantograph import MultibodyTable, PantographTable
-from catenary.mbs.head.flexure import Flexure
-from catenary.mbs.head.strips import Strips, Suspension, Turning
-from catenary.mbs.library import READY
 from catenary.mbs.lumped_data import LumpedData
 
 if TYPE_CHECKING:
@@ -49,36 +44,10 @@ def pantograph_of(
         strips_of(table.strips, spring, damper),
         None
         if roll is None
-        else _turning(roll.inertia_kg_m2, roll.spring_distance_m, spring, damper),
+        else turning_of(roll.inertia_kg_m2, roll.spring_distance_m, spring, damper),
         uplift_of(table.aerodynamics, reversed),
         laws_of(table.laws, len(table.masses_kg)),
     )
-
-
-def strips_of(table: StripsTable, spring: float = 0.0, damper: float = 0.0) -> Strips:
-    """Strips of a head whose own spring [N/m] and damper [N s/m] also hold its pitch."""
-    suspension = pitch = None
-    if table.mass_kg is not None and table.stiffness_N_per_m is not None:
-        suspension = Suspension(table.mass_kg, table.stiffness_N_per_m, table.damping_N_s_per_m)
-    inertia, distance = table.pitch_inertia_kg_m2, table.pitch_spring_distance_m
-    if inertia is not None and distance is not None:
-        pitch = _turning(inertia, distance, spring, damper)
-    flexure = None
-    if table.flexure is not None:
-        own = table.flexure
-        flexure = Flexure(
-            own.bending_stiffness_N_m2, own.spring_distance_m, own.modes, own.damping_ratio
-        )
-    spacing = table.spacing_m or 0.0
-    rake = math.radians(table.rake_deg)
-    length = table.length_m
-    return Strips(table.number, spacing, length, suspension, pitch, flexure=flexure, rake=rake)
-
-
-def _turning(inertia: float, distance: float, spring: float, damper: float) -> Turning:
-    """A head on two halves of its spring and damper at a distance [m] from each other."""
-    square = (0.5 * distance) ** 2
-    return Turning(inertia, spring * square, damper * square)
 
 
 def static_force(name: str, table: PantographTable, speed_km_h: float) -> float | None:
@@ -92,16 +61,3 @@ def static_force(name: str, table: PantographTable, speed_km_h: float) -> float 
 
         return stand(multibody_of(name, table, speed_km_h)).static_force
     return wanted_force(table, speed_km_h)
-
-
-def wanted_force(table: PantographTable, speed_km_h: float) -> float | None:
-    """Static force [N] of a table at a speed, None if it has none for it."""
-    if table.static_force_N is not None:
-        return table.static_force_N
-    if table.static_force_by_speed is None:
-        ready = None if isinstance(table, MultibodyTable) else table.model
-        return None if ready is None else READY[ready].force_at(speed_km_h)
-    speeds, forces = np.array(table.static_force_by_speed).T
-    if not speeds[0] <= speed_km_h <= speeds[-1]:
-        return None
-    return float(np.interp(speed_km_h, speeds, forces))

@@ -12,7 +12,7 @@ from pydantic import (
 from catenary.cases.scene.tables.table import TAKE_AWAY, Table
 from catenary.postproc.record.snapshots.blocks import OTHER_PARTS
 from catenary.postproc.record.snapshots.field_kinds import FIELDS, USUAL_FIELDS
-from catenary.solver.time_loop.channels import line_channels
+from catenary.solver.time_loop.views.channels import line_channels
 
 # Channels of the line, which may be recorded in part.
 _RECORDED = line_channels()

@@ -1,0 +1,1 @@
+"""Tables of a scene's line at rest, without a march: heights, droppers, temperatures."""

@@ -1,0 +1,221 @@
+"""What a run needs, estimated before anything is made: time, memory and room for its files."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from catenary.cases.result_folder.output_folder import RunSize
+from catenary.cases.run.planning.file_sizes import FileSizes, estimate_files
+from catenary.cases.run.recording import (
+    Extent,
+    Recording,
+    extent_before_meshing,
+    extent_of,
+    recording_of,
+)
+from catenary.cases.scene.checks.line.mesh_size import size_of
+from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.cost_model import estimate_march, estimate_memory
+from catenary.cases.scene.scene import Scene
+from catenary.mbs.lumped_data import LumpedData
+from catenary.meshgen.mesh import LineMesh
+from catenary.solver.effects import all_effects as effects
+from catenary.solver.effects.build_model import numbering_of
+from catenary.solver.integrators.detour import Detour, detour_of
+from catenary.solver.problem.problem import Problem
+from catenary.solver.problem.watched_links import GAUGES
+from catenary.solver.time_loop.single_steps import single_steps_of
+from catenary.solver.window.choice import moving_share
+
+# Time between two flushes of the result file at full speed, each of which takes some 5 ms [s], and
+# what may wait for one in memory [B].
+FLUSH_EVERY = 0.2
+FLUSH_MEMORY = 1e8
+# Time to write the state to continue from [s an unknown], and what it may take of a march with a
+# window.
+STATE_PER_UNKNOWN, STATE_SHARE = 1e-7, 0.05
+# Steps of a flush whose chunks are not too small.
+LEAST_FLUSH = 256
+
+_BYTES = 8
+_PER_PANTOGRAPH = 8  # channels of a pantograph, mostly at most
+
+
+@dataclass(frozen=True)
+class Needs:
+    """What a run needs.
+
+    Attributes
+    ----------
+    n_steps : number of steps
+    memory : resident memory on one rank [B]
+    march : wall time of the time loop on one rank [s]
+    files : sizes of the files
+    recording : what is recorded
+    detour : why steps of the line take longer than they could, None if they do not
+    """
+
+    n_steps: int
+    memory: float
+    march: float
+    files: FileSizes
+    recording: Recording
+    detour: Detour | None = None
+
+
+class Kept(NamedTuple):
+    """A run of several, and what of it stays on the disk beside summary and snapshots."""
+
+    scene: Scene
+    result: bool
+    report: bool
+
+
+def needs_of(
+    scene: Scene,
+    problem: Problem,
+    extent: Extent,
+    n_dofs: int,
+    stations: Mapping[int, int] | None = None,
+    detour: Detour | None = None,
+) -> Needs:
+    """What a run of a scene needs. Not collective.
+
+    Parameters
+    ----------
+    problem : of the scene
+    extent : of its mesh
+    n_dofs : unknowns of the line
+    stations : how many have each number of unknowns; by default all have a node of each wire
+    detour : why steps take longer than they could
+    """
+    active = effects.active(problem)
+    if not stations:
+        groups = effects.unknown_groups(active, problem.line.wires)
+        stations = {sum(len(names) for group in groups for names in group.values()): 1}
+    scheme, n_substeps = problem.numerics.scheme, _substeps(problem)
+    gusts = problem.wind is not None and problem.wind.gusts is not None
+    n_moving = round(n_dofs * moving_share(problem))
+    n_steps = max(1, math.floor(simulated_time(problem) / problem.numerics.dt + 1e-9))
+    recording = recording_of(scene.output, problem, extent, n_steps)
+    flush_every = scene.output.flush_every_steps or flush_cadence(problem, n_dofs, recording)
+    return Needs(
+        n_steps=n_steps,
+        memory=estimate_memory(n_dofs, n_steps),
+        march=_slower(detour, n_substeps)
+        * estimate_march(n_moving, n_steps, scheme, n_substeps, stations, gusts),
+        files=estimate_files(scene, problem, recording, n_dofs, flush_every),
+        recording=recording,
+        detour=detour,
+    )
+
+
+def _slower(detour: Detour | None, n_substeps: int) -> float:
+    """By how much a detour lengthens the march; substeps are counted by themselves."""
+    return 1.0 if detour is None or n_substeps else detour.factor
+
+
+def simulated_time(problem: Problem) -> float:
+    """From the start of a run to its end [s]."""
+    train = problem.train
+    return (train.end - train.start) / train.speed
+
+
+def needs_before_meshing(scene: Scene, problem: Problem | None = None) -> Needs | None:
+    """What a run needs, known from its scene alone; None if that brings its own mesh.
+
+    Not collective. ``problem`` is the scene's unless another one is run on its line.
+    """
+    size = size_of(scene)
+    if size is None:
+        return None
+    problem = problem or problem_of(scene)
+    extent = extent_before_meshing(problem.line, size.nodes)
+    return needs_of(scene, problem, extent, size.unknowns)
+
+
+def needs_with_mesh(scene: Scene, mesh: LineMesh) -> Needs:
+    """What a run on a mesh needs. Not collective."""
+    problem = problem_of(scene)
+    numbering = numbering_of(problem, mesh)
+    detour = detour_of(problem, numbering) or single_steps_of(problem)
+    extent = extent_of(mesh)
+    stations: Counter[int] = Counter()
+    for places, count in zip(numbering.make_ups, np.bincount(numbering.make_up), strict=True):
+        stations[len(places)] += int(count)
+    return needs_of(scene, problem, extent, numbering.n_unknowns, stations, detour)
+
+
+def run_size(needs: Needs) -> RunSize:
+    """Size of one run with its report."""
+    return RunSize(needs.files.total, needs.march, needs.n_steps)
+
+
+def total_size(runs: Iterable[Kept]) -> RunSize:
+    """Size of several runs, one after the other. Not collective.
+
+    Result files that do not stay take the room of the largest one. Runs whose scenes bring their
+    own mesh, which is not read here, are not counted.
+    """
+    left = largest = seconds = 0.0
+    n_steps = 0
+    for run in runs:
+        needs = needs_before_meshing(run.scene)
+        if needs is None:
+            continue
+        files = needs.files
+        left += files.film + (files.report if run.report else 0.0)
+        left += files.result if run.result else 0.0
+        largest = max(largest, 0.0 if run.result else files.result)
+        seconds += needs.march
+        n_steps += needs.n_steps
+    return RunSize(left + largest, seconds, n_steps)
+
+
+def _substeps(problem: Problem) -> int:
+    """Substeps in a step of all pantographs whose bodies are all moved."""
+    kinds = [place.data for place in problem.train.placements]
+    ways = [kind.all_bodies for kind in kinds if not isinstance(kind, LumpedData)]
+    return sum(way.substeps for way in ways if way is not None)
+
+
+def flush_cadence(problem: Problem, n_dofs: int, recording: Recording) -> int:
+    """Steps between two flushes: about 0.2 s of wall time at full speed, and what fits into memory.
+
+    Not so few that the file is made of small chunks, and whole chunks of them. The same on any
+    number of ranks, so that their files are. Where a window moves the state of the whole line is
+    written so rarely that this does not count.
+    """
+    n_moving = round(n_dofs * moving_share(problem))
+    step = estimate_march(n_moving, 1, problem.numerics.scheme, _substeps(problem))
+    spent = FLUSH_EVERY
+    if problem.window.moves:
+        spent = max(spent, STATE_PER_UNKNOWN * n_dofs / STATE_SHARE)
+    wanted = max(round(spent / step), LEAST_FLUSH)
+    steps = max(1, min(wanted, _steps_in_memory(problem, recording)))
+    for part in (LEAST_FLUSH * recording.line.every, LEAST_FLUSH, recording.line.every):
+        if steps >= part:
+            return steps - steps % part
+    return steps
+
+
+def _steps_in_memory(problem: Problem, recording: Recording) -> int:
+    """Steps whose channels fit into memory."""
+    of_train = _PER_PANTOGRAPH * len(problem.train.placements)
+    columns = recording.arm_x.size + recording.dropper_x.size + len(GAUGES) * recording.end_x.size
+    window, masts = recording.line.window, problem.line.support_positions
+    if window is None or not problem.window.moves:
+        return int(FLUSH_MEMORY / (_BYTES * (of_train + columns)))
+    # Of n steps the columns near the train: those at first, and those that it comes to.
+    per_metre = columns / (masts[-1] - masts[0]) / recording.line.every
+    behind = [placement.behind for placement in problem.train.placements]
+    at_first = of_train + per_metre * (sum(window) + max(behind) - min(behind))
+    later = per_metre * problem.train.speed * problem.numerics.dt
+    room = FLUSH_MEMORY / _BYTES
+    return int((math.sqrt(at_first**2 + 4.0 * later * room) - at_first) / (2.0 * later))

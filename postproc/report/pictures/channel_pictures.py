@@ -1,0 +1,141 @@
+"""Pictures of channels without one made for them: histories, and ranges on the line."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from catenary.postproc.read.results import Results
+from catenary.postproc.report.pictures.envelope import thinned
+from catenary.postproc.report.pictures.figures import COLOURS, colour, legend_above, stacked, tidy
+from catenary.postproc.report.pictures.marks import mark_line, still_marks, travelled
+from catenary.solver.time_loop.views.channels import (
+    ARM,
+    CHANNELS,
+    CONTACT,
+    ENERGIES,
+    STRIP,
+    WIRE,
+    WIRE_END,
+    Channel,
+)
+
+
+def channel_pictures(results: Results) -> list[tuple[str, str, Figure]]:
+    """Name of the file without its end, caption and picture of each such channel."""
+    drawn = []
+    for channel in CHANNELS.values():
+        if not channel.own_picture and results.has(channel.name) and results.n_rows("time") > 1:
+            figure = _picture_of(results, channel)
+            if figure is not None:
+                drawn.append((picture_name(channel), f"{_sentence(channel)}.", figure))
+    recorded = results.energies()
+    for channel in ENERGIES.values():
+        if channel.energy is not None and not channel.own_picture and channel.name in recorded:
+            figure = _of_energy(recorded["time"], recorded[channel.name], channel)
+            drawn.append((picture_name(channel), f"{_sentence(channel)}.", figure))
+    return drawn
+
+
+def _picture_of(results: Results, channel: Channel) -> Figure | None:
+    if channel.per == WIRE_END:
+        return _at_ends(results, channel)
+    return _on_line(results, channel) if channel.of_line else _of_train(results, channel)
+
+
+def picture_name(channel: Channel) -> str:
+    """Name of a channel's picture without its end."""
+    return f"channel_{channel.name}"
+
+
+def _sentence(channel: Channel) -> str:
+    return channel.meaning[:1].upper() + channel.meaning[1:]
+
+
+def _label(channel: Channel) -> str:
+    return f"{channel.name.replace('_', ' ')} [{channel.unit}]"
+
+
+def _of_train(results: Results, channel: Channel) -> Figure:
+    """A panel for each pantograph, a curve for each of its columns."""
+    names = results.pantograph_names()
+    labels = [[channel.name.replace("_", " ")]] * len(names)
+    columns = [range(p, p + 1) for p in range(len(names))]
+    if channel.per == STRIP:
+        columns = results.strip_columns()
+        labels = [
+            [f"strip {n + 1}" for n in range(len(own))] if len(own) > 1 else labels[0]
+            for own in columns
+        ]
+    elif channel.per == WIRE:
+        by_wire = results.wire_columns()
+        columns = [range(min(own.values()), max(own.values()) + 1) for own in by_wire]
+        labels = [list(own) for own in by_wire]
+    elif channel.per == CONTACT:
+        columns = [range(own.start, own.stop) for own in results.contact_columns()]
+        labels = [[word or labels[0][0] for word in own] for own in results.contact_names()]
+    start, end = travelled(results)
+    figure, panels = stacked(0.7 + 2.7 * len(names), len(names), shared=True)
+    for p, axes in enumerate(panels):
+        mark_line(axes, results, start, end)
+        position = results.column("contact_position", p)
+        for number, column in enumerate(columns[p]):
+            values = results.column(channel.name, column)
+            chosen = thinned(values)
+            several = len(columns[p]) > 1
+            own = colour(number if several else p)
+            label = labels[p][number]
+            axes.plot(position[chosen], values[chosen], color=own, linewidth=1.2, label=label)
+        tidy(axes, "", _label(channel), names[p].capitalize())
+        legend_above(axes)
+    panels[-1].set_xlabel("position along the track [m]")
+    return figure
+
+
+def _on_line(results: Results, channel: Channel) -> Figure:
+    """The range of each column over the run."""
+    x = results.line("arm_x" if channel.per == ARM else "dropper_x")
+    low, high = results.extremes(channel.name)
+    figure, (axes,) = stacked(3.4, 1)
+    mark_line(axes, results, float(np.min(x, initial=0.0)), float(np.max(x, initial=1.0)))
+    axes.vlines(x, low, high, color=COLOURS[0], linewidth=1.6, label="range over the run")
+    still_marks(axes, x, low, high)
+    tidy(axes, "position along the track [m]", _label(channel))
+    legend_above(axes)
+    return figure
+
+
+def _at_ends(results: Results, channel: Channel) -> Figure | None:
+    """A panel for each wire with the history at each of its ends, None if all stay zero."""
+    low, high = results.extremes(channel.name)
+    if not (np.any(low) or np.any(high)):
+        return None
+    x, wire, outwards = (results.line(f"end_{part}") for part in ("x", "wire", "outwards"))
+    names = list(results.attributes["wires"])
+    there = np.unique(wire).astype(int)
+    figure, panels = stacked(0.7 + 2.4 * there.size, there.size)
+    for axes, number in zip(panels, there.tolist(), strict=True):
+        own = np.flatnonzero((wire == number) & ((low != 0.0) | (high != 0.0)))
+        for k, column in enumerate(own.tolist()):
+            values = results.column(channel.name, column)
+            chosen = thinned(values)
+            side = "from" if outwards[column] < 0 else "up to"
+            label = f"wire {side} {x[column]:g} m"
+            time = results.line_time[chosen]
+            axes.plot(time, values[chosen], color=colour(k), linewidth=1.2, label=label)
+        axes.margins(x=0.0)
+        tidy(axes, "", _label(channel), names[number].replace("_", " "))
+        if own.size:
+            legend_above(axes)
+    panels[-1].set_xlabel("time [s]")
+    return figure
+
+
+def _of_energy(time: np.ndarray, values: np.ndarray, channel: Channel) -> Figure:
+    figure, (axes,) = stacked(3.0, 1)
+    chosen = thinned(values)
+    axes.plot(time[chosen], values[chosen], color=COLOURS[0], label=channel.name.replace("_", " "))
+    axes.margins(x=0.0)
+    tidy(axes, "time [s]", _label(channel))
+    legend_above(axes)
+    return figure

@@ -1,0 +1,206 @@
+"""Pictures of the line in a run: uplift of arms, forces of droppers, the line at rest, energies."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from catenary.postproc.evaluate.statistics import RunStatistics
+from catenary.postproc.read.results import Results
+from catenary.postproc.report.pictures.envelope import thinned
+from catenary.postproc.report.pictures.figures import (
+    COLOURS,
+    GREY,
+    LIGHT,
+    LIMIT,
+    colour,
+    legend_above,
+    stacked,
+    tidy,
+)
+from catenary.postproc.report.pictures.marks import mark_line, mark_static, still_marks, with_margin
+
+# Evaluated arms whose passage is drawn.
+_MOST_ARMS = 60
+
+
+def arm_uplift(results: Results, statistics: RunStatistics, limit: float | None) -> Figure:
+    """Uplift at the evaluated arms as the train passes, and the largest uplift of every arm.
+
+    ``limit`` is the allowed uplift [m], None for none.
+    """
+    supports = statistics.supports
+    figure, (passing, along) = stacked(5.6, 2)
+    _passing_train(passing, results, statistics)
+
+    mark_line(along, results, float(supports.x.min(initial=0)), float(supports.x.max(initial=1)))
+    along.margins(x=0.02)
+    along.vlines(supports.x, 0.0, 1e3 * supports.uplift, color=GREY, linewidth=1.4)
+    along.plot(
+        supports.x, 1e3 * supports.uplift, "o", color="#222222", ms=4, label="largest uplift"
+    )
+    if limit is not None:
+        along.axhline(1e3 * limit, color=LIMIT, linewidth=1.1, label=f"limit {1e3 * limit:.0f} mm")
+    along.set_xlim(*with_margin(supports.x))
+    along.set_ylim(bottom=0.0)
+    tidy(along, "position along the track [m]", "largest uplift [mm]", "All arms")
+    legend_above(along)
+    return figure
+
+
+def _passing_train(axes: Axes, results: Results, statistics: RunStatistics) -> None:
+    """Uplift of evaluated arms over the position of the leading pantograph relative to each."""
+    supports = statistics.supports
+    evaluated = np.flatnonzero(supports.evaluated & np.isfinite(supports.uplift))
+    first = results.first_position
+    leader = int(np.argmax(first))
+    behind = first[leader] - first
+    before, after = -60.0, float(behind.max()) + 140.0
+    position = results.column("contact_position", leader)[:: results.line_record.every]
+
+    def curve(arm: int) -> tuple[np.ndarray, np.ndarray]:
+        from_to = np.searchsorted(position, supports.x[arm] + np.array([before, after]))
+        rows = slice(*np.clip(from_to, 0, results.n_rows("arm_uplift")).tolist())
+        uplift = results.column("arm_uplift", arm, rows)
+        chosen = thinned(uplift)
+        return position[rows][chosen] - supports.x[arm], 1e3 * uplift[chosen]
+
+    worst = int(evaluated[np.argmax(supports.uplift[evaluated])]) if evaluated.size else None
+    others = evaluated[evaluated != worst]
+    shown = others[np.linspace(0, others.size - 1, min(others.size, _MOST_ARMS)).astype(int)]
+    label = "other evaluated arms"
+    if shown.size < others.size:
+        label += f", {shown.size} of {others.size}"
+    for number, arm in enumerate(shown):
+        told = label if number == 0 else None
+        axes.plot(*curve(int(arm)), color=LIGHT, linewidth=0.8, label=told)
+    if worst is not None:
+        axes.plot(
+            *curve(worst),
+            color="#222222",
+            linewidth=1.6,
+            label=f"largest uplift, arm at {supports.x[worst]:.1f} m",
+        )
+    for p, name in enumerate(results.pantograph_names()):
+        axes.axvline(
+            behind[p], color=colour(p), linestyle="--", linewidth=1.1, label=f"{name} passes"
+        )
+    axes.set_xlim(before, after)
+    who = "leading pantograph" if results.n_pantographs > 1 else "pantograph"
+    tidy(axes, f"position of the {who} relative to the arm [m]", "uplift [mm]", "Evaluated arms")
+    legend_above(axes)
+
+
+def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
+    """Forces of the worst dropper and of a mid-span one, and the range of every dropper."""
+    droppers = statistics.droppers
+    x, evaluated = droppers.x, np.flatnonzero(droppers.evaluated)
+    figure, (history, along) = stacked(5.6, 2)
+
+    masts, span = results.line("support_x"), results.reference_span
+    middle = int(np.argmin(np.abs(x - 0.5 * (masts[span] + masts[span + 1]))))
+    chosen = [(middle, f"mid-span dropper at {x[middle]:.1f} m", COLOURS[2])]
+    if evaluated.size:
+        worst = int(evaluated[np.argmin(droppers.lowest[evaluated])])
+        if worst != middle:
+            chosen.insert(0, (worst, f"lowest force, dropper at {x[worst]:.1f} m", "#222222"))
+    for dropper, label, line_colour in chosen:
+        force = results.column("dropper_force", dropper)
+        shown = thinned(force)
+        force = force[shown]
+        history.plot(results.line_time[shown], force, color=line_colour, linewidth=1.2, label=label)
+    history.axhline(0.0, color=LIMIT, linewidth=1.0, linestyle="--", label="slack")
+    history.margins(x=0.0)
+    tidy(history, "time [s]", "dropper force [N]", "Histories")
+    legend_above(history)
+
+    mark_line(along, results, *with_margin(x))
+    along.vlines(
+        x,
+        droppers.lowest,
+        droppers.highest,
+        color=COLOURS[0],
+        linewidth=1.6,
+        label="range over the run",
+    )
+    still_marks(along, x, droppers.lowest, droppers.highest)
+    slack = droppers.lowest <= 0.0
+    along.plot(x[slack], droppers.lowest[slack], "v", color=LIMIT, ms=4, label="slackened")
+    along.axhline(0.0, color=GREY, linewidth=0.8)
+    tidy(along, "position along the track [m]", "dropper force [N]", "All droppers")
+    legend_above(along)
+    return figure
+
+
+def static_line(results: Results) -> Figure:
+    """Contact-wire profile of the reference span and its neighbours; elasticity along a span.
+
+    Of several contact wires each has a curve.
+    """
+    profiles = results.contact_profiles()
+    at, lift = results.static("elasticity_x"), results.static("elasticity")
+    masts, span = results.line("support_x"), results.reference_span
+    figure, (profile, compliance) = stacked(5.2, 2)
+
+    start, end = masts[max(span - 1, 0)], masts[min(span + 2, masts.size - 1)]
+    level = min(float(np.interp(masts[span], x, height)) for x, height in profiles.values())
+    for number, (name, (x, height)) in enumerate(profiles.items()):
+        shown = (x >= start) & (x <= end)
+        profile.plot(
+            x[shown],
+            1e3 * (height[shown] - level),
+            color=colour(number),
+            linewidth=1.5,
+            linestyle="--" if number else "-",
+            label=f"{name.replace('_', ' ')} at rest",
+        )
+    mark_static(profile, results, float(start), float(end))
+    tidy(
+        profile,
+        "position along the track [m]",
+        f"height above {level:.3f} m [mm]",
+        "Profile at rest",
+    )
+    legend_above(profile)
+
+    if len(profiles) > 1:
+        own = results.static("elasticity_of_wires")
+        for number, name in enumerate(profiles):
+            known = np.isfinite(own[:, number])
+            compliance.plot(
+                at[known],
+                1e3 * own[known, number],
+                color=colour(number),
+                linestyle="--" if number else "-",
+                label=f"{name.replace('_', ' ')} alone",
+            )
+    look = (COLOURS[0], "elasticity") if len(profiles) == 1 else (GREY, "all contact wires")
+    compliance.plot(at, 1e3 * lift, color=look[0], linewidth=1.5, label=look[1])
+    if at.size:
+        mark_static(compliance, results, float(at.min()), float(at.max()))
+    compliance.set_ylim(bottom=0.0)
+    tidy(
+        compliance,
+        "position along the track [m]",
+        "lift under unit force [mm/N]",
+        "Elasticity along a span",
+    )
+    legend_above(compliance)
+    return figure
+
+
+def energies(results: Results) -> Figure | None:
+    """Energies of the line over time; None if the run did not record them."""
+    recorded = results.energies()
+    if not recorded or not recorded["time"].size:
+        return None
+    figure, (axes,) = stacked(3.0, 1)
+    for number, name in enumerate(("kinetic", "elastic")):
+        chosen = thinned(recorded[name])
+        curve = recorded["time"][chosen], recorded[name][chosen]
+        axes.plot(*curve, color=COLOURS[number], label=name)
+    axes.margins(x=0.0)
+    tidy(axes, "time [s]", "energy [J]", "Energies of the line relative to equilibrium")
+    legend_above(axes)
+    return figure

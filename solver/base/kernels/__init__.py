@@ -1,0 +1,1 @@
+"""What compiled kernels share: decorators, the cache on disk, bound arguments, aligned arrays."""

@@ -1,0 +1,50 @@
+"""Decorators for the loops of a time step, compiled by Numba and kept between runs.
+
+Cancellation-free arithmetic matters more than the last per cent: no fastmath, same answer as the
+formulas and on every rank.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+from numba import njit
+
+from catenary.solver.base.kernels import loop_cache
+
+_settings: Any = numba.config  # Numba makes its attributes while it is imported
+
+
+def compiled(function: Any) -> Any:
+    """A compiled ``function``, its machine code kept in ``loop_cache.folder()`` if there is one."""
+    return _compile(function)
+
+
+def in_line(function: Any) -> Any:
+    """Likewise, for what a loop is made of: no call is left of it.
+
+    A call copies seven numbers for each array among its arguments, in records and tuples as well,
+    and counts references to it: many a kernel takes less time than that.
+    """
+    return _compile(function, forceinline=True)
+
+
+def inner(function: Any) -> Any:
+    """Likewise, for lines that only compiled code calls.
+
+    No entry from Python is made, which takes as long as compiling the lines; a call from there
+    would end the process.
+    """
+    return _compile(function, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+def _compile(function: Any, **options: Any) -> Any:
+    folder = loop_cache.folder(numba.__version__)
+    before = _settings.CACHE_DIR
+    try:
+        # Numba looks for its folder here, once for each function; other users' loops keep theirs.
+        _settings.CACHE_DIR = str(folder or "")
+        return njit(cache=folder is not None, error_model="numpy", **options)(function)
+    finally:
+        _settings.CACHE_DIR = before

@@ -1,0 +1,204 @@
+"""Arrays and compiled functions by their addresses, so that a compiled loop takes any of them.
+
+A loop is compiled anew for each type of argument. Heads of different models, and steps of lines of
+different widths, reach a loop as numbers: one machine code, kept between runs, serves them all.
+Whoever takes an address keeps what stands there alive.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import carray, typeof, types
+from numba.extending import intrinsic
+
+from catenary.solver.base.kernels.compiled import compiled
+
+_inlined: Any = intrinsic
+# Integers that a tuple of arguments takes at most; an array of two dimensions takes nine.
+_MOST_HELD = 512
+
+
+def address_of(array: np.ndarray) -> int:
+    """Where the numbers of an array are, which are to be contiguous doubles."""
+    if array.dtype != np.float64 or not array.flags.c_contiguous:
+        raise ValueError("a compiled loop needs contiguous doubles")
+    return int(array.ctypes.data)
+
+
+class HeldCall:
+    """A compiled function with its arguments, which a compiled loop calls by ``address``.
+
+    The loop's own machine code depends on neither. Arrays are kept alive as long as this is.
+
+    Attributes
+    ----------
+    address : (3,) int, what ``call_held`` takes
+    """
+
+    def __init__(self, kernel: Any, arguments: tuple[Any, ...]) -> None:
+        self._arguments = arguments
+        kinds = tuple(typeof(argument) for argument in arguments)
+        kernel.compile(kinds)
+        self._held = np.zeros(_MOST_HELD, dtype=np.int64)
+        if not _hold(arguments, self._held):
+            raise ValueError("too many arguments to be held")
+        pointed = types.CPointer(types.Tuple(kinds))
+        _go.compile((types.int64, pointed))
+        self.address = (
+            _function_at(_go, (types.int64, pointed)),
+            _function_at(kernel, kinds),
+            int(self._held.ctypes.data),
+        )
+
+
+def can_hold_calls() -> bool:
+    """Whether this Numba gives the address of a compiled function.
+
+    ``entry_point``, by which it does, is no documented part of Numba: without it steps are taken
+    one by one.
+    """
+    kind = types.FunctionType(types.none())
+    _own_address.compile((kind,))
+    return hasattr(_own_address.overloads.get((kind,)), "entry_point")
+
+
+def _function_at(kernel: Any, kinds: tuple[Any, ...]) -> int:
+    """Where the machine code of a compiled function is, for arguments of these types."""
+    kind = types.FunctionType(types.none(*kinds))
+    _own_address.compile((kind,))
+    return int(_own_address.overloads[(kind,)].entry_point(kernel))
+
+
+@_inlined
+def pointer(typing_context, address):
+    """An address as a pointer."""
+
+    def generate(context, builder, signature, arguments):
+        return builder.inttoptr(arguments[0], ir.IntType(8).as_pointer())
+
+    return types.voidptr(types.int64), generate
+
+
+@_inlined
+def call(typing_context, address, arguments):
+    """Call the compiled function at an address with a tuple of arguments."""
+
+    def generate(context, builder, signature, given):
+        place, packed = given
+        kinds = signature.args[1].types
+        taken = [context.get_value_type(kind) for kind in kinds]
+        function = ir.FunctionType(context.get_value_type(types.none), taken)
+        values = [builder.extract_value(packed, number) for number in range(len(kinds))]
+        builder.call(builder.inttoptr(place, function.as_pointer()), values)
+        return context.get_dummy_value()
+
+    return types.void(types.int64, arguments), generate
+
+
+@_inlined
+def borrowed(typing_context, value):
+    """An array, or a tuple that holds arrays, of which no references are counted from here on.
+
+    Whoever has given it keeps it alive. Counting takes a tenth of a step of a short line.
+    """
+
+    def generate(context, builder, signature, arguments):
+        return _borrow(context, builder, signature.return_type, arguments[0])
+
+    return value(value), generate
+
+
+def _borrow(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    """LLVM's value of an array or tuple without owners."""
+    if isinstance(kind, types.Array):
+        array = context.make_array(kind)(context, builder, value)
+        array.meminfo = ir.Constant(array.meminfo.type, None)
+        array.parent = ir.Constant(array.parent.type, None)
+        return array._getvalue()
+    parts: Any = getattr(kind, "types", ())
+    if isinstance(kind, types.BaseTuple):
+        for number, part in enumerate(parts):
+            held = _borrow(context, builder, part, builder.extract_value(value, number))
+            value = builder.insert_value(value, held, number)
+    return value
+
+
+@_inlined
+def _store(typing_context, value, place):
+    """Write a tuple to an array of integers as it is in memory; whether there is room."""
+
+    def generate(context, builder, signature, arguments):
+        kind, into = signature.args
+        pointer = context.make_array(into)(context, builder, arguments[1]).data
+        size = context.get_abi_sizeof(context.get_value_type(kind))
+        if size > 8 * _MOST_HELD:
+            return ir.Constant(ir.IntType(1), 0)
+        there = builder.bitcast(pointer, context.get_value_type(kind).as_pointer())
+        builder.store(arguments[0], there, align=8)
+        return ir.Constant(ir.IntType(1), 1)
+
+    return types.boolean(value, place), generate
+
+
+@_inlined
+def _loaded(typing_context, place):
+    """The tuple that ``_store`` has written to a place, without owners."""
+
+    def generate(context, builder, signature, arguments):
+        kind = context.get_value_type(signature.return_type)
+        there = builder.bitcast(arguments[0], kind.as_pointer())
+        return builder.load(there, align=8)
+
+    return place.dtype(place), generate
+
+
+@_inlined
+def _address_in(typing_context, function):
+    """The address that a compiled function is called at."""
+
+    def generate(context, builder, signature, arguments):
+        return builder.ptrtoint(builder.extract_value(arguments[0], 0), ir.IntType(64))
+
+    return types.int64(function), generate
+
+
+@compiled
+def _hold(arguments, held):
+    return _store(borrowed(arguments), held)
+
+
+@compiled
+def _go(kernel, place):
+    call(kernel, _loaded(place))
+
+
+@compiled
+def call_held(address):
+    """Call what a ``HeldCall`` holds; ``address`` is its own."""
+    call(address[0], (address[1], address[2]))
+
+
+@compiled
+def _own_address(function):
+    return _address_in(function)
+
+
+@compiled
+def numbers_at(address, n):
+    """The array (n,) at an address."""
+    return carray(pointer(address), (n,), np.float64)
+
+
+@compiled
+def table_at_address(address, n, m):
+    """The array (n, m) at an address."""
+    return carray(pointer(address), (n, m), np.float64)
+
+
+@compiled
+def cube_at(address, n, m, k):
+    """The array (n, m, k) at an address."""
+    return carray(pointer(address), (n, m, k), np.float64)

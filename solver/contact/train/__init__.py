@@ -1,0 +1,1 @@
+"""The train's side of the contacts: pantographs, their strips and where these are."""

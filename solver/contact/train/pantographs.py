@@ -1,0 +1,371 @@
+"""The train's pantographs: models on rank 0, their contacts' places on all ranks."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy import integrate
+
+from catenary.mbs.build import Operation, has_joints, make_pantograph, steady_forces
+from catenary.mbs.head.head_kernels import N_DRIVE
+from catenary.mbs.head.head_records import HEAD, fill_head
+from catenary.mbs.head.newmark_head import SteppedHead
+from catenary.mbs.head.wire_crossing import CrossingPath, FollowedPath, LateralPath, SeveralPaths
+from catenary.mbs.interface import Pantograph
+from catenary.mbs.lowering import LoweredPantograph
+from catenary.mbs.mechanism.full_pantograph import FullPantograph
+from catenary.mbs.roll import roll_of
+from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.solver.base.kernels.bound import bound
+from catenary.solver.base.parallel import on_root
+from catenary.solver.contact.contact_wire import Candidates, ContactWires
+from catenary.solver.contact.train import output_kernels
+from catenary.solver.contact.train.air_around import airflow
+from catenary.solver.contact.train.head_states import Heads
+from catenary.solver.contact.train.output_kernels import Ends
+from catenary.solver.contact.train.place_kernels import move_contacts
+from catenary.solver.contact.train.raked_strips import leads_of
+from catenary.solver.problem.contact_laws import KinematicLaw
+from catenary.solver.problem.problem import Placement, Problem
+from catenary.solver.problem.simulated import Simulated
+from catenary.solver.statics.elasticity import Elasticity
+
+
+class Pantographs:
+    """All pantographs of a train, n of them, with their strips. Collective to make.
+
+    Each strip may touch each contact wire: these are the contacts, strip by strip.
+
+    Each is placed at the wire at rest, or ``start_below`` it. With a kinematic contact it already
+    moves up and down with the wire under way, V dw/dx: a head at rest would have to be brought to
+    that within one step.
+
+    Attributes
+    ----------
+    models : the models on rank 0, empty elsewhere
+    n_contacts : number of strips times contact wires
+    candidates : Candidates for contacts (n_contacts,), all ranks
+    position : (n,) of the pantographs along the track [m], all ranks
+    contact_force, head_height, wire_height : (n,) after the latest step, rank 0 only: the sum over
+        a pantograph's strips, and their means
+    strip_force : (n_strips,) the sum over the wires that each strip touches
+    contact_wire_force : (n * n_wires,) the sum over the strips that touch each wire, pantograph by
+        pantograph; empty if there is one wire
+    joints_in_loop : whether a pantograph has joints that may open, all ranks
+    constraint_violation : (n,) largest open joint after the latest step [m], NaN for pantographs
+        without joints in the loop, rank 0 only
+    across : (3, n_contacts) where lateral motion is simulated: where the wires are across the track
+        [m], how fast that changes at the contacts [m/s] and how far they are from rest [m], rank 0
+    lateral_place : (n_contacts,) then, else (0,): where wires are on the strips, to the left of
+        their middle [m], NaN where a wire is not on its strip; rank 0
+    lateral_displacement : the last of ``across``
+    outputs : ``position`` and all these of the latest step one after another; ``of_step`` is the
+        part that a step fills after its forces are known
+    speed : of the train [m/s]
+    moving : start and places of contacts and pantographs and leads of contacts on raked strips, see
+        ``move_contacts``
+    reach : how far contacts are behind and ahead of their pantographs at most [m], all ranks
+    ends : Ends, contacts of each strip and strips of each pantograph
+
+    Raises
+    ------
+    CatenaryError
+        On all ranks, if a pantograph does not reach the wire.
+    """
+
+    def __init__(
+        self,
+        comm: Any,
+        problem: Problem,
+        simulated: Simulated,
+        wires: ContactWires,
+        nominal_height: Callable[[Placement], float],
+    ) -> None:
+        train = problem.train
+        self._wires = wires
+        self._start = np.array([train.start - p.behind for p in train.placements])
+        self.speed = train.speed
+        offsets = [placement.data.strip_offsets for placement in train.placements]
+        counts, n_wires = [len(own) for own in offsets], wires.n_wires
+        of_strip, of_pantograph = np.arange(sum(counts) + 1), np.cumsum([0, *counts])
+        self.ends = Ends(n_wires * of_strip.astype(np.int64), of_pantograph.astype(np.int64))
+        self._contacts = [
+            slice(int(a), int(b)) for a, b in itertools.pairwise(n_wires * of_pantograph)
+        ]
+        strip_start = np.repeat(self._start, counts) + np.concatenate(offsets)
+        half_length = [placement.data.strips.half_length for placement in train.placements]
+        # Places of contacts and of pantographs move together, in one sum.
+        self.n_contacts = n_wires * strip_start.size
+        self._all_start = np.concatenate([np.repeat(strip_start, n_wires), self._start])
+        shares = self.n * n_wires if n_wires > 1 else 0
+        sizes = (self.n, 3 * self.n, strip_start.size, shares, self.n)
+        places_and_outputs = np.zeros(self.n_contacts + sum(sizes))
+        self._all_places = places_and_outputs[: self._all_start.size]
+        self.candidates = Candidates(
+            places_and_outputs[: self.n_contacts],
+            np.tile(np.arange(n_wires), strip_start.size),
+            np.repeat(np.repeat(half_length, counts), n_wires),
+        )
+        rake = [
+            placement.data.strips.rake * simulated.raked_strips for placement in train.placements
+        ]
+        leads = leads_of(wires, self.candidates.wire, np.repeat(np.repeat(rake, counts), n_wires))
+        self.moving = self._all_start, self._all_places, leads
+        self._move = bound(move_contacts, *self.moving, later=(0.0,))
+        self.reach = (
+            max(0.0, -min(map(min, offsets))) + max(0.0, -leads.lead.min(initial=0.0)),
+            max(0.0, max(map(max, offsets))) + leads.lead.max(initial=0.0),
+        )
+        self.outputs = places_and_outputs[self.n_contacts :]
+        parts = np.split(self.outputs, np.cumsum(sizes)[:-1])
+        self.position, forces, self.strip_force, self.contact_wire_force = parts[:-1]
+        self.constraint_violation = parts[-1]
+        self.move_to(0.0)
+        self.contact_force, self.head_height, self.wire_height = forces.reshape(3, self.n)
+        self.of_step = self.outputs[self.n : -self.n]
+        self.wire_height[:] = wires.rest_height(self._start)
+        self.head_height[:] = self.wire_height - train.start_below
+        self._heads = Heads(self.n_contacts)
+        self.across = np.zeros((3, self.n_contacts if simulated.lateral else 0))
+        self.lateral_displacement = self.across[2]
+        self.lateral_place = np.zeros(self.lateral_displacement.size)
+        self.joints_in_loop = any(has_joints(placement.data) for placement in train.placements)
+        self.constraint_violation[:] = np.nan
+        self.models: list[Pantograph] = []
+        self._followed: list[FollowedPath] = []
+        on_root(comm, lambda: self._make_all(problem, simulated, nominal_height), takes_long=True)
+
+    @property
+    def n(self) -> int:
+        """Number of pantographs."""
+        return int(self._start.size)
+
+    @property
+    def n_wires(self) -> int:
+        """Number of contact wires."""
+        return self._wires.n_wires
+
+    @property
+    def lateral(self) -> bool:
+        """Whether the wires move across the track."""
+        return self.across.size > 0
+
+    @property
+    def n_strips(self) -> tuple[int, ...]:
+        """Number of strips of each pantograph."""
+        return tuple(np.diff(self.ends.of_pantograph).tolist())
+
+    @property
+    def most_contacts(self) -> int:
+        """Number of contacts of the pantograph with the most."""
+        return self._wires.n_wires * max(self.n_strips)
+
+    def move_to(self, time: float) -> None:
+        """Move pantographs and contacts to where they are at ``time`` [s]."""
+        self._move(self.speed * time)
+
+    def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Heights and velocities (n_contacts,) at ``time`` from the motion alone. Rank 0 only."""
+        height, velocity = np.empty(self.n_contacts), np.empty(self.n_contacts)
+        for model, strips in self._models_with_contacts:
+            height[strips], velocity[strips] = model.extrapolate(time)
+        return height, velocity
+
+    def cross(self, time: float, present: np.ndarray) -> None:
+        """Note where wires cross the strips at ``time`` [s], from ``across``.
+
+        ``present`` (n_contacts,) is 0 where a wire is not on its strip. Does nothing where there
+        are no models, or no lateral motion.
+        """
+        for path, contacts in zip(self._followed, self._contacts, strict=False):
+            path.move_to(time)
+            self.lateral_place[contacts] = path.place
+        self.lateral_place[present[: self.lateral_place.size] == 0.0] = np.nan
+
+    def predict(self, time: float) -> Heads:
+        """Strips at ``time`` as functions of the contact forces. Rank 0 only."""
+        if len(self.models) == 1:
+            self._heads.adopt(self.models[0].predict(time))
+            return self._heads
+        for model, strips in self._models_with_contacts:
+            self._heads.put(strips, model.predict(time))
+        return self._heads
+
+    def advance(self, contact_force: np.ndarray, reported: np.ndarray, depth: np.ndarray) -> None:
+        """Take the step with these forces and depths (n_contacts,). Rank 0 only.
+
+        ``reported`` is what of the forces counts as contact force in the records.
+        """
+        if len(self.models) == 1:
+            self.models[0].advance(contact_force)
+        else:
+            for model, strips in self._models_with_contacts:
+                model.advance(contact_force[strips])
+        if self.joints_in_loop:
+            self.look_at_joints()
+        output_kernels.write_outputs(
+            contact_force, reported, self._heads.affine, depth, self.ends, self.of_step
+        )
+
+    def places(self) -> list[np.ndarray]:
+        """Where masses and bodies of each pantograph are now, see `Pantograph.places`; rank 0."""
+        return [model.places() for model in self.models]
+
+    def bases(self, time: float) -> list[float]:
+        """Heights of the pantographs' bases at ``time`` [s], see `Pantograph.base`; rank 0 [m]."""
+        return [model.base(time) for model in self.models]
+
+    def records(self) -> np.ndarray | None:
+        """The heads as a compiled loop steps them, None if it cannot step one of them."""
+        records = np.zeros(self.n, dtype=HEAD)
+        for record, model, strips in zip(records, self.models, self._contacts, strict=True):
+            if not isinstance(model, SteppedHead) or model.by_hand:
+                return None
+            fill_head(record, {**model.record(), "first": strips.start})
+        return records
+
+    def fill_drives(self, times: Sequence[float], drives: np.ndarray) -> None:
+        """Fill in what heads of ``records`` depend on in steps to ``times`` [s].
+
+        ``drives`` (len(times), n, `head_records.drive_width`).
+        """
+        for number, model in enumerate(self.models):
+            assert isinstance(model, SteppedHead)
+            model.fill_drives(times, drives[:, number])
+            if self._followed:
+                path = self._followed[number]
+                path.fill_ahead(times, drives[:, number, N_DRIVE : N_DRIVE + 2 * path.place.size])
+
+    def look_at_joints(self) -> None:
+        """Note by how much joints are open now. Does nothing where there are no models."""
+        for number, model in enumerate(self.models):
+            moved = model.model if isinstance(model, LoweredPantograph) else model
+            if isinstance(moved, FullPantograph):
+                self.constraint_violation[number] = moved.constraint_violation()
+
+    def take_over(self, other: Pantographs) -> None:
+        """Go on from where ``other`` are, the same train made for another step. Not collective."""
+        self.outputs[:] = other.outputs
+        self.across[:], self.lateral_place[:] = other.across, other.lateral_place
+        for mine, theirs in zip(self.models, other.models, strict=True):
+            mine.restore(theirs.state())
+
+    def _make_all(
+        self,
+        problem: Problem,
+        simulated: Simulated,
+        nominal_height: Callable[[Placement], float],
+    ) -> None:
+        """Make and place all models. Rank 0 only."""
+        velocity = np.zeros(self.n)
+        if isinstance(problem.contact, KinematicLaw):
+            velocity = self.speed * self._wires.rest_slope(self._start)
+        for number, placement in enumerate(problem.train.placements):
+            height = nominal_height(placement)
+            base = _base(problem, simulated, placement)
+            path: CrossingPath | None = None
+            if self.lateral:
+                path = FollowedPath(self.across[:2, self._contacts[number]], base)
+                self._followed.append(path)
+            if not _depends_on_place(placement, simulated):
+                path = None
+            elif path is None:
+                path = _lateral_path(problem, placement, base, self._wires)
+            model = _make(problem, simulated, placement, height, self.n_wires, base, path)
+            model.place(float(self.head_height[number]), float(velocity[number]))
+            self.models.append(model)
+        self._models_with_contacts = list(zip(self.models, self._contacts, strict=True))
+        self.look_at_joints()
+
+
+def _make(
+    problem: Problem,
+    simulated: Simulated,
+    placement: Placement,
+    nominal_height: float,
+    n_wires: int,
+    base: BaseMotion | None,
+    path: CrossingPath | None,
+) -> Pantograph:
+    numerics, train = problem.numerics, problem.train
+    operation = Operation(
+        placement.static_force,
+        nominal_height,
+        train.raise_time,
+        numerics.dt,
+        numerics.beta,
+        numerics.gamma,
+        path,
+        base,
+        airflow(problem, simulated, placement),
+        placement.lowering if simulated.lowering else None,
+        placement.regulator if simulated.regulated_lift else None,
+        simulated.head_roll,
+    )
+    data = placement.data
+    laws = data.laws if simulated.pantograph_laws else ()
+    flexure = data.strips.flexure if simulated.flexible_strips else None
+    strips = replace(data.strips, wires=n_wires, flexure=flexure)
+    data = replace(data, strips=strips, laws=laws)
+    return make_pantograph(data, operation)
+
+
+def _base(problem: Problem, simulated: Simulated, placement: Placement) -> BaseMotion | None:
+    """How the vehicle moves a pantograph, None if it does not."""
+    if simulated.vehicle is None:
+        return None
+    vehicle = replace(simulated.vehicle, suspension=simulated.suspension)
+    train = problem.train
+    return BaseMotion(vehicle, train.start - placement.behind, train.speed)
+
+
+def _depends_on_place(placement: Placement, simulated: Simulated) -> bool:
+    """Whether it matters where wires cross the strips: to a head that rolls or bends."""
+    bends = simulated.flexible_strips and placement.data.strips.flexure is not None
+    return bends or (simulated.head_roll and roll_of(placement.data) is not None)
+
+
+def _lateral_path(
+    problem: Problem, placement: Placement, base: BaseMotion | None, wires: ContactWires
+) -> CrossingPath:
+    """Where wires that do not move sideways cross the strips."""
+    train = problem.train
+    paths = [
+        LateralPath(
+            *wires.course(number),
+            train.start - placement.behind,
+            placement.data.strip_offsets,
+            train.speed,
+            base,
+        )
+        for number in range(wires.n_wires)
+    ]
+    return paths[0] if len(paths) == 1 else SeveralPaths(paths)
+
+
+def nominal_height_rule(
+    wires: ContactWires, elasticity: Elasticity, air_speed: float | None = None
+) -> Callable[[Placement], float]:
+    """Head height at which the static force is defined.
+
+    That of the placement, or else the mean height of a head that lifts the contact wires in the
+    stretch of ``elasticity`` with the static force and that of still air at ``air_speed`` [m/s], so
+    that the base spring neither adds to the mean force nor takes from it.
+    """
+    x = elasticity.x
+    at_rest = np.stack([wires.rest_height_of(wire, x) for wire in range(wires.n_wires)], axis=1)
+
+    def height(placement: Placement) -> float:
+        if placement.nominal_height is not None:
+            return placement.nominal_height
+        force = placement.static_force
+        if air_speed is not None and placement.data.meets_air:
+            force += steady_forces(placement.data, air_speed).whole
+        lifted = elasticity.pressed(at_rest, force)
+        return float(integrate.trapezoid(lifted, x) / (x[-1] - x[0]))
+
+    return height

@@ -1,0 +1,164 @@
+"""Effects of defects: what befalls a line once its droppers have been cut."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from catenary.meshgen.line import Line
+from catenary.solver.effects.effect import Effect, register
+from catenary.solver.effects.shipped import irregularity_effects  # noqa: F401  (built before)
+from catenary.solver.model.links.links import at_places
+from catenary.solver.model.model import Block
+from catenary.solver.problem.defects import (
+    HardSpot,
+    Kink,
+    LooseClamp,
+    MissingDropper,
+    WornWire,
+    WrongTension,
+)
+from catenary.solver.problem.irregularities import BentWire
+from catenary.solver.problem.problem import Problem
+from catenary.solver.problem.simulated import Simulated
+
+if TYPE_CHECKING:
+    from catenary.solver.model.builder import ModelBuilder
+
+_Kind = TypeVar("_Kind")
+
+
+def _those(problem: Problem, kind: type[_Kind]) -> Iterator[_Kind]:
+    return (defect for defect in problem.defects if isinstance(defect, kind))
+
+
+def _has(kind: type) -> Callable[[Problem], bool]:
+    return lambda problem: any(True for _ in _those(problem, kind))
+
+
+def _missing(laws: Simulated, problem: Problem) -> Simulated:
+    return replace(laws, missing=tuple(defect.x for defect in _those(problem, MissingDropper)))
+
+
+def _loose(laws: Simulated, problem: Problem) -> Simulated:
+    return replace(laws, loose=tuple(defect.x for defect in _those(problem, LooseClamp)))
+
+
+def _worn(line: Line, problem: Problem) -> Line:
+    worn = list(_those(problem, WornWire))
+    wires = (
+        replace(wire, worn=tuple((d.start, d.end, d.lost) for d in worn if d.wire == wire.name))
+        for wire in line.wires
+    )
+    return replace(line, wires=tuple(wires))
+
+
+def _pulled(line: Line, problem: Problem) -> Line:
+    return line.with_shares({d.wire: d.factor for d in _those(problem, WrongTension)})
+
+
+def _hard_spots(builder: ModelBuilder) -> None:
+    for spot in _those(builder.problem, HardSpot):
+        place = at_places(builder.model, spot.wire, np.array([spot.x]))
+        if spot.mass:
+            builder.add_masses_at(spot.wire, place, np.array([spot.mass]))
+        if spot.stiffness:
+            spring = spot.stiffness * place.weights[:, :, None] * place.weights[:, None, :]
+            unknowns, kind = place.unknowns, np.zeros(1, dtype=np.int64)
+            builder.add_block(Block(spot.wire, unknowns, kind, None, spring))
+
+
+def _kinks(laws: Simulated, problem: Problem) -> Simulated:
+    bent = []
+    for kink in _those(problem, Kink):
+        wire = problem.line.wire(kink.wire)
+        decay = float(np.sqrt(wire.bending_stiffness / wire.tension))
+        bent.append(BentWire(kink.wire, kink.x, kink.angle, decay))
+    return replace(laws, surface=(*laws.surface, *bent))
+
+
+register(
+    Effect(
+        "missing_dropper",
+        "droppers that are missing from the start",
+        "matrices, weights and rest without the dropper and its clamps; [[defects]]",
+        "static equilibrium with given lengths of droppers that only pull",
+        default=True,
+        requires=("gravity",),
+        data="defects of the type missing_dropper",
+        applies=_has(MissingDropper),
+        law=_missing,
+        after_cutting=True,
+    )
+)
+register(
+    Effect(
+        "loose_clamp",
+        "droppers whose clamp slips from the start",
+        "matrices and rest without the dropper, whose masses stay; [[defects]]",
+        "static equilibrium with given lengths of droppers that only pull",
+        default=True,
+        requires=("gravity",),
+        data="defects of the type loose_clamp",
+        applies=_has(LooseClamp),
+        law=_loose,
+        after_cutting=True,
+    )
+)
+register(
+    Effect(
+        "worn_wire",
+        "wires that are worn over a stretch",
+        "less mass and bending stiffness there, under the same tension; [[defects]]",
+        "section of a round wire worn flat from below",
+        default=True,
+        requires=("gravity",),
+        data="defects of the type worn_wire",
+        applies=_has(WornWire),
+        hangs=_worn,
+        after_cutting=True,
+    )
+)
+register(
+    Effect(
+        "wrong_tension",
+        "wires that hang with a wrong tension",
+        "matrices and rest with it, droppers cut for the right one; [[defects]]",
+        "static equilibrium with given lengths of droppers that only pull",
+        default=True,
+        requires=("gravity",),
+        data="defects of the type wrong_tension",
+        applies=_has(WrongTension),
+        hangs=_pulled,
+        after_cutting=True,
+    )
+)
+register(
+    Effect(
+        "hard_spot",
+        "hard spots of wires",
+        "a lumped mass and a spring at a place, droppers cut without them; [[defects]]",
+        "obstacle on a string: R = -D / (D + 2 i w Z)",
+        default=True,
+        requires=("gravity",),
+        data="defects of the type hard_spot",
+        applies=_has(HardSpot),
+        build=_hard_spots,
+        after_cutting=True,
+    )
+)
+register(
+    Effect(
+        "kink",
+        "kinks of contact wires, as at a splice",
+        "a height and a slope at each contact; [[defects]]",
+        "bent beam under tension: z = -angle l exp(-|x| / l) / 2, l = sqrt(EI / F)",
+        default=True,
+        data="defects of the type kink",
+        applies=_has(Kink),
+        law=_kinks,
+    )
+)

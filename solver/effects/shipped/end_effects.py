@@ -1,0 +1,92 @@
+"""Effects of how a line ends: layers that absorb waves, and lines that go on periodically."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from catenary.solver.effects.effect import Effect, register
+from catenary.solver.effects.shipped import defect_effects, lateral_effects  # noqa: F401  (built before)
+from catenary.solver.model.absorbing_layers import layer_blocks
+from catenary.solver.model.model import Block
+from catenary.solver.problem.ends import AbsorbingLayer, Periodic
+from catenary.solver.problem.integrator_parameters import integration_of
+from catenary.solver.problem.problem import Problem, steps_of
+from catenary.solver.problem.simulated import Simulated
+
+if TYPE_CHECKING:
+    from catenary.solver.model.builder import ModelBuilder
+
+# The component that lines beyond an end are in the damping: the line's.
+_BEYOND = "line_beyond"
+
+
+def _layers(builder: ModelBuilder) -> None:
+    masts, n = builder.problem.line.support_positions, builder.problem.line.n_spans
+    for end, (last, step) in zip(builder.problem.ends, ((0, 1), (n, -1)), strict=True):
+        if isinstance(end, AbsorbingLayer):
+            begin, outer = masts[last + step * end.n_spans], masts[last]
+            for block in layer_blocks(builder.model, float(begin), float(outer), end.damping):
+                builder.add_block(block)
+
+
+def _going_on(laws: Simulated, problem: Problem) -> Simulated:
+    start, end = (isinstance(end, Periodic) for end in problem.ends)
+    return replace(laws, goes_on=(start, end))
+
+
+def _lines_beyond(builder: ModelBuilder) -> None:
+    # Compiled loops and transforms, which lines that do not go on need not import.
+    from catenary.solver.ends.line_beyond import line_beyond
+    from catenary.solver.ends.periodic_end import StepSums, periodic_end
+    from catenary.solver.model.loads import MemoryLoad
+
+    model, problem = builder.model, builder.problem
+    numerics, damping = problem.numerics, model.damping_of(_BEYOND)
+    integration = integration_of(
+        numerics.integrator, numerics.spectral_radius, numerics.beta, numerics.gamma
+    )
+    sums, ends = StepSums(numerics.dt, integration), []
+    for side, goes_on in enumerate(model.simulated.goes_on):
+        if goes_on:
+            beyond = line_beyond(model, side, builder.held)
+            builder.hold_unknowns(beyond.held)
+            ends.append(periodic_end(beyond, side, damping, sums))
+    for end in ends:  # once both are found, as these are no part of what goes on
+        kind = np.zeros(1, dtype=np.int64)
+        matrices = end.mass[None], end.stiffness[None]
+        builder.add_block(Block(_BEYOND, end.unknowns[None], kind, *matrices))
+        builder.add_load(MemoryLoad(end.unknowns, numerics.dt, steps_of(problem), end.memory))
+
+
+def _has(problem: Problem, kind: type) -> bool:
+    return any(isinstance(end, kind) for end in problem.ends)
+
+
+register(
+    Effect(
+        "absorbing_layers",
+        "spans at the ends that absorb waves",
+        "damping on mass that grows towards the end; line.ends",
+        "graded absorbing layer, b (x/l)^2 M",
+        default=True,
+        applies=lambda p: _has(p, AbsorbingLayer),
+        build=_layers,
+        data="line.ends with an end of kind absorbing_layer",
+    )
+)
+register(
+    Effect(
+        "periodic_ends",
+        "lines that go on beyond their ends",
+        "stiffness, mass and memory of the periodic line beyond; line.ends",
+        "Bloch waves of a span; convolution quadrature (Lubich 1988)",
+        default=True,
+        applies=lambda p: _has(p, Periodic),
+        build=_lines_beyond,
+        law=_going_on,
+        data="line.ends with an end of kind periodic",
+    )
+)

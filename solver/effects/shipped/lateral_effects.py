@@ -1,0 +1,101 @@
+"""Lateral motion: wires, droppers as pendulums, clamps, and steady arms as pinned bars."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from catenary.solver.effects.effect import Effect, register
+from catenary.solver.effects.shipped import vertical_effects  # noqa: F401  (built before)
+from catenary.solver.model.links.leaning import sideways_of_droppers
+from catenary.solver.model.links.links import Direction, between_nodes, law
+from catenary.solver.model.model import Block
+
+if TYPE_CHECKING:
+    from catenary.solver.model.builder import ModelBuilder
+
+PLANE = ("v", "theta_z")
+# Of a bar along itself, far stiffer than what it holds [N/m].
+BAR_STIFFNESS = 1e7
+# Parts of unit vectors along the track below this are none: round-off [-].
+_UPRIGHT = 1e-9
+
+
+def _lateral(builder: ModelBuilder) -> None:
+    mesh, line = builder.mesh, builder.problem.line
+    for wire in reversed(line.wires):
+        builder.add_wire(wire.name, PLANE)
+    _pendulums(builder)
+    for number, clamps in enumerate(line.clamps):
+        pairs = mesh.clamps[line.clamp_group == number]
+        laws = law(mesh.x(pairs[:, 1]), clamps.stiffness)
+        builder.add_links(clamps.name, between_nodes(builder.model, pairs, "v"), laws)
+    barred = np.array([arms.kind.length > 0.0 for arms in line.steady_arms], dtype=bool)
+    on_bars = barred[mesh.arm_group] if barred.size else np.zeros(0, dtype=bool)
+    for number, arms in enumerate(line.steady_arms):
+        if barred[number]:
+            _bars(builder, arms.name, mesh.arm_group == number, arms.kind.length)
+    held = np.concatenate([mesh.supports, mesh.steady_arms[~on_bars], builder.held_ends])
+    builder.hold(np.setdiff1d(held, mesh.steady_arms[on_bars]), "v")
+
+
+def _pendulums(builder: ModelBuilder) -> None:
+    """What droppers' forces do across them, N/l of a pendulum."""
+    direction, stiffness = sideways_of_droppers(builder.model)
+    for number, group in enumerate(builder.problem.line.droppers):
+        mine = builder.mesh.dropper_group == number
+        _add_stiffness(builder, group.name, direction, mine, stiffness)
+
+
+def _bars(builder: ModelBuilder, name: str, mine: np.ndarray, length: float) -> None:
+    """Bars from the wire to hinges: stiff along themselves, P/l across."""
+    model, nodes = builder.model, builder.mesh.steady_arms[mine]
+    unit, tension = np.tile([1.0, 0.0, 0.0], (nodes.size, 1)), np.zeros(nodes.size)
+    if model.form is not None and model.form.lateral is not None:
+        shape = model.form.lateral
+        unit, tension = shape.arm_direction[mine], shape.arm_tension[mine]
+    # Along the track an arm that has not swung out does nothing but swing.
+    swings = "u" in model.unknowns
+    slewed = swings and bool((np.abs(unit[:, 2]) > _UPRIGHT).any())
+    names = ("v", "w", "u") if slewed else ("v", "w")
+    unit = unit[:, : len(names)]
+    unknowns = np.stack([model.dofs(nodes, one) for one in names], axis=1)
+    laws = law(builder.mesh.x(nodes), BAR_STIFFNESS, rest=tension)
+    builder.add_links(name, Direction(unknowns, -unit), laws, of_shape=True)
+    across = np.eye(len(names)) - unit[:, :, None] * unit[:, None, :]
+    matrices, kind = (tension / length)[:, None, None] * across, np.arange(nodes.size)
+    builder.add_block(Block(name, unknowns, kind, None, matrices, of_shape=True))
+    if swings and not slewed:
+        along, values = model.dofs(nodes, "u")[:, None], (tension / length)[:, None, None]
+        builder.add_block(Block(name, along, kind, None, values, of_shape=True))
+
+
+def _add_stiffness(
+    builder: ModelBuilder,
+    component: str,
+    direction: Direction,
+    which: np.ndarray,
+    stiffness: np.ndarray,
+) -> None:
+    """Springs along some of the directions, which are never cut [N/m]."""
+    unknowns, weights = direction.unknowns[which], direction.weights[which]
+    matrices = stiffness[which, None, None] * weights[:, :, None] * weights[:, None, :]
+    kind = np.arange(len(unknowns))
+    builder.add_block(Block(component, unknowns, kind, None, matrices, of_shape=True))
+
+
+register(
+    Effect(
+        "lateral_motion",
+        "lateral motion of the wires, with steady arms as pinned bars",
+        "lateral bending, tension and mass of all wires; droppers as pendulums, arms as bars",
+        "tensioned beam in the lateral plane; bars with geometric stiffness",
+        default=False,
+        unknowns_of_wire=lambda wire: PLANE,
+        build=_lateral,
+        of_form=True,
+        law=lambda laws, p: replace(laws, lateral=True),
+    )
+)

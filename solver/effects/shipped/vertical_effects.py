@@ -1,0 +1,371 @@
+"""The effects that Catenary ships, in building order. Importing this module registers them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from catenary.mbs.roll import roll_of
+from catenary.solver.effects.effect import Effect, Limit, register
+from catenary.solver.effects.shipped import target_heights
+from catenary.solver.model.links.links import between_nodes, law
+from catenary.solver.problem.contact_laws import KinematicLaw
+from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
+from catenary.solver.problem.problem import Problem, slowest_wave_speed
+from catenary.solver.problem.simulated import Simulated, TargetHeight
+
+if TYPE_CHECKING:
+    from catenary.meshgen.hardware import SteadyArms
+    from catenary.solver.model.builder import ModelBuilder
+
+
+def _vertical(builder: ModelBuilder) -> None:
+    mesh, line = builder.mesh, builder.problem.line
+    for wire in reversed(line.wires):
+        builder.add_wire(wire.name)
+    builder.add_droppers()
+    for number, supports in enumerate(line.supports):
+        nodes = mesh.supports[mesh.support_group == number]
+        builder.add_springs(supports.name, nodes, "w", supports.stiffness)
+    for number, clamps in enumerate(line.clamps):
+        pairs = mesh.clamps[line.clamp_group == number]
+        laws = law(mesh.x(pairs[:, 1]), clamps.stiffness)
+        builder.add_links(clamps.name, between_nodes(builder.model, pairs), laws)
+    builder.hold(builder.held_ends, "w")
+
+
+def _dropper_mass(builder: ModelBuilder) -> None:
+    mesh = builder.mesh
+    for number, droppers in enumerate(builder.problem.line.droppers):
+        mine = mesh.dropper_group == number
+        half = 0.5 * droppers.kind.mass_per_length * builder.model.dropper_lengths[mine]
+        half[builder.model.missing[mine]] = 0.0
+        for side in (0, 1):
+            builder.add_masses(droppers.name, mesh.droppers[mine, side], half)
+
+
+def _clamp_mass(builder: ModelBuilder) -> None:
+    mesh = builder.mesh
+    for number, droppers in enumerate(builder.problem.line.droppers):
+        mine = mesh.dropper_group == number
+        upper, lower = mesh.droppers[mine].T
+        there = 1.0 - builder.model.missing[mine]
+        builder.add_masses(droppers.upper, upper, droppers.kind.upper_clamp_mass * there)
+        builder.add_masses(droppers.lower, lower, droppers.kind.lower_clamp_mass * there)
+    for number, clamps in enumerate(builder.problem.line.clamps):
+        pairs = mesh.clamps[builder.problem.line.clamp_group == number]
+        for name, side in ((clamps.upper, 0), (clamps.lower, 1)):
+            builder.add_masses(name, pairs[:, side], 0.5 * clamps.mass)
+
+
+def _arm_inertia(builder: ModelBuilder) -> None:
+    mesh = builder.mesh
+    for number, arms in enumerate(builder.problem.line.steady_arms):
+        nodes, clamp = mesh.steady_arms[mesh.arm_group == number], arms.kind.clamp_mass
+        rod = arms.kind.mass_per_length * arms.kind.length
+        # A rod hinged at its far end: a third of its mass moves with the wire, half of it hangs.
+        builder.add_masses(arms.name, nodes, rod / 3 + clamp, hanging_mass=rod / 2 + clamp)
+        builder.model.hanging_at_arms[mesh.arm_group == number] = rod / 2 + clamp
+
+
+def _arm_stiffness(builder: ModelBuilder) -> None:
+    mesh = builder.mesh
+    for number, arms in enumerate(builder.problem.line.steady_arms):
+        if arms.kind.length > 0.0 and builder.model.simulated.lateral:
+            continue  # a bar, whose stiffness follows from its radial force
+        nodes = mesh.steady_arms[mesh.arm_group == number]
+        stiffness = arms.vertical_stiffness(builder.problem.line.wire(arms.wire))
+        builder.add_springs(arms.name, nodes, "w", stiffness)
+
+
+def _is_bar(problem: Problem, arms: SteadyArms) -> bool:
+    """Whether arms are bars, whose stiffness follows from their radial force."""
+    return arms.kind.length > 0.0 and "lateral_motion" in problem.effects
+
+
+def _bars_instead(problem: Problem) -> str:
+    """The stiffness that arms have in a scene, and do not as bars."""
+    found = {
+        arms.name: arms.kind.stiffness
+        for arms in problem.line.steady_arms
+        if arms.kind.stiffness > 0.0 and _is_bar(problem, arms)
+    }
+    given = ", ".join(f"of {name} {stiffness:g} N/m" for name, stiffness in found.items())
+    return (
+        f"{given} are not used: with lateral motion they are bars, whose stiffness follows from "
+        "their radial force"
+        if found
+        else ""
+    )
+
+
+def _shaped(laws: Simulated, by: TargetHeight) -> Simulated:
+    return replace(laws, target_heights=(*laws.target_heights, by))
+
+
+def _residual_stiffness(laws: Simulated, problem: Problem) -> Simulated:
+    return replace(laws, kept_ratio=problem.residual_stiffness_ratio) if laws.slackening else laws
+
+
+def _happening(laws: Simulated, problem: Problem, kind: type[LineIncident]) -> Simulated:
+    """The incidents of one more kind, in the problem's order."""
+    chosen = [i for i in problem.incidents if isinstance(i, kind) or i in laws.incidents]
+    return replace(laws, incidents=tuple(chosen))
+
+
+register(
+    Effect(
+        "vertical",
+        "vertical motion of the tensioned wires",
+        "wire bending and tension, droppers, messenger supports, anchors",
+        "paper eq. (2.1)",
+        default=True,
+        unknowns_of_wire=lambda wire: ("w", "theta_y"),
+        always=True,
+        build=_vertical,
+    )
+)
+register(
+    Effect(
+        "gravity",
+        "gravity and form finding",
+        "weights, static equilibrium, dropper pre-tension and lengths",
+        "paper section 2; static equilibrium of a tensioned beam",
+        default=True,
+        law=lambda laws, p: replace(laws, gravity=p.gravity),
+    )
+)
+register(
+    Effect(
+        "pre_sag",
+        "pre-sag of the contact wire",
+        "target heights of the form finding",
+        "paper section 1 (pre-sag of 1/1000)",
+        default=True,
+        requires=("gravity",),
+        applies=lambda p: any(any(wanted.sag) for wanted in p.line.profiles),
+        law=lambda laws, p: _shaped(laws, target_heights.pre_sag),
+        data="line.dropper.pre_sag_mm or pre_sag_mid_mm other than 0",
+    )
+)
+register(
+    Effect(
+        "transition_spans",
+        "transition spans in which the contact wire rises to the tensioner",
+        "target heights of the form finding at both ends",
+        "paper section 5, figure 4",
+        default=True,
+        applies=lambda p: any(wanted.rises for wanted in p.line.profiles),
+        law=lambda laws, p: _shaped(laws, target_heights.transition),
+        data="line.transition with a rise_m",
+    )
+)
+register(
+    Effect(
+        "dropper_mass",
+        "mass of the droppers",
+        "half of each dropper's mass at either end",
+        "paper Table 1",
+        default=True,
+        applies=lambda p: any(group.kind.mass_per_length > 0 for group in p.line.droppers),
+        build=_dropper_mass,
+        data="line.dropper.mass_kg_per_m above 0",
+    )
+)
+register(
+    Effect(
+        "clamp_mass",
+        "mass of clamps on the wires",
+        "lumped masses at both ends of droppers and clamps",
+        "paper section 2 and Table 1",
+        default=True,
+        applies=lambda p: (
+            any(group.mass > 0 for group in p.line.clamps)
+            or any(
+                group.kind.upper_clamp_mass + group.kind.lower_clamp_mass > 0
+                for group in p.line.droppers
+            )
+        ),
+        build=_clamp_mass,
+        data="clamps of some mass, such as line.dropper.contact_clamp_kg",
+    )
+)
+register(
+    Effect(
+        "arm_inertia",
+        "inertia and weight of the steady arms",
+        "a third of the hinged arm's mass and its clamp on the contact wire",
+        "paper Table 1; hinged rod",
+        default=True,
+        applies=lambda p: any(
+            group.kind.clamp_mass + group.kind.mass_per_length * group.kind.length > 0
+            for group in p.line.steady_arms
+        ),
+        build=_arm_inertia,
+        data="line.steady_arm with a clamp_kg, or a length_m and mass_kg_per_m",
+    )
+)
+register(
+    Effect(
+        "arm_stiffness",
+        "vertical stiffness of the steady arms",
+        "springs from the contact wire to the ground at the arms",
+        "EN 50318:2002 reference model",
+        default=True,
+        applies=lambda p: any(
+            bool(group.vertical_stiffness(p.line.wire(group.wire)).any()) and not _is_bar(p, group)
+            for group in p.line.steady_arms
+        ),
+        instead=_bars_instead,
+        build=_arm_stiffness,
+        data="line.steady_arm.stiffness_N_per_m above 0, or stiffness_by_radial_force",
+    )
+)
+register(
+    Effect(
+        "structural_damping",
+        "structural damping of the line",
+        "C = alpha K + beta M, globally or per component",
+        "paper eq. (2.2)",
+        default=True,
+        applies=lambda p: (
+            p.damping.alpha > 0
+            or p.damping.beta > 0
+            or any(any(pair) for pair in p.damping.per_component.values())
+        ),
+        law=lambda laws, p: replace(laws, damping=p.damping),
+        data="line.damping with alpha_s or beta_per_s above 0",
+    )
+)
+register(
+    Effect(
+        "dropper_slackening",
+        "droppers that slacken",
+        "compensation of the droppers that would be pushed",
+        "paper eq. (2.7)",
+        default=True,
+        requires=("gravity",),
+        law=lambda laws, p: replace(laws, slackening=True, kept_ratio=0.0),
+    )
+)
+register(
+    Effect(
+        "residual_dropper_stiffness",
+        "residual stiffness of slack droppers",
+        "a share of the stiffness is kept in compression",
+        "paper section 2 (about 1/100)",
+        default=False,
+        requires=("dropper_slackening",),
+        applies=lambda p: p.residual_stiffness_ratio > 0,
+        law=_residual_stiffness,
+        data="line.dropper.residual_stiffness_ratio above 0",
+    )
+)
+register(
+    Effect(
+        "contact_loss",
+        "loss and regain of contact",
+        "the contact force cannot pull",
+        "paper section 4",
+        default=True,
+        applies=lambda p: not isinstance(p.contact, KinematicLaw),
+        law=lambda laws, p: replace(laws, contact_loss=True),
+        data="contact.law other than kinematic",
+    )
+)
+register(
+    Effect(
+        "contact_damping",
+        "damping of the contact",
+        "a force on the gap rate, its convective part V dw/dx included",
+        "penalty contact with a viscous term, or hysteresis (paper eq. 4.1)",
+        default=False,
+        applies=lambda p: p.contact.dissipates,
+        law=lambda laws, p: replace(laws, contact=p.contact),
+        data="contact.damping_N_s_per_m above 0 or contact.restitution below 1",
+    )
+)
+register(
+    Effect(
+        "several_pantographs",
+        "several pantographs on one train",
+        "one contact and one pantograph each",
+        "paper section 5",
+        default=True,
+        applies=lambda p: len(p.train.placements) > 1,
+        lifts=(Limit.ONE_PANTOGRAPH,),
+        data="a second entry of train.pantographs",
+    )
+)
+register(
+    Effect(
+        "head_roll",
+        "roll of the pan heads under a wire that moves along their strips",
+        "a roll of each head, on which the contact force acts with the stagger as its lever",
+        "rigid head on two springs beside each other",
+        default=False,
+        applies=lambda p: any(roll_of(place.data) is not None for place in p.train.placements),
+        law=lambda laws, p: replace(laws, head_roll=True),
+        data="a head that can roll (pantographs.*.roll) under a wire with line.stagger_m",
+    )
+)
+register(
+    Effect(
+        "vehicle_motion",
+        "motion of the vehicle under its pantographs",
+        "height and lateral place of the pantographs' bases as functions of time and place",
+        "given motion, or spectra of track irregularities (FRA; ORE B176)",
+        default=False,
+        applies=lambda p: p.train.vehicle is not None,
+        law=lambda laws, p: replace(laws, vehicle=p.train.vehicle),
+        data="a table [vehicle]",
+    )
+)
+register(
+    Effect(
+        "dropper_break",
+        "droppers that break during the run",
+        "matrices without the dropper and the balance that it leaves, from its time on",
+        "equation of motion of the line without it; [[incidents]]",
+        default=True,
+        applies=lambda p: any(isinstance(incident, DropperBreak) for incident in p.incidents),
+        law=lambda laws, p: _happening(laws, p, DropperBreak),
+        data="an entry of incidents of type dropper_break",
+    )
+)
+register(
+    Effect(
+        "tension_loss",
+        "wires that lose tension during the run",
+        "matrices with what is left of the tension and the balance lost, from its time on",
+        "equation of motion of the line with it; [[incidents]]",
+        default=True,
+        applies=lambda p: any(isinstance(incident, TensionLoss) for incident in p.incidents),
+        law=lambda laws, p: _happening(laws, p, TensionLoss),
+        data="an entry of incidents of type tension_loss",
+    )
+)
+register(
+    Effect(
+        "lowering",
+        "pantographs that are lowered during the run",
+        "a static force that goes over to a lower one, and what catches the head",
+        "the course of the raising, the other way; [[incidents]]",
+        default=True,
+        applies=lambda p: any(place.lowering is not None for place in p.train.placements),
+        law=lambda laws, p: replace(laws, lowering=True),
+        data="an entry of incidents of type lowering",
+    )
+)
+register(
+    Effect(
+        "supercritical_speed",
+        "train speed at or above the wave speed of the contact wire",
+        "nothing: it lifts the check on the speed",
+        "paper eq. (1.1)",
+        default=False,
+        applies=lambda p: p.train.speed >= slowest_wave_speed(p),
+        lifts=(Limit.WAVE_SPEED,),
+        data="a train.speed_km_h at or above the contact wire's wave speed",
+    )
+)

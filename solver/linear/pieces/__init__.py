@@ -1,0 +1,1 @@
+"""Pieces of a long line: those that a window needs have matrices, factors and unit responses."""

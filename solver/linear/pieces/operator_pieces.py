@@ -1,0 +1,236 @@
+"""Products with M, K and C and factors of A, of the pieces of a long line that a window needs."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from catenary.solver.base.errors import RunBroken
+from catenary.solver.linear.factors.station_factors import (
+    layout_of_factors,
+    station_factors,
+)
+from catenary.solver.linear.petsc_solvers import DIRECT, wants_own_solver
+from catenary.solver.linear.pieces.factor_pieces import JOINED_OTHERWISE, FactorPieces
+from catenary.solver.linear.pieces.pieces import Piece, Pieces, Slots, most_within
+from catenary.solver.linear.stations.like_stations import LikeStations
+from catenary.solver.linear.stations.sections import Sections, places_of
+from catenary.solver.linear.stations.station_layout import Layout
+from catenary.solver.linear.stations.station_products import (
+    StationProduct,
+    layout_of,
+    packed_rows,
+    station_product,
+    with_damping,
+)
+from catenary.solver.linear.stations.station_rows import LikeRows, StationRows
+from catenary.solver.model.model import Model
+
+Coefficients = tuple[float, float, float]
+
+
+class WantedPieces(NamedTuple):
+    """What steps need of a line at a time.
+
+    Attributes
+    ----------
+    moving : length of the longest stretch that moves [m]
+    ahead : by how much that may shift before the next stretch is made [m]
+    around : stations that are needed beside it
+    """
+
+    moving: float
+    ahead: float
+    around: int
+
+    def pieces_of(
+        self, model: Model, coefficients: Coefficients, reach: float
+    ) -> OperatorPieces | None:
+        """Operators of the line by pieces, None if they are as well made of all of it at once.
+
+        Not collective. ``reach`` is that of a step [m].
+        """
+        numbering = model.numbering
+        if not (numbering.in_stations and wants_own_solver()):
+            return None
+        around = self.moving + 4.0 * reach
+        pieces = Pieces(numbering, reach, around + self.ahead, self.around)
+        if pieces.are_few:
+            return None
+        layouts = layouts_of(model, coefficients, pieces, most_within(numbering, around))
+        return None if layouts is None else OperatorPieces(model, coefficients, pieces, *layouts)
+
+
+class OperatorPieces:
+    """The operators of a whole line, made by pieces. Not collective.
+
+    Attributes
+    ----------
+    pieces : as given
+    layout : how unknowns of a station stand in lanes
+    factors : FactorPieces of A
+    like : marks of the stations of the stretch of the latest piece
+
+    Parameters
+    ----------
+    layout, of_factors : of products and of factors, see ``layouts_of``
+    """
+
+    like: LikeStations
+
+    def __init__(
+        self,
+        model: Model,
+        coefficients: Coefficients,
+        pieces: Pieces,
+        layout: Layout,
+        of_factors: Layout,
+    ) -> None:
+        self._model, self._coefficients, self.pieces = model, coefficients, pieces
+        self._stations = Sections.of(model.numbering, 0, model.numbering.size)
+        self.layout = layout
+        self.factors = FactorPieces(of_factors, self._stations, pieces)
+        self._products: list[tuple[Slots, StationProduct, Coefficients, Coefficients | None]] = []
+        pieces.add(self._make)
+
+    def product(self, of: Coefficients, damping: Coefficients | None) -> StationProduct:
+        """The product with a sum of M, K and C ``of`` these coefficients; it subtracts one with
+        that of ``damping``. Of pieces that are made after this."""
+        layout = self.layout
+        if damping is not None:
+            joined = joined_by(self._model, damping)
+            layout = with_damping(layout, None if joined is None else joined[0])
+        stations, pieces = self._stations.padded(), self.pieces
+        sets = 1 if damping is None else 2
+        widths = tuple(
+            sets * (part.own_terms.sources.size + 2 * part.beside_terms.sources.size)
+            for part in layout.parts
+        )
+        table = Slots(pieces.n_slots, pieces.size, widths, layout.varies)
+        kinds: np.ndarray = np.zeros(self._stations.size, dtype=table.kind)
+        product = StationProduct(layout, stations.places(), kinds, table.numbers, 1, 0)
+        self._products.append((table, product, of, damping))
+        return product
+
+    def rows_of(self, piece: Piece) -> StationRows:
+        """Rows of A on the stretch that a piece is worked out on."""
+        return Stretch(self._model, piece).whole(self._coefficients, 1.0)
+
+    def _make(self, piece: Piece) -> None:
+        rows = Stretch(self._model, piece)
+        self.like = rows.like
+        self.factors.make(piece, rows.whole(self._coefficients, 1.0))
+        part = self._stations.make_up[piece.begin : piece.end]
+        for table, product, of, damping in self._products:
+            own = rows.whole(of).part(piece.own)
+            damped = None if damping is None else rows.whole(damping).part(piece.own)
+            packed = packed_rows(product.layout, own, damped, part)
+            if packed is None:
+                raise RunBroken(JOINED_OTHERWISE)
+            kinds, numbers, _ = packed
+            product.kinds[piece.begin : piece.end] = kinds + table.put(piece.slot, numbers)
+
+
+class Stretch:
+    """Rows of matrices on the stretch that a piece is worked out on. Not collective.
+
+    Attributes
+    ----------
+    like : marks of its stations
+    """
+
+    def __init__(self, model: Model, piece: Piece) -> None:
+        starts = model.numbering.starts
+        self._ends = int(starts[piece.low]), int(starts[piece.high])
+        self.like = LikeStations(model, piece.low, piece.high)
+        self._rows = LikeRows(model, self.like, *self._ends)
+
+    def whole(self, of: Coefficients, held_diagonal: float = 0.0) -> StationRows:
+        """Those of a sum of M, K and C, cut off at the ends of the stretch."""
+        rows = self._rows.sum_of(of, self._ends, held_diagonal)
+        if rows is None:
+            raise RunBroken(JOINED_OTHERWISE)
+        return rows
+
+
+def layouts_of(
+    model: Model, coefficients: Coefficients, pieces: Pieces, n_needed: int
+) -> tuple[Layout, Layout] | None:
+    """Layouts of products and of factors, the latter by the first piece of the line; None if there
+    are none. ``n_needed`` stations are read in a step."""
+    stations = Sections.of(model.numbering, 0, model.numbering.size)
+    joined = joined_by(model, coefficients, (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
+    if joined is None:
+        return None
+    operator, stiffness, mass = joined
+    make_ups = stations.make_ups if stations.varies else ()
+    # Products with M, for energies, are of the same layout.
+    layout = layout_of(operator, stiffness | mass, make_ups)
+    if layout is None:
+        return None
+    piece = pieces.first()
+    rows = Stretch(model, piece).whole(coefficients, 1.0)
+    part = stations.part(piece.low, piece.high)
+    of_factors = layout_of_factors(layout, part, rows, n_needed / (2 * part.size))
+    if of_factors is None or not _residual(rows, layout, part) <= DIRECT:
+        return None
+    return layout, of_factors
+
+
+def _residual(rows: StationRows, layout: Layout, stations: Sections) -> float:
+    """Relative residual of a solve on a stretch of the line with a load on every unknown."""
+    product = station_product(rows, 0, layout, columns=stations)
+    factors = station_factors(rows, layout, stations=stations)
+    if product is None or factors is None:
+        return np.inf
+    size, pad = int(stations.starts[-1]), stations.width
+    load = np.cos(1.0 + 3.7 * np.arange(size))
+    found, answer = np.zeros(size + 2 * pad), np.zeros(size)
+    factors.solve(load, answer)
+    found[pad : pad + size] = answer
+    product.multiply(found, answer)
+    return float(np.linalg.norm(answer - load) / np.linalg.norm(load))
+
+
+def joined_by(model: Model, *sums: Coefficients) -> list[np.ndarray] | None:
+    """Which places of a cross-section each of some sums of M, K and C may join, (3, 1, b, b): to
+    the station before, within one, and to the one after; None if stations further apart are."""
+    stations = Sections.of(model.numbering, 0, model.numbering.size)
+    station, place = places_of(np.arange(model.numbering.size), stations)
+    width = stations.width
+    result = [np.zeros((3, width, width), dtype=bool) for _ in sums]
+    for joined in result:
+        joined[1][np.diag_indices(width)] = True
+    for block in model.blocks:
+        if not block.dofs.size:
+            continue
+        at, where = _kinds_of_elements(station, place, block.dofs, width)
+        alpha, beta = model.damping_of(block.component)
+        for joined, (m, k, c) in zip(result, sums, strict=True):
+            terms = ((block.mass, m + c * beta), (block.stiffness, k + c * alpha))
+            given = [
+                (term != 0.0).any(axis=0)
+                for term, share in (*terms, (block.damping, c))
+                if term is not None and share
+            ]
+            pairs = np.nonzero(np.logical_or.reduce(given)) if given else ()
+            for i, j in zip(*pairs, strict=True):
+                step = at[:, j] - at[:, i]
+                if np.abs(step).max() > 1:
+                    return None
+                joined[step + 1, where[:, i], where[:, j]] = True
+    return [joined[:, None] for joined in result]
+
+
+def _kinds_of_elements(
+    station: np.ndarray, place: np.ndarray, dofs: np.ndarray, width: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Stations and places of the unknowns of one element of each kind, both (k, m)."""
+    apart = station[dofs] - station[dofs[:, :1]]
+    low, high = int(apart.min()), int(apart.max())
+    code, size = np.zeros(len(dofs), dtype=np.int64), (high - low + 1) * width
+    for column in range(dofs.shape[1]):
+        code = code * size + (apart[:, column] - low) * width + place[dofs[:, column]]
+    _, first = np.unique(code, return_index=True)
+    return station[dofs[first]], place[dofs[first]]

@@ -1,0 +1,1 @@
+"""Matrices in blocks of stations: unknowns in vector lanes, like stations stored once."""

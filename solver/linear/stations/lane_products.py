@@ -1,0 +1,196 @@
+"""Products of packed blocks with the unknowns of a station in vector lanes, for Numba's kernels.
+
+Products that are added to each other share two sums, which a processor works on side by side.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+
+from catenary.solver.linear.stations.lanes import (
+    FUSED,
+    Lanes,
+    Registers,
+    gathered,
+    inlined,
+    register_ranges,
+    spread,
+    vector_type,
+)
+from catenary.solver.linear.stations.station_layout import Halves, Terms
+
+_NUMBERS = types.CPointer(types.float64)
+
+
+@inlined
+def numbers_from(typing_context, array, at):
+    """Where ``array[at]`` is in memory; the array is contiguous, and kept alive by others."""
+
+    def generate(context, builder, signature, arguments):
+        array, at = arguments
+        data = context.make_array(signature.args[0])(context, builder, array).data
+        place = builder.gep(data, [at])
+        # Unknown to the compiler, which else computes the address anew for each number.
+        unchanged = ir.FunctionType(place.type, [place.type])
+        return builder.asm(unchanged, "", "=r,0", [place], side_effect=False)
+
+    return _NUMBERS(array, at), generate
+
+
+@inlined
+def sums_from(typing_context, layout, total):
+    """Two sums of products with blocks of a layout, to which ``total`` is added."""
+
+    def generate(context, builder, signature, arguments):
+        _, total = arguments
+        none = ir.Constant(total.type, [-0.0] * total.type.count)  # adds nothing, not even a sign
+        return context.make_tuple(builder, signature.return_type, [total, none])
+
+    return types.UniTuple(total, 2)(layout, total), generate
+
+
+@inlined
+def total_of(typing_context, layout, sums):
+    """What both sums are together."""
+
+    def generate(context, builder, signature, arguments):
+        layout = signature.args[0].layout
+        first, second = (builder.extract_value(arguments[1], number) for number in range(2))
+        registers = Registers(layout.n_lanes)
+        result = []
+        for one, other in zip(
+            registers.apart(builder, first), registers.apart(builder, second), strict=True
+        ):
+            if layout.turns:
+                other = spread(builder, other, [lane ^ 1 for lane in range(other.type.count)])
+            result.append(builder.fadd(one, other))
+        return registers.together(builder, result)
+
+    return Lanes(layout.layout.n_lanes)(layout, sums), generate
+
+
+def _product(terms_of: Any, summary: str) -> Any:
+    """A function that adds the product of a block of such terms to sums."""
+
+    def product(typing_context, layout, sums, numbers, skipped, x):
+        def generate(context, builder, signature, arguments):
+            _, sums, numbers, skipped, x = arguments
+            data = builder.gep(numbers, [skipped])
+            terms = terms_of(signature.args[0].layout)
+            both = [builder.extract_value(sums, number) for number in range(2)]
+            _add_terms(builder, both, data, x, terms)
+            return context.make_tuple(builder, signature.return_type, both)
+
+        return sums(layout, sums, numbers, skipped, x), generate
+
+    product.__doc__ = f"""{summary}
+
+    The block stands ``skipped`` numbers after the place of ``numbers``.
+    """
+    return inlined(product)
+
+
+add_whole = _product(
+    lambda layout: layout.whole_terms, "Add a block that joins all of a plane, times x, to sums."
+)
+add_own = _product(
+    lambda layout: layout.own_terms, "Add a diagonal block of K or C, times x, to sums."
+)
+add_beside = _product(
+    lambda layout: layout.beside_terms,
+    "Add a block of K or C that joins a station to one beside it, times x, to sums.",
+)
+
+
+@inlined
+def add_symmetric(typing_context, layout, sums, numbers, x):
+    """Add a symmetric block, of which one half is stored from the place of ``numbers`` on, times x
+    to sums; see ``Layout.halves``."""
+
+    def generate(context, builder, signature, arguments):
+        _, sums, data, x = arguments
+        layout = signature.args[0].layout
+        halves, registers = layout.halves, Registers(layout.n_lanes)
+        both = [builder.extract_value(sums, number) for number in range(2)]
+        lanes = np.tile(np.arange(layout.n_lanes), (len(halves.sources), 1))
+        direct = Terms(halves.sources, lanes, layout.sums_of(len(lanes)))
+        _add_terms(builder, both, data, x, direct)
+        if halves.mirrored.any():
+            other = _mirrored(builder, data, registers.apart(builder, x), halves)
+            total = registers.apart(builder, both[0])
+            total = [builder.fadd(*pair, flags=FUSED) for pair in zip(total, other, strict=True)]
+            both[0] = registers.together(builder, total)
+        return context.make_tuple(builder, signature.return_type, both)
+
+    return sums(layout, sums, numbers, x), generate
+
+
+@inlined
+def add_transposed(typing_context, layout, total, numbers, skipped, x):
+    """``total`` plus the transpose of a block for ``add_whole`` times x; the layout shares such."""
+
+    def generate(context, builder, signature, arguments):
+        _, total, numbers, skipped, x = arguments
+        if not signature.args[0].layout.shares:
+            return total  # never called then
+        terms = signature.args[0].layout.whole_terms
+        data, lane = builder.gep(numbers, [skipped]), np.arange(x.type.count)
+        # What the block's rows and columns are exchanged by; one register holds all lanes.
+        sums = {0: total}
+        for term, (source, target) in enumerate(zip(terms.sources, terms.targets, strict=True)):
+            stored = _stored(builder, data, term * lane.size, lane.size)
+            product = builder.fmul(stored, gathered(builder, [x], target), flags=FUSED)
+            turned = int(source[0])
+            before = sums.get(turned)
+            sums[turned] = product if before is None else builder.fadd(before, product, flags=FUSED)
+        parts = [gathered(builder, [one], lane ^ turned) for turned, one in sums.items()]
+        while len(parts) > 1:
+            parts = [builder.fadd(*parts[k : k + 2]) for k in range(0, len(parts), 2)]
+        return parts[0]
+
+    return total(layout, total, numbers, skipped, x), generate
+
+
+def _stored(builder: Any, data: Any, at: int, size: int) -> Any:
+    """Numbers of a block from ``at`` on."""
+    place = builder.gep(data, [ir.Constant(ir.IntType(64), at)])
+    return builder.load(builder.bitcast(place, vector_type(size).as_pointer()), align=8)
+
+
+def _add_terms(builder: Any, sums: list[Any], data: Any, x: Any, terms: Terms) -> None:
+    """Add all terms of a block stored at ``data`` times x to two ``sums``, which are replaced."""
+    n_lanes = terms.sources.shape[1]
+    registers = Registers(n_lanes)
+    factors = registers.apart(builder, x)
+    parts = [registers.apart(builder, one) for one in sums]
+    sources = np.where(terms.sources < 0, terms.targets, terms.sources)
+    for term, (source, number) in enumerate(zip(sources, terms.sums, strict=True)):
+        for register, (first, size) in enumerate(register_ranges(n_lanes)):
+            factor = gathered(builder, factors, source[first : first + size])
+            stored = _stored(builder, data, term * n_lanes + first, size)
+            product = builder.fmul(stored, factor, flags=FUSED)
+            total = parts[number][register]
+            parts[number][register] = builder.fadd(total, product, flags=FUSED)
+    sums[:] = [registers.together(builder, part) for part in parts]
+
+
+def _mirrored(builder: Any, data: Any, factors: list[Any], halves: Halves) -> list[Any]:
+    """What the half of a symmetric block that is not stored makes of ``factors``, by registers."""
+    n_lanes = halves.sources.shape[1]
+    ranges = register_ranges(n_lanes)
+    total: list[Any] = []
+    for term in np.flatnonzero(halves.mirrored):
+        products = []
+        for factor, (first, size) in zip(factors, ranges, strict=True):
+            stored = _stored(builder, data, int(term) * n_lanes + first, size)
+            products.append(builder.fmul(stored, factor, flags=FUSED))
+        lanes = halves.back[term]
+        back = [gathered(builder, products, lanes[first : first + size]) for first, size in ranges]
+        if total:
+            back = [builder.fadd(*pair, flags=FUSED) for pair in zip(total, back, strict=True)]
+        total = back
+    return total

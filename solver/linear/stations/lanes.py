@@ -1,0 +1,394 @@
+"""Vector lanes for the unknowns of a station, for Numba's kernels.
+
+Numba leaves arithmetic on a few numbers to one after the other. These functions, for use in
+compiled ones only, become vector instructions where the processor has them. How many lanes there
+are, and what stands in them, is a ``Layout``: its type holds the numbers, so that a kernel is
+compiled, and kept on disk, once for each layout that a line has.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import (
+    NativeValue,
+    intrinsic,
+    models,
+    register_model,
+    typeof_impl,
+    unbox,
+)
+
+from catenary.solver.linear.stations.station_layout import REGISTER, Layout
+
+# Numba's own annotations know nothing of the calls.
+inlined: Any = intrinsic
+
+# A product and a sum may become one instruction, which rounds once instead of twice.
+FUSED = ("contract",)
+
+
+class LayoutType(types.Type):
+    """Numba's type of a layout, which is all of it."""
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+        super().__init__(name=f"Layout{layout.key}")
+
+
+class Lanes(types.Type):
+    """Numba's type of the numbers in the lanes of a layout."""
+
+    def __init__(self, n_lanes: int) -> None:
+        self.n_lanes = n_lanes
+        super().__init__(name=f"Lanes({n_lanes})")
+
+
+@register_model(LayoutType)
+class _LayoutModel(models.OpaqueModel):
+    """Nothing: the type says it all."""
+
+
+@register_model(Lanes)
+class _LanesModel(models.PrimitiveModel):
+    """Numbers as LLVM's vectors."""
+
+    def __init__(self, manager: Any, front_end_type: Lanes) -> None:
+        super().__init__(manager, front_end_type, Registers(front_end_type.n_lanes).type)
+
+
+@typeof_impl.register(Layout)
+def _type_of(layout: Layout, context: Any) -> LayoutType:
+    return LayoutType(layout)
+
+
+@unbox(LayoutType)
+def _unbox(kind: LayoutType, layout: Any, context: Any) -> NativeValue:
+    return NativeValue(context.context.get_dummy_value())
+
+
+def _constant(value_of: Any, summary: str) -> Any:
+    """A function of a layout, that is a constant in compiled code."""
+
+    def constant(typing_context, layout):
+        number = int(value_of(layout.layout))
+
+        def generate(context, builder, signature, arguments):
+            return ir.Constant(ir.IntType(64), number)
+
+        return types.uint64(layout), generate
+
+    constant.__doc__ = summary
+    return inlined(constant)
+
+
+pitch = _constant(lambda layout: layout.pitch, "Unknowns of a station.")
+whole_size = _constant(
+    lambda layout: layout.whole_terms.sources.size, "Numbers of a packed block of factors."
+)
+half_size = _constant(
+    lambda layout: layout.halves.sources.size, "Numbers of a packed symmetric block of factors."
+)
+own_size = _constant(
+    lambda layout: layout.own_terms.sources.size, "Numbers of a packed diagonal block of K or C."
+)
+beside_size = _constant(
+    lambda layout: layout.beside_terms.sources.size,
+    "Numbers of a packed block of K or C beside the diagonal.",
+)
+remembers = _constant(
+    lambda layout: layout.remembers, "Whether steps need an acceleration known before."
+)
+is_by_mass = _constant(
+    lambda layout: layout.by_mass, "Whether steps make their right-hand side by M."
+)
+shares = _constant(
+    lambda layout: layout.shares, "Whether factors keep one block for both ways between stations."
+)
+is_sparse = _constant(
+    lambda layout: layout.sparse, "Whether factors keep the matrix's own blocks between stations."
+)
+is_damped = _constant(lambda layout: layout.damped, "Whether a product with K is one with C too.")
+
+
+varies = _constant(lambda layout: layout.varies, "Whether stations are of several make-ups.")
+
+
+@inlined
+def part_of(typing_context, layout, number):
+    """The layout of a make-up by its ``number``, which is a constant."""
+    if not isinstance(number, types.IntegerLiteral):
+        return None
+
+    def generate(context, builder, signature, arguments):
+        return context.get_dummy_value()
+
+    return LayoutType(layout.layout.parts[number.literal_value])(layout, number), generate
+
+
+@inlined
+def same_part(typing_context, layout, part):
+    """The part of ``layout`` for the make-up of ``part``, which is one of another layout."""
+
+    def generate(context, builder, signature, arguments):
+        return context.get_dummy_value()
+
+    return LayoutType(layout.layout.parts[part.layout.number])(layout, part), generate
+
+
+@inlined
+def narrowed(typing_context, part, x):
+    """Lanes of a whole layout as those of one of its parts."""
+    layout = part.layout
+
+    def generate(context, builder, signature, arguments):
+        if layout.whole is None:
+            return arguments[1]
+        return _chosen(builder, arguments[1], layout.lanes_of_whole)
+
+    return Lanes(layout.n_lanes)(part, x), generate
+
+
+@inlined
+def widened(typing_context, part, x):
+    """Lanes of a part as those of its whole layout, 0 where the part has none."""
+    layout = part.layout
+    whole = layout if layout.whole is None else layout.whole
+
+    def generate(context, builder, signature, arguments):
+        if layout.whole is None:
+            return arguments[1]
+        lanes, own = np.full(whole.n_lanes, -1), layout.lanes_of_whole
+        lanes[own[own >= 0]] = np.flatnonzero(own >= 0)
+        return _chosen(builder, arguments[1], lanes)
+
+    return Lanes(whole.n_lanes)(part, x), generate
+
+
+@inlined
+def zero(typing_context, layout):
+    """0 in all lanes."""
+
+    def generate(context, builder, signature, arguments):
+        return Registers(signature.return_type.n_lanes).zeros()
+
+    return Lanes(layout.layout.n_lanes)(layout), generate
+
+
+@inlined
+def load(typing_context, layout, array, at):
+    """The unknowns of a station, from ``array[at]`` on; ``array`` is contiguous."""
+
+    def generate(context, builder, signature, arguments):
+        _, array, at = arguments
+        data = context.make_array(signature.args[1])(context, builder, array).data
+        unknowns = signature.args[0].layout.unknowns
+        result = []
+        for first, size in register_ranges(unknowns.size):
+            result.append(_load_some(builder, data, at, unknowns[first : first + size]))
+        return Registers(unknowns.size).together(builder, result)
+
+    return Lanes(layout.layout.n_lanes)(layout, array, at), generate
+
+
+@inlined
+def store(typing_context, layout, array, at, x):
+    """Write the unknowns of a station to ``array[at]`` and on."""
+
+    def generate(context, builder, signature, arguments):
+        _, array, at, x = arguments
+        data = context.make_array(signature.args[1])(context, builder, array).data
+        unknowns = signature.args[0].layout.unknowns
+        parts = Registers(unknowns.size).apart(builder, x)
+        for part, (first, size) in zip(parts, register_ranges(unknowns.size), strict=True):
+            _store_some(builder, data, at, unknowns[first : first + size], part)
+        return context.get_dummy_value()
+
+    return types.void(layout, array, at, x), generate
+
+
+@inlined
+def add(typing_context, x, y):
+    """The sum of two."""
+
+    def generate(context, builder, signature, arguments):
+        both = Registers(signature.return_type.n_lanes)
+        return both.each(builder, lambda a, b: builder.fadd(a, b), *arguments)
+
+    return x(x, y), generate
+
+
+@inlined
+def add_scaled(typing_context, total, factor, x):
+    """``total`` plus the number ``factor`` times x."""
+
+    def generate(context, builder, signature, arguments):
+        total, factor, x = arguments
+
+        def sum_of(a, b):
+            alone = ir.Constant(b.type, ir.Undefined)
+            first = builder.insert_element(alone, factor, ir.Constant(ir.IntType(32), 0))
+            product = builder.fmul(spread(builder, first, [0] * b.type.count), b, flags=FUSED)
+            return builder.fadd(a, product, flags=FUSED)
+
+        return Registers(signature.return_type.n_lanes).each(builder, sum_of, total, x)
+
+    return total(total, factor, x), generate
+
+
+class Registers:
+    """LLVM's vectors of at most eight numbers that arithmetic on lanes is done with.
+
+    Between operations lanes are one vector: a struct of several would be kept in memory. Its size
+    is a power of two, with lanes at the end that are not defined: LLVM takes others apart into
+    single numbers wherever a loop begins anew.
+    """
+
+    def __init__(self, n_lanes: int) -> None:
+        self._ranges = register_ranges(n_lanes)
+        self.type = vector_type(1 << (n_lanes - 1).bit_length())
+
+    def zeros(self) -> Any:
+        """0 in all lanes."""
+        return zeros(self.type.count)
+
+    def together(self, builder: Any, vectors: list[Any]) -> Any:
+        """Lanes from the vectors that hold them."""
+        result = vectors[0]
+        for (first, size), vector in zip(self._ranges[1:], vectors[1:], strict=True):
+            result = _shuffled(
+                builder,
+                _widened(builder, result, max(first, size)),
+                _widened(builder, vector, max(first, size)),
+                list(range(first + size)),
+            )
+        return _widened(builder, result, self.type.count)
+
+    def apart(self, builder: Any, lanes: Any) -> list[Any]:
+        """Vectors that hold the lanes."""
+        if self._ranges == [(0, lanes.type.count)]:
+            return [lanes]
+        return [spread(builder, lanes, list(range(a, a + size))) for a, size in self._ranges]
+
+    def each(self, builder: Any, function: Any, *lanes: Any) -> Any:
+        """A function of vectors for all lanes."""
+        parts = zip(*(self.apart(builder, one) for one in lanes), strict=True)
+        return self.together(builder, [function(*part) for part in parts])
+
+
+def register_ranges(n_lanes: int) -> list[tuple[int, int]]:
+    """First lane and number of lanes of each vector that holds some of them."""
+    firsts = range(0, n_lanes, REGISTER)
+    return [(first, min(REGISTER, n_lanes - first)) for first in firsts]
+
+
+def gathered(builder: Any, vectors: list[Any], lanes: np.ndarray) -> Any:
+    """Numbers by their lanes in ``vectors``."""
+    source = lanes // REGISTER
+    numbers = np.unique(source).tolist()
+    one = vectors[numbers[0]]
+    if len(numbers) == 1:
+        places = lanes - numbers[0] * REGISTER
+        if np.array_equal(places, np.arange(one.type.count)):
+            return one
+        return spread(builder, one, places.tolist())
+    places = lanes % REGISTER
+    for number in numbers[1:]:
+        other = _widened(builder, vectors[number], REGISTER)
+        chosen = np.where(source == number, lanes % REGISTER + REGISTER, places)
+        one = _shuffled(builder, _widened(builder, one, REGISTER), other, chosen.tolist())
+        places = np.arange(lanes.size)
+    return one
+
+
+def _load_some(builder: Any, data: Any, at: Any, unknowns: np.ndarray) -> Any:
+    """A vector with the unknowns of its lanes, 0 where there are none."""
+    result = None
+    for lane, first, size in _runs(unknowns):
+        part = builder.load(_pointer(builder, data, _at(builder, at, first), size), align=8)
+        if size == unknowns.size:
+            return part
+        mask = np.full(unknowns.size, size)  # a lane of zeros
+        mask[lane : lane + size] = np.arange(size)
+        wide = _shuffled(builder, part, zeros(size), mask.tolist())
+        if result is None:
+            result = wide
+        else:
+            chosen = np.arange(unknowns.size)
+            chosen[lane : lane + size] += unknowns.size
+            result = _shuffled(builder, result, wide, chosen.tolist())
+    return zeros(unknowns.size) if result is None else result
+
+
+def _store_some(builder: Any, data: Any, at: Any, unknowns: np.ndarray, vector: Any) -> None:
+    """Write the lanes of a vector that hold unknowns."""
+    for lane, first, size in _runs(unknowns):
+        part = vector
+        if size < unknowns.size:
+            part = spread(builder, vector, list(range(lane, lane + size)))
+        builder.store(part, _pointer(builder, data, _at(builder, at, first), size), align=8)
+
+
+def _runs(unknowns: np.ndarray) -> list[tuple[int, int, int]]:
+    """First lane, first unknown and size, a power of two, of runs that stand together in memory."""
+    result, lane = [], 0
+    while lane < unknowns.size:
+        if unknowns[lane] < 0:
+            lane += 1
+            continue
+        size = 1
+        while (
+            lane + 2 * size <= unknowns.size
+            and (unknowns[lane : lane + 2 * size] == unknowns[lane] + np.arange(2 * size)).all()
+        ):
+            size *= 2
+        result.append((lane, int(unknowns[lane]), size))
+        lane += size
+    return result
+
+
+def vector_type(size: int) -> ir.VectorType:
+    """LLVM's type of so many numbers."""
+    return ir.VectorType(ir.DoubleType(), size)
+
+
+def zeros(size: int) -> ir.Constant:
+    """As many zeros."""
+    return ir.Constant(vector_type(size), [0.0] * size)
+
+
+def spread(builder: Any, x: Any, lanes: list[int]) -> Any:
+    """Numbers of x by their lanes."""
+    return _shuffled(builder, x, ir.Constant(x.type, ir.Undefined), lanes)
+
+
+def _chosen(builder: Any, x: Any, lanes: np.ndarray) -> Any:
+    """Numbers of x by their lanes, 0 for -1, as ``Registers`` hold them."""
+    chosen = np.where(lanes < 0, x.type.count, lanes)
+    result = _shuffled(builder, x, zeros(x.type.count), chosen.tolist())
+    return _widened(builder, result, Registers(lanes.size).type.count)
+
+
+def _widened(builder: Any, x: Any, size: int) -> Any:
+    """x with lanes that are not defined at its end."""
+    if x.type.count == size:
+        return x
+    # The first lane after those of x is of what is not defined.
+    return spread(builder, x, [min(lane, x.type.count) for lane in range(size)])
+
+
+def _shuffled(builder: Any, x: Any, y: Any, lanes: list[int]) -> Any:
+    mask = ir.Constant(ir.VectorType(ir.IntType(32), len(lanes)), lanes)
+    return builder.shuffle_vector(x, y, mask)
+
+
+def _at(builder: Any, at: Any, step: int) -> Any:
+    return builder.add(at, ir.Constant(at.type, step)) if step else at
+
+
+def _pointer(builder: Any, data: Any, at: Any, size: int) -> Any:
+    """Pointer to numbers of an array as a vector."""
+    return builder.bitcast(builder.gep(data, [at]), vector_type(size).as_pointer())

@@ -1,0 +1,131 @@
+"""Stations that the rows or columns of a matrix belong to, and its blocks by stations.
+
+Blocks are as large as a cross-section, whatever its stations have: what one lacks is a row and a
+column of zeros.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from catenary.solver.linear.stations.make_ups import ALIKE, Places
+from catenary.solver.model.unknowns.registry import Unknowns
+
+
+@dataclass(frozen=True)
+class Sections:
+    """Consecutive stations.
+
+    Attributes
+    ----------
+    starts : (n + 1,) first unknown of each, counted from the first station's, and of the one after
+    make_up : (n,) of each
+    make_ups : places in a cross-section of the stations of each make-up
+    width : places of a cross-section
+    """
+
+    starts: np.ndarray
+    make_up: np.ndarray
+    make_ups: tuple[tuple[int, ...], ...]
+    width: int
+
+    @classmethod
+    def alike(cls, n: int, width: int) -> Sections:
+        """Stations that have all places."""
+        make_up = np.zeros(n, dtype=np.int64)
+        return cls(width * np.arange(n + 1), make_up, (tuple(range(width)),), width)
+
+    @classmethod
+    def of(cls, numbering: Unknowns, low: int, high: int) -> Sections:
+        """Stations of the unknowns [``low``, ``high``), which are whole ones."""
+        first, last = numbering.stations_over(low, high)
+        starts = numbering.starts[first : last + 1] - numbering.starts[first]
+        make_up = numbering.make_up[first:last]
+        return cls(starts, make_up, numbering.make_ups, numbering.width)
+
+    @property
+    def size(self) -> int:
+        """Number of stations."""
+        return int(self.make_up.size)
+
+    @property
+    def varies(self) -> bool:
+        """Whether some stations lack a place."""
+        return any(len(places) < self.width for places in self.make_ups)
+
+    def part(self, first: int, last: int) -> Sections:
+        """Stations from ``first`` to before ``last``."""
+        starts = self.starts[first : last + 1] - self.starts[first]
+        return Sections(starts, self.make_up[first:last], self.make_ups, self.width)
+
+    def places(self) -> Places:
+        """What kernels read of them."""
+        if not self.varies:
+            return ALIKE
+        return Places(self.starts[:-1].astype(np.int64), self.make_up.astype(np.uint8))
+
+    def padded(self) -> Sections:
+        """The same with a station of all places more at both ends."""
+        whole = tuple(range(self.width))
+        make_ups = self.make_ups if whole in self.make_ups else (*self.make_ups, whole)
+        number = make_ups.index(whole)
+        starts = self.width + np.r_[-self.width, self.starts, self.starts[-1] + self.width]
+        return Sections(starts, np.r_[number, self.make_up, number], make_ups, self.width)
+
+    def missing(self) -> np.ndarray:
+        """Whether a station lacks a place, shape (n, width)."""
+        lacks = np.ones((len(self.make_ups), self.width), dtype=bool)
+        for row, places in zip(lacks, self.make_ups, strict=True):
+            row[list(places)] = False
+        return lacks[self.make_up]
+
+
+def neighbours(
+    matrix: sparse.bsr_matrix, first: int = 0, columns: Sections | None = None
+) -> np.ndarray | None:
+    """Blocks of each row towards the start of the line, on the diagonal and towards the end.
+
+    Row i has its diagonal block in column ``first`` + i. Shape (3, n, b, b); None if the matrix has
+    blocks further away. ``columns`` are the stations of the columns; a matrix without has one block
+    for each.
+    """
+    if columns is not None and columns.varies:
+        return _of_varying(matrix, first, columns)
+    n, (size, _) = matrix.indptr.size - 1, matrix.blocksize
+    if n == 0:
+        return None
+    row = np.repeat(np.arange(n), np.diff(matrix.indptr))
+    step = matrix.indices - row - first
+    if np.abs(step).max(initial=0) > 1:
+        return None
+    blocks = np.zeros((3, n, size, size))
+    blocks[step + 1, row] = matrix.data
+    return blocks
+
+
+def _of_varying(matrix: sparse.bsr_matrix, first: int, columns: Sections) -> np.ndarray | None:
+    """``neighbours`` of a matrix in blocks of any size."""
+    entries = matrix.tocoo()
+    n = int(np.searchsorted(columns.starts, columns.starts[first] + matrix.shape[0])) - first
+    rows, row_place = places_of(entries.row + columns.starts[first], columns)
+    others, place = places_of(entries.col, columns)
+    rows -= first
+    step = others - rows - first
+    there = entries.data != 0
+    if n == 0 or np.abs(step[there]).max(initial=0) > 1:
+        return None
+    blocks = np.zeros((3, n, columns.width, columns.width))
+    blocks[step[there] + 1, rows[there], row_place[there], place[there]] = entries.data[there]
+    return blocks
+
+
+def places_of(unknowns: np.ndarray, columns: Sections) -> tuple[np.ndarray, np.ndarray]:
+    """Station of each unknown, and its place in a cross-section."""
+    station = np.searchsorted(columns.starts, unknowns, side="right") - 1
+    place_of = np.full((len(columns.make_ups), columns.width), -1)
+    for row, places in zip(place_of, columns.make_ups, strict=True):
+        row[: len(places)] = places
+    return station, place_of[columns.make_up[station], unknowns - columns.starts[station]]

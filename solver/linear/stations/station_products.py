@@ -1,0 +1,292 @@
+"""Matrices in blocks of stations: block tridiagonal along the track, each unique one stored once.
+
+A station is a cross-section of the line: the unknowns of a node of each wire at one place. Spans
+are alike, so that a line has few unique stations, however long it is. Their numbers then stay in
+the caches, where a stored matrix leaves them on a long line, and products and solves wait for
+memory. Where no two spans are alike, blocks are read one after the other, as memory likes it best.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from catenary.solver.base.kernels import aligned_arrays
+from catenary.solver.base.kernels.bound import bound
+from catenary.solver.base.kernels.compiled import compiled, inner
+from catenary.solver.base.kernels.pointers import borrowed
+from catenary.solver.linear.stations.lane_products import (
+    add_beside,
+    add_own,
+    numbers_from,
+    sums_from,
+    total_of,
+)
+from catenary.solver.linear.stations.lanes import (
+    beside_size,
+    is_damped,
+    narrowed,
+    own_size,
+    store,
+    zero,
+)
+from catenary.solver.linear.stations.make_ups import (
+    Places,
+    block_at,
+    by_make_up,
+    load_at,
+    make_up_of,
+    start_of,
+)
+from catenary.solver.linear.stations.sections import Sections
+from catenary.solver.linear.stations.station_layout import LANES, WIDEST, Layout
+from catenary.solver.linear.stations.station_rows import StationRows, rows_of
+from catenary.solver.linear.stations.unique_rows import kinds_of
+
+
+def layout_of(
+    operator: np.ndarray, stiffness: np.ndarray, make_ups: tuple[tuple[int, ...], ...] = ()
+) -> Layout | None:
+    """Layout of a line by its blocks of A and K, see ``neighbours``, and by the make-ups of its
+    stations if there are several.
+
+    None if a plane is wider than kernels are.
+    """
+    joined = (operator != 0).any(axis=(0, 1)) | (stiffness != 0).any(axis=(0, 1))
+    widths = _without_gaps(_planes(joined))
+    if max(widths) > WIDEST:
+        return None
+    # A plane of one or two wires has the terms of beams that droppers join, some of which a bare or
+    # a straight line lacks: few kernels serve them all.
+    usual = ((0, 1, 2), (0, 1)) if max(widths) in (3, 4) else ((0, 1), (0, 1))
+    own, beside = usual if max(widths) <= 4 else ((), ())
+    return joining(Layout(widths, own, beside, make_ups=make_ups), stiffness)
+
+
+def with_damping(layout: Layout, damping: np.ndarray | None) -> Layout:
+    """The same for products with C, by its blocks, as well."""
+    found = layout if damping is None else joining(layout, damping)
+    return found.changed(damped=True)
+
+
+def joining(layout: Layout, blocks: np.ndarray) -> Layout:
+    """A layout for a matrix of these blocks, see ``neighbours``, too."""
+    joined = (blocks != 0).any(axis=1)
+    own = layout.differences(joined[1])
+    beside = layout.differences(joined[0] | joined[2])
+    return layout.changed(
+        own=tuple(sorted({*layout.own, *own})), beside=tuple(sorted({*layout.beside, *beside}))
+    )
+
+
+def _planes(joined: np.ndarray) -> tuple[int, ...]:
+    """Widths of the runs of unknowns that ``joined`` (b, b) does not join."""
+    size = joined.shape[0]
+    reach = np.where(joined | joined.T, np.arange(size), 0).max(axis=1, initial=0)
+    ends = np.flatnonzero(np.maximum.accumulate(np.maximum(reach, np.arange(size))) == range(size))
+    return tuple(int(width) for width in np.diff(ends, prepend=-1))
+
+
+def _without_gaps(widths: tuple[int, ...]) -> tuple[int, ...]:
+    """Planes beside each other put together where they fit into the lanes of one."""
+    lanes = min((n for n in LANES if n >= max(widths)), default=WIDEST)
+    merged = [widths[0]]
+    for width in widths[1:]:
+        if merged[-1] + width <= lanes:
+            merged[-1] += width
+        else:
+            merged.append(width)
+    return tuple(merged)
+
+
+def by_kinds(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Kind (n,) of each station of whose ``numbers`` (n, m), and those of the kinds in a row."""
+    first, kinds = kinds_of(numbers)
+    return kinds, aligned_arrays.copy(numbers[first])
+
+
+def kinds_by_make_up(
+    layout: Layout, make_up: np.ndarray, pack: Callable[[Layout, Any], np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, int, int]:
+    """Kinds (n,) of stations, the numbers of all kinds in a row, how many kinds there are, and how
+    many numbers of all stations are not zero.
+
+    ``pack`` returns the numbers of stations in the layout of their make-up, (n, m). Where
+    make-ups vary a kind is the place of its first number; see ``block_at``.
+    """
+    if not layout.varies:
+        packed = pack(layout, slice(None))
+        kinds, numbers = by_kinds(packed)
+        return kinds, numbers, int(kinds.max(initial=-1)) + 1, np.count_nonzero(packed)
+    begins, parts = np.zeros(make_up.size, dtype=np.int64), [np.zeros(0)]
+    end = n_kinds = count = 0
+    for number, part in enumerate(layout.parts):
+        stations = np.flatnonzero(make_up == number)
+        packed = pack(part, stations)
+        count += np.count_nonzero(packed)
+        first, kinds = kinds_of(packed)
+        begins[stations] = end + packed.shape[1] * kinds
+        parts.append(packed[first].ravel())
+        end += parts[-1].size
+        n_kinds += first.size
+    return begins, aligned_arrays.copy(np.concatenate(parts)), n_kinds, count
+
+
+class StationProduct:
+    """Products with rows of K, and C if the layout is damped. Not collective.
+
+    Attributes
+    ----------
+    layout : Layout
+    places : of the stations of the factor
+    kinds : (n,) of its rows
+    blocks : of each kind the diagonal block of K, then what joins it to the stations before and
+        after it; the same of -C; all as products read them, see ``Layout``
+    first : station in the factor of the first row; the factor has one before and one after all
+        rows, which is zero where the line ends
+    n_kinds : how many rows are different
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        places: Places,
+        kinds: np.ndarray,
+        blocks: np.ndarray,
+        first: int,
+        n_kinds: int,
+    ) -> None:
+        self.layout, self.places, self.kinds = layout, places, kinds
+        self.blocks, self.first, self.n_kinds = blocks, first, n_kinds
+        later = 0, 0, np.zeros(0), np.zeros(0), np.zeros(0)
+        self._multiply = bound(multiply, layout, places, kinds, blocks, first, later=later)
+
+    def multiply(
+        self, factor: np.ndarray, result: np.ndarray, velocity: np.ndarray | None = None
+    ) -> None:
+        """Make ``result`` K ``factor``, less C ``velocity`` if the layout is damped."""
+        velocity = factor if velocity is None else velocity
+        self._multiply(0, self.kinds.size, factor, velocity, result)
+
+    def multiply_rows(self, begin: int, end: int, factor: np.ndarray, result: np.ndarray) -> None:
+        """The rows from ``begin`` to ``end`` of that, where the layout is not damped; of others
+        ``result`` stays as it is."""
+        self._multiply(begin, end, factor, factor, result)
+
+
+def station_product(
+    matrix: sparse.bsr_matrix | StationRows,
+    first: int,
+    layout: Layout,
+    damping: sparse.bsr_matrix | StationRows | None = None,
+    columns: Sections | None = None,
+) -> StationProduct | None:
+    """Products with a matrix in sorted blocks, or with its rows by stations.
+
+    The first row is that of column ``first``; ``damping`` has kinds of the same stations. The
+    factor has a whole cross-section more at both ends than the matrix has ``columns``, which are
+    alike if not given. None if the matrix joins what the layout does not.
+    """
+    rows = rows_of(matrix, first, columns)
+    damped = None if damping is None else rows_of(damping, first, columns)
+    if rows is None or (damping is not None and damped is None):
+        return None
+    n_rows = rows.kinds.size
+    if columns is None:
+        columns = Sections.alike(first + n_rows + 1, layout.pitch)
+    stations = columns.padded()
+    packed = packed_rows(layout, rows, damped, stations.make_up[first + 1 : first + 1 + n_rows])
+    if packed is None:
+        return None
+    return StationProduct(layout, stations.places(), *packed[:2], first + 1, packed[2])
+
+
+def packed_rows(
+    layout: Layout, rows: StationRows, damping: StationRows | None, make_up: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, int] | None:
+    """Kinds and numbers of stations as ``StationProduct`` keeps them, and how many kinds there are.
+
+    ``make_up`` (n,) of the stations; None if the matrices join what the layout does not.
+    """
+    numbers: list[tuple[np.ndarray, str]] = []
+    for part, sign in ((rows, 1.0), (damping, -1.0)):
+        if part is not None:
+            for place, terms in ((1, "own_terms"), (0, "beside_terms"), (2, "beside_terms")):
+                numbers.append((sign * part.blocks[place], terms))
+
+    def pack(part: Layout, which: slice | np.ndarray) -> np.ndarray:
+        packed = [part.packed(blocks[which], getattr(part, terms)) for blocks, terms in numbers]
+        return np.concatenate(packed, axis=1)
+
+    kinds, packed, n_kinds, count = kinds_by_make_up(layout, make_up[rows.chosen], pack)
+    if count != sum(np.count_nonzero(blocks) for blocks, _ in numbers):
+        return None
+    return kinds[rows.kinds], packed, n_kinds
+
+
+@inner
+def row_sums(part, multiplied, row, positions, velocities):
+    """Sums of a row of a product, with what the factor and the velocity hold before, at and after
+    its station.
+
+    ``multiplied`` holds layout, places, kinds, blocks and first of ``StationProduct`` and both
+    vectors; ``part`` is the layout of the station's make-up.
+    """
+    _, _, kinds, blocks, _, _, _ = multiplied
+    size, beside = own_size(part), beside_size(part)
+    stored = size + np.uint64(2) * beside
+    if is_damped(part):
+        numbers = numbers_from(blocks, block_at(part, kinds, row, np.uint64(2) * stored))
+    else:
+        numbers = numbers_from(blocks, block_at(part, kinds, row, stored))
+    sums = sums_from(part, zero(part))
+    sums = add_own(part, sums, numbers, np.uint64(0), narrowed(part, positions[1]))
+    sums = add_beside(part, sums, numbers, size, narrowed(part, positions[0]))
+    sums = add_beside(part, sums, numbers, size + beside, narrowed(part, positions[2]))
+    if is_damped(part):
+        sums = add_own(part, sums, numbers, stored, narrowed(part, velocities[1]))
+        sums = add_beside(part, sums, numbers, stored + size, narrowed(part, velocities[0]))
+        after = narrowed(part, velocities[2])
+        sums = add_beside(part, sums, numbers, stored + size + beside, after)
+    return sums
+
+
+@inner
+def read_station(multiplied, row):
+    """What the factor and the velocity hold at the station of a row, which may be one before or
+    after all rows."""
+    layout, places, _, _, first, factor, velocity = multiplied
+    at, make_up = start_of(layout, places, first + row), make_up_of(layout, places, first + row)
+    position = load_at(layout, make_up, factor, at)
+    if is_damped(layout):
+        return position, load_at(layout, make_up, velocity, at)
+    return position, position
+
+
+@inner
+def _put_row(part, multiplied, row, positions, velocities, result):
+    layout, places, _, _, first, _, _ = multiplied
+    total = total_of(part, row_sums(part, multiplied, row, positions, velocities))
+    at = start_of(layout, places, first + row) - start_of(layout, places, first)
+    store(part, result, at, total)
+
+
+put_row = by_make_up(_put_row)
+
+
+@compiled
+def multiply(layout, places, kinds, blocks, first, begin, end, factor, velocity, result):
+    """Rows from ``begin`` to ``end`` of ``result`` = K ``factor``, less C ``velocity``; see
+    ``StationProduct``."""
+    multiplied = borrowed((layout, places, kinds, blocks, first, factor, velocity))
+    result = borrowed(result)
+    before, here = read_station(multiplied, begin - 1), read_station(multiplied, begin)
+    for i in range(begin, end):
+        after = read_station(multiplied, i + 1)
+        positions, velocities = (before[0], here[0], after[0]), (before[1], here[1], after[1])
+        make_up = make_up_of(layout, multiplied[1], first + i)
+        put_row(layout, make_up, multiplied, i, positions, velocities, result)
+        before, here = here, after

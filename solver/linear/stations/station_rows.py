@@ -1,0 +1,128 @@
+"""Rows of a line's matrices by stations, those that are alike assembled and stored once."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from catenary.solver.linear.stations.like_stations import LikeStations
+from catenary.solver.linear.stations.sections import Sections, neighbours, places_of
+from catenary.solver.model.entries import iterate_entries
+from catenary.solver.model.model import Model
+
+# Stations whose entries are put together at once, some 50 MB of them.
+_STRETCH = 2**14
+
+
+class StationRows(NamedTuple):
+    """Rows of a block tridiagonal matrix by stations.
+
+    Attributes
+    ----------
+    kinds : (n,) int32 of each station
+    chosen : (k,) first station of each kind, ascending
+    blocks : (3, k, b, b) of each kind towards the start of the line, on the diagonal and towards
+        the end
+    """
+
+    kinds: np.ndarray
+    chosen: np.ndarray
+    blocks: np.ndarray
+
+    def part(self, stations: slice) -> StationRows:
+        """The rows of a range of the stations."""
+        used, first, kinds = np.unique(self.kinds[stations], return_index=True, return_inverse=True)
+        order = np.argsort(first)
+        kinds = np.argsort(order).astype(np.int32)[kinds]
+        return StationRows(kinds, first[order], self.blocks[:, used[order]])
+
+
+def rows_of(
+    matrix: sparse.bsr_matrix | StationRows, first: int = 0, columns: Sections | None = None
+) -> StationRows | None:
+    """Rows of a matrix in sorted blocks, each a kind of its own; see ``neighbours``."""
+    if isinstance(matrix, StationRows):
+        return matrix
+    blocks = neighbours(matrix, first, columns)
+    if blocks is None:
+        return None
+    every = np.arange(blocks.shape[1])
+    return StationRows(every.astype(np.int32), every, blocks)
+
+
+class LikeRows:
+    """Rows of M, K and C from one station to another. Not collective.
+
+    Parameters
+    ----------
+    model : Model
+    like : marks of its stations
+    low, high : first unknown and the one after the last, of whole stations
+    """
+
+    def __init__(self, model: Model, like: LikeStations, low: int, high: int) -> None:
+        self._model = model
+        self._stations = Sections.of(model.numbering, 0, model.numbering.size)
+        self._first, last = model.numbering.stations_over(low, high)
+        marks = like.marks[self._first - like.first : last - like.first].copy()
+        # What is beyond the ends may be cut off: the rows there are no others'.
+        marks[:1] += np.uint64(1)
+        marks[-1:] += np.uint64(2)
+        _, first, kinds = np.unique(marks, return_index=True, return_inverse=True)
+        order = np.argsort(first)
+        self._chosen = first[order]
+        self._kinds = np.argsort(order).astype(np.int32)[kinds]
+
+    def sum_of(
+        self,
+        coefficients: tuple[float, float, float],
+        columns: tuple[int, int],
+        held_diagonal: float = 0.0,
+    ) -> StationRows | None:
+        """Rows of a sum of M, K and C; None if it joins stations that are no neighbours.
+
+        Entries beyond ``columns`` are left out; those of held unknowns are zero but for
+        ``held_diagonal``.
+        """
+        width = self._model.numbering.width
+        blocks = np.zeros((3, self._chosen.size, width, width))
+        for begin in range(0, self._chosen.size, _STRETCH):
+            part = slice(begin, begin + _STRETCH)
+            found = self._part(self._chosen[part], coefficients, columns, held_diagonal)
+            if found is None:
+                return None
+            blocks[:, part] = found
+        return StationRows(self._kinds, self._chosen, blocks)
+
+    def _part(
+        self,
+        chosen: np.ndarray,
+        coefficients: tuple[float, float, float],
+        columns: tuple[int, int],
+        held_diagonal: float,
+    ) -> np.ndarray | None:
+        """Blocks of the ``chosen`` stations."""
+        model, numbering = self._model, self._model.numbering
+        stations = chosen + self._first
+        begin, end = numbering.starts[stations[0]], numbering.starts[stations[-1] + 1]
+        number = np.full(int(stations[-1] - stations[0]) + 1, -1)
+        number[stations - stations[0]] = np.arange(stations.size)
+        wanted = np.repeat(number >= 0, np.diff(numbering.starts[stations[0] : stations[-1] + 2]))
+        parts = list(iterate_entries(model, int(begin), int(end), *coefficients, wanted))
+        held = model.constrained_between(int(begin), int(end))
+        held = held[wanted[held - begin]]
+        parts.append((held, held, np.full(held.size, held_diagonal)))
+        rows, others, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+        inside = (others >= columns[0]) & (others < columns[1])
+        inside &= values != 0.0
+        values, size, n = values[inside], numbering.width, stations.size
+        station, place = places_of(rows[inside], self._stations)
+        other, at = places_of(others[inside], self._stations)
+        step = other - station
+        if np.abs(step).max(initial=0) > 1:
+            return None
+        flat = ((step + 1) * n + number[station - stations[0]]) * size + place
+        found = np.bincount(flat * size + at, weights=values, minlength=3 * n * size * size)
+        return np.asarray(found).reshape(3, n, size, size)

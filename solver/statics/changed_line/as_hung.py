@@ -1,0 +1,69 @@
+"""The line at rest with the droppers that were cut, after what befell it: its profile follows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from catenary.solver.base.errors import InputError
+from catenary.solver.effects.all_effects import simulated
+from catenary.solver.effects.build_model import build
+from catenary.solver.model.model import Model
+from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.changed_line.potential import Potential
+from catenary.solver.statics.changed_line.rest_nearby import RestNearby, where
+from catenary.solver.statics.rest_loads import dead_loads
+
+
+def hang(problem: Problem, cut: Model, form: Equilibrium) -> tuple[Model, Equilibrium]:
+    """The model of a line as it hangs, and its equilibrium. Not collective.
+
+    Parameters
+    ----------
+    problem : whose line is the one that hangs, and whose effects are all that it has
+    cut : model of the line for which droppers were cut
+    form : its equilibrium; droppers that push there slacken, and others take their part
+
+    Raises
+    ------
+    InputError
+        If a dropper would have no length, or there is no rest.
+    """
+    mesh, errors = cut.mesh, _errors_of_length(problem, cut)
+    length = cut.dropper_lengths + errors
+    if (length <= 0.0).any():
+        number = int(np.argmin(length))
+        raise InputError(
+            f"irregularities.dropper_lengths leaves the dropper at "
+            f"{mesh.x(mesh.droppers[number, 1]):g} m a length of {length[number]:.3f} m: "
+            "take smaller errors"
+        )
+    model = build(problem, mesh, length, form=form)
+    potential = Potential(cut, model, form, form.dropper_length + errors)
+    rest = RestNearby(potential, dead_loads(model) - dead_loads(cut)).find()
+    _refuse_slack_wires(model, rest.form)
+    return build(problem, mesh, length, form=rest.form, gap=rest.gap), rest.form
+
+
+def _errors_of_length(problem: Problem, cut: Model) -> np.ndarray:
+    """Errors of the droppers' lengths, (n_droppers,) [m]."""
+    errors, n = simulated(problem).length_errors, cut.dropper_lengths.size
+    if errors is None:
+        return np.zeros(n)
+    found = errors.of(n)
+    for x, error in errors.given:
+        found[cut.droppers_at((x,))] += error
+    return found
+
+
+def _refuse_slack_wires(model: Model, form: Equilibrium) -> None:
+    for name, gained in form.gained_tension.items():
+        wire, pairs = model.problem.line.wire(name), model.mesh.elements(name)
+        middle = model.mesh.x(pairs).mean(axis=1)
+        left = wire.tension_at(middle) + gained
+        if left.min() <= 0.0:
+            raise InputError(
+                f"{name} would be slack{where(model)} (tension {left.min():.0f} N at "
+                f"{middle[left.argmin()]:.1f} m): give its end a tensioner (line.ends, "
+                "line.tensioner), or change line.temperature.difference_K"
+            )

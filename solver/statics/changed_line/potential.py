@@ -1,0 +1,228 @@
+"""Forces of a line in any shape beside those of a rest that is known: one energy for all planes.
+
+Wires have the strain of their course in every plane that is simulated, droppers the length between
+their ends wherever these are, steady arms that of a bar to a hinge that stays. All else is linear.
+With the rest z known to be balanced under its loads, a displacement d from it is at rest where
+
+    p(d) = load,        p(d) = dE'/dd(z + d) - dE/dd(z)
+
+E is the potential energy of the line that was balanced, E' that of the line as it is now, and the
+load what it has to carry beside the former one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from catenary.meshgen.wires import Wire
+from catenary.solver.effects.shipped.lateral_effects import BAR_STIFFNESS
+from catenary.solver.model.axial_elements import curve_rows, shape_of
+from catenary.solver.model.elements import beam
+from catenary.solver.model.model import Model, wire_elements
+from catenary.solver.model.rest.rest_shape import Equilibrium
+
+# Components of a dropper's vector and of an arm's.
+_DROPPER, _ARM = ("u", "v", "w"), ("v", "w", "u")
+
+
+class Potential:
+    """What a line pulls at its unknowns in shapes near a known rest.
+
+    Parameters
+    ----------
+    was : the model that was balanced in the shape ``known``
+    model : the line as it is now, about the same shape
+    cut : (n_droppers,) unstretched lengths of its droppers [m]
+    """
+
+    def __init__(self, was: Model, model: Model, known: Equilibrium, cut: np.ndarray) -> None:
+        self.model, self.known, self._cut = model, known, cut
+        self._wires = [_Wire(was, model, wire, known) for wire in model.problem.line.wires]
+        self._springs = [b for b in model.blocks if b.stiffness is not None and not b.of_shape]
+        self._stiffness = model.dropper_stiffness
+        self._parts = [k for k, name in enumerate(_DROPPER) if name in model.unknowns]
+        if not model.simulated.lateral:
+            self._parts = [k for k in self._parts if _DROPPER[k] != "v"]
+        self._droppers_were = self._pulls(known, known.dropper_force)
+        self._arms = _arms(model, known)
+
+    def reserve(self, form: Equilibrium) -> np.ndarray:
+        """What droppers would carry if they could push, (n_droppers,) [N]."""
+        vectors = form.dropper_vectors(self.model.mesh.droppers)
+        return np.asarray(self._stiffness * (np.linalg.norm(vectors, axis=1) - self._cut))
+
+    def form(self, moved: np.ndarray) -> Equilibrium:
+        """The shape after a displacement (n_dofs,), forces of droppers as if they could push."""
+        model, known = self.model, self.known
+        every = np.arange(model.mesh.n_nodes)
+        form = replace(
+            known,
+            height=known.height + moved[model.dofs(every)],
+            slope=known.slope + moved[model.dofs(every, "theta_y")],
+            dropper_length=self._cut,
+        )
+        if "u" in model.unknowns:
+            before = known.along if known.along.size else np.zeros(every.size)
+            gained = {wire.name: wire.gained(moved) for wire in self._wires}
+            along = before + moved[model.dofs(every, "u")]
+            form = replace(form, along=along, gained_tension=gained)
+        if known.lateral is not None:
+            force = known.lateral.arm_force.copy()
+            pushed = np.zeros(len(force), dtype=bool)
+            for arm in self._arms:
+                force[arm.mine] = arm.force(moved)
+                pushed[arm.mine] = arm.tension(moved)[0] < 0.0
+            lateral = replace(
+                known.lateral,
+                y=known.lateral.y + moved[model.dofs(every, "v")],
+                slope=known.lateral.slope + moved[model.dofs(every, "theta_z")],
+                arm_force=force,
+                arm_pushed=pushed,
+            )
+            form = replace(form, lateral=lateral)
+        return replace(form, dropper_force=self.reserve(form))
+
+    def pull(self, moved: np.ndarray, form: Equilibrium, carried: np.ndarray) -> np.ndarray:
+        """p(d), (n_dofs,) [N], [N m].
+
+        Parameters
+        ----------
+        moved : displacement from the known rest (n_dofs,)
+        form : the shape after it
+        carried : (n_droppers,) tension of the droppers [N]
+        """
+        total = np.zeros(self.model.n_dofs)
+        for block in self._springs:
+            assert block.stiffness is not None
+            own = np.einsum("nij,nj->ni", block.stiffness[block.kind], moved[block.dofs])
+            np.add.at(total, block.dofs, own)
+        for wire in self._wires:
+            wire.add_pull(total, moved)
+        upper, lower = self.model.mesh.droppers.T
+        change = self._pulls(form, carried) - self._droppers_were
+        for k in self._parts:
+            np.add.at(total, self.model.dofs(upper, _DROPPER[k]), change[:, k])
+            np.add.at(total, self.model.dofs(lower, _DROPPER[k]), -change[:, k])
+        for arm in self._arms:
+            np.add.at(total, arm.unknowns, arm.was - arm.force(moved)[:, : arm.unknowns.shape[1]])
+        return total
+
+    def _pulls(self, form: Equilibrium, tension: np.ndarray) -> np.ndarray:
+        """Forces of droppers on their upper ends, downwards and so on, (n_droppers, 3) [N]."""
+        vectors = form.dropper_vectors(self.model.mesh.droppers)
+        return np.asarray((tension / np.linalg.norm(vectors, axis=1))[:, None] * vectors)
+
+
+class _Wire:
+    """The elements of a wire: their tension, and how they pull at their nodes."""
+
+    def __init__(self, was: Model, model: Model, wire: Wire, known: Equilibrium) -> None:
+        pairs = model.mesh.elements(wire.name)
+        ends = model.mesh.x(pairs)
+        middle, self._length = ends.mean(axis=1), np.diff(ends, axis=1)[:, 0]
+        before = was.problem.line.wire(wire.name)
+        section, bending = wire.left_of(ends)
+        self.name, self._tension = wire.name, wire.tension_at(middle)
+        self._other_tension = self._tension - before.tension_at(middle)
+        # By a unit of tension, and by bending and tension; then what bends otherwise than before.
+        self._taut = beam.stiffness(self._length, 0.0, 1.0)
+        bent = beam.stiffness(self._length, wire.bending_stiffness, 0.0)
+        self._linear = bending[:, None, None] * bent + self._tension[:, None, None] * self._taut
+        other_bending = (bending - before.left_of(ends)[1])[:, None, None] * bent
+        self._other_bending = other_bending if other_bending.any() else None
+        self._curved = np.zeros((len(pairs), 4))
+        self._planes = []
+        for number, (plane, course, slope) in enumerate(known.planes()):
+            dofs, _ = wire_elements(model, wire.name, plane)
+            self._planes.append((dofs, shape_of(course, slope, pairs)))
+            if number:
+                self._curved = curve_rows(model, wire.name)
+        self._along = model.dofs(pairs, "u") if "u" in model.unknowns else None
+        self._had = known.gained_tension.get(wire.name, np.zeros(len(pairs)))
+        if self._along is not None:
+            assert wire.axial_stiffness is not None
+            self._axial = wire.axial_stiffness * section
+            warmer = model.simulated.warmer - was.simulated.warmer
+            self._grown = wire.expansion * warmer
+
+    def gained(self, moved: np.ndarray) -> np.ndarray:
+        """Tension of each element beside that of the installation, (n,) [N]."""
+        if self._along is None:
+            return self._had
+        first, second = moved[self._along].T
+        strain = (second - first) / self._length - self._grown
+        for number, (dofs, shape) in enumerate(self._planes):
+            bent = moved[dofs]
+            strain += (self._rows(number, shape + 0.5 * bent) * bent).sum(axis=1)
+        return np.asarray(self._had + self._axial * strain)
+
+    def add_pull(self, total: np.ndarray, moved: np.ndarray) -> None:
+        """Add what the wire pulls beside the known rest to ``total``."""
+        gained = self.gained(moved)
+        more = gained - self._had
+        if self._along is not None:
+            np.add.at(total, self._along, np.stack([-more, more], axis=1))
+        other = (self._other_tension + more) * self._length
+        for number, (dofs, shape) in enumerate(self._planes):
+            bent = moved[dofs]
+            pull = np.einsum("nij,nj->ni", self._linear, bent)
+            if self._other_bending is not None:
+                pull += np.einsum("nij,nj->ni", self._other_bending, shape)
+            if other.any():
+                pull += other[:, None] * self._rows(number, shape)
+            if gained.any():
+                pull += gained[:, None] * np.einsum("nij,nj->ni", self._taut, bent)
+            np.add.at(total, dofs, pull)
+
+    def _rows(self, plane: int, shape: np.ndarray) -> np.ndarray:
+        """Derivatives of the mean strain by the unknowns of a plane in a shape, (n, 4)."""
+        rows = np.einsum("nij,nj->ni", self._taut, shape) / self._length[:, None]
+        return rows + self._curved if plane else rows
+
+
+class _Arms:
+    """Steady arms of one kind as bars between clamps on a wire and hinges that stay.
+
+    Attributes
+    ----------
+    mine : (n_arms,) bool, which they are
+    unknowns : (n, 2) or (n, 3) of their clamps
+    was : forces on the wire at the known rest, as many [N]
+    """
+
+    def __init__(self, model: Model, known: Equilibrium, number: int, length: float) -> None:
+        assert known.lateral is not None
+        self.mine = model.mesh.arm_group == number
+        nodes = model.mesh.steady_arms[self.mine]
+        names = [name for name in _ARM if name in model.unknowns]
+        self.unknowns = np.stack([model.dofs(nodes, name) for name in names], axis=1)
+        tension = known.lateral.arm_tension[self.mine]
+        # The arm's own length is that which it has under this tension.
+        self._cut = length - tension / BAR_STIFFNESS
+        self._hinge = length * known.lateral.arm_direction[self.mine]
+        self.was = self.force(np.zeros(model.n_dofs))[:, : len(names)]
+
+    def tension(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of each, (n,) [N], and the unit vectors from clamps to hinges, (n, 3)."""
+        to_hinge = self._hinge.copy()
+        to_hinge[:, : self.unknowns.shape[1]] -= moved[self.unknowns]
+        length = np.linalg.norm(to_hinge, axis=1)
+        return BAR_STIFFNESS * (length - self._cut), to_hinge / length[:, None]
+
+    def force(self, moved: np.ndarray) -> np.ndarray:
+        """On the wire: lateral, upward, and along the track, (n, 3) [N]."""
+        tension, unit = self.tension(moved)
+        return np.asarray(tension[:, None] * unit)
+
+
+def _arms(model: Model, known: Equilibrium) -> list[_Arms]:
+    if known.lateral is None:
+        return []
+    kinds = [arms.kind for arms in model.problem.line.steady_arms]
+    return [
+        _Arms(model, known, number, kind.length)
+        for number, kind in enumerate(kinds)
+        if kind.length > 0.0
+    ]

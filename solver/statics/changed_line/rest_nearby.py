@@ -1,0 +1,205 @@
+"""The rest that a line comes to from one that is known, once something about it has changed.
+
+Newton's method on its potential energy, all planes at once; its tangent is the stiffness of the
+model about each shape, and one step is all that a line needs whose matrices do not depend on its
+shape. Droppers only pull, and wheels of tensioners stand or turn: which ones do is found by
+switching all at once, until nothing switches; should that go round, one at a time from the first
+on, which ends always where shapes are small displacements (K. G. Murty, Linear Algebra Appl. 7,
+1974: the matrix of that problem is positive definite).
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import linalg as sparse_linalg
+
+from catenary.solver.base.errors import InputError
+from catenary.solver.effects import all_effects as effects
+from catenary.solver.effects.build_model import build
+from catenary.solver.model.model import Model
+from catenary.solver.model.rest.rest_shape import Equilibrium
+from catenary.solver.model.wire_ends import tensioned_ends
+from catenary.solver.statics.changed_line.potential import Potential
+from catenary.solver.statics.changed_line.tensioned_end import TensionedEnd
+
+# Displacements change by less than this where Newton's method ends [m].
+_SETTLED = 1e-9
+_MOST_STEPS = 40
+# A step that moves a line by more goes nowhere [m].
+_FARTHEST = 1e3
+# Steps at first in which droppers switch as they are, where matrices depend on the shape.
+_SWITCHING = 12
+# Passes in which all switch at once, before one at a time does, and the most after these.
+_ALL_AT_ONCE = 40
+# Forces below this are none [N]: what a dropper of 1e6 N/m pulls when it stretches by 1e-13 m.
+_NO_FORCE = 1e-7
+
+
+class Rest(NamedTuple):
+    """A rest that was found.
+
+    Attributes
+    ----------
+    form : the shape, with what droppers carry in it
+    moved : (n_dofs,) displacement from the known rest
+    reserve : (n_droppers,) what droppers would carry if they could push [N]
+    gap : (n_droppers,) what those that are slack lack to be taut [m]
+    """
+
+    form: Equilibrium
+    moved: np.ndarray
+    reserve: np.ndarray
+    gap: np.ndarray
+
+
+class RestNearby:
+    """The search for a rest near a known one. Not collective.
+
+    Parameters
+    ----------
+    potential : of the line as it is now about the known rest
+    load : (n_dofs,) what it has to carry beside the former line's loads [N], [N m]
+    ends_stay : whether ends that are held along the track at the known rest stay so
+    """
+
+    def __init__(self, potential: Potential, load: np.ndarray, ends_stay: bool = False) -> None:
+        self._potential, self._load = potential, load
+        self._model = model = potential.model
+        self._ends: list[TensionedEnd] = []
+        if model.simulated.tensioner is not None and not ends_stay:
+            self._ends = [TensionedEnd(model, end) for end in tensioned_ends(model)]
+        self._bends = effects.needs_form(model.problem)
+        self._matrix: sparse.csc_matrix | None = None
+        self._lost = 1.0 - model.simulated.kept_ratio if model.simulated.slackening else 0.0
+        self._switches = ~model.broken & (self._lost > 0.0)
+
+    def find(self) -> Rest:
+        """The rest.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        model, potential = self._model, self._potential
+        k = model.dropper_stiffness
+        switches = self._switches
+        slack = switches & (potential.reserve(potential.known) < -_NO_FORCE)
+        moved = np.zeros(model.n_dofs)
+        for again in itertools.count():
+            moved, form, slack = self._newton(moved, slack)
+            reserve = form.dropper_force
+            wrong = switches & np.where(slack, reserve > _NO_FORCE, reserve < -_NO_FORCE)
+            # All ends are looked at: each goes over to the state that follows.
+            turned = [end.changes(form) for end in self._ends]
+            if not (wrong.any() or any(turned)):
+                break
+            if again > _ALL_AT_ONCE + 2 * k.size + 2 * len(self._ends):
+                raise InputError(
+                    f"the line finds no rest{where(model)}: its droppers or tensioners start and "
+                    "stop without end"
+                )
+            chosen = wrong if again < _ALL_AT_ONCE else np.arange(k.size) == np.argmax(wrong)
+            slack = slack ^ (chosen & wrong)
+        gap = np.zeros(k.size)
+        gap[slack] = -reserve[slack] / k[slack]
+        force = np.where(np.abs(reserve) < _NO_FORCE, 0.0, reserve)
+        rest = replace(form, dropper_force=self._carried(force, slack))
+        return Rest(rest, moved, reserve, gap)
+
+    def _carried(self, reserve: np.ndarray, slack: np.ndarray) -> np.ndarray:
+        return np.where(slack, (1.0 - self._lost) * reserve, reserve)
+
+    def _newton(
+        self, moved: np.ndarray, slack: np.ndarray
+    ) -> tuple[np.ndarray, Equilibrium, np.ndarray]:
+        """Displacement and shape at rest with some droppers slack, from a displacement nearby.
+
+        Where shapes bend matrices, droppers go slack under way at first: one that pushes would
+        buckle sideways.
+        """
+        model, potential, moved = self._model, self._potential, moved.copy()
+        free = [end.unknown for end in self._ends if end.pull is not None]
+        held = [end.unknown for end in self._ends if end.pull is None]
+        constrained = np.union1d(np.setdiff1d(model.constrained, free), held).astype(np.int64)
+        load = self._load.copy()
+        for end in self._ends:
+            if end.pull is None:
+                moved[end.unknown] = end.end.outwards * end.held_at - self._already(end)
+            else:
+                tension = model.problem.line.wire(end.end.wire).tension
+                load[end.unknown] += end.end.outwards * (end.pull - tension)
+        change, form = np.inf, potential.form(moved)
+        for again in range(_MOST_STEPS):
+            if self._bends and again < _SWITCHING:
+                slack = self._switches & (form.dropper_force < -_NO_FORCE)
+            carried = self._carried(form.dropper_force, slack)
+            lacks = load - potential.pull(moved, form, carried)
+            lacks[constrained] = 0.0
+            about = model
+            if self._bends:
+                shape = replace(form, dropper_force=carried)
+                lengths = model.dropper_lengths
+                about = build(model.problem, model.mesh, lengths, model.broken, shape)
+                about.constrained = constrained
+            step = self._solved(about, slack, lacks)
+            change = float(np.abs(step).max())
+            if not change < _FARTHEST:
+                raise InputError(
+                    f"the line finds no rest{where(model)}: Newton's method leaves all bounds; its "
+                    "wires may be slack there"
+                )
+            moved += step
+            form = potential.form(moved)
+            if change < _SETTLED or not self._bends:
+                return moved, form, slack
+        raise InputError(
+            f"the line finds no rest{where(model)}: it still moves by {change:.2g} m after "
+            f"{_MOST_STEPS} steps of Newton's method; its wires may be slack there"
+        )
+
+    def _already(self, end: TensionedEnd) -> float:
+        """Where the known rest has an end, along the track since the installation [m]."""
+        known = self._potential.known
+        return float(known.along[end.end.node]) if known.along.size else 0.0
+
+    def _solved(self, about: Model, slack: np.ndarray, lacks: np.ndarray) -> np.ndarray:
+        """Displacement under what is lacking (n_dofs,), by the stiffness with droppers slack.
+
+        Infinite where that is singular.
+        """
+        # PETSc is not loaded by a check of a sound line.
+        from catenary.solver.model.matrices import stiffness_matrix
+
+        if self._matrix is None or self._bends:
+            self._matrix = stiffness_matrix(about)
+        matrix = self._matrix
+        if slack.any():
+            assert about.droppers is not None
+            unknowns, weights = (part[slack] for part in about.droppers.direction)
+            rows = np.repeat(np.arange(len(unknowns)), unknowns.shape[1])
+            shape = len(unknowns), about.n_dofs
+            spread = sparse.csr_matrix((weights.ravel(), (rows, unknowns.ravel())), shape=shape)
+            free = np.ones(about.n_dofs)
+            free[about.constrained] = 0.0
+            spread = spread @ sparse.diags(free)
+            gone = sparse.diags(self._lost * about.dropper_stiffness[slack])
+            matrix = (matrix - spread.T @ gone @ spread).tocsc()
+        try:
+            return np.asarray(sparse_linalg.splu(matrix.tocsc()).solve(lacks))
+        except RuntimeError:  # of SuperLU: the matrix is singular
+            return np.full(about.n_dofs, np.inf)
+
+
+def where(model: Model) -> str:
+    """At what temperature a line is that has no rest, for a sentence; "" if at that of its
+    installation."""
+    warmer = model.simulated.warmer
+    if not warmer:
+        return ""
+    return f" at {abs(warmer):g} K {'above' if warmer > 0 else 'below'} its installation"

@@ -1,0 +1,278 @@
+"""Form finding: the line at rest under its own weight, in the wanted profiles.
+
+Wires are linear in their loads. At each dropper the lower wire's height is wanted and the dropper's
+force unknown: one sparse system over the nodes of all wires in the order along the track, in which
+a height that is given has its force as unknown. Any number of wires may hang below each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from catenary.meshgen.geometry import SAME_CUT
+from catenary.meshgen.line import Line
+from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.wires import Wire
+from catenary.solver.base.errors import InputError
+from catenary.solver.effects import all_effects as effects
+from catenary.solver.effects.build_model import build
+from catenary.solver.model.model import Model
+from catenary.solver.model.rest.lateral_shape import LateralShape
+from catenary.solver.model.rest.rest_shape import Equilibrium as Equilibrium
+from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.changed_line.as_hung import hang
+from catenary.solver.statics.form_finding.banded_factors import BandedFactors
+from catenary.solver.statics.form_finding.lateral_equilibrium import lateral_shape
+from catenary.solver.statics.form_finding.repeated_ends import repeated_ends, settled
+from catenary.solver.statics.form_finding.sparse_sum import (
+    Part,
+    clamp_parts,
+    columns_of,
+    wire_parts,
+)
+from catenary.solver.statics.rest_loads import dead_loads
+
+# Lengths are printed to the millimetre; the iteration contracts by the ratio of dropper weight
+# to tension sag, about 1e-3, so that this costs one more pass and leaves no trace in the forces.
+_LENGTH_TOLERANCE = 1e-10
+_MAX_PASSES = 30
+# Of what steady arms lift, which follows from the lateral plane [N].
+_FORCE_TOLERANCE = 1e-8
+
+
+def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
+    """The model of a line and its equilibrium under its own weight. Not collective.
+
+    Droppers are cut for the sound line, or for irregular heights of the contact wire; with all that
+    is wrong besides the line then hangs on them. ``problem`` of the model has the wires that hang.
+
+    Raises
+    ------
+    InputError
+        If a dropper of the sound line would be slack at rest or would have no length, or if lengths
+        do not settle.
+    """
+    befallen = effects.after_cutting(problem)
+    if not befallen:
+        return _cut(problem, mesh)
+    cut_for = {effect.name for effect in befallen if effect.cut_for}
+    sound = _cut(effects.as_cut(problem), mesh)
+    if cut_for:
+        irregular = effects.as_cut(problem, but=cut_for)
+        sound = _cut(irregular, mesh, pushing=True)
+    return hang(effects.as_hung(problem), *sound)
+
+
+def _cut(problem: Problem, mesh: LineMesh, pushing: bool = False) -> tuple[Model, Equilibrium]:
+    """The line for which droppers are cut; they may push where ``pushing`` says so."""
+    length = mesh.points[mesh.droppers[:, 0], 2] - mesh.points[mesh.droppers[:, 1], 2]
+    hanging: _HangingWires | None = None
+    model: Model | None = None
+    lateral: LateralShape | None = None
+    for _ in range(_MAX_PASSES):
+        model = build(problem, mesh, length, before=model)
+        hanging = hanging or _HangingWires(model)
+        form = hanging.at_rest(model, lateral)
+        _check(problem.line, mesh, form, pushing)
+        still_lifted, before = 0.0, lateral
+        if model.simulated.lateral:
+            form = _with_lateral(model, form)
+            lateral = form.lateral
+            still_lifted = _most_change(before, lateral)
+        geometric = np.linalg.norm(form.dropper_vectors(mesh.droppers), axis=1)
+        change = np.abs(geometric - length).max(initial=0.0)
+        length = geometric
+        if change < _LENGTH_TOLERANCE and still_lifted < _FORCE_TOLERANCE:
+            return about(model, form)
+    raise InputError(
+        f"the lengths of the droppers do not settle: they still change by {1e3 * change:.2g} mm "
+        f"after {_MAX_PASSES} passes, as each stretches the line by its own weight; make "
+        "line.dropper.mass_kg_per_m smaller, or the tensions greater"
+    )
+
+
+def about(model: Model, form: Equilibrium) -> tuple[Model, Equilibrium]:
+    """The model with matrices about its shape at rest, if any effect's are, and that shape. Not
+    collective."""
+    if not effects.needs_form(model.problem):
+        return model, form
+    return build(model.problem, model.mesh, model.dropper_lengths, form=form), form
+
+
+def _with_lateral(model: Model, form: Equilibrium) -> Equilibrium:
+    """The equilibrium with its lateral plane, in which droppers may lean."""
+    shape = lateral_shape(model, form)
+    form = replace(form, lateral=shape)
+    vectors = form.dropper_vectors(model.mesh.droppers)
+    length = np.linalg.norm(vectors, axis=1)
+    force = form.dropper_force * length / vectors[:, 2]
+    return replace(
+        form, dropper_force=force, dropper_length=length - force / model.dropper_stiffness
+    )
+
+
+def _most_change(before: LateralShape | None, after: LateralShape | None) -> float:
+    """Largest change of the vertical force of an arm [N]."""
+    if before is None or after is None:
+        return np.inf
+    return float(np.abs(after.arm_force - before.arm_force)[:, 1].max(initial=0.0))
+
+
+class _HangingWires:
+    """The wires of a line between what holds them, factored; their loads may change.
+
+    Unknowns are height and slope at each node. Where a height is given, the upward force that holds
+    the wire there is unknown in its place; that of a dropper also pulls down its upper end. Where
+    the line goes on height and slope are given, and those of the mast before.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self._w = 2 * model.row_of_node
+        n = 2 * model.mesh.n_nodes
+        parts, self._spring_load = _springs_and_wires(model, self._w)
+        nodes, heights, held_at = _given_heights(model)
+        self._repeated = repeated_ends(model)
+        ends = self._w[self._repeated.ends]
+        self._at_ends = np.concatenate([ends, ends + 1])
+        self._pulls = columns_of(parts, self._at_ends, n)
+        self._given = np.concatenate([self._w[nodes], ends + 1])
+        heights = np.concatenate([heights, np.zeros(ends.size)])
+        self._heights = np.zeros(n)
+        self._heights[self._given] = heights
+        # Without weight droppers carry nothing: what holds the lower wire pulls at nothing above.
+        self._weighted = model.simulated.gravity != 0.0
+        upper, lower = self._w[model.mesh.droppers if self._weighted else model.mesh.droppers[:0]].T
+        rows = np.concatenate([self._w[held_at], ends + 1, upper])
+        columns = np.concatenate([self._given, lower])
+        sign = np.repeat([-1.0, 1.0], [self._given.size, upper.size])
+        forces = rows, columns, sign
+        self._factor = BandedFactors(parts, self._given, heights, forces, n)
+
+    def at_rest(self, model: Model, lateral: LateralShape | None) -> Equilibrium:
+        """The line at rest under the weights of ``model``, which may differ in them only, and
+        under what arms lift of their own in the lateral plane."""
+        mesh, every = model.mesh, np.arange(model.mesh.n_nodes)
+        load = self._spring_load - self._factor.from_given
+        dead = dead_loads(model)
+        load[self._w] += dead[model.dofs(every)]
+        load[self._w + 1] += dead[model.dofs(every, "theta_y")]
+        holding = _holding(model)
+        if lateral is not None:
+            at = self._w[mesh.steady_arms[~holding]]
+            np.add.at(load, at, lateral.arm_force[~holding, 1])
+        solution, held_by = self._solve(load)
+        height, slope = solution[self._w], solution[self._w + 1]
+        n = mesh.droppers.shape[0]
+        force = held_by[:n] if self._weighted else np.zeros(n)
+        stretched = height[mesh.droppers[:, 0]] - height[mesh.droppers[:, 1]]
+        lift, first = np.zeros(mesh.steady_arms.size), mesh.droppers.shape[0]
+        by_group = np.argsort(mesh.arm_group[holding], kind="stable")
+        lift[np.flatnonzero(holding)[by_group]] = held_by[first : first + by_group.size]
+        cut = stretched - force / model.dropper_stiffness
+        return Equilibrium(height, slope, force, cut, arm_lift=lift)
+
+    def _solve(self, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Heights and slopes (n,) under a load, and the forces by which given ones are held."""
+        given, first = self._given, self._heights[self._at_ends]
+        masts, rise = self._w[self._repeated.masts[0]], self._repeated.rise
+        found = solution = np.zeros(0)
+
+        def turn(values: np.ndarray) -> np.ndarray:
+            nonlocal found, solution
+            found = self._factor.solve(load - self._pulls @ (values - first))
+            solution = found.copy()
+            solution[given] = self._heights[given]
+            solution[self._at_ends] = values
+            return np.concatenate([solution[masts] + rise, solution[masts + 1]])
+
+        settled(turn, first)
+        return solution, found[given]
+
+
+def _holding(model: Model) -> np.ndarray:
+    """Which steady arms hold their wire at its height, (n_arms,) bool."""
+    holds = [arms.kind.holds_height for arms in model.problem.line.steady_arms]
+    return np.array([*holds, False])[model.mesh.arm_group]
+
+
+def _springs_and_wires(model: Model, w: np.ndarray) -> tuple[list[Part], np.ndarray]:
+    """Stiffness of wires, supports and clamps, and the load of relaxed supports.
+
+    ``w`` is the number of each node's height; that of its slope follows. A support is a spring
+    relaxed at its height: it gives way under the line's weight. Supports that hold a wire at the
+    height wanted do so by an unknown force. Arms are without force at rest.
+    """
+    mesh, line = model.mesh, model.problem.line
+    n = 2 * mesh.n_nodes
+    load = np.zeros(n)
+    parts = wire_parts(model, w)
+    for number, supports in enumerate(line.supports):
+        if supports.holds:
+            continue
+        dofs = w[mesh.supports[mesh.support_group == number]]
+        parts.append((dofs[:, None], np.full((dofs.size, 1, 1), supports.stiffness)))
+        relaxed = line.wire(supports.wire).points(np.array(supports.x))[:, 2]
+        np.add.at(load, dofs, supports.stiffness * relaxed)
+    parts += clamp_parts(model, w)
+    return parts, load
+
+
+def _given_heights(model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes with a given height, droppers' lower ends first, the heights [m], and the nodes at
+    which the forces act by which they are held."""
+    mesh, line = model.mesh, model.problem.line
+    nodes, heights = [mesh.droppers[:, 1]], [np.zeros(mesh.droppers.shape[0])]
+    for number, group in enumerate(line.droppers):
+        mine = mesh.dropper_group == number
+        heights[0][mine] = _wanted(model, line.wire(group.lower), mesh.droppers[mine, 1])
+    for number, arms in enumerate(line.steady_arms):
+        if arms.kind.holds_height:
+            nodes.append(mesh.steady_arms[mesh.arm_group == number])
+            heights.append(_wanted(model, line.wire(arms.wire), nodes[-1]))
+    for wire in line.wires:
+        nodes.append(mesh.anchors[np.isin(mesh.anchors, mesh.wires[wire.name])])
+        if wire.profile is None:
+            heights.append(np.array(wire.held_heights))
+        else:
+            heights.append(_wanted(model, wire, nodes[-1]))
+    held_at = list(nodes)
+    for number, supports in enumerate(line.supports):
+        if supports.holds:
+            held_at.append(mesh.supports[mesh.support_group == number])
+            chain = mesh.wires[supports.holds]
+            nodes.append(chain[np.searchsorted(mesh.x(chain), mesh.x(held_at[-1]) - SAME_CUT)])
+            heights.append(_wanted(model, line.wire(supports.holds), nodes[-1]))
+    return np.concatenate(nodes), np.concatenate(heights), np.concatenate(held_at)
+
+
+def _wanted(model: Model, wire: Wire, nodes: np.ndarray) -> np.ndarray:
+    """Heights that nodes of a wire are to have, (n,) [m]."""
+    return model.simulated.target_height(wire, model.mesh.x(nodes))
+
+
+def _check(line: Line, mesh: LineMesh, form: Equilibrium, pushing: bool) -> None:
+    length = form.height[mesh.droppers[:, 0]] - form.height[mesh.droppers[:, 1]]
+    _refuse(line, mesh, length <= 0, lambda i: f"would have a length of {length[i]:.3f} m")
+    weighted = form.dropper_force.any() and not pushing
+    slack = (form.dropper_force <= 0) & weighted
+    _refuse(
+        line, mesh, slack, lambda i: f"would be slack at rest (force {form.dropper_force[i]:.1f} N)"
+    )
+
+
+def _refuse(line: Line, mesh: LineMesh, bad: np.ndarray, what: Callable[[int], str]) -> None:
+    found = np.flatnonzero(bad)
+    if found.size == 0:
+        return
+    x = mesh.x(mesh.droppers[found, 1])
+    masts = line.support_positions
+    span = np.clip(np.searchsorted(masts, x, side="right") - 1, 0, line.n_spans - 1)
+    place = f"span {span[0] + 1} at {x[0] - masts[span[0]]:.2f} m from its left support"
+    more = f", and so would {found.size - 1} more" if found.size > 1 else ""
+    raise InputError(
+        f"the dropper in {place} {what(int(found[0]))}{more}: change line.dropper.pre_sag_mm, the "
+        "dropper positions, line.encumbrance_m or the tensions"
+    )

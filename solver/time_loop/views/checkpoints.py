@@ -1,0 +1,145 @@
+"""Checkpoints: everything that a march needs to go on from a step, made and put back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from catenary.solver.base.errors import InputError
+from catenary.solver.base.parallel import on_root
+from catenary.solver.contact.train.pantographs import Pantographs
+from catenary.solver.integrators.line_integrator import LineIntegrator
+from catenary.solver.model.model import Model
+from catenary.solver.schemes.scheme import Scheme
+
+# What every state of a line has.
+_MOTION = ("displacement", "velocity", "acceleration")
+
+
+class Checkpoints:
+    """States of a marched line and train, from the arrays that the march steps.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+    model : of the line as it is now
+    """
+
+    def __init__(
+        self,
+        comm: Any,
+        model: Model,
+        line: LineIntegrator,
+        pantographs: Pantographs,
+        scheme: Scheme,
+    ) -> None:
+        self._comm, self._model, self._line = comm, model, line
+        self._pantographs, self._scheme = pantographs, scheme
+        self._outputs = ["contact_force", "head_height", "wire_height", "strip_force"]
+        self._outputs += ["contact_wire_force"] if pantographs.n_wires > 1 else []
+        self._outputs += ["across"] if pantographs.lateral else []
+
+    def make(self, step: int) -> dict[str, Any] | None:
+        """Everything needed to continue after ``step``, the latest one, on rank 0. Collective."""
+        line, pantographs = self._line, self._pantographs
+        whole = {
+            name: self._comm.gather(values.copy(), root=0)
+            for name, values in line.exact_state().items()
+        }
+        past = line.past()
+        if self._comm.rank != 0:
+            return None
+        numbering, in_rows = self._model.numbering, np.argsort(self._model.row_of_node)
+        result: dict[str, Any] = {
+            name: numbering.by_node(np.concatenate(parts))[in_rows].ravel()
+            for name, parts in whole.items()
+            if parts
+        }
+        if past is not None:
+            result["line_past"] = past
+        result |= {"row_of_node": self._model.row_of_node, "step": step}
+        result |= {name: getattr(pantographs, name).copy() for name in self._outputs}
+        result["contacts"] = self._scheme.state()
+        if line.window is not None:
+            result["window"] = line.window.state()
+        for i, pantograph in enumerate(pantographs.models):
+            result[f"pantograph_{i}"] = pantograph.state()
+        return result
+
+    def restore(self, checkpoint: dict[str, Any]) -> None:
+        """Continue from a checkpoint, which all ranks pass. Collective.
+
+        Raises
+        ------
+        InputError
+            If it does not say which node its unknowns belong to, or is not one of this line with
+            these pantographs and methods; nothing was restored then.
+        """
+        line, pantographs = self._line, self._pantographs
+        states = self._states_of_line(checkpoint)
+        outputs = {
+            name: like(checkpoint, name, getattr(pantographs, name)) for name in self._outputs
+        }
+        on_root(self._comm, lambda: self._refuse_other_states(checkpoint))
+        if line.remembers:
+            if "line_past" not in checkpoint:
+                raise impossible("line_past is missing")
+            line.recall(np.asarray(checkpoint["line_past"]), int(checkpoint["step"]))
+        line.restore(states)
+        if line.window is not None and "window" in checkpoint:
+            line.window.restore(like(checkpoint, "window", line.window.state()))
+        for name, values in outputs.items():
+            getattr(pantographs, name)[:] = values
+        self._scheme.restore(checkpoint["contacts"])
+        for i, pantograph in enumerate(pantographs.models):
+            pantograph.restore(checkpoint[f"pantograph_{i}"])
+        pantographs.look_at_joints()
+
+    def _states_of_line(self, checkpoint: dict[str, Any]) -> dict[str, np.ndarray]:
+        """The rank's part of the line's motion, by name, each (n_local,)."""
+        line, model = self._line, self._model
+        if "row_of_node" not in checkpoint:
+            raise InputError(
+                "the state to continue from was written by an earlier version of Catenary, which "
+                "this one cannot continue; start the run anew"
+            )
+        n_nodes, names = model.mesh.n_nodes, len(model.unknowns)
+        row_of_node = like(checkpoint, "row_of_node", model.row_of_node)
+        if not np.array_equal(np.sort(row_of_node), np.arange(n_nodes)):
+            raise impossible("row_of_node does not number the nodes of this line")
+        owned = slice(line.ownership.first, line.ownership.last)
+        states = {}
+        for name in line.exact_state():
+            if name in checkpoint or name in _MOTION:
+                by_row = np.reshape(like(checkpoint, name, np.empty(n_nodes * names)), (-1, names))
+                states[name] = model.numbering.as_vector(by_row[row_of_node])[owned]
+        return states
+
+    def _refuse_other_states(self, checkpoint: dict[str, Any]) -> None:
+        """Raise InputError unless the states of contacts and pantographs are of their kinds.
+
+        On rank 0, which has them.
+        """
+        like(checkpoint, "contacts", self._scheme.state())
+        for i, pantograph in enumerate(self._pantographs.models):
+            like(checkpoint, f"pantograph_{i}", pantograph.state())
+
+
+def like(checkpoint: dict[str, Any], name: str, wanted: np.ndarray) -> np.ndarray:
+    """The finite array of a checkpoint that is to have the shape of ``wanted``."""
+    if name not in checkpoint:
+        raise impossible(f"{name} is missing")
+    values, shape = np.asarray(checkpoint[name]), np.shape(wanted)
+    if values.dtype.kind not in "fiub" or values.shape != shape:
+        raise impossible(f"{name} has the shape {values.shape} in place of {shape}")
+    if not np.isfinite(values).all():
+        raise impossible(f"{name} holds NaN or infinity")
+    return values
+
+
+def impossible(what: str) -> InputError:
+    """The error of a state that is of another scene."""
+    return InputError(
+        f"the state to continue from does not belong to this scene: {what}; start the run anew"
+    )

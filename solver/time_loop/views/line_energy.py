@@ -1,0 +1,134 @@
+"""The energy of the line at the step that is shown, summed anew where the line has moved."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from catenary.solver.contact.followed_links import FollowedLinks
+from catenary.solver.integrators.line_integrator import LineIntegrator
+from catenary.solver.time_loop.views.shown_motion import ShownMotion
+from catenary.solver.window.moving_columns import Columns, columns_of
+
+# Stations, and links, that are summed together where only a part of the line moves.
+_STATIONS, _LINKS = 128, 256
+
+
+class LineEnergy:
+    """Kinetic and elastic energy of a rank's part of a line.
+
+    What rests adds what it has added before. Collective, as its methods.
+
+    Parameters
+    ----------
+    line : LineIntegrator
+    links : of the line
+    load : (n_local,) forces that act on it all the time [N]
+    columns : with the stations of the line, as of ``motion``
+    """
+
+    def __init__(
+        self, line: LineIntegrator, links: FollowedLinks, load: np.ndarray, columns: Columns
+    ) -> None:
+        self._line, self._links = line, links
+        self._loaded = np.flatnonzero(load)
+        self._load = load[self._loaded]
+        self._products = line.operators.by_rows()
+        n, n_links = line.ownership.n_local, links.numbers.size
+        in_parts = line.window is not None and self._products is not None
+        self._size = _STATIONS if in_parts else max(1, columns.n_stations)
+        self._links_size = _LINKS if in_parts else max(1, n_links)
+        # Where parts begin, and where the last one ends.
+        self._edges = np.append(np.arange(0, columns.n_stations, self._size), columns.n_stations)
+        self._starts = columns.starts[self._edges]
+        # Without a window the line is one station, of which a product has many rows.
+        self._rows = self._edges
+        if not in_parts and self._products is not None:
+            self._rows = np.array([0, self._products[0].kinds.size])
+        stations = None if line.window is None else line.window.stations
+        self._of_links = columns_of((links.links.unknowns,), n, stations)
+        self._force = np.zeros(n)
+        self._sums = np.zeros((2, self._edges.size - 1))
+        self._switched = np.zeros(-(-n_links // self._links_size))
+
+    @property
+    def pad(self) -> int:
+        """Zeros that ``padded`` of a motion needs at either end."""
+        return 0 if self._products is None else self._products[2]
+
+    def parts(self, motion: ShownMotion) -> np.ndarray:
+        """What this rank adds to kinetic and elastic energy, the latter relative to rest without
+        loads, links switched as they are [J], shape (2,)."""
+        begin, end = motion.take_changes()
+        displacement, velocity = motion.displacement, motion.velocity
+        if self._products is None:
+            parts = self._line.energy_parts(displacement, velocity)
+        else:
+            if begin < end:
+                # What joins two stations changes with either.
+                changed = max(0, begin - 1), min(int(self._edges[-1]), end + 1)
+                self._sum_stations(motion.padded, (displacement, velocity), *changed)
+            parts = 0.5 * np.add.reduce(self._sums, axis=1)
+        if begin < end:
+            self._sum_links(displacement, begin, end)
+        parts[1] += np.add.reduce(self._switched)
+        if self._loaded.size:
+            parts[1] -= self._load @ displacement[self._loaded]
+        return parts
+
+    def _sum_stations(
+        self,
+        padded: tuple[np.ndarray, ...],
+        motion: tuple[np.ndarray, np.ndarray],
+        begin: int,
+        end: int,
+    ) -> None:
+        assert self._products is not None
+        if self._edges.size == 2:
+            for row, product in enumerate(self._products[:2]):
+                product.multiply_rows(0, int(self._rows[1]), padded[1 - row], self._force)
+                self._sums[row, 0] = self._force @ motion[1 - row]
+            return
+        assert self._line.window is not None
+        together = max(1, (self._line.window.most_rows - 2) // self._size)
+        first, last = begin // self._size, -(-end // self._size)
+        for part in range(first, last, together):
+            self._sum_parts(padded, motion, part, min(part + together, last))
+
+    def _sum_parts(
+        self,
+        padded: tuple[np.ndarray, ...],
+        motion: tuple[np.ndarray, np.ndarray],
+        first: int,
+        last: int,
+    ) -> None:
+        """Sum the parts from ``first`` to before ``last``."""
+        assert self._products is not None and self._line.window is not None
+        window = self._line.window
+        if not window.has_rows(*self._rows[[first, last]].tolist()):
+            # Of what has not moved no rows are needed.
+            own = slice(*self._starts[[first, last]].tolist())
+            self._sums[:, first:last] = 0.0
+            moved = own.start + np.flatnonzero((motion[0][own] != 0) | (motion[1][own] != 0))
+            if not moved.size:
+                return
+            first, last = np.searchsorted(self._starts, moved[[0, -1]], side="right") + (-1, 0)
+        begin, end = self._rows[[first, last]].tolist()
+        own = slice(*self._starts[[first, last]].tolist())
+        window.provide_rows(begin, end)
+        for row, product in enumerate(self._products[:2]):
+            # The kinetic energy is that of the velocity.
+            factor, values = padded[1 - row], motion[1 - row][own]
+            product.multiply_rows(begin, end, factor, self._force)
+            force = self._force[own]
+            if last == first + 1:
+                self._sums[row, first] = force @ values
+            else:
+                places = self._starts[first:last] - own.start
+                self._sums[row, first:last] = np.add.reduceat(force * values, places)
+
+    def _sum_links(self, displacement: np.ndarray, begin: int, end: int) -> None:
+        first, last = int(self._of_links.first[begin, 0]), int(self._of_links.last[end, 0])
+        size = self._links_size
+        for part in range(first // size, -(-last // size) if first < last else 0):
+            own = size * part, min(size * (part + 1), self._links.numbers.size)
+            self._switched[part] = self._links.energy_of_switching(displacement, *own)

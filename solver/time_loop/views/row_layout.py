@@ -1,0 +1,86 @@
+"""The row that a step shows: the values of all channels one after another.
+
+First stands what pantographs keep in one array, then arms and droppers: a step fills these parts as
+a whole. What other channels take from arrays elsewhere is copied behind them, number by number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from catenary.solver.base.kernels.pointers import address_of
+from catenary.solver.time_loop.views.channels import CHANNELS, Channel, Sources
+
+
+class RowLayout:
+    """Where in a row each channel is, and what fills it. Not collective.
+
+    Attributes
+    ----------
+    columns : name of a channel -> its part of a row
+    width : numbers of a row
+    taps : (k,) addresses of the numbers behind the first ones, for a compiled loop
+    in_loop : whether a compiled loop can fill a row; not if a channel is a function
+
+    Parameters
+    ----------
+    sources : of the channels, of which ``arm_uplift`` and ``dropper_force`` are parts of ``shown``
+    shown : (n,) what pantographs, arms and droppers show
+
+    Raises
+    ------
+    ValueError
+        If the values of a channel are no contiguous doubles.
+    """
+
+    def __init__(self, sources: Sources, shown: np.ndarray) -> None:
+        self.columns: dict[str, slice] = {}
+        self._copied: list[tuple[slice, np.ndarray]] = []
+        self._called: list[tuple[slice, Callable[[], np.ndarray]]] = []
+        self.width = shown.size
+        addresses: list[int] = []
+        for channel in CHANNELS.values():
+            assert channel.values is not None
+            values = channel.values(sources)
+            array = values if isinstance(values, np.ndarray) else np.asarray(values())
+            part = _part_of(shown, sources, array)
+            if part is None:
+                part = slice(self.width, self.width + array.size)
+                self.width = part.stop
+                if isinstance(values, np.ndarray):
+                    start = _address(channel, array)
+                    addresses += [start + 8 * number for number in range(array.size)]
+                    self._copied.append((part, array))
+                else:
+                    self._called.append((part, values))
+            self.columns[channel.name] = part
+        self.in_loop = not self._called
+        self.taps = np.array(addresses, dtype=np.int64)
+
+    def fill(self, row: np.ndarray) -> None:
+        """Fill in what stands behind the first numbers of a row."""
+        for part, array in self._copied:
+            row[part] = array
+        for part, values in self._called:
+            row[part] = values()
+
+
+def _address(channel: Channel, array: np.ndarray) -> int:
+    try:
+        return address_of(array)
+    except ValueError as error:
+        raise ValueError(f"the values of channel {channel.name} are no contiguous doubles") from (
+            error
+        )
+
+
+def _part_of(shown: np.ndarray, sources: Sources, array: np.ndarray) -> slice | None:
+    """Where an array is in what a step shows, None if it is not a part of it."""
+    outputs = sources.pantographs.outputs
+    for whole, at in ((shown, 0), (outputs, 0)):
+        begin = array.ctypes.data - whole.ctypes.data
+        if 0 <= begin and begin + array.nbytes <= whole.nbytes and array.flags.c_contiguous:
+            return slice(at + begin // 8, at + begin // 8 + array.size)
+    return None

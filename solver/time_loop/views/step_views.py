@@ -1,0 +1,320 @@
+"""Views for observers: what a run is made of, and the state after each step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from catenary.meshgen.mesh import DROPPERS
+from catenary.solver.base.kernels.bound import bound
+from catenary.solver.base.parallel import total
+from catenary.solver.contact.followed_links import FollowedLinks
+from catenary.solver.contact.forces_on_line import ForcesOnLine
+from catenary.solver.contact.train.pantographs import Pantographs
+from catenary.solver.integrators import state_kernels
+from catenary.solver.model.gauges import Gauges, gauges_of
+from catenary.solver.model.switching_links import NO_LINKS, LinkArrays, padded
+from catenary.solver.problem.watched_links import GAUGES
+from catenary.solver.schemes.scheme import Scheme
+from catenary.solver.statics.changed_line.after_incidents import ChangedLine
+from catenary.solver.statics.form_finding.equilibrium import Equilibrium
+from catenary.solver.time_loop.views.channels import (
+    Energies,
+    Sources,
+    energies_follow_motion,
+    energies_of,
+)
+from catenary.solver.time_loop.views.checkpoints import Checkpoints
+from catenary.solver.time_loop.views.line_energy import LineEnergy
+from catenary.solver.time_loop.views.observers import Stage, StepView
+from catenary.solver.time_loop.views.row_layout import RowLayout
+from catenary.solver.time_loop.views.shown_motion import ShownMotion
+from catenary.solver.window.moving_columns import MovingColumns, columns_of
+
+# Channels of the first tables of ``Shown.columns``.
+_OF_COLUMNS = ("arm_uplift", "dropper_force")
+
+
+class Showing:
+    """The marched line and train as observers see them, from the arrays that the march steps.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+    line, form : the line as it is now, and its first rest, from which displacements count
+    moving : kept up to date for those who watch
+
+    Attributes
+    ----------
+    shown : first argument of ``state_kernels.show``
+    layout : of a row of a view
+    motion : ShownMotion
+    checkpoints : Checkpoints
+    """
+
+    def __init__(
+        self,
+        comm: Any,
+        line: ChangedLine,
+        form: Equilibrium,
+        interaction: ForcesOnLine,
+        pantographs: Pantographs,
+        scheme: Scheme,
+        moving: MovingColumns,
+    ) -> None:
+        self._comm, self._moving = comm, moving
+        model = line.model
+        self._model = model
+        self._changed = line
+        self._form = form
+        self._interaction = interaction
+        self._pantographs = pantographs
+        self._line = interaction.line
+        self.checkpoints = Checkpoints(comm, model, self._line, pantographs, scheme)
+        self._unbalanced = bool(line.load.any())
+        first, owned = self._line.ownership.first, self._line.ownership.owned
+        arms = model.dofs(model.mesh.steady_arms)
+        self._owned_arms = np.flatnonzero(owned(arms))
+        self._arm_rows = (arms[self._owned_arms] - first).astype(np.int64)
+        nodes = np.arange(model.mesh.n_nodes)
+        self._owned_nodes = nodes[owned(model.dofs(nodes))]
+        self._node_rows = (model.dofs(self._owned_nodes) - first).astype(np.int64)
+        n_outputs, n_arms = pantographs.outputs.size, self._arm_rows.size
+        self._owned_droppers, droppers = interaction.links.shown(DROPPERS)
+        self._shown = np.zeros(n_outputs + n_arms + self._owned_droppers.size)
+        _, uplift, tension = np.split(self._shown, [n_outputs, n_outputs + n_arms])
+        self._gauges = gauges_of(model)
+        self._owned_gauges, watched = _owned_gauges(self._gauges, owned, first)
+        others, other_force, by_name = _further_links(interaction.links, watched)
+        at_ends = {name: by_name.pop(name) for name in watched}
+        self._sources = Sources(pantographs, interaction, scheme, uplift, tension, by_name, at_ends)
+        self.layout = RowLayout(self._sources, self._shown)
+        self._is_kept, self._energies_follow_motion = False, energies_follow_motion()
+        self._rows_of_unknown: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        self._kept_places = np.zeros(0)
+        self._row = np.zeros(self.layout.width)
+        self._view = StepView(
+            step=0,
+            time=0.0,
+            row=self._row,
+            columns=self.layout.columns,
+            node_uplift=lambda: self.motion.displacement[self._node_rows],
+            node_motion=self._node_motion,
+            wire_tension=lambda: self._tension,
+            pantograph_places=self._pantograph_places,
+            line_state=self._line_state,
+            energies=self._energies,
+            checkpoint=self._checkpoint,
+        )
+
+        self.shown = state_kernels.Shown(
+            self._line.motion.read,
+            self._arm_rows,
+            droppers,
+            others,
+            other_force,
+            columns_of(
+                (self._arm_rows[:, None], droppers.unknowns, others.unknowns),
+                self._line.ownership.n_local,
+                None if self._line.window is None else self._line.window.stations,
+            ),
+        )
+        stepped = slice(self._line.ownership.first, self._line.ownership.last)
+        load = line.load[stepped] if self._unbalanced else np.zeros(0)
+        columns = self.shown.columns
+        self._energy = LineEnergy(self._line, interaction.links, load, columns)
+        self.motion = ShownMotion(self._line, columns, self._energy.pad)
+        n = columns.n_stations
+        self._show = bound(state_kernels.show, self.shown, uplift, tension, 0, n)
+
+    def stage(self, dt: float, start_time: float, n_steps: int) -> Stage:
+        """What stays the same for the whole run."""
+        mesh, model_laws = self._model.mesh, self._model.simulated
+        points = mesh.points.copy()
+        points[:, 2] = self._form.height
+        if self._form.lateral is not None:
+            points[:, 1] = self._form.lateral.y
+        return Stage(
+            n_pantographs=self._pantographs.n,
+            dt=dt,
+            start_time=start_time,
+            n_steps=n_steps,
+            arm_x=mesh.x(mesh.steady_arms),
+            dropper_x=mesh.x(mesh.droppers[:, 1]),
+            owned_arms=self._owned_arms,
+            owned_droppers=self._owned_droppers,
+            node_points=points,
+            owned_nodes=self._owned_nodes,
+            n_strips=self._pantographs.n_strips,
+            unknowns=self._model.unknowns,
+            n_places=tuple(places.size for places in self._pantographs.places()),
+            joints_in_loop=self._pantographs.joints_in_loop,
+            n_wires=self._pantographs.n_wires,
+            lateral=self._pantographs.lateral,
+            uplift_stops=model_laws.uplift_stops,
+            moving=self._moving,
+            wire_ends=self._gauges.places,
+            owned_ends=self._owned_gauges,
+        )
+
+    def view(self, step: int, time: float, *, followed: bool = False) -> StepView:
+        """The state after a step; the same object each time.
+
+        ``followed`` says whether a compiled loop has noted which stations moved up to it.
+        """
+        view, outputs, self._is_kept = self._view, self._pantographs.outputs, False
+        self.motion.late(followed=followed)
+        if not followed:
+            self._moving.all_move()
+        view.step, view.time, view.row = step, time, self._row
+        self._shown[: outputs.size] = outputs
+        self._show()
+        view.row[: self._shown.size] = self._shown
+        self.layout.fill(view.row)
+        return view
+
+    def cross(self, time: float, *, found: bool = False) -> None:
+        """Note where wires that move sideways cross the strips at ``time`` [s], if any do.
+
+        ``found`` says whether what they do there is known, of a state that was restored.
+        Collective.
+        """
+        if not self._pantographs.lateral:
+            return
+        self._interaction.locate()
+        if not found:
+            self._interaction.find_across()
+        self._pantographs.cross(time, self._interaction.presence)
+
+    def follow(self, stations: np.ndarray) -> None:
+        """Say that only ``stations`` (2,), from and to, have moved since the latest rows."""
+        if self._line.window is not None:
+            self._moving.follow(self.shown.columns, _OF_COLUMNS, stations)
+
+    def view_of(self, step: int, time: float, row: np.ndarray) -> StepView:
+        """The state after a step that a compiled loop has shown as ``row`` of a view, its latest
+        one."""
+        self.motion.late(followed=True)
+        return self._viewed(step, time, row, is_kept=False)
+
+    def view_of_kept(
+        self,
+        step: int,
+        time: float,
+        row: np.ndarray,
+        motion: tuple[tuple[int, int], np.ndarray],
+        places: np.ndarray,
+    ) -> StepView:
+        """The same of a step before it, with what is left of its ``motion``, see
+        ``ShownMotion.show``, and with ``places`` of the pantographs."""
+        self.motion.show(*motion)
+        self._kept_places = places
+        return self._viewed(step, time, row, is_kept=True)
+
+    def _viewed(self, step: int, time: float, row: np.ndarray, *, is_kept: bool) -> StepView:
+        view, self._is_kept = self._view, is_kept
+        # Of a long line a row is not to be copied.
+        view.step, view.time, view.row = step, time, row
+        return view
+
+    def _node_motion(self, name: str, rate: bool, among: np.ndarray | None = None, /) -> np.ndarray:
+        """One unknown of the rank's nodes, or its rate, zero for nodes without it."""
+        if name not in self._rows_of_unknown:
+            numbering = self._model.numbering
+            numbers = numbering.numbers[self._owned_nodes, numbering.names.index(name)]
+            there = np.flatnonzero(numbers >= 0)
+            self._rows_of_unknown[name] = there, numbers[there] - self._line.ownership.first
+        there, own = self._rows_of_unknown[name]
+        motion = self.motion.velocity if rate else self.motion.displacement
+        if there.size == self._owned_nodes.size:
+            return np.take(motion, own if among is None else own[among])
+        result = np.zeros(self._owned_nodes.size)
+        result[there] = motion[own]
+        return result if among is None else result[among]
+
+    def _pantograph_places(self) -> np.ndarray:
+        """Heights of the bases, then places of masses and bodies, on rank 0."""
+        now = [self._kept_places] if self._is_kept else self._pantographs.places()
+        return np.concatenate([self._pantographs.bases(self._view.time), *now])
+
+    @cached_property
+    def _tension(self) -> np.ndarray:
+        """Tension of the wires ahead of all nodes, as the line is now [N]."""
+        mesh, line = self._model.mesh, self._model.problem.line
+        tension = np.zeros(mesh.n_nodes)
+        for name, nodes in mesh.wires.items():
+            tension[nodes] = line.wire(name).tension_at(mesh.x(nodes))
+        return tension + self._gained
+
+    @cached_property
+    def _gained(self) -> np.ndarray:
+        """What another temperature adds to that of the installation [N]."""
+        mesh, gained = self._model.mesh, np.zeros(self._model.mesh.n_nodes)
+        for name, more in self._form.gained_tension.items():
+            first, second = mesh.elements(name).T
+            gained[second] = more
+            gained[first] = more
+        return gained
+
+    def _line_state(self) -> Mapping[str, np.ndarray]:
+        self._refuse_kept_motion()
+        return self._line.state()
+
+    def _refuse_kept_motion(self) -> None:
+        if self._is_kept:
+            raise RuntimeError("of this step only the motion was kept, see `MotionObserver`")
+
+    def _energies(self) -> tuple[float, ...]:
+        """The energies that are recorded, in the order of their table. Collective."""
+        if not self._energies_follow_motion:
+            self._shown[:] = self._view.row[: self._shown.size]
+        return energies_of(Energies(*self._line_energies(), self._sources))
+
+    def _line_energies(self) -> tuple[float, float]:
+        """Kinetic and elastic energy relative to the first rest, slack droppers as they are [J].
+
+        Collective. After an incident it is that of what is left of the line; see `after_incidents`.
+        """
+        parts = self._energy.parts(self.motion)
+        kinetic, elastic = total(self._comm, parts).tolist()
+        return kinetic, elastic + self._changed.energy if self._unbalanced else elastic
+
+    def _checkpoint(self) -> dict[str, Any] | None:
+        """Everything needed to continue after the step shown last, on rank 0. Collective."""
+        self._refuse_kept_motion()
+        return self.checkpoints.make(self._view.step)
+
+
+def _owned_gauges(
+    gauges: Gauges, owned: Callable[[np.ndarray], np.ndarray], first: int
+) -> tuple[np.ndarray, dict[str, LinkArrays]]:
+    """Numbers of the gauges that a rank owns, and what they watch in its unknowns."""
+    if not gauges.places:
+        return np.zeros(0, dtype=np.int64), {}
+    mine = np.flatnonzero(owned(gauges.watched[GAUGES[0]].unknowns[:, 0]))
+    local = {
+        name: links._replace(unknowns=links.unknowns - first).of(mine)
+        for name, links in gauges.watched.items()
+    }
+    return mine, local
+
+
+def _further_links(
+    links: FollowedLinks, watched: Mapping[str, LinkArrays]
+) -> tuple[LinkArrays, np.ndarray, dict[str, np.ndarray]]:
+    """Owned links of one sign beside droppers, then gauges, room for their forces [N], and that by
+    component and by what a gauge shows."""
+    parts = {
+        name: links.shown(name)[1] for name in links.table.components if name != DROPPERS
+    } | dict(watched)
+    if not parts:
+        return NO_LINKS, np.zeros(0), {}
+    width = max(part.unknowns.shape[1] for part in parts.values())
+    wide = [padded(part, width) for part in parts.values()]
+    ends = np.cumsum([part.law.size for part in wide])
+    force = np.zeros(ends[-1])
+    by_name = dict(zip(parts, np.split(force, ends[:-1]), strict=True))
+    return LinkArrays(*map(np.concatenate, zip(*wide, strict=True))), force, by_name
