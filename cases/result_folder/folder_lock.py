@@ -254,7 +254,7 @@ def _in_use(folder: Path, owner: Owner | None, silence: float) -> str:
     advice = "wait for its end, or choose another folder"
     if silence > SILENT * HEARTBEAT:
         advice = f"if that process has ended, remove {lock}; else {advice}"
-    return f"{folder} is in use by {owner.told}, {sign}: {advice}"
+    return f"{folder} is in use by {owner.in_words}, {sign}: {advice}"
 
 
 def _duration(seconds: float) -> str:

@@ -41,7 +41,7 @@ class Owner:
         return json.dumps(asdict(self), indent=1) + "\n"
 
     @property
-    def told(self) -> str:
+    def in_words(self) -> str:
         """The process in words."""
         return f"process {self.pid} on {self.host} (`{self.command}`, since {self.since})"
 

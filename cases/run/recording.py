@@ -104,7 +104,7 @@ class Recording:
                 told["film"] += f" from {behind:g} m behind to {ahead:g} m ahead of the train"
         return told
 
-    def told(self, dt: float) -> list[str]:
+    def thinned(self, dt: float) -> list[str]:
         """The sentences of what its size has thinned, for the log."""
         chosen = {"line": self.line.by_size, "film": self.field_by_size}
         return [text for name, text in self.sentences(dt).items() if chosen[name]]

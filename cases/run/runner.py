@@ -265,7 +265,7 @@ def _observers(
     excited = order.excited
     usual = FIELD_EVERY if excited is None else excited.snapshot_every
     recording = recording_of(output, problem, extent_of(at_rest.mesh), begun_for, usual)
-    for sentence in recording.told(dt):
+    for sentence in recording.thinned(dt):
         logger.info(sentence)
     flush_every = output.flush_every_steps or flush_cadence(
         problem, at_rest.model.n_unknowns, recording

@@ -9,7 +9,7 @@ import numpy as np
 from catenary.meshgen.hardware import Clamps
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import MESSENGER_WIRE
-from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData
+from catenary.meshgen.topologies.line_data import SHORTEST_GAP, LineData, StitchWire
 from catenary.meshgen.topologies.registry import HUNG, register
 from catenary.meshgen.topologies.sag import GRAVITY
 from catenary.meshgen.topologies.simple import simple_catenary
@@ -46,22 +46,7 @@ def stitched_catenary(data: LineData) -> Line:
         raise InputError(
             f"no dropper hangs from a stitch wire: none is nearer than {half:g} m to a support"
         )
-    # First guess: half of the stitch wire and what it carries hang on each clamp.
-    carried = GRAVITY * half * (contact.mass_per_length + stitch.conductor.mass_per_length)
-    falls = 0.5 * carried * half / stitch.conductor.tension
-    starts, ends = data.around_supports(stitch.length).T
-    clamps = [messenger.points(x)[:, 2] for x in (starts, ends)]
-    pieces = []
-    for a, mast, b, left, right in zip(starts, masts, ends, *clamps, strict=True):
-        x, z = (a, mast, b), (left, 0.5 * (left + right) - falls, right)
-        pieces.append(
-            Piece(
-                tuple(map(float, x)),
-                data.over_track(np.array(x)),
-                tuple(map(float, z)),
-                (End.CLAMPED,) * 2,
-            )
-        )
+    pieces = _pieces(data, stitch, contact, messenger)
     taken = tuple((piece.x[0], piece.x[-1], stitch.conductor.tension) for piece in pieces)
     groups = [
         replace(low, name=name, upper=upper, upper_x=places, lower_x=places)
@@ -75,7 +60,7 @@ def stitched_catenary(data: LineData) -> Line:
         topology=STITCHED,
         wires=(
             contact,
-            Wire.of(stitch.conductor, STITCH_WIRE, Role.STITCH, tuple(pieces)),
+            Wire.of(stitch.conductor, STITCH_WIRE, Role.STITCH, pieces),
             replace(messenger, taken=taken),
         ),
         droppers=tuple(groups),
@@ -90,6 +75,26 @@ def stitched_catenary(data: LineData) -> Line:
             ),
         ),
     )
+
+
+def _pieces(
+    data: LineData, stitch: StitchWire, contact: Wire, messenger: Wire
+) -> tuple[Piece, ...]:
+    """A stitch wire at each inner support. First guess of its sag: half of it, and of the contact
+    wire that it carries, hang on each clamp."""
+    half = 0.5 * stitch.length
+    carried = GRAVITY * half * (contact.mass_per_length + stitch.conductor.mass_per_length)
+    sag = 0.5 * carried * half / stitch.conductor.tension
+    starts, ends = data.around_supports(stitch.length).T
+    clamps = [messenger.points(x)[:, 2] for x in (starts, ends)]
+    pieces = []
+    for a, mast, b, left, right in zip(
+        starts, data.support_positions[1:-1], ends, *clamps, strict=True
+    ):
+        x, z = (a, mast, b), (left, 0.5 * (left + right) - sag, right)
+        course = tuple(map(float, x)), data.over_track(np.array(x)), tuple(map(float, z))
+        pieces.append(Piece(*course, (End.CLAMPED,) * 2))
+    return tuple(pieces)
 
 
 def _check_lengths(data: LineData, length: float) -> None:

@@ -204,7 +204,7 @@ class ResultFile:
         self._file.flush()
         with trimmed(self._file):
             self._file.close()
-        self._forget()
+        self._remove_if_empty()
 
     def _append_line(self, line: LineBlock) -> None:
         """Append rows of the line's channels; blocks that are outside of the window are left out,
@@ -224,9 +224,9 @@ class ResultFile:
     def abandon(self) -> None:
         """Close the file without writing to it, after a write has failed."""
         abandon(self._file)
-        self._forget()
+        self._remove_if_empty()
 
-    def _forget(self) -> None:
+    def _remove_if_empty(self) -> None:
         """Remove a new file that never held a row."""
         if not self._begun:
             self._made_as.unlink(missing_ok=True)

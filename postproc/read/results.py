@@ -71,7 +71,7 @@ class Results(LineOfRun):
     @property
     def damage(self) -> list[str]:
         """A sentence that names the file's damage and what is used of it, none if it is sound."""
-        return self._file.told
+        return self._file.damage
 
     @property
     def outcome(self) -> str:

@@ -105,7 +105,7 @@ class SoundFile:
         return self.attrs.get("format") in EARLIER_FORMATS
 
     @property
-    def told(self) -> list[str]:
+    def damage(self) -> list[str]:
         """A sentence that names the file's damage and what is used of it, none if it is sound."""
         damage = [*self._partial, *self.records.told]
         if not damage:

@@ -76,7 +76,7 @@ class Progress:
             return
         self._dt, self._start = stage.dt, stage.start_time
         self._total = stage.n_steps * stage.dt - stage.start_time
-        self._begin = self._looked = self._told = self._clock()
+        self._begin = self._clock_read_at = self._line_at = self._clock()
         self._step = round(stage.start_time / stage.dt)
         self._done, self._lines = 0.0, 0
         self._next_look = self._step + 1
@@ -106,16 +106,16 @@ class Progress:
             return
         now, steps = self._clock(), view.step - self._step
         every = _LOOK_AT_BAR if self._on_terminal else _LOOK_AT_LINES
-        per_look = steps * every / max(now - self._looked, 1e-9)
+        per_look = steps * every / max(now - self._clock_read_at, 1e-9)
         self._next_look = view.step + max(1, min(int(per_look), _GROWTH * steps))
-        self._step, self._looked = view.step, now
+        self._step, self._clock_read_at = view.step, now
         done = view.time - self._start
         factor = done / max(now - self._begin, 1e-9)
         if self._bar is not None:
             self._bar.set_postfix_str(f"{factor:.1f} x real time", refresh=False)
             self._bar.update(done - self._done)
-        elif now - self._told >= LINE_EVERY and factor > 0:
-            self._told = now
+        elif now - self._line_at >= LINE_EVERY and factor > 0:
+            self._line_at = now
             self._lines += 1
             left = (self._total - done) / factor
             logger.info(

@@ -28,35 +28,35 @@ class StripWatch:
         """Begin to watch a march."""
         ends = stage.n_wires * np.cumsum([0, *stage.train.n_strips])
         self._contacts = [slice(*pair) for pair in zip(ends[:-1], ends[1:], strict=True)]
-        self._told = [False] * stage.n_pantographs
+        self._warned = [False] * stage.n_pantographs
         self._columns: dict[str, slice] = {}
 
     def observe(self, view: StepView) -> None:
-        """Look at a step."""
+        """Check a step."""
         self._columns = view.columns
-        self._look(np.array([view.time]), view.row[None])
+        self._check(np.array([view.time]), view.row[None])
 
     def next_state(self, step: int) -> int:
         """Rows are enough, once the first step has shown where they have what."""
         return sys.maxsize if self._columns else step + 1
 
     def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
-        """Look at steps of which only rows are left."""
-        self._look(times, rows)
+        """Check steps of which only rows are left."""
+        self._check(times, rows)
 
     def finish(self, outcome: str) -> None:
         """Nothing."""
 
-    def _look(self, times: np.ndarray, rows: np.ndarray) -> None:
+    def _check(self, times: np.ndarray, rows: np.ndarray) -> None:
         places = rows[:, self._columns["lateral_place"]]
         if not places.shape[1]:
             return  # on another rank
         for p, (half, own) in enumerate(zip(self._half_lengths, self._contacts, strict=True)):
-            if self._told[p]:
+            if self._warned[p]:
                 continue
             beyond = (np.abs(places[:, own]) > half).any(axis=1)
             if beyond.any():
-                self._told[p] = True
+                self._warned[p] = True
                 row = int(np.argmax(beyond))
                 x = rows[row, self._columns["contact_position"]][p]
                 logger.warning(

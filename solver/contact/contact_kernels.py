@@ -102,7 +102,7 @@ class Gains(NamedTuple):
 
 
 @in_line
-def look_at_surface(place, surface, touch):
+def find_surface(place, surface, touch):
     """Height and slope of the running surface at a place, cubic between samples, zero beyond."""
     first, last = touch.samples[0], touch.samples[1] - 1
     touch.surface[0], touch.surface[1] = 0.0, 0.0
@@ -161,7 +161,7 @@ def locate(x, wires, touches):
             touch.value[k] = values[k] * node.owned[unknown]
             touch.slope[k] = slopes[k] * node.owned[unknown]
         if surface.size:
-            look_at_surface(place, surface, touch)
+            find_surface(place, surface, touch)
 
 
 @in_line

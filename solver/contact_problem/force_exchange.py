@@ -77,7 +77,7 @@ class Exchange:
         self._merged = LineResponse(n, capacity, self._early, self._bounds)
         self._answer = np.zeros(_HEAD + n + 2 * capacity)
         # Said once how long they are and of what, messages cost half a microsecond less.
-        self._told = _message(self._answer)
+        self._answer_message = _message(self._answer)
         self._sums = _message(self.share.summed), _message(self._merged.summed)
 
     def to_root(self) -> LineResponse | None:
@@ -119,7 +119,7 @@ class Exchange:
             if 0 < count <= room:
                 answer[_HEAD + n : _HEAD + n + count] = reply.links
                 answer[_HEAD + n + count : _HEAD + n + 2 * count] = reply.compensation
-        comm.Bcast(self._told, root=0)
+        comm.Bcast(self._answer_message, root=0)
         self._count(answer.nbytes)
         count = int(answer[1])
         pairs = answer[_HEAD + n : _HEAD + n + 2 * count]

@@ -29,16 +29,16 @@ class Detour(NamedTuple):
         return f"steps take about {self.factor:g} times as long as they could: {self.reason}"
 
 
-_told: set[str] = set()
+_logged: set[str] = set()
 
 
-def tell(detour: Detour) -> None:
+def log_detour(detour: Detour) -> None:
     """Warn of a detour, once in a process: not for each line of a sweep, or each length of steps.
 
     Not collective; on rank 0.
     """
-    if detour.reason not in _told:
-        _told.add(detour.reason)
+    if detour.reason not in _logged:
+        _logged.add(detour.reason)
         logger.warning("%s", detour)
 
 

@@ -9,8 +9,8 @@ from catenary.solver.integrators.detour import (
     PARTS,
     Detour,
     load_detour,
+    log_detour,
     method_detour,
-    tell,
 )
 from catenary.solver.integrators.generalized_alpha import GeneralizedAlphaLine
 from catenary.solver.integrators.line_integrator import LineIntegrator
@@ -51,5 +51,5 @@ def make_line(
     if reason and line.detour is None:
         line.detour = Detour(reason, CALLED)
     if line.detour is not None and comm.rank == 0:
-        tell(line.detour)
+        log_detour(line.detour)
     return line

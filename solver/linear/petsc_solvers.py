@@ -159,7 +159,7 @@ class PartSolver:
         """PETSc's reason why the last solve did not converge; 0 if it did."""
         return min(0, self._ksp.getConvergedReason()) if self._uses_petsc else 0
 
-    def hurry(self) -> None:
+    def bypass_ksp(self) -> None:
         """Use the bare factors from now on, if the solver is direct.
 
         What PETSc does around them is a tenth of a solve with a short line.

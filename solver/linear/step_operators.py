@@ -137,7 +137,7 @@ class LineOperators:
         if isinstance(self._solver, PartSolver):
             if comm.size > 1 and comm.rank == 0 and wants_view():
                 self._solver.view()  # one for all; on one rank PETSc shows it at its first solve
-            self._solver.hurry()
+            self._solver.bypass_ksp()
         self._checked = None
         self._products.prepare()
 

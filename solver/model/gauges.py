@@ -14,6 +14,7 @@ from catenary.solver.model import axial_elements, wire_ends
 from catenary.solver.model.model import Model
 from catenary.solver.model.switching_links import RESERVE, LinkArrays
 from catenary.solver.model.unknowns.stations import SAME_STATION
+from catenary.solver.problem.along_track import Tensioner
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.watched_links import (
     GAUGES,
@@ -78,42 +79,67 @@ def gauges_of(model: Model) -> Gauges:
     for i, place in enumerate(places):
         wire = model.problem.line.wires[place.wire]
         element, node = _element_at(model, wire.name, place)
-        unknowns = axial_elements.unknowns_along(model, wire.name)[element]
-        assert wire.axial_stiffness is not None
-        left, _ = wire.left_of(model.mesh.x(model.mesh.elements(wire.name)[element])[None])
-        tension = _row(watched[TENSION], i, unknowns, place)
-        tension.weights[i] = axial_elements.strain_rows(model, wire.name)[element]
-        tension.law["stiffness"][i] = wire.axial_stiffness * left[0]
-        rest = _tension_at_rest(model, place, element)
-        tension.law["rest"][i] = rest
+        _watch_tension(model, watched, i, place, element)
         end = ends.get((wire.name, node))
+        if end is None:
+            continue
         outwards = np.zeros(width)
         outwards[0 if place.outwards < 0 else 1] = place.outwards
         moved = _moved(model, node) * place.outwards
-        for name in GAUGES[1:]:
-            _row(watched[name], i, unknowns, place)
-        if end is None:
-            continue
         watched[TRAVEL].weights[i] = outwards
         watched[TRAVEL].law["stiffness"][i], watched[TRAVEL].law["rest"][i] = 1.0, moved
-        if not end.tensioned or tensioner is None:
-            continue
-        watched[WEIGHT].weights[i] = tensioner.ratio * outwards
-        watched[WEIGHT].law["stiffness"][i] = 1.0
-        watched[WEIGHT].law["rest"][i] = tensioner.ratio * moved
-        if tensioner.travel is None:
-            continue
-        if wire_ends.at_stop(model, end):
-            low, high = tensioner.band(wire.name, wire, model.problem.gravity)
-            stop, sign, pull = (LOW_STOP, -1.0, low) if moved > 0.0 else (HIGH_STOP, 1.0, high)
-            watched[stop].weights[i] = tension.weights[i]
-            watched[stop].law["stiffness"][i] = sign * tension.law["stiffness"][i]
-            watched[stop].law["rest"][i] = sign * (rest - pull)
-        else:
-            for stop, sign in ((LOW_STOP, 1.0), (HIGH_STOP, -1.0)):
-                gap = max(tensioner.travel - sign * moved, 0.0)
-                _open(watched[stop], i, sign * outwards, gap, tensioner.stop_stiffness)
+        if end.tensioned and tensioner is not None:
+            watched[WEIGHT].weights[i] = tensioner.ratio * outwards
+            watched[WEIGHT].law["stiffness"][i] = 1.0
+            watched[WEIGHT].law["rest"][i] = tensioner.ratio * moved
+            _watch_stops(model, watched, i, end, tensioner, outwards, moved)
     return Gauges(places, watched)
+
+
+def _watch_tension(
+    model: Model, watched: dict[str, LinkArrays], i: int, place: GaugePlace, element: int
+) -> None:
+    """Watch the tension of an ``element`` by gauge ``i``; all that it watches has its unknowns."""
+    wire = model.problem.line.wires[place.wire]
+    unknowns = axial_elements.unknowns_along(model, wire.name)[element]
+    for table in watched.values():
+        _row(table, i, unknowns, place)
+    assert wire.axial_stiffness is not None
+    left, _ = wire.left_of(model.mesh.x(model.mesh.elements(wire.name)[element])[None])
+    tension = watched[TENSION]
+    tension.weights[i] = axial_elements.strain_rows(model, wire.name)[element]
+    tension.law["stiffness"][i] = wire.axial_stiffness * left[0]
+    tension.law["rest"][i] = _tension_at_rest(model, place, element)
+
+
+def _watch_stops(
+    model: Model,
+    watched: dict[str, LinkArrays],
+    i: int,
+    end: wire_ends.WireEnd,
+    tensioner: Tensioner,
+    outwards: np.ndarray,
+    moved: float,
+) -> None:
+    """Watch the stops of a tensioner by gauge ``i``, if its travel has limits.
+
+    ``outwards`` (m,) are the weights of the end's travel, which is ``moved`` [m] at rest.
+    """
+    if tensioner.travel is None:
+        return
+    if not wire_ends.at_stop(model, end):
+        for name, sign in ((LOW_STOP, 1.0), (HIGH_STOP, -1.0)):
+            gap = max(tensioner.travel - sign * moved, 0.0)
+            _open(watched[name], i, sign * outwards, gap, tensioner.stop_stiffness)
+        return
+    # The stop bears what the tension at rest lacks of what the weights pull.
+    wire, tension = model.problem.line.wire(end.wire), watched[TENSION]
+    low, high = tensioner.band(wire.name, wire, model.problem.gravity)
+    name, sign, pull = (LOW_STOP, -1.0, low) if moved > 0.0 else (HIGH_STOP, 1.0, high)
+    stop = watched[name]
+    stop.weights[i] = tension.weights[i]
+    stop.law["stiffness"][i] = sign * tension.law["stiffness"][i]
+    stop.law["rest"][i] = sign * (tension.law["rest"][i] - pull)
 
 
 def _open(table: LinkArrays, i: int, weights: np.ndarray, gap: float, stiffness: float) -> None:
@@ -123,11 +149,10 @@ def _open(table: LinkArrays, i: int, weights: np.ndarray, gap: float, stiffness:
     law["carried"][i], law["released"][i] = 0.0, 1.0
 
 
-def _row(table: LinkArrays, i: int, unknowns: np.ndarray, place: GaugePlace) -> LinkArrays:
-    """The table with the unknowns of its gauge ``i``, which is watched as it is."""
+def _row(table: LinkArrays, i: int, unknowns: np.ndarray, place: GaugePlace) -> None:
+    """Give gauge ``i`` of a table its unknowns and its place; it shows what it watches as it is."""
     table.unknowns[i] = unknowns
     table.law["place"][i], table.law["carried"][i] = place.x, 1.0
-    return table
 
 
 def _element_at(model: Model, wire: str, place: GaugePlace) -> tuple[int, int]:

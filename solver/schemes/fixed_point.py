@@ -21,7 +21,7 @@ from catenary.solver.schemes.scheme import (
     Counters,
     StepController,
     StepRejected,
-    look_across,
+    find_crossings,
 )
 
 # A correction that moves any of the line by more than this [m] will not come back.
@@ -71,7 +71,7 @@ class FixedPoint:
         self.interaction.locate()
         self._nowhere = ~self.interaction.present()
         if self.pantographs.lateral:
-            look_across(self.interaction, self.pantographs, time)
+            find_crossings(self.interaction, self.pantographs, time)
         heads = self._heads_everywhere(time)
         force = self._force
         fixed = self.numerics.iterations
@@ -93,7 +93,7 @@ class FixedPoint:
         if fixed is not None and not (np.abs(force) < DIVERGED).all():
             raise self._broken("diverges")
         if self.judge is not None:
-            self._ask(self.judge, time, depth, force, heads)
+            self._refuse_rejected(self.judge, time, depth, force, heads)
         self.counters.steps += 1
         self.counters.solves = self.counters.rounds
         self._force = force
@@ -103,12 +103,12 @@ class FixedPoint:
         on_root(self.comm, lambda: heads_below.advance(force, self.law.reported(force), depth))
         return not stop
 
-    def _ask(
+    def _refuse_rejected(
         self, judge: StepController, time: float, depth: np.ndarray, force: np.ndarray, heads: Heads
     ) -> None:
         """Raise StepRejected on all ranks if the step is not to be taken. Collective."""
         stiffness = self.law.tangents.by_depth
-        # Of the line's compliance this scheme knows nothing.
+        # The line's compliance has no part in this scheme.
         yielding = heads.height_compliance.diagonal()
         decision = on_root(self.comm, lambda: judge.decide(time, depth, force, stiffness, yielding))
         judge.set_level(decision.level)

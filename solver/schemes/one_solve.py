@@ -21,7 +21,7 @@ from catenary.solver.schemes.scheme import (
     Counters,
     StepController,
     StepRejected,
-    look_across,
+    find_crossings,
 )
 
 # First guesses of what reserves elsewhere may lose [N] and of contact forces [N]; both grow when a
@@ -141,7 +141,7 @@ class OneSolve:
     def _solve_inner(self, time: float, stop: bool) -> Reply:
         exchange, interaction, events = self._exchange, self.interaction, self._events
         if self.pantographs.lateral:
-            look_across(interaction, self.pantographs, time)
+            find_crossings(interaction, self.pantographs, time)
         events["ContactInner"].begin()
         heads = self._heads(time) if self.comm.rank == 0 else None
         events["ContactInner"].end()

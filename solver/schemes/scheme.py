@@ -11,7 +11,7 @@ from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.train.pantographs import Pantographs
 
 
-def look_across(interaction: ForcesOnLine, pantographs: Pantographs, time: float) -> None:
+def find_crossings(interaction: ForcesOnLine, pantographs: Pantographs, time: float) -> None:
     """Note where wires that move sideways cross the strips at ``time`` [s], the end of a step whose
     contacts are located and whose forces do not act yet. Collective."""
     interaction.find_across()

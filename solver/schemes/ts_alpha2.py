@@ -19,7 +19,7 @@ from catenary.solver.linear.petsc_solvers import PREFIX
 from catenary.solver.problem.integrator_parameters import GENERALIZED_ALPHA, NEWMARK, integration_of
 from catenary.solver.problem.problem import Numerics
 from catenary.solver.schemes.monolithic_system import WholeSystem
-from catenary.solver.schemes.scheme import Counters, look_across
+from catenary.solver.schemes.scheme import Counters, find_crossings
 
 # Norm of what may be left of the forces [N], and what short steps add to it by round-off of
 # inertia forces, some ten times eps of masses below 100 kg and ways below 0.1 m [N s2].
@@ -107,7 +107,7 @@ class TSAlpha2:
             raise self._broken()
         # Its own times are sums of steps, which drift.
         self._ts.setTime(time)
-        self._tell(time)
+        self._publish(time)
         return not stop
 
     def _broken(self) -> NotConverged:
@@ -173,7 +173,7 @@ class TSAlpha2:
         result.assemble()
         self.counters.solves += 1
 
-    def _tell(self, time: float) -> None:
+    def _publish(self, time: float) -> None:
         """Show the state where the march looks for it: at the line and the pantographs."""
         system, line, pantographs = self.system, self.interaction.line, self.pantographs
         line.displacement[:] = self._u[: system.n_line]
@@ -185,7 +185,7 @@ class TSAlpha2:
         pantographs.wire_height[:] = pantographs.head_height - depth
         if pantographs.lateral:
             self.interaction.locate()
-            look_across(self.interaction, pantographs, time)
+            find_crossings(self.interaction, pantographs, time)
         self.counters.steps += 1
         self.counters.rounds = self.counters.solves
         self.counters.slack_dropper_steps += system.n_slack(self._u, self._v)

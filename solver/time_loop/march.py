@@ -27,7 +27,7 @@ from catenary.solver.base.petsc import PETSc
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.train.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.effects.all_effects import simulated
-from catenary.solver.integrators.detour import Detour, tell
+from catenary.solver.integrators.detour import Detour, log_detour
 from catenary.solver.linear.petsc_solvers import wants_single_steps, wants_solution
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
@@ -130,7 +130,7 @@ class March:
         self._happened: tuple[LineIncident, ...] = ()
         self._ahead = self._happening()
         if self.detour is not None and comm.rank == 0:
-            tell(self.detour)
+            log_detour(self.detour)
 
     def _set_up(self, changed: ChangedLine) -> None:
         """Make all that steps a line and shows it, from a line that is at rest. Collective."""
@@ -364,7 +364,7 @@ class March:
         dt = self._problem.numerics.dt
         blocks = None
         if not wants_single_steps():
-            blocks = compiled_steps(self._scheme, self._showing, dt, audience.looks)
+            blocks = compiled_steps(self._scheme, self._showing, dt, audience.is_there)
         self._stepper = Stepper(
             self._scheme, self._showing, audience, stop_requested, dt, (first, end), blocks
         )

@@ -68,7 +68,7 @@ class Stepper:
             else:
                 self._take(self._blocks, ts)
         except RunBroken as error:
-            self._give_up(ts, str(error))
+            self._end_loop(ts, str(error))
             return
         ts.setTime(self.step_number * self._dt)
         if not goes_on:
@@ -93,7 +93,7 @@ class Stepper:
         try:
             goes_on = self._scheme.step(time, stop)
         except RunBroken as error:
-            raise self._told(error) from error
+            raise self._placed(error) from error
         self.step_number = number
         self._audience.show(lambda: self._showing.view(number, time))
         return goes_on
@@ -118,7 +118,7 @@ class Stepper:
         passed = taken if broken is not None else taken - 1
         self._show_passed(blocks, first, passed, kept)
         if broken is not None:
-            raise self._told(broken) from broken
+            raise self._placed(broken) from broken
         self._audience.show(lambda: blocks.last_view(self.step_number))
         ts.setStepNumber(self.step_number - 1)  # PETSc adds one
 
@@ -142,14 +142,14 @@ class Stepper:
                 break
             self._audience.show_motion(blocks.motion_view(first + 1 + at, at, number))
 
-    def _told(self, error: RunBroken) -> RunBroken:
+    def _placed(self, error: RunBroken) -> RunBroken:
         """The error of the next step with its time and place."""
         scheme = self._scheme
         scheme.counters.unconverged_steps += isinstance(error, NotConverged)
         time, place = (self.step_number + 1) * self._dt, float(scheme.pantographs.position[0])
         return RunBroken(f"the step to t = {time:.4f} s with the train at {place:.1f} m: {error}")
 
-    def _give_up(self, ts: PETSc.TS, why: str) -> None:
+    def _end_loop(self, ts: PETSc.TS, why: str) -> None:
         """End the time loop because of an error that the march reports."""
         self.broken = why
         # Not a reason of failure, for which PETSc would raise an error of its own.

@@ -47,7 +47,7 @@ def test_log_and_outcome_of_a_march_say_the_same(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Warnings are given once a process, of which other tests are a part.
-    monkeypatch.setattr(detour, "_told", set())
+    monkeypatch.setattr(detour, "_logged", set())
     damping = Damping(1e-4, 0.0125, {"contact_wire": (2e-3, 0.3)})
     line = en50318_line(3)
     for coupling, slower in (("implicit", False), ("explicit", True)):

@@ -25,7 +25,7 @@ from catenary.solver.problem.ends import EndCondition
 from catenary.solver.problem.problem import Problem
 
 
-class Told(NamedTuple):
+class Traced(NamedTuple):
     """A line for waves, the course of each pantograph, what reaches it, and how it is called."""
 
     line: WaveLine
@@ -39,11 +39,11 @@ def arrival_facts(scene: Scene, problem: Problem) -> dict[str, Any]:
 
     Not collective.
     """
-    told = _told(problem)
-    rows = zip(told.names, told.found, told.courses, strict=True)
+    traced = _traced(problem)
+    rows = zip(traced.names, traced.found, traced.courses, strict=True)
     return {
-        "wave_speed_m_per_s": told.line.speed,
-        "fastest_wave_m_per_s": told.line.fastest,
+        "wave_speed_m_per_s": traced.line.speed,
+        "fastest_wave_m_per_s": traced.line.fastest,
         "pantographs": [
             {
                 "start_m": course.start,
@@ -62,9 +62,9 @@ def arrival_facts(scene: Scene, problem: Problem) -> dict[str, Any]:
         "ends": list(end_sentences(problem)),
         "warnings": [
             *end_warnings(problem),
-            *_reflections(scene, told),
-            *_short_run_in(scene, problem, told),
-            *_short_stretch(problem, told),
+            *_reflections(scene, traced),
+            *_short_run_in(scene, problem, traced),
+            *_short_stretch(problem, traced),
         ],
     }
 
@@ -97,7 +97,7 @@ def wave_line(problem: Problem) -> WaveLine:
     )
 
 
-def _told(problem: Problem) -> Told:
+def _traced(problem: Problem) -> Traced:
     line, train = wave_line(problem), problem.train
     starts = [train.start - place.behind for place in train.placements]
     duration = (train.end - train.start) / train.speed
@@ -118,7 +118,7 @@ def _told(problem: Problem) -> Told:
     )
     n = len(starts)
     names = tuple("pantograph" if n == 1 else f"pantograph {i + 1}" for i in range(n))
-    return Told(line, courses, found, names)
+    return Traced(line, courses, found, names)
 
 
 def _without_let_out(found: Arrivals, ends: tuple[EndCondition, EndCondition]) -> Arrivals:
@@ -188,29 +188,29 @@ def _meets_in_stretch(found: Arrivals, course: Course) -> bool:
     return found.far_end is not None and found.far_end.at < course.stretch[1]
 
 
-def _reflections(scene: Scene, told: Told) -> list[str]:
+def _reflections(scene: Scene, traced: Traced) -> list[str]:
     felt = [
         i
-        for i, course in enumerate(told.courses)
-        if _meets_in_stretch(told.found[i], course) and reflection_felt(told.line, course)
+        for i, course in enumerate(traced.courses)
+        if _meets_in_stretch(traced.found[i], course) and reflection_felt(traced.line, course)
     ]
     if not felt:
         return []
-    ends = [end_for(told.line, told.courses[i]) for i in felt]
+    ends = [end_for(traced.line, traced.courses[i]) for i in felt]
     # 1 mm for the rounding of sums.
-    more = math.ceil((max(ends) - told.line.end - 1e-3) / told.line.span)
+    more = math.ceil((max(ends) - traced.line.end - 1e-3) / traced.line.span)
     wanted = scene.line.n_spans + max(more, 1)
     said = []
     for i in felt:
-        met = told.found[i].far_end
+        met = traced.found[i].far_end
         assert met is not None  # a stretch lies within the run
-        share = told.found[i].far_share
+        share = traced.found[i].far_share
         left = "" if share > 0.9 else f", with up to {100 * share:.2g} % of its amplitude"
-        first, last = told.courses[i].stretch
-        fits = met.at - first >= told.line.span
+        first, last = traced.courses[i].stretch
+        fits = met.at - first >= traced.line.span
         shorter = f", or evaluation.to_m = {math.floor(met.at):g} at most" if fits else ""
         said.append(
-            f"{_subject(told.names[i])} meets the waves that the far end of the line reflects at "
+            f"{_subject(traced.names[i])} meets the waves that the far end of the line reflects at "
             f"{met.at:.0f} m ({met.time:.1f} s){left}, before the evaluated stretch ends "
             f"({first:g} to {last:g} m): its force is not that of a long line. Take "
             f"line.n_spans = {wanted}{shorter}."
@@ -218,24 +218,24 @@ def _reflections(scene: Scene, told: Told) -> list[str]:
     return said
 
 
-def _short_run_in(scene: Scene, problem: Problem, told: Told) -> list[str]:
-    speed, line = problem.train.speed, told.line
-    short = [i for i, found in enumerate(told.found) if found.start_share > SHORT_RUN_IN]
+def _short_run_in(scene: Scene, problem: Problem, traced: Traced) -> list[str]:
+    speed, line = problem.train.speed, traced.line
+    short = [i for i, found in enumerate(traced.found) if found.start_share > SHORT_RUN_IN]
     if not short:
         return []
     needed = run_in_for(line, speed)
-    leader = max(course.leader for course in told.courses)
+    leader = max(course.leader for course in traced.courses)
     first = problem.line.running_range[0]
     said = []
     for i in short:
-        course, found = told.courses[i], told.found[i]
+        course, found = traced.courses[i], traced.found[i]
         # To a metre, on the safe side.
         start = math.floor(course.stretch[0] - needed + leader - course.start)
         begin = math.ceil(course.start + needed)
         fits = start - (leader - course.rear) >= first
         remedy = f"train.start_m = {start:g} at most, or " if fits else ""
         said.append(
-            f"{_subject(told.names[i])} starts {found.run_in:.0f} m, {found.run_in_spans:.1f} "
+            f"{_subject(traced.names[i])} starts {found.run_in:.0f} m, {found.run_in_spans:.1f} "
             f"spans, before the evaluated stretch: the start is estimated to leave "
             f"{100 * found.start_share:.0f} % of the standard deviation in its force, where "
             f"{100 * SHORT_RUN_IN:.0f} % is the limit. Take {remedy}evaluation.from_m = {begin:g} "
@@ -248,12 +248,12 @@ def _subject(name: str) -> str:
     return "The pantograph" if name == "pantograph" else name.capitalize()
 
 
-def _short_stretch(problem: Problem, told: Told) -> list[str]:
+def _short_stretch(problem: Problem, traced: Traced) -> list[str]:
     first, last = problem.evaluation
-    if last - first >= told.line.span * (1.0 - 1e-9):
+    if last - first >= traced.line.span * (1.0 - 1e-9):
         return []
     return [
-        f"The evaluated stretch of {last - first:g} m is shorter than a span ({told.line.span:g} "
+        f"The evaluated stretch of {last - first:g} m is shorter than a span ({traced.line.span:g} "
         "m): its statistics leave out what the rest of a span does, and no criterion that they "
-        f"pass says much. Take evaluation.to_m = {first + math.ceil(told.line.span):g} at least."
+        f"pass says much. Take evaluation.to_m = {first + math.ceil(traced.line.span):g} at least."
     ]

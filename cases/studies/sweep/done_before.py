@@ -53,13 +53,13 @@ def read_record(path: Path) -> dict[str, Any] | None:
         fault = "wall_s is no time"
     elif not isinstance(content.get("measured", {}), dict):
         fault = "measured is no table"
-    return None if _told(path, fault) else content
+    return None if _is_damaged(path, fault) else content
 
 
 def read_summary(path: Path) -> dict[str, Any] | None:
     """A variant's ``summary.json``, None if there is none or it is damaged, which is logged."""
     content = _table(path)
-    if content is None or _told(path, _summary_fault(content)):
+    if content is None or _is_damaged(path, _summary_fault(content)):
         return None
     return content
 
@@ -97,12 +97,16 @@ def _table(path: Path) -> dict[str, Any] | None:
     except OSError:
         return None
     except (ValueError, RecursionError):
-        _told(path, "it is no JSON")
+        _is_damaged(path, "it is no JSON")
         return None
-    return None if _told(path, "" if isinstance(content, dict) else "it is no table") else content
+    return (
+        None
+        if _is_damaged(path, "" if isinstance(content, dict) else "it is no table")
+        else content
+    )
 
 
-def _told(path: Path, fault: str) -> bool:
+def _is_damaged(path: Path, fault: str) -> bool:
     """Log that a file is damaged, if it is; returns whether it is."""
     if fault:
         logger.warning("%s is damaged (%s): its variant is run again", path, fault)

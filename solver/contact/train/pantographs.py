@@ -206,7 +206,7 @@ class Pantographs:
             for model, strips in self._models_with_contacts:
                 model.advance(contact_force[strips])
         if self.joints_in_loop:
-            self.look_at_joints()
+            self.measure_joints()
         output_kernels.write_outputs(
             contact_force, reported, self._heads.affine, depth, self.ends, self.of_step
         )
@@ -240,8 +240,8 @@ class Pantographs:
                 path = self._followed[number]
                 path.fill_ahead(times, drives[:, number, N_DRIVE : N_DRIVE + 2 * path.place.size])
 
-    def look_at_joints(self) -> None:
-        """Note by how much joints are open now. Does nothing where there are no models."""
+    def measure_joints(self) -> None:
+        """Measure by how much joints are open now; nothing where there are no models."""
         for number, model in enumerate(self.models):
             moved = model.model if isinstance(model, LoweredPantograph) else model
             if isinstance(moved, FullPantograph):
@@ -279,7 +279,7 @@ class Pantographs:
             model.place(float(self.head_height[number]), float(velocity[number]))
             self.models.append(model)
         self._models_with_contacts = list(zip(self.models, self._contacts, strict=True))
-        self.look_at_joints()
+        self.measure_joints()
 
 
 def _make(

@@ -36,8 +36,8 @@ class Audience:
         self._event = event("Show")
 
     @property
-    def looks(self) -> bool:
-        """Whether there is anybody."""
+    def is_there(self) -> bool:
+        """Whether there are observers."""
         return bool(self._observers)
 
     def start(self, stage: Stage) -> None:

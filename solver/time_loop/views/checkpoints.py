@@ -94,7 +94,7 @@ class Checkpoints:
         self._scheme.restore(checkpoint["contacts"])
         for i, pantograph in enumerate(pantographs.models):
             pantograph.restore(checkpoint[f"pantograph_{i}"])
-        pantographs.look_at_joints()
+        pantographs.measure_joints()
 
     def _states_of_line(self, checkpoint: dict[str, Any]) -> dict[str, np.ndarray]:
         """The rank's part of the line's motion, by name, each (n_local,)."""

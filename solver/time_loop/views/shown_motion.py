@@ -66,25 +66,25 @@ class ShownMotion:
 
     @property
     def displacement(self) -> np.ndarray:
-        """(n_local,) [m]; overwritten by the next look."""
-        self._look()
+        """(n_local,) [m]; overwritten when it is read next."""
+        self._bring_up_to_date()
         return self._displacement
 
     @property
     def velocity(self) -> np.ndarray:
-        """(n_local,) [m/s]; overwritten by the next look."""
-        self._look()
+        """(n_local,) [m/s]; overwritten when it is read next."""
+        self._bring_up_to_date()
         return self._velocity
 
     def take_changes(self) -> tuple[int, int]:
         """First station that has changed since it was asked for last, and the one after the last;
         the first is not before the last if none has."""
-        self._look()
+        self._bring_up_to_date()
         begin, end = self.changed.tolist()
         self.changed[0], self.changed[1] = self._columns.n_stations, 0
         return begin, end
 
-    def _look(self) -> None:
+    def _bring_up_to_date(self) -> None:
         if not self._is_late:
             return
         begin, end = self._columns.starts[self.moved].tolist()

@@ -96,7 +96,19 @@ class Showing:
         self._rows_of_unknown: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self._kept_places = np.zeros(0)
         self._row = np.zeros(self.layout.width)
-        self._view = StepView(
+        self._view = self._new_view()
+        self.shown = self._what_is_shown(droppers, others, other_force)
+        stepped = slice(self._line.ownership.first, self._line.ownership.last)
+        load = line.load[stepped] if self._unbalanced else np.zeros(0)
+        columns = self.shown.columns
+        self._energy = LineEnergy(self._line, interaction.links, load, columns)
+        self.motion = ShownMotion(self._line, columns, self._energy.pad)
+        n = columns.n_stations
+        self._show = bound(state_kernels.show, self.shown, uplift, tension, 0, n)
+
+    def _new_view(self) -> StepView:
+        """The view of all steps, whose step, time and row are set for each."""
+        return StepView(
             step=0,
             time=0.0,
             row=self._row,
@@ -110,25 +122,19 @@ class Showing:
             checkpoint=self._checkpoint,
         )
 
-        self.shown = state_kernels.Shown(
-            self._line.motion.read,
-            self._arm_rows,
-            droppers,
-            others,
-            other_force,
-            columns_of(
-                (self._arm_rows[:, None], droppers.unknowns, others.unknowns),
-                self._line.ownership.n_local,
-                None if self._line.window is None else self._line.window.stations,
-            ),
+    def _what_is_shown(
+        self, droppers: LinkArrays, others: LinkArrays, other_force: np.ndarray
+    ) -> state_kernels.Shown:
+        """Where a row's values of the line come from, and which change with which stations."""
+        window = self._line.window
+        columns = columns_of(
+            (self._arm_rows[:, None], droppers.unknowns, others.unknowns),
+            self._line.ownership.n_local,
+            None if window is None else window.stations,
         )
-        stepped = slice(self._line.ownership.first, self._line.ownership.last)
-        load = line.load[stepped] if self._unbalanced else np.zeros(0)
-        columns = self.shown.columns
-        self._energy = LineEnergy(self._line, interaction.links, load, columns)
-        self.motion = ShownMotion(self._line, columns, self._energy.pad)
-        n = columns.n_stations
-        self._show = bound(state_kernels.show, self.shown, uplift, tension, 0, n)
+        return state_kernels.Shown(
+            self._line.motion.read, self._arm_rows, droppers, others, other_force, columns
+        )
 
     def stage(self, dt: float, start_time: float, n_steps: int) -> Stage:
         """What stays the same for the whole run."""

@@ -44,7 +44,7 @@ def loops(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[bool]]:
         return loop
 
     monkeypatch.setattr(time_loop, "compiled_steps", watched)
-    monkeypatch.setattr(detour, "_told", set())
+    monkeypatch.setattr(detour, "_logged", set())
     yield found
 
 
