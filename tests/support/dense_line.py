@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -164,14 +165,12 @@ class DenseLine:
         begins at the set of the step before and ends at the first that fits.
         """
         dt = self.problem.numerics.dt
-        mass, damping, stiffness = self.matrices
+        _, damping, stiffness = self.matrices
         d, v, a = self.state
         d, v = d + dt * v + dt**2 / 4 * a, v + dt / 2 * a
-        n_contacts = len(self.problem.line.wires_of(Role.CONTACT))
+        n_contacts, n_links = len(self.problem.line.wires_of(Role.CONTACT)), len(self.pull)
         contacts = [self.meets(x, number) for number in range(n_contacts)]
         law = self.problem.contact.stiffness  # type: ignore[union-attr]
-        step = mass + dt / 2 * damping + dt**2 / 4 * stiffness
-        right = self.load - damping @ v - stiffness @ d
         kept = np.append(np.full(self.n_droppers, self.share), np.zeros(len(self.further)))
         c = self.alpha * self.spring
         if self.dampers_act:
@@ -180,26 +179,27 @@ class DenseLine:
         worth = self.spring * dt**2 / 4 + c * dt / 2
         change = np.where(self.open, 1.0, kept - 1.0)
         known = self.rest + self.spring * (self.pull @ d) + c * (self.pull @ v)
+        # Links, then contacts: what acting adds along each direction to the matrix and to the load.
+        along = np.array([*self.pull, *(direction for direction, _ in contacts)])
+        depth_before = np.array([direction @ d + rest for direction, rest in contacts])
+        added = np.append(change * worth, np.full(n_contacts, law * dt**2 / 4))
+        load = -np.append(change * known, law * depth_before)
+        answers = self._inverse @ along.T
+        free = self._inverse @ (self.load - damping @ v - stiffness @ d)
+        between, of_free = along @ answers, along @ free
         found: list[tuple[frozenset[int], np.ndarray, np.ndarray, np.ndarray]] = []
         for acts in self._sets():
-            matrix, force = step.copy(), right.copy()
-            for number in (number for number in acts if number >= 0):
-                pull = self.pull[number]
-                matrix += change[number] * worth[number] * np.outer(pull, pull)
-                force -= change[number] * known[number] * pull
-            for number, (direction, rest) in enumerate(contacts, start=1):
-                if -number in acts:
-                    matrix += law * dt**2 / 4 * np.outer(direction, direction)
-                    force -= law * (direction @ d + rest) * direction
-            new = np.zeros(self.size)
-            new[self.free] = np.linalg.solve(matrix[np.ix_(self.free, self.free)], force[self.free])
-            tension = known + worth * (self.pull @ new)
-            moved = d + dt**2 / 4 * new
-            depth = np.array([direction @ moved + rest for direction, rest in contacts])
+            rows = [n if n >= 0 else n_links - n - 1 for n in sorted(acts)]
+            # Forces along the directions that act, and what all directions move by.
+            own = np.eye(len(rows)) + added[rows, None] * between[np.ix_(rows, rows)]
+            forces = np.linalg.solve(own, load[rows] - added[rows] * of_free[rows])
+            moves = of_free + between[:, rows] @ forces
+            tension = known + worth * moves[:n_links]
+            depth = depth_before + dt**2 / 4 * moves[n_links:]
             beyond = np.where(self.open, tension > 0.0, tension < 0.0)
             switched = set(np.flatnonzero(beyond).tolist())
             if switched | set((-1 - np.flatnonzero(depth > 0.0)).tolist()) == acts:
-                found.append((acts, new, tension, depth))
+                found.append((acts, free + answers[:, rows] @ forces, tension, depth))
                 if not every_set:
                     break
         self.tried = len(found)
@@ -207,6 +207,17 @@ class DenseLine:
         self.state = np.array([d + dt**2 / 4 * new, v + dt / 2 * new, new])
         self.contact_forces = law * np.maximum(depth, 0.0)
         return float(self.contact_forces.sum()), np.where(tension < 0.0, kept * tension, tension)
+
+    @cached_property
+    def _inverse(self) -> np.ndarray:
+        """Of the matrix of a step in which no link is switched and nothing touches; zero for held
+        unknowns. A set that acts changes the matrix along a few directions only."""
+        dt = self.problem.numerics.dt
+        mass, damping, stiffness = self.matrices
+        step = mass + dt / 2 * damping + dt**2 / 4 * stiffness
+        result = np.zeros((self.size, self.size))
+        result[np.ix_(self.free, self.free)] = np.linalg.inv(step[np.ix_(self.free, self.free)])
+        return result
 
     def _sets(self) -> Iterator[frozenset[int]]:
         """All sets of switched links and of -1, -2 ..., the contacts; those near the latest one
