@@ -5,7 +5,8 @@ from __future__ import annotations
 import ast
 import functools
 import graphlib
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -94,6 +95,11 @@ def tree_of(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"), str(path))
 
 
+@functools.cache
+def imports_of(path: Path) -> list[str]:
+    return list(imports_in(tree_of(path)))
+
+
 def test_the_checks_find_what_they_are_for() -> None:
     tree = ast.parse(
         "import catenary.solver.time_loop.march\n"
@@ -114,16 +120,22 @@ def test_the_checks_find_what_they_are_for() -> None:
     assert len(FILES) > len(PARTS)
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_a_file_imports_only_layers_before_its_own(path: Path) -> None:
-    part = path.relative_to(ROOT).parts[0]
-    assert broken_arrows(part, list(imports_in(tree_of(path)))) == []
+def wrong_in(files: Iterable[Path], find: Callable[[Path], Sequence[object]]) -> dict[str, object]:
+    """What ``find`` finds wrong, by the file that has it."""
+    return {str(path.relative_to(ROOT)): found for path in files if (found := find(path))}
+
+
+def test_files_import_only_layers_before_their_own() -> None:
+    def broken(path: Path) -> list[str]:
+        return broken_arrows(path.relative_to(ROOT).parts[0], imports_of(path))
+
+    assert wrong_in(FILES, broken) == {}
 
 
 @pytest.mark.parametrize("leaf", sorted(LEAVES))
 def test_a_leaf_imports_nothing_but_leaves(leaf: str) -> None:
     path = ROOT.joinpath(*leaf.split(".")[1:]).with_suffix(".py")
-    ours = [name for name in imports_in(tree_of(path)) if is_within(name, "catenary")]
+    ours = [name for name in imports_of(path) if is_within(name, "catenary")]
     assert all(any(is_within(name, other) for other in LEAVES) for name in ours)
 
 
@@ -134,7 +146,7 @@ def test_a_mesh_library_is_imported_in_one_file(module: str, only: str) -> None:
     users = {
         str(path.relative_to(ROOT))
         for path in FILES
-        if any(is_within(name, module) for name in imports_in(tree_of(path)))
+        if any(is_within(name, module) for name in imports_of(path))
     }
     assert users == {only}
 
@@ -142,16 +154,12 @@ def test_a_mesh_library_is_imported_in_one_file(module: str, only: str) -> None:
 FILE_WRITERS = ("h5py", "meshio", "gmsh", "catenary.postproc", "matplotlib", "jinja2")
 
 
-@pytest.mark.parametrize(
-    "path", sorted((ROOT / "solver").rglob("*.py")), ids=lambda path: str(path.relative_to(ROOT))
-)
-def test_the_solver_never_writes_results(path: Path) -> None:
-    found = [
-        name
-        for name in imports_in(tree_of(path))
-        if any(is_within(name, writer) for writer in FILE_WRITERS)
-    ]
-    assert found == []
+def test_the_solver_never_writes_results() -> None:
+    def writers(path: Path) -> list[str]:
+        names = imports_of(path)
+        return [name for name in names if any(is_within(name, one) for one in FILE_WRITERS)]
+
+    assert wrong_in((ROOT / "solver").rglob("*.py"), writers) == {}
 
 
 def world_at_import(tree: ast.Module) -> Iterator[int]:
@@ -171,13 +179,9 @@ def world_at_import(tree: ast.Module) -> Iterator[int]:
         pending += ast.iter_child_nodes(node)
 
 
-@pytest.mark.parametrize(
-    "path",
-    [path for path in FILES if path.relative_to(ROOT).parts[0] != "cases"],
-    ids=lambda path: str(path.relative_to(ROOT)),
-)
-def test_no_module_holds_the_world_communicator(path: Path) -> None:
-    assert list(world_at_import(tree_of(path))) == []
+def test_no_module_holds_the_world_communicator() -> None:
+    below = [path for path in FILES if path.relative_to(ROOT).parts[0] != "cases"]
+    assert wrong_in(below, lambda path: list(world_at_import(tree_of(path)))) == {}
 
 
 def room_of(module: str) -> str | None:
@@ -195,7 +199,7 @@ def arrows_up(path: Path) -> list[str]:
         return []
     order = ROOMS[part]
     found = []
-    for module in imports_in(tree_of(path)):
+    for module in imports_of(path):
         if is_within(module, f"catenary.{part}"):
             room = room_of(module)
             if room is not None and order.index(room) > order.index(own):
@@ -210,9 +214,8 @@ def test_the_order_of_rooms_names_each_of_them() -> None:
             assert room_of(".".join(("catenary", part, *rest))), path
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_a_file_imports_only_rooms_below_its_own(path: Path) -> None:
-    assert arrows_up(path) == []
+def test_files_import_only_rooms_below_their_own() -> None:
+    assert wrong_in(FILES, arrows_up) == {}
 
 
 def first_line(path: Path) -> str:
@@ -241,8 +244,8 @@ def without_types(tree: ast.Module) -> ast.Module:
     return ast.Module(kept, [])
 
 
-def circles_in(folder: Path) -> list[str] | None:
-    """Files and sub-packages of a folder that import each other in a circle, None if none do.
+def circles_in(folder: Path) -> list[str]:
+    """Files and sub-packages of a folder that import each other in a circle, none if none do.
 
     What only type checkers import does not count.
     """
@@ -260,26 +263,20 @@ def circles_in(folder: Path) -> list[str] | None:
         graphlib.TopologicalSorter(arrows).prepare()
     except graphlib.CycleError as error:
         return list(error.args[1])
-    return None
+    return []
 
 
-@pytest.mark.parametrize(
-    "folder",
-    sorted({path.parent.parent for path in FILES if path.name == "__init__.py"} - {ROOT}),
-    ids=lambda path: str(path.relative_to(ROOT)),
-)
-def test_files_and_folders_of_a_folder_import_each_other_one_way(folder: Path) -> None:
-    assert circles_in(folder) is None
+def test_files_and_folders_of_a_folder_import_each_other_one_way() -> None:
+    folders = {path.parent.parent for path in FILES if path.name == "__init__.py"} - {ROOT}
+    assert wrong_in(sorted(folders), circles_in) == {}
 
 
 MOST_FILES, MOST_LINES = 13, 400
 
 
-@pytest.mark.parametrize(
-    "folder", sorted({path.parent for path in FILES}), ids=lambda path: str(path.relative_to(ROOT))
-)
-def test_a_folder_has_about_a_dozen_files(folder: Path) -> None:
-    assert len([path for path in folder.glob("*.py") if path.stem != "__init__"]) <= MOST_FILES
+def test_a_folder_has_about_a_dozen_files() -> None:
+    counts = Counter(path.parent for path in FILES if path.stem != "__init__")
+    assert {str(path): n for path, n in counts.items() if n > MOST_FILES} == {}
 
 
 def test_a_file_is_read_in_one_sitting() -> None:
