@@ -15,6 +15,7 @@ import numpy as np
 from catenary.meshgen.wires import Role, Wire
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.problem.contact_laws import ContactLaw, HertzLaw, LinearLaw
+from catenary.solver.problem.ends import Periodic
 from catenary.solver.problem.integrator_parameters import Integration, integration_of
 from catenary.solver.time_loop.views.channels import PANTOGRAPH, RUN
 from catenary.solver.wind.spectra import PEAK
@@ -273,6 +274,18 @@ FACTS: dict[str, Fact] = {
         "-",
         "share of its stiffness that a pushed dropper keeps, 1 where droppers do not slacken",
         lambda source: simulated(source.problem).kept_ratio,
+        high=1.0,
+    ),
+    "periodic_start": Fact(
+        "-",
+        "1 where the line goes on periodically beyond its start, 0 where not",
+        lambda source: float(isinstance(source.problem.ends[0], Periodic)),
+        high=1.0,
+    ),
+    "periodic_end": Fact(
+        "-",
+        "the same of its end",
+        lambda source: float(isinstance(source.problem.ends[1], Periodic)),
         high=1.0,
     ),
     "strongest_gust": Fact(

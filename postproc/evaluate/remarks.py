@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -146,9 +146,7 @@ def _about_droppers(results: Results) -> list[str]:
 
 def _about_ends(results: Results) -> list[str]:
     """That droppers beyond a periodic end would have slackened, by those of the span before it."""
-    config = results.attributes.get("config", {})
-    kinds = [_key(config, "line", "ends", side, "kind") for side in _SIDES]
-    periodic = [side for side, kind in zip(_SIDES, kinds, strict=True) if kind == "periodic"]
+    periodic = [side for side in _SIDES if results.fact(f"periodic_{side}") == 1.0]
     if not periodic or not slackens_at_all(results):
         return []
     masts, x = results.line("support_x"), results.line("dropper_x")
@@ -169,13 +167,6 @@ def _about_ends(results: Results) -> list[str]:
                 f"{remedy}, or a larger line.n_spans."
             )
     return said
-
-
-def _key(table: Any, *names: str) -> Any:
-    """The value of a key in nested tables, None if it is not there."""
-    for name in names:
-        table = table.get(name) if isinstance(table, dict) else None
-    return table
 
 
 def _about_contact(results: Results) -> list[str]:

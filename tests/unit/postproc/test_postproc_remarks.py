@@ -21,6 +21,8 @@ class Told:
             "fixed_iterations": np.nan,
             "step_tolerance": np.nan,
             "strongest_gust": np.nan,
+            "periodic_start": 0.0,
+            "periodic_end": 0.0,
             "stiffest_dropper": 1e5,
             "dropper_stiffness_damping": 0.0,
             "touching_mass": np.full(2, mass),
@@ -147,9 +149,8 @@ class Ended(Told):
     evaluation = (60.0, 140.0)
 
     def __init__(self, *slack: float) -> None:
-        super().__init__(7.2, 1e-3, 1e6, slack_stiffness_share=0.0)
-        ends = {side: {"kind": "periodic", "along": "fixed"} for side in ("start", "end")}
-        self.attributes["config"] = {"line": {"ends": ends}}
+        ends = {"periodic_start": 1.0, "periodic_end": 1.0}
+        super().__init__(7.2, 1e-3, 1e6, slack_stiffness_share=0.0, **ends)
         self._x = np.arange(4).repeat(2) * 50.0 + np.tile([10.0, 40.0], 4)
         self._lowest = np.where(np.isin(self._x, slack), 0.0, 5.0)
 
@@ -169,7 +170,7 @@ def test_droppers_that_slacken_at_a_periodic_end_of_the_stretch_are_told() -> No
     (sentence,) = remarks(told)  # type: ignore[arg-type]
     assert sentence.startswith("2 droppers of the span at the periodic end of the line slackened")
     assert "evaluation.to_m of 150 at most" in sentence
-    told.attributes["config"]["line"]["ends"]["end"] = {"kind": "fixed"}
+    told.facts["periodic_end"] = 0.0
     assert remarks(told) == []  # type: ignore[arg-type]
     early = Ended(10.0)
     early.evaluation = (40.0, 140.0)
