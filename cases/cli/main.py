@@ -42,9 +42,9 @@ def main() -> None:
     """Entry point. Exit codes: 0 done, 1 the run broke, 2 bad input, 3 not accepted (--strict)."""
     from catenary.solver.base.parallel import launched_by_mpirun
 
-    # Modules and their tables make many objects and no garbage: collections in between would cost
-    # 7 % of a short run's processor time.
-    gc.set_threshold(20_000, 10, 10)
+    # Modules, tables and pictures make many objects and little garbage: a short run ends before the
+    # first collection, which takes 0.15 s of it otherwise. A long series of runs has some.
+    gc.set_threshold(500_000, 3, 10)
     # One thread a process unless the user says otherwise, before a library reads it: matrices are
     # small here, and MPI is what runs in parallel.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):

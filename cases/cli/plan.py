@@ -117,8 +117,6 @@ def _cost(wish: Wish, out: Path | None, as_json: bool, force: bool) -> int:
     """What --cost does; returns the exit code."""
     import tempfile
 
-    from mpi4py import MPI
-
     from catenary.cases.process.petsc_options import as_arguments, start_petsc
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.result_folder.output_folder import refuse_impossible
@@ -133,6 +131,7 @@ def _cost(wish: Wish, out: Path | None, as_json: bool, force: bool) -> int:
     if out is not None:
         refuse_impossible(out)
     scene = load_scene(wish.case, wish.overrides, wish.shortened)
+    comm = console.alone()
     start_petsc(as_arguments(scene.petsc.given(), []))
     from catenary.cases.studies.choice import output, study
 
@@ -145,7 +144,7 @@ def _cost(wish: Wish, out: Path | None, as_json: bool, force: bool) -> int:
             found = study.measure(wish, Path(folder), say)
         files: list[Path] = []
     else:
-        with held(out, MPI.COMM_SELF, f"catenary plan {wish.case} --cost"):
+        with held(out, comm, f"catenary plan {wish.case} --cost"):
             _refuse_other(out, output.RECORD, force)
             found = study.measure(wish, out / _RUNS, say, force)
             files = [] if found is None else output.write(found, out)

@@ -14,6 +14,7 @@ from typing import Annotated, Any
 import typer
 
 from catenary.cases.scene.input.plain_text import plain
+from catenary.solver.base import lone_process
 from catenary.solver.base.errors import CatenaryError, InputError
 from catenary.solver.base.parallel import NO_MEMORY, launched_by_mpirun, on_root
 
@@ -79,9 +80,18 @@ def run_folder(text: str) -> Path:
 
 def world() -> Any:
     """The communicator of all processes; starts MPI. Not collective."""
-    from mpi4py import MPI
+    with lone_process.settings():
+        from mpi4py import MPI
 
     return MPI.COMM_WORLD
+
+
+def alone() -> Any:
+    """The communicator of this process alone; starts MPI. Not collective."""
+    world()
+    from mpi4py import MPI
+
+    return MPI.COMM_SELF
 
 
 def guarded(command: Callable[..., int | None]) -> Callable[..., None]:

@@ -165,6 +165,47 @@ def locate(x, wires, touches):
 
 
 @in_line
+def put_columns(nodes, data, weights, answer, filled):
+    """Make ``answer`` the weighted columns of two ``nodes`` beside each other, two of each, and
+    zero elsewhere.
+
+    ``filled`` is the range outside of which it is zero, before and after.
+    """
+    first, second = nodes[0], nodes[1]
+    low, high = first.begin, first.begin + first.width
+    last, end = second.begin, second.begin + second.width
+    if not low <= last < high <= end:
+        # One without columns, as beyond a run, or windows that do not overlap.
+        clear(answer, filled[0], filled[1])
+        filled[0], filled[1] = answer.size, 0
+        for side in range(2):
+            add_columns(nodes[side], data, weights[2 * side], weights[2 * side + 1], answer)
+            if nodes[side].width > 0:
+                filled[0] = min(filled[0], nodes[side].begin)
+                filled[1] = max(filled[1], nodes[side].begin + nodes[side].width)
+        filled[0] = min(filled[0], filled[1])
+        return
+    # Windows of neighbours are nearly the same: what both fill is written once.
+    clear(answer, filled[0], min(filled[1], low))
+    clear(answer, max(filled[0], end), filled[1])
+    at, after = first.at, second.at
+    a, b = data[at : at + first.width], data[at + first.width : at + 2 * first.width]
+    c, d = data[after : after + second.width], data[after + second.width : after + 2 * second.width]
+    before, both = last - low, high - last
+    alone = answer[low:last]
+    for j in range(alone.size):
+        alone[j] = weights[0] * a[j] + weights[1] * b[j]
+    shared, a, b = answer[last:high], a[before:], b[before:]
+    for j in range(shared.size):
+        of_first = weights[0] * a[j] + weights[1] * b[j]
+        shared[j] = of_first + (weights[2] * c[j] + weights[3] * d[j])
+    rest, c, d = answer[high:end], c[both:], d[both:]
+    for j in range(rest.size):
+        rest[j] = weights[2] * c[j] + weights[3] * d[j]
+    filled[0], filled[1] = low, end
+
+
+@in_line
 def add_columns(node, data, by_height, by_slope, answer):
     """Add the weighted columns of a node's two unknowns."""
     # Slices, whose indices are never negative: such loops become vector instructions.
@@ -177,10 +218,11 @@ def add_columns(node, data, by_height, by_slope, answer):
 
 @in_line
 def clear(answer, low, high):
-    """Make the numbers from ``low`` to ``high`` zero."""
-    cleared = answer[low:high]
-    for j in range(cleared.size):
-        cleared[j] = 0.0
+    """Make the numbers from ``low`` to ``high`` zero, if there are any."""
+    if low < high:
+        cleared = answer[low:high]
+        for j in range(cleared.size):
+            cleared[j] = 0.0
 
 
 @in_line
@@ -191,28 +233,22 @@ def place(x, wires, data, touches, answers):
     """
     nodes = wires.nodes
     by_force, slope = answers
-    for i in range(x.size):
-        low, high = touches[i].filled
-        clear(by_force[i], low, high)
-        if slope.shape[1] > 0:
-            clear(slope[i], low, high)
     locate(x, wires, touches)
     for i in range(x.size):
         touch = touches[i]
-        low, high = by_force.shape[1], 0
-        # Where there is no wire on a strip nothing answers: the answer stays cleared.
-        for side in range(2 if touch.present != 0.0 else 0):
-            node = nodes[touch.element + side]
-            if node.width == 0:
-                continue
-            by_height, by_slope = touch.whole_value[2 * side], touch.whole_value[2 * side + 1]
-            add_columns(node, data, by_height, by_slope, by_force[i])
+        if touch.present == 0.0:
+            # Where there is no wire on a strip nothing answers.
+            clear(by_force[i], touch.filled[0], touch.filled[1])
             if slope.shape[1] > 0:
-                by_height, by_slope = touch.whole_slope[2 * side], touch.whole_slope[2 * side + 1]
-                add_columns(node, data, by_height, by_slope, slope[i])
-            low = min(low, node.begin)
-            high = max(high, node.begin + node.width)
-        touch.filled[0], touch.filled[1] = min(low, high), high
+                clear(slope[i], touch.filled[0], touch.filled[1])
+            touch.filled[0] = touch.filled[1] = 0
+            continue
+        pair = nodes[touch.element : touch.element + 2]
+        if slope.shape[1] > 0:
+            low, high = touch.filled
+            put_columns(pair, data, touch.whole_slope, slope[i], touch.filled)
+            touch.filled[0], touch.filled[1] = low, high
+        put_columns(pair, data, touch.whole_value, by_force[i], touch.filled)
 
 
 @in_line

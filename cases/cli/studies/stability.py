@@ -33,8 +33,6 @@ def stability_map(
     force: Force = False,
 ) -> int:
     """Serial."""
-    from mpi4py import MPI
-
     from catenary.cases.studies.stability import map as study
     from catenary.cases.studies.stability.picture import draw
     from catenary.cases.studies.sweep.output import as_csv
@@ -48,7 +46,7 @@ def stability_map(
         )
     given = [*(assignments or []), *(extras or [])]
     grid = study.QUICK if quick else study.Grid()
-    found = study.make_map(case, given, shortened, MPI.COMM_SELF, grid, console.say)
+    found = study.make_map(case, given, shortened, console.alone(), grid, console.say)
     content: dict[str, bytes | str] = {
         TABLE: as_csv(study.as_rows(found)),
         PICTURE: figures.png(draw(found)),

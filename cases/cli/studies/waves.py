@@ -179,8 +179,6 @@ def _separations(
     case: str, out: Path, text: str, vary: list[str], given: list[str], shortened: bool, force: bool
 ) -> int:
     """What --separations does; returns the exit code."""
-    from mpi4py import MPI
-
     from catenary.cases.cli.studies.sweep import verdict
     from catenary.cases.process.petsc_options import start_petsc
     from catenary.cases.result_folder.folder_lock import held
@@ -195,8 +193,8 @@ def _separations(
     check_keys(product(varied, {}) if varied else [], "on the command line (--vary)")
     scene = load(case, given, None, shortened)
     jobs = separation.jobs_of(case, scene, values, varied, given, shortened)
+    comm = console.alone()
     start_petsc([])
-    comm = MPI.COMM_SELF
     with held(out, comm, f"catenary waves {case} --separations {text}"):
         ended = separation.run(jobs, out, comm, RunOptions(force, (), console.say))
         theory, span = theory_of(scene)
@@ -234,15 +232,14 @@ def _window_error(
 
 def _run(scene: object, out: Path, force: bool) -> bool:
     """Run the case; whether it came to its end."""
-    from mpi4py import MPI
-
     from catenary.cases.process.petsc_options import start_petsc
     from catenary.cases.run.runner import run_case
     from catenary.cases.scene.scene import Scene
 
     assert isinstance(scene, Scene)
+    comm = console.alone()
     start_petsc([])
-    result = run_case(scene, out, MPI.COMM_SELF, force=force, only_summary=True)
+    result = run_case(scene, out, comm, force=force, only_summary=True)
     if result.outcome != "done":
         console.complain(result.outcome)
     return result.outcome == "done"

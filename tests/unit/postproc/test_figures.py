@@ -62,7 +62,19 @@ def test_a_panel_has_few_ticks(scale: float) -> None:
     figure = panel_of(scale, 1, False)
     drawn(figure)
     (axes,) = figure.axes
-    assert 4 <= len(axes.get_xticks()) <= 10 and 4 <= len(axes.get_yticks()) <= 7
+    assert 4 <= len(axes.get_xticks()) <= 9 and 3 <= len(axes.get_yticks()) <= 6
+
+
+@pytest.mark.parametrize("scale", [1.3e-3, -1.0, 3.1e4])
+def test_no_tick_is_made_that_is_not_drawn(scale: float) -> None:
+    figure = panel_of(scale, 1, False)
+    (axes,) = figure.axes
+    axes.invert_xaxis()
+    drawn(figure)
+    for axis in (axes.xaxis, axes.yaxis):
+        low, high = sorted(axis.get_view_interval())
+        places = [tick.get_loc() for tick in axis.get_major_ticks()]
+        assert len(places) >= 3 and low <= min(places) and max(places) <= high
 
 
 def test_the_layout_of_panels_is_not_computed() -> None:

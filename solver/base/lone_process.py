@@ -1,0 +1,34 @@
+"""MPI in a process that no launcher has started: without what reaches other processes."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+
+from catenary.solver.base.parallel import launched_by_mpirun
+
+# Open MPI's daemon for processes that this one might start, its networks, and the search for them
+# take 0.3 s at the start. Other implementations do not read these variables.
+SETTINGS = {
+    "OMPI_MCA_ess_singleton_isolated": "1",
+    "OMPI_MCA_pml": "ob1",
+    "OMPI_MCA_btl": "self",
+}
+
+
+@contextlib.contextmanager
+def settings() -> Iterator[None]:
+    """While entered, MPI starts as one process alone if it is one. Not collective.
+
+    What the environment says wins. Processes that this one starts later get nothing of it: there
+    may be a launcher among them.
+    """
+    own = {} if launched_by_mpirun() else SETTINGS
+    added = {name: value for name, value in own.items() if name not in os.environ}
+    os.environ.update(added)
+    try:
+        yield
+    finally:
+        for name in added:
+            del os.environ[name]

@@ -1,0 +1,36 @@
+"""How MPI starts in a process that no launcher has started."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from catenary.solver.base.lone_process import SETTINGS, settings
+
+
+@pytest.fixture(autouse=True)
+def alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in (*SETTINGS, "OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK"):
+        monkeypatch.delenv(name, raising=False)
+
+
+def test_what_reaches_other_processes_is_left_out_while_mpi_starts() -> None:
+    before = dict(os.environ)
+    with settings():
+        assert {name: os.environ[name] for name in SETTINGS} == SETTINGS
+    # A launcher that this process may start later has its networks.
+    assert dict(os.environ) == before
+
+
+def test_what_the_environment_says_wins(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OMPI_MCA_pml", "ucx")
+    with settings():
+        assert os.environ["OMPI_MCA_pml"] == "ucx" and "OMPI_MCA_btl" in os.environ
+    assert os.environ["OMPI_MCA_pml"] == "ucx" and "OMPI_MCA_btl" not in os.environ
+
+
+def test_ranks_of_a_launcher_reach_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
+    with settings():
+        assert not set(SETTINGS) & set(os.environ)
