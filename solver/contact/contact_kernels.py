@@ -315,7 +315,7 @@ def respond(motion, touches, gains, answers, bounds, followed, share):
     # A NaN elsewhere reaches the reserve of a link one step later and is caught there.
     count = -1
     if finite:
-        count = watch(followed, bounds, touches, answers, gains, share.rows)
+        count = watch(motion, followed, bounds, touches, answers, gains, share.rows)
     room, flags = share.rows.number.size, share.flags[0]
     flags.rows = min(max(count, 0), room)
     flags.broken = count < 0

@@ -13,6 +13,7 @@ from catenary.solver.contact.line_response import Coupled
 from catenary.solver.contact.link_kernels import Followed
 from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_integrator import LineIntegrator
+from catenary.solver.integrators.state_kernels import Riders
 from catenary.solver.linear.pieces.column_pieces import columns_of
 from catenary.solver.linear.unit_responses import ShortColumns
 from catenary.solver.model.switching_links import LinkArrays, LinkTable
@@ -29,8 +30,9 @@ class FollowedLinks:
     ----------
     table : LinkTable of the whole line
     local : LinkArrays of the whole table, with local unknowns, of which other ranks own some
-    numbers : (n,) numbers in the table of those that may carry
+    numbers : (n,) numbers in the table of those that may carry, but riders
     links : LinkArrays of these, with local unknowns
+    riders, riding : of these, and their numbers (m,) in the table
     reserve : (n,) what was found last, here or by a free step of the line [N]
     moving : (2,) first of them that may switch and the one after the last; all, if there is no
         window
@@ -41,21 +43,27 @@ class FollowedLinks:
         mine = line.ownership.owned(table.arrays.unknowns[:, 0])
         self._mine = mine
         self.local = table.arrays._replace(unknowns=table.arrays.unknowns - line.ownership.first)
-        self.numbers = np.flatnonzero(mine & ~table.broken)
+        self.numbers = np.flatnonzero(mine & ~table.broken & ~table.rides)
         self.links = self.local.of(self.numbers)
+        self.riding = np.flatnonzero(mine & ~table.broken & table.rides)
+        masters = table.master[self.riding]
+        ends = np.append(self.numbers, table.master.size)
+        self.riders = Riders(self.local.of(self.riding), np.searchsorted(masters, ends))
+        self._master = np.searchsorted(self.numbers, masters)
         self._released = self.links.law["released"].copy()
         self.reserve = np.zeros(self.numbers.size)
         self.moving = np.array([0, self.numbers.size], dtype=np.int64)
         self._line = line
         self._energy = bound(
-            state_kernels.energy_of_switching, later=(np.zeros(0), self.links, 0, 0)
+            state_kernels.energy_of_switching, later=(np.zeros(0), self.links, self.riders, 0, 0)
         )
         line.track_links(self.links, self.reserve)
 
     @property
     def followed(self) -> Followed:
         """The same as kernels take it."""
-        return Followed(self.numbers, self.links, self.reserve, self.moving)
+        links = self.numbers, self.links, self.reserve, self.moving
+        return Followed(*links, self.riders, self.riding)
 
     def shown(self, component: str) -> tuple[np.ndarray, LinkArrays]:
         """Numbers among those of its component, and arrays, of all links that this rank owns,
@@ -73,9 +81,24 @@ class FollowedLinks:
     def _find_reserve(self) -> Callable[[], None]:
         return bound(state_kernels.reserves, self._line.motion.read, self.links, self.reserve)
 
+    @cached_property
+    def _across(self) -> tuple[np.ndarray, Callable[[], None]]:
+        """Reserve of riders, and what finds it."""
+        found = np.zeros(self.riding.size)
+        motion = self._line.motion.read
+        return found, bound(state_kernels.reserves, motion, self.riders.links, found)
+
     def compensation(self) -> np.ndarray:
-        """Compensations in the line's present motion [N], (n,) (eq. 2.7)."""
-        return np.asarray(self._released * np.maximum(0.0, -self.find_reserve()))
+        """Compensations of links, then of riders, in the line's present motion [N], (n + m,) (eq.
+        2.7)."""
+        reserve = self.find_reserve()
+        own = self._released * np.maximum(0.0, -reserve)
+        if not self.riding.size:
+            return np.asarray(own)
+        across, find = self._across
+        find()
+        carries = self.riders.links.law["released"] * (reserve[self._master] < 0.0)
+        return np.concatenate([own, -carries * across])
 
     def energy_of_switching(self, displacement: np.ndarray, begin: int, end: int) -> float:
         """What elastic energy of the line lacks where owned links have switched, were they springs:
@@ -83,20 +106,28 @@ class FollowedLinks:
 
         ``displacement`` (n_local,) of the line [m]; of the links from ``begin`` to ``end``.
         """
-        return float(self._energy(displacement, self.links, begin, end))
+        return float(self._energy(displacement, self.links, self.riders, begin, end))
 
     def loads(self, compensation: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Local unknowns and forces of compensations (n,) [N] of all of them."""
-        acting = np.flatnonzero(compensation)
-        if not acting.size:
-            return []
-        forces = -compensation[acting][:, None] * self.links.weights[acting]
-        return [(self.links.unknowns[acting].ravel(), forces.ravel())]
+        """Local unknowns and forces of compensations (n,) [N] of all of them, or (n + m,) with
+        riders."""
+        found = []
+        for part, links in zip(
+            np.split(compensation, [self.numbers.size]),
+            (self.links, self.riders.links),
+            strict=True,
+        ):
+            acting = np.flatnonzero(part)
+            if acting.size:
+                forces = -part[acting][:, None] * links.weights[acting]
+                found.append((links.unknowns[acting].ravel(), forces.ravel()))
+        return found
 
 
 def no_links() -> Coupled:
     """A line without links that switch."""
-    return Coupled(np.zeros((0, 1)), np.zeros(0), np.zeros(0, dtype=bool), np.zeros(0))
+    none = np.zeros(0)
+    return Coupled(np.zeros((0, 1)), none, none > 0.0, np.zeros(0, dtype=np.int64), none)
 
 
 class LinkCoupling:
@@ -116,9 +147,10 @@ class LinkCoupling:
         self._followed, table = followed, followed.table
         unknowns, weights, law = table.arrays
         self._per_acceleration = np.zeros(law.size)
-        own = law[followed.numbers]
-        self._per_acceleration[followed.numbers] = own["stiffness"] * line.position_factor
-        self._per_acceleration[followed.numbers] += own["damping"] * line.velocity_factor
+        owned = np.concatenate([followed.numbers, followed.riding])
+        own = law[owned]
+        self._per_acceleration[owned] = own["stiffness"] * line.position_factor
+        self._per_acceleration[owned] += own["damping"] * line.velocity_factor
         self._band: np.ndarray | None = None
         places = unknowns[:, None], weights[:, None], law["place"], table.half_length
         operators = line.operators.in_pieces
@@ -128,7 +160,8 @@ class LinkCoupling:
             band = comm.reduce(band, root=0)
         if band is not None:
             released, slackens = table.arrays.law["released"].copy(), table.slackens
-            self.coupled = Coupled(band, released, slackens, np.zeros(law.size))
+            behind = np.arange(law.size) - table.master
+            self.coupled = Coupled(band, released, slackens, behind, np.zeros(law.size))
 
     def _band_of(self, columns: ShortColumns) -> np.ndarray:
         """The array of the G_de, zero until their columns are there."""

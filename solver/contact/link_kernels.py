@@ -10,17 +10,21 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.solver.base.kernels.compiled import in_line
+from catenary.solver.integrators.state_kernels import Riders, reserve_of_many
 from catenary.solver.model.switching_links import LinkArrays
 
 
 class Followed(NamedTuple):
     """Links that a rank follows: their ``numbers`` (n,) in the line, ``links`` (``LinkArrays``) and
-    ``reserve`` (n,) [N], as a free step leaves it; which of them may switch, ``moving`` (2,)."""
+    ``reserve`` (n,) [N], as a free step leaves it; which of them may switch, ``moving`` (2,); their
+    ``riders``, of numbers ``riding`` (m,)."""
 
     numbers: np.ndarray
     links: LinkArrays
     reserve: np.ndarray
     moving: np.ndarray
+    riders: Riders
+    riding: np.ndarray
 
 
 @in_line
@@ -45,16 +49,34 @@ def spread(link, links, answer):
 
 
 @in_line
-def watch(followed, bounds, touches, answers, gains, rows):
-    """Number of links that may switch within ``bounds``; a row each, as far as they fit.
+def put_row(rows, at, of_link, links, link, answers, gains):
+    """Make row ``at`` that of one of ``links``; ``of_link`` are its number and its reserve."""
+    by_force, by_slope = answers
+    law, uses_rate = links.law[link], by_slope.shape[1] > 0
+    per_acceleration = law.stiffness * gains.position + law.damping * gains.velocity
+    rows.number[at], rows.reserve[at] = of_link
+    for i in range(by_force.shape[0]):
+        apart = spread(link, links, by_force[i])
+        rows.reaction[at, i] = per_acceleration * apart
+        rows.lift[at, i] = gains.position * apart
+        rows.rise[at, i] = 0.0
+        if uses_rate:
+            along = spread(link, links, by_slope[i])
+            rows.rise[at, i] = gains.velocity * apart + gains.train_speed * gains.position * along
+
+
+@in_line
+def watch(motion, followed, bounds, touches, answers, gains, rows):
+    """Number of links that may switch within ``bounds``, riders included; a row each, as far as
+    they fit, those of riders behind those of their masters.
 
     ``followed`` links stand in the order along the track, with their reserve without contact
     forces. Contacts touch those within reach. -1 if a reserve is not finite.
     """
-    numbers, links, reserve, moving = followed
-    by_force, by_slope = answers
+    numbers, links, reserve, moving, riders, riding = followed
+    by_force = answers.by_force
     laws, limits, margin = links.law, bounds.force, bounds.loss[0]
-    count, n, uses_rate = 0, touches.size, by_slope.shape[1] > 0
+    count, n = 0, touches.size
     low, high = touches[0].x, touches[0].x
     for i in range(1, n):
         low, high = min(low, touches[i].x), max(high, touches[i].x)
@@ -86,16 +108,13 @@ def watch(followed, bounds, touches, answers, gains, rows):
         if not candidate:
             continue
         if count < rows.number.size:
-            rows.number[count], rows.reserve[count] = numbers[d], reserve[d]
-            for i in range(n):
-                apart = spread(d, links, by_force[i])
-                rows.reaction[count, i] = per_acceleration * apart
-                rows.lift[count, i] = gains.position * apart
-                rows.rise[count, i] = 0.0
-                if uses_rate:
-                    along = spread(d, links, by_slope[i])
-                    rows.rise[count, i] = (
-                        gains.velocity * apart + gains.train_speed * gains.position * along
-                    )
+            put_row(rows, count, (numbers[d], reserve[d]), links, d, answers, gains)
         count += 1
+        for r in range(riders.begin[d], riders.begin[d + 1]):
+            if count < rows.number.size:
+                own = riders.links
+                vectors, shares = motion[:3], motion[3]
+                left = reserve_of_many(vectors, shares, own.unknowns, own.weights, own.law[r], r)
+                put_row(rows, count, (riding[r], left), own, r, answers, gains)
+            count += 1
     return count

@@ -10,7 +10,8 @@ All forces act through the line's and the pantographs' compliance within the ste
 
 The reserve of a dropper is the tension that it would carry if it pushed, or that of its spring
 alone where dampers of slack droppers are kept in action; a share r of its stiffness may be kept,
-released = 1 - r. Stops and others with a gap: `model.switching_links`.
+released = 1 - r. Stops and others with a gap, and riders, whose s has any sign while that of their
+master is not zero: `model.switching_links`.
 
 With the law linear, or replaced by its tangent, this is a linear complementarity problem. Its
 matrix is a P-matrix, so that it has one solution, unless the convective part of a contact damper
@@ -163,20 +164,24 @@ class InnerProblem:
     def slack_under(self, line: LineResponse, force: np.ndarray) -> np.ndarray:
         """Compensations (m,) [N] under given contact forces (n,) [N]."""
         n, m = self.law.n, line.count
-        if not m or not complementarity_kernels.any_switched(line.rows, m, force):
+        coupled = self.coupled
+        if not m or not complementarity_kernels.any_switched(line.rows, m, coupled, force):
             return np.zeros(m)
         if m > self._room:
             self._make_room(m)
-        _, matrix, right, _ = self.unknowns
+        _, behind, matrix, right, _ = self.unknowns
         none = np.zeros(n)
-        complementarity_kernels.couple(line.rows, m, self.coupled, none, none, matrix, right)
+        complementarity_kernels.couple(line.rows, m, coupled, none, none, behind, matrix, right)
+        behind = behind[n : n + m]
         right = right[n : n + m] - matrix[n : n + m, :n] @ force
         matrix = matrix[n : n + m, n : n + m].copy()
         always, solution = np.zeros(m, dtype=bool), np.zeros(m)
-        rounds = complementarity_kernels.settle(matrix, right, always, solution, _MAX_ROUNDS)
+        rounds = complementarity_kernels.settle(
+            matrix, right, always, behind, solution, _MAX_ROUNDS
+        )
         if rounds <= 0:
             self.pivoted = True
-            _pivot(matrix, right, always, solution)
+            _pivot(matrix, right, always, behind, solution)
         return solution
 
     def covers(self, line: LineResponse, force: np.ndarray, slack: np.ndarray) -> bool:
@@ -218,17 +223,17 @@ class InnerProblem:
             self._bound_to = heads.affine, line
             self._solve = bound(complementarity_kernels.solve, self.problem(heads.affine, line))
         rounds, size, finite, complete = self._solve()
-        always, matrix, right, solution = self.unknowns
+        _, behind, matrix, right, solution = self.unknowns
         force = solution[:n]
         if rounds <= 0:
             self.pivoted = True
             rounds = self._pivot(size) - rounds
-            if size == n and m and complementarity_kernels.any_switched(line.rows, m, force):
+            links = line.rows, m, self.coupled
+            if size == n and m and complementarity_kernels.any_switched(*links, force):
                 # Contacts alone needed pivoting, too.
                 tangents, size = self.law.tangents, n + m
-                complementarity_kernels.couple(
-                    line.rows, m, self.coupled, tangents.by_depth, tangents.by_rate, matrix, right
-                )
+                worth = tangents.by_depth, tangents.by_rate
+                complementarity_kernels.couple(*links, *worth, behind, matrix, right)
                 rounds += self._pivot(size)
             gap.under(force, solution[n:size])
             complete = self.covers(line, force, solution[n:size])
@@ -240,10 +245,9 @@ class InnerProblem:
 
     def _pivot(self, size: int) -> int:
         """Rounds that pivoting needs for the first ``size`` unknowns, whose solution it finds."""
-        always, matrix, right, solution = self.unknowns
-        return _pivot(
-            matrix[:size, :size].copy(), right[:size].copy(), always[:size], solution[:size]
-        )
+        always, behind, matrix, right, solution = self.unknowns
+        whole = matrix[:size, :size].copy(), right[:size].copy()
+        return _pivot(*whole, always[:size], behind[:size], solution[:size])
 
     def problem(self, heads: Affine, line: LineResponse) -> SmallProblem:
         """Arguments of the kernel; ``unknowns`` are others when more links need room."""
@@ -269,25 +273,36 @@ class InnerProblem:
         size = n + self._room
         always = np.zeros(size, dtype=bool)
         always[:n] = self.law.pulls
-        self.unknowns = Unknowns(always, np.zeros((size, size)), np.zeros(size), np.zeros(size))
+        behind = np.zeros(size, dtype=np.int64)
+        room = np.zeros((size, size)), np.zeros(size), np.zeros(size)
+        self.unknowns = Unknowns(always, behind, *room)
         self._bound_to = None, None
 
 
-def _pivot(matrix: np.ndarray, right: np.ndarray, always: np.ndarray, solution: np.ndarray) -> int:
-    """Murty's least-index pivoting: slower, but it cannot cycle for a P-matrix.
+def _pivot(
+    matrix: np.ndarray,
+    right: np.ndarray,
+    always: np.ndarray,
+    behind: np.ndarray,
+    solution: np.ndarray,
+) -> int:
+    """Murty's least-index pivoting: slower, but it cannot cycle for a P-matrix. Riders go with
+    their masters.
 
     Fills the solution and returns the rounds needed.
     """
-    acts = always.copy()
+    acts, master = always.copy(), np.arange(behind.size) - behind
     scale = 1e-12 * (1.0 + np.abs(right).max())
     for rounds in range(1, 20 * right.size + 100):
         complementarity_kernels.solve_on(matrix, right, acts, solution)
         residual = matrix @ solution - right
         wrong = np.where(acts, (solution < -scale) & ~always, residual < -scale)
+        wrong &= behind == 0
         if not wrong.any():
             return rounds
         first = int(np.argmax(wrong))
         acts[first] = not acts[first]
+        acts = acts[master]
     raise NotConverged(
         "contacts and slack droppers of this step have no common solution; take a smaller "
         "numerics.dt_s or less contact damping"

@@ -26,10 +26,12 @@ class Tangents(NamedTuple):
 class Unknowns(NamedTuple):
     """Room for the small problem with up to k unknowns: the contact forces, then compensations.
 
-    ``always`` (k,) tells which may have any sign.
+    ``always`` (k,) tells which may have any sign; ``behind`` (k,) of a rider's how many rows its
+    master's is before it, which it acts with, 0 of others.
     """
 
     always: np.ndarray
+    behind: np.ndarray
     matrix: np.ndarray
     right: np.ndarray
     solution: np.ndarray
@@ -124,9 +126,11 @@ def hertz(depth, rate, speed, stiffness, exponent, hysteresis, tangents, force):
 
 
 @in_line
-def any_switched(rows, count, force):
+def any_switched(rows, count, coupled, force):
     """Whether contact forces alone take any of the links beyond its reserve."""
     for d in range(count):
+        if coupled.behind[int(rows.number[d])] > 0:
+            continue
         value = rows.reserve[d]
         for i in range(force.size):
             value += rows.reaction[d, i] * force[i]
@@ -136,8 +140,9 @@ def any_switched(rows, count, force):
 
 
 @compiled
-def couple(rows, count, coupled, by_depth, by_rate, matrix, right):
-    """The rows and columns of links beside those of the n contacts, which stand there.
+def couple(rows, count, coupled, by_depth, by_rate, behind, matrix, right):
+    """The rows and columns of links beside those of the n contacts, which stand there, and which of
+    them are ``behind`` a master.
 
     ``by_depth`` and ``by_rate`` (n,) are what depth and rate are worth at each contact.
     """
@@ -146,6 +151,7 @@ def couple(rows, count, coupled, by_depth, by_rate, matrix, right):
     for d in range(count):
         row, number = n + d, int(rows.number[d])
         released = coupled.released[number]
+        behind[row] = coupled.behind[number]
         right[row] = -released * rows.reserve[d]
         for i in range(n):
             matrix[row, i] = released * rows.reaction[d, i]
@@ -245,19 +251,23 @@ def solve_on(matrix, right, acts, solution):
 
 
 @compiled
-def settle(matrix, right, always, solution, max_rounds):
-    """Active-set iteration for x = max(0, x - (matrix x - right)), freely where ``always``.
+def settle(matrix, right, always, behind, solution, max_rounds):
+    """Active-set iteration for x = max(0, x - (matrix x - right)), freely where ``always``, and
+    freely with another before it where ``behind`` one.
 
     Returns the rounds needed, which are not positive if the set did not settle.
     """
     n = right.size
     acts = np.empty(n, dtype=np.bool_)
     for i in range(n):
-        acts[i] = always[i] or right[i] > 0.0
+        acts[i] = acts[i - behind[i]] if behind[i] else always[i] or right[i] > 0.0
     for rounds in range(1, max_rounds + 1):
         solve_on(matrix, right, acts, solution)
         changed = False
         for i in range(n):
+            if behind[i]:
+                acts[i] = acts[i - behind[i]]
+                continue
             residual = -right[i]
             for j in range(n):
                 residual += matrix[i, j] * solution[j]
@@ -309,7 +319,7 @@ def leaves_out(force, compensation, rows, bounds, coupled):
         if compensation[k] != 0.0:
             e = int(rows.number[k])
             for d in range(max(0, e - half), min(n, e + half + 1)):
-                if coupled.released[d] > 0.0:
+                if coupled.released[d] > 0.0 and coupled.behind[d] == 0:
                     drop[d] += compensation[k] * band[e, d - e + half]
     for k in range(compensation.size):
         drop[int(rows.number[k])] = 0.0
@@ -335,21 +345,22 @@ def solve(problem):
     """
     heads, line, gap, present, pulls, flags, rows, bounds = problem[:8]
     tangents, coupled, unknowns, found, max_rounds = problem[8:]
-    always, matrix, right, solution = unknowns
+    always, behind, matrix, right, solution = unknowns
     n, count = gap.place.size, int(flags[0].rows)
     finite = subtract(heads, line, present, gap)
     for i in range(n):
         always[i] = pulls and present[i] != 0.0
+        behind[i] = 0
     press(gap, tangents, right, matrix)
     force = solution[:n]
-    rounds = settle(matrix[:n, :n], right[:n], always[:n], force, max_rounds)
+    rounds = settle(matrix[:n, :n], right[:n], always[:n], behind[:n], force, max_rounds)
     size = n
-    if rounds > 0 and any_switched(rows, count, force):
-        couple(rows, count, coupled, tangents.by_depth, tangents.by_rate, matrix, right)
+    if rounds > 0 and any_switched(rows, count, coupled, force):
+        worth = tangents.by_depth, tangents.by_rate
+        couple(rows, count, coupled, *worth, behind, matrix, right)
         size = n + count
-        rounds = settle(
-            matrix[:size, :size], right[:size], always[:size], solution[:size], max_rounds
-        )
+        kinds = always[:size], behind[:size]
+        rounds = settle(matrix[:size, :size], right[:size], *kinds, solution[:size], max_rounds)
     finite &= under(gap, rows, force, solution[n:size], found)
     complete = not leaves_out(force, solution[n:size], rows, bounds, coupled)
     return rounds, size, finite, complete

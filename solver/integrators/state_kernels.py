@@ -146,10 +146,18 @@ def motion_within(motion, begin, end, displacement, velocity):
     velocities(part, velocity[begin:end])
 
 
+class Riders(NamedTuple):
+    """What goes with links that switch: ``links`` (``LinkArrays``) of m riders, of which those from
+    ``begin[d]`` to ``begin[d + 1]`` go with link d, ``begin`` (n + 1,)."""
+
+    links: Any
+    begin: np.ndarray
+
+
 @compiled
-def energy_of_switching(displacement, links, begin, end):
-    """What elastic energy lacks where links from ``begin`` to ``end`` have switched [J], were they
-    springs."""
+def energy_of_switching(displacement, links, riders, begin, end):
+    """What elastic energy lacks where links from ``begin`` to ``end`` have switched, and what goes
+    with them [J], were they springs."""
     energy = 0.0
     unknowns, weights, laws = links
     for link in range(begin, end):
@@ -160,6 +168,13 @@ def energy_of_switching(displacement, links, begin, end):
             continue
         beyond = min(law.rest + law.stiffness * stretch, 0.0)
         energy -= law.released * beyond**2 / (2.0 * law.stiffness)
+        if beyond < 0.0:
+            for r in range(riders.begin[link], riders.begin[link + 1]):
+                own, across = riders.links.law[r], 0.0
+                for k in range(riders.links.unknowns.shape[1]):
+                    at = riders.links.unknowns[r, k]
+                    across += riders.links.weights[r, k] * displacement[at]
+                energy -= 0.5 * own.released * own.stiffness * across**2
     return energy
 
 

@@ -5,6 +5,9 @@ then: the tension of a dropper, or what an open stop lacks to press. A link of K
 compensation s = released max(0, -R) beside what K does; for an open link, which K does not hold,
 s = max(0, -R) is its force. Both act on the unknowns with -L s, so that the time loop treats both
 alike: R = rest + k e + c e' with rest, k and c of an open link the negative ones of its law.
+
+A *rider* is a link of K that carries while its *master* does: what a dropper's force does across it
+goes with the dropper. Where the master has R < 0, its riders get s = -released R, of any sign.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.solver.model.links.leaning import swings_of_droppers
 from catenary.solver.model.links.links import BOTH, PUSHES, Links
 from catenary.solver.model.model import Model
 
@@ -50,13 +54,15 @@ NO_LINKS = LinkArrays(np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros(0, 
 
 @dataclass(frozen=True)
 class LinkTable:
-    """All links that are followed, the same on every rank, in order of place.
+    """All links that are followed, the same on every rank, in order of place; riders right behind
+    their master.
 
     Attributes
     ----------
     arrays : LinkArrays, in a number all over the line
     components : names of components
-    component, index : (n,) which of these each is of, and its number there
+    component, index : (n,) which of these each is of, -1 for riders, and its number there
+    master : (n,) number of the link that each switches with, for most its own
     broken : (n,) whether it carries nothing any longer
     half_length : (n,) how far its unknowns are from its place [m]
     switches : whether any of them does
@@ -66,12 +72,18 @@ class LinkTable:
     components: tuple[str, ...]
     component: np.ndarray
     index: np.ndarray
+    master: np.ndarray
     broken: np.ndarray
     half_length: np.ndarray
 
     @property
     def switches(self) -> bool:
         return bool(self.arrays.law["released"].any())
+
+    @property
+    def rides(self) -> np.ndarray:
+        """(n,) whether each switches with a link before it."""
+        return np.asarray(self.master != np.arange(self.master.size))
 
     @property
     def slackens(self) -> np.ndarray:
@@ -92,10 +104,12 @@ def switching_links(model: Model, dropper_force: np.ndarray) -> LinkTable:
     parts: list[LinkArrays] = []
     names: list[str] = []
     broken: list[np.ndarray] = []
+    first_dropper = 0
     free = np.ones(model.n_dofs)
     free[model.constrained] = 0.0
     for links in model.links:
         if links is model.droppers:
+            first_dropper = sum(part.law.size for part in parts)
             arrays = _droppers(model, links, dropper_force)
             out = model.broken
         else:
@@ -105,15 +119,26 @@ def switching_links(model: Model, dropper_force: np.ndarray) -> LinkTable:
         parts.append(arrays._replace(weights=arrays.weights * free[arrays.unknowns]))
         names.append(links.component)
         broken.append(out)
+    sizes = [part.law.size for part in parts]
+    own = np.arange(sum(sizes))
+    masters = [own]
+    for arrays, droppers in _riders(model):
+        parts.append(arrays._replace(weights=arrays.weights * free[arrays.unknowns]))
+        masters.append(first_dropper + droppers)
+        broken.append(np.zeros(droppers.size, dtype=bool))
     # Two at least, which kernels take without a loop.
     m = max((part.unknowns.shape[1] for part in parts), default=2)
     m = max(m, 2)
     parts = [padded(part, m) for part in parts]
     arrays = LinkArrays(*(np.concatenate(same) for same in zip(*parts, strict=True)))
-    order = np.argsort(arrays.law["place"], kind="stable")
-    sizes = [part.law.size for part in parts]
+    # By place, then by number; riders stand behind the masters of which they have the number.
+    master = np.concatenate(masters)
+    order = np.lexsort((master, arrays.law["place"]))
+    place_of = np.empty(order.size, dtype=np.int64)
+    place_of[order] = np.arange(order.size)
     distinct = tuple(dict.fromkeys(names))
-    component = np.repeat([distinct.index(name) for name in names], sizes)
+    component = np.full(master.size, -1)
+    component[own] = np.repeat([distinct.index(name) for name in names], sizes)
     index = np.zeros(component.size, dtype=np.int64)
     for number in range(len(distinct)):
         own = component == number
@@ -122,7 +147,10 @@ def switching_links(model: Model, dropper_force: np.ndarray) -> LinkTable:
     x = model.numbering.as_vector(model.mesh.points[:, :1])
     half_length = np.abs(x[arrays.unknowns] - arrays.law["place"][:, None]).max(axis=1)
     out = np.concatenate(broken)[order]
-    return LinkTable(arrays, distinct, component[order], index[order], out, half_length)
+    masters_there = place_of[master[order]]
+    return LinkTable(
+        arrays, distinct, component[order], index[order], masters_there, out, half_length
+    )
 
 
 def _droppers(model: Model, links: Links, force: np.ndarray) -> LinkArrays:
@@ -138,6 +166,25 @@ def _droppers(model: Model, links: Links, force: np.ndarray) -> LinkArrays:
     law["damping"][slack] *= -1.0
     law["carried"][slack] = -kept
     return LinkArrays(*links.direction, law)
+
+
+def _riders(model: Model) -> list[tuple[LinkArrays, np.ndarray]]:
+    """What goes with droppers that may slacken, and numbers of these."""
+    found: list[tuple[LinkArrays, np.ndarray]] = []
+    if model.droppers is None:
+        return found
+    for direction, stiffness in swings_of_droppers(model):
+        own = np.flatnonzero((stiffness > 0.0) & ~model.broken & (model.dropper_gap <= 0.0))
+        law = np.zeros(own.size, dtype=RESERVE)
+        law["stiffness"] = stiffness[own]
+        alpha = model.released_damping[own] / model.dropper_stiffness[own]
+        law["damping"] = alpha * law["stiffness"]
+        law["place"] = model.droppers.law["place"][own]
+        law["released"] = 1.0 - model.simulated.kept_ratio
+        if law["released"].any():
+            arrays = LinkArrays(direction.unknowns[own], direction.weights[own], law)
+            found.append((arrays, own))
+    return found
 
 
 def _one_sign(model: Model, links: Links) -> LinkArrays:

@@ -104,8 +104,11 @@ class WholeSystem:
         self._held = model.constrained
         self._set_matrices(model, data, ends)
 
-        links = switching_links(model, form.dropper_force).arrays
-        self._links = links.of(links.law["released"] > 0.0)
+        table = switching_links(model, form.dropper_force)
+        kept = np.flatnonzero(table.arrays.law["released"] > 0.0)
+        self._links = table.arrays.of(kept)
+        # Which of them decides on each: riders go with another.
+        self._master = np.searchsorted(kept, table.master[kept])
         unknowns, weights, _ = self._links
         m = unknowns.shape[1]
         self._link_at = np.stack(
@@ -188,7 +191,12 @@ class WholeSystem:
 
     def n_slack(self, u: np.ndarray, v: np.ndarray) -> int:
         """How many links are slack that were taut at rest."""
-        return int(((self.reserve(u, v) < 0.0) & (self._links.law["carried"] > 0.0)).sum())
+        switched = self._switched(self.reserve(u, v))
+        return int((switched & (self._links.law["carried"] > 0.0)).sum())
+
+    def _switched(self, reserve: np.ndarray) -> np.ndarray:
+        """Which links have switched, (n_links,) bool: riders with their masters."""
+        return np.asarray(reserve[self._master] < 0.0)
 
     def residual(self, time: float, u: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """F(t, u, v, a), (n,) [N]; at held unknowns u itself."""
@@ -206,7 +214,8 @@ class WholeSystem:
         for f, (dofs, along, _) in zip(force, meets, strict=True):
             result[dofs] += f * along
         unknowns, weights, law = self._links
-        compensation = law["released"] * np.maximum(0.0, -self.reserve(u, v))
+        reserve = self.reserve(u, v)
+        compensation = -law["released"] * np.where(self._switched(reserve), reserve, 0.0)
         np.add.at(result, unknowns, compensation[:, None] * weights)
         result[self._held] = u[self._held]
         return np.asarray(result)
@@ -224,7 +233,7 @@ class WholeSystem:
                 by_u += contact.damping * convective
                 at = self._at(np.repeat(dofs, dofs.size), np.tile(dofs, dofs.size))
                 result[at] += np.outer(along, by_u).ravel()
-        switched = self.reserve(u, v) < 0.0
+        switched = self._switched(self.reserve(u, v))
         law = self._links.law[switched]
         change = law["released"] * (law["stiffness"] + by_v * law["damping"])
         square = self._link_square[switched]

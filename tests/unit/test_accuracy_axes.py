@@ -11,8 +11,9 @@ from typer.testing import CliRunner
 from catenary.cases.cli.main import app
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.load import load_scene
-from catenary.cases.studies.accuracy import axes
-from catenary.cases.studies.accuracy.axes import AXES, DISCRETISATION, parse_axes
+from catenary.cases.studies.accuracy import models
+from catenary.cases.studies.accuracy.axes import AXES, parse_axes
+from catenary.cases.studies.accuracy.axis import DISCRETISATION
 from catenary.cases.studies.accuracy.plan import Plan, make_plan
 from catenary.solver.base.errors import InputError
 
@@ -117,7 +118,8 @@ def test_a_mechanism_is_varied_as_one(of_a_mechanism: Plan) -> None:
 def test_a_pantograph_that_is_fitted_to_itself_is_found_again(plan: Plan) -> None:
     """The fit of two masses to the reference model's two masses: 7.2 and 15 kg."""
     jobs = {job.variant.name: job.scene for job in plan.jobs}
-    scene = jobs[plan.axes[-1].runs["fitted_2_mass"]]
+    (planned,) = [one for one in plan.axes if one.axis.name == "pantograph"]
+    scene = jobs[planned.runs["fitted_2_mass"]]
     masses = scene.pantographs["fitted_2"].masses_kg
     # The fit ends when its residual changes by less than 1e-8; masses follow to some 1e-4.
     assert masses == pytest.approx([7.2, 15.0], rel=1e-3)
@@ -129,13 +131,67 @@ def test_a_level_that_a_case_does_not_allow_is_told(
 ) -> None:
     """Strips with a mass of their own are not moved with all bodies."""
     fitted = {level.name: level for level in of_a_mechanism.axes[0].levels}
-    monkeypatch.setattr(axes, "_fitted", lambda scene, kind, n: fitted[f"fitted_{n}_mass"])
+    monkeypatch.setattr(models, "_fitted", lambda scene, kind, n: fitted[f"fitted_{n}_mass"])
     strips = "pantographs.seven_body.strips"
     own = (f"{strips}.mass_kg=1.0", f"{strips}.stiffness_N_per_m=2e4")
     (planned,) = make_plan("ambrosio2012", parse_axes("pantograph"), own).axes
     assert [*planned.refused] == ["all_bodies"]
     assert "strips" in planned.refused["all_bodies"]
     assert "all_bodies" not in planned.runs
+
+
+@pytest.mark.parametrize(
+    ("case", "changes", "levels"),
+    [
+        (CASE, [], ["vertical", "lateral"]),
+        ("ac_simple_3d", [], ["vertical", "lateral"]),
+        (
+            "ac_simple_3d",
+            [
+                "line.contact_wire.axial_stiffness_N=15e6",
+                "line.messenger_wire.axial_stiffness_N=12e6",
+            ],
+            ["vertical", "lateral", "axial", "three_planes"],
+        ),
+    ],
+)
+def test_wires_move_in_the_planes_that_a_scene_has_data_for(
+    case: str, changes: list[str], levels: list[str]
+) -> None:
+    plan = make_plan(case, parse_axes("planes"), changes)
+    (planned,) = plan.axes
+    assert [*planned.runs] == levels and not planned.refused
+    scenes = {job.variant.name: job.scene for job in plan.jobs}
+    for level, run in planned.runs.items():
+        on = scenes[run].switches()
+        assert on["lateral_motion"] == (level in ("lateral", "three_planes"))
+        assert on["axial_motion"] == (level in ("axial", "three_planes"))
+    # The case as it is is one of them, and run once.
+    assert planned.reference in planned.runs.values()
+    assert len(plan.jobs) == len(levels)
+
+
+@pytest.mark.parametrize(
+    ("case", "level", "left"),
+    [
+        ("re330_stitched", "without_stitch_wire", "simple"),
+        ("shinkansen_compound", "without_auxiliary_wire", "simple"),
+        ("dc_twin", "without_twin", "simple"),
+        ("overlap", "without_overlap", "simple"),
+    ],
+)
+def test_a_line_is_compared_with_itself_less_a_part(case: str, level: str, left: str) -> None:
+    plan = make_plan(case, parse_axes("parts"))
+    (planned,) = plan.axes
+    assert [*planned.runs] == [level] and not planned.refused
+    scenes = {job.variant.name: job.scene for job in plan.jobs}
+    scene, part = scenes[planned.runs[level]], level.removeprefix("without_")
+    assert scene.line.topology == left and getattr(scene.line, part) is None
+    assert getattr(scenes[planned.reference].line, part) is not None
+
+
+def test_a_simple_line_has_no_part_to_do_without() -> None:
+    assert not [*parse_axes("parts")[0].chosen(load_scene(CASE), False)]
 
 
 def test_an_own_mesh_leaves_nothing_to_refine(tmp_path: Path) -> None:

@@ -68,7 +68,8 @@ def test_energy_falls_by_what_damping_takes_and_nothing_else(
     rest = hard_runs.at_rest(scene, MPI.COMM_SELF)
     model, dt = rest.model, rest.problem.numerics.dt
     wire = ContactWires(model, rest.form, distribute(model, 1, 0))
-    watcher = States(wire, (), hard_runs.LineBalance(model, rest.problem))
+    balance = hard_runs.LineBalance(model, rest.problem, rest.form.dropper_force)
+    watcher = States(wire, (), balance)
     with March(MPI.COMM_SELF, rest.problem, model, rest.form, rest.lift) as march:
         assert march.run([watcher]).outcome == "done"
     run = watcher.watched("done", {})
@@ -88,7 +89,7 @@ def test_energy_falls_by_what_damping_takes_and_nothing_else(
     taken = excess * (form(stiffness, du) + dt**2 * d * form(mass, da))
     taken += dt * form(viscous, 0.5 * (v[1:] + v[:-1]) + 0.5 * dt * d * da)
     taken += dt**3 * d * (excess**2 - d / 4) * form(viscous, da)
-    fell = -np.diff(run.energy + run.damping_terms - run.work)
+    fell = -np.diff(run.energy + run.terms - run.work)
     assert np.abs(fell - taken).max() < 1e-10 * run.energy_scale()
     lost = run.force[:, 0] == 0.0
     assert (lost[1:] != lost[:-1]).any()  # contact switches
@@ -120,8 +121,8 @@ def test_the_criterion_fails_where_energy_is_made(monkeypatch: pytest.MonkeyPatc
         wrong.setattr(hard_runs, "at_rest", fed)
         assert not energy_is_kept(case)
 
-    def half(model: Model, problem: Any) -> hard_runs.LineBalance:
-        made = hard_runs_balance(model, problem)
+    def half(model: Model, problem: Any, tension: np.ndarray) -> hard_runs.LineBalance:
+        made = hard_runs_balance(model, problem, tension)
         made.weights = 0.5 * made.weights[0], 0.5 * made.weights[1]
         return made
 

@@ -1,4 +1,4 @@
-"""What it is worth that a slack dropper keeps its stiffness across, N / l of its rest: two strings
+"""What it is worth that a slack dropper loses its stiffness across, N / l of its rest: two strings
 on droppers in space with exact geometry, beside the same linearised about rest with and without it.
 
 The strings are masses on straight pieces under tension, in lateral and vertical displacements;
@@ -55,11 +55,11 @@ class Strings:
         return (force - self.rest)[:, None] * self.unit + own[:, None] * across
 
     def kept(self, apart: np.ndarray, shown: np.ndarray) -> np.ndarray:
-        """The program's law: N / l across whatever the force is."""
+        """A law of constant operators: N / l across whatever the force is."""
         return self._linear(apart, np.ones_like)
 
     def cut(self, apart: np.ndarray, shown: np.ndarray) -> np.ndarray:
-        """N / l across while it is taut, nothing while slack."""
+        """The program's law: N / l across while it is taut, nothing while slack."""
         return self._linear(apart, lambda force: (force > 0.0).astype(float))
 
     def run(self, law: Law) -> tuple[np.ndarray, np.ndarray, float]:

@@ -7,7 +7,8 @@ import re
 from collections.abc import Mapping, Sequence
 
 from catenary.cases.studies.accuracy.analysis import HISTORY, QUANTITIES, Row
-from catenary.cases.studies.accuracy.axes import AXES, DISCRETISATION, Axis
+from catenary.cases.studies.accuracy.axes import AXES
+from catenary.cases.studies.accuracy.axis import DISCRETISATION, Axis
 from catenary.cases.studies.accuracy.plan import PlannedAxis
 from catenary.cases.studies.accuracy.runs import Measured
 from catenary.postproc.evaluate.wording import counted

@@ -21,7 +21,7 @@ from catenary.cases.studies.accuracy.analysis import (
     observed_orders,
     pareto,
 )
-from catenary.cases.studies.accuracy.axes import DISCRETISATION, Axis
+from catenary.cases.studies.accuracy.axis import DISCRETISATION, Axis
 from catenary.cases.studies.accuracy.markdown import run_in_words, uncertainty_text
 from catenary.cases.studies.accuracy.runs import Measured
 from catenary.cases.studies.sweep import output as sweep_output

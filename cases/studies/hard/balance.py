@@ -13,6 +13,8 @@ from scipy.sparse import csr_matrix
 
 from catenary.solver.integrators.loads.line_loads import LineLoads
 from catenary.solver.linear.halo import Subdomain
+from catenary.solver.model.links.leaning import swings_of_droppers
+from catenary.solver.model.links.links import Direction
 from catenary.solver.model.loads import MemoryLoad
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
@@ -40,11 +42,18 @@ class LineBalance:
     makes at most (1 - gamma)^2 k (h e')^2 / 2; one that tightens makes nothing. The same holds for
     an uplift stop that opens or closes.
 
+    **What a dropper does across it** goes with it where it slackens: (N / l) q^2 / 2 comes and goes
+    at once. The balance takes what it leaves as a load on a line that keeps it: `across`.
+
     Integrators other than Newmark's are balanced like average acceleration. After incidents the
     terms are those of the line as it was.
+
+    Parameters
+    ----------
+    tension : (n_droppers,) forces of droppers at rest [N]
     """
 
-    def __init__(self, model: Model, problem: Problem) -> None:
+    def __init__(self, model: Model, problem: Problem, tension: np.ndarray) -> None:
         numerics = problem.numerics
         newmark = numerics.integrator == "newmark"
         dt, gamma = numerics.dt, numerics.gamma if newmark else 0.5
@@ -72,6 +81,17 @@ class LineBalance:
         outer = [load for load in model.loads if not isinstance(load, MemoryLoad)]
         self._loads = LineLoads(outer, whole, model.constrained) if outer else None
         self._share = 0.5 * model.dropper_stiffness * ((1.0 - gamma) * dt) ** 2
+        assert model.droppers is not None
+        self._along, self._stiffness = model.droppers.direction, model.dropper_stiffness
+        self._tension = tension
+        hangs = (model.dropper_gap <= 0.0) & ~model.broken
+        alpha = np.divide(
+            model.released_damping, self._stiffness, where=hangs, out=np.zeros(hangs.size)
+        )
+        share = np.where(hangs, 1.0 - model.simulated.kept_ratio, 0.0)
+        self._swings = [
+            (direction, share * pull, alpha) for direction, pull in swings_of_droppers(model)
+        ]
         self._arms = model.dofs(model.mesh.steady_arms)
         stops = [arms.kind.stop_stiffness for arms in problem.line.steady_arms]
         self._stop_share = 0.5 * max(stops, default=0.0) * ((1.0 - gamma) * dt) ** 2
@@ -101,6 +121,24 @@ class LineBalance:
         means = before * forces[:-1] + after * forces[1:]
         return np.asarray(np.einsum("ij,ij->i", means, moved))
 
+    def across(
+        self, states: Mapping[str, np.ndarray], taut: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What the energy of states (k, n_dofs) each lacks as slack droppers carry nothing across
+        them [J], (k,), and the work of what they leave in the steps between [J], (k - 1,)."""
+        moved, speed = states["displacement"], states["velocity"]
+        lacks, work = np.zeros(len(moved)), np.zeros(len(moved) - 1)
+        # Stored energy knows of no dampers.
+        loose = self._tension + self._stiffness * _stretch(self._along, moved) < 0.0
+        before, after = self.weights
+        for direction, pull, alpha in self._swings:
+            across = _stretch(direction, moved)
+            lacks += np.where(loose, across**2, 0.0) @ (0.5 * pull)
+            force = np.where(taut, 0.0, pull * (across + alpha * _stretch(direction, speed)))
+            means = before * force[:-1] + after * force[1:]
+            work += (means * np.diff(across, axis=0)).sum(axis=1)
+        return lacks, work
+
     def one_switch(self, velocity: np.ndarray, switched: np.ndarray) -> float:
         """The most that one dropper makes [J] at velocities (k, n_dofs) after the steps in which
         those ``switched`` (k, n_droppers) slackened or tightened."""
@@ -118,3 +156,9 @@ class LineBalance:
         """Upper less lower end of each dropper, (k, n) of (k, n_dofs)."""
         upper, lower = self._ends.T
         return np.asarray(values[:, upper] - values[:, lower])
+
+
+def _stretch(direction: Direction, values: np.ndarray) -> np.ndarray:
+    """Stretch of n links under values (k, n_dofs), (k, n)."""
+    unknowns, weights = direction
+    return np.asarray((values[:, unknowns] * weights).sum(axis=2))

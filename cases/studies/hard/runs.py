@@ -49,8 +49,8 @@ class Watched:
     taut : (n, n_droppers) whether a dropper carries anything; only on one rank
     energy : (n,) of the line [J]; work : (n,) of the contact forces and gusts on it since the start
         [J]; both empty without ``with_work``
-    damping_terms : (n,) what numerical damping adds to the energy in the balance [J], see
-        `LineBalance`; empty like these
+    terms : (n,) what numerical damping, and slack droppers across them, add to the energy in the
+        balance [J], see `LineBalance`; empty like these
     one_switch : the most that one dropper may have made in one switch [J], see `LineBalance`
     counters : of the scheme
     kept : by step, dropper forces [N] and the line's displacement as incidents found them
@@ -67,7 +67,7 @@ class Watched:
     taut: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
     energy: np.ndarray = field(default_factory=lambda: np.zeros(0))
     work: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    damping_terms: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    terms: np.ndarray = field(default_factory=lambda: np.zeros(0))
     one_switch: float = 0.0
     counters: dict[str, int] = field(default_factory=dict)
     kept: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
@@ -79,8 +79,8 @@ class Watched:
         the first rest, may be negative.
         """
         balance = self.energy - self.work
-        if self.damping_terms.size:
-            balance = balance + self.damping_terms
+        if self.terms.size:
+            balance = balance + self.terms
         rise = (balance - np.minimum.accumulate(balance)).max()
         return float(rise / self.energy_scale())
 
@@ -170,7 +170,7 @@ class Watcher:
             stops=self._channel("stop_force") > 0.0,
             energy=np.array(self._energy),
             work=self._work,
-            damping_terms=self._terms,
+            terms=self._terms,
             one_switch=self._one_switch,
             counters=counters,
             kept=self._kept,
@@ -200,8 +200,10 @@ class Watcher:
         for weight, part in zip(balance.weights, (slice(None, -1), slice(1, None)), strict=True):
             done[1:] += weight * (pushed[part] * np.take_along_axis(moved, dofs[part], 1)).sum(1)
         done[1:] += balance.work_of_loads(np.concatenate(self._times)[-k:], moved)
-        done[0] = self._work[-1] if seen else 0.0
         taut = self._channel("dropper_force", k) > 0.0
+        lacks, left = balance.across(states, taut)
+        done[1:] += left
+        done[0] = self._work[-1] if seen else 0.0
         switched = taut[1:] != taut[:-1]
         self._one_switch = max(
             self._one_switch, balance.one_switch(states["velocity"][1:], switched)
@@ -212,7 +214,8 @@ class Watcher:
         self._one_switch = max(self._one_switch, one_stop)
         again = min(seen, 1)  # the first state ended the block before
         self._work = np.append(self._work, np.cumsum(done)[again:])
-        self._terms = np.append(self._terms, balance.damping_terms(states, taut)[again:])
+        terms = balance.damping_terms(states, taut) + lacks
+        self._terms = np.append(self._terms, terms[again:])
         del self._states[:-1]
 
     def _behind_means(self, means: np.ndarray, weights: tuple[float, float]) -> np.ndarray:
@@ -256,7 +259,7 @@ def run(rest: LineAtRest, comm: Any, with_work: bool = False) -> Watched:
     """March to the end, or to where it breaks. Collective; ``with_work`` on one rank only."""
     wire = ContactWires(rest.model, rest.form, distribute(rest.model, 1, 0)) if with_work else None
     simulated = rest.model.simulated
-    balance = LineBalance(rest.model, rest.problem) if with_work else None
+    balance = LineBalance(rest.model, rest.problem, rest.form.dropper_force) if with_work else None
     keep = [happened.step for happened in in_steps(simulated.incidents, rest.problem.numerics.dt)]
     watcher = Watcher(wire, keep, balance)
     with March(comm, *rest) as march:

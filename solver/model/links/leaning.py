@@ -46,6 +46,18 @@ def sideways_of_droppers(model: Model) -> tuple[Direction, np.ndarray]:
     return _along(model, np.cross(unit, _across(unit)), (_SIDEWAYS,)), pull
 
 
+def swings_of_droppers(model: Model) -> list[tuple[Direction, np.ndarray]]:
+    """What droppers' forces at rest do across them in the planes of the model beside the vertical
+    one: directions of all droppers, and N / l of each (n_droppers,) [N/m], of one plane after the
+    other."""
+    found = []
+    if model.simulated.lateral:
+        found.append(sideways_of_droppers(model))
+    if "u" in model.unknowns:
+        found.append(across_droppers(model))
+    return found
+
+
 def _across(unit: np.ndarray) -> np.ndarray:
     """Unit vectors across others in the plane along the track, (n, 3)."""
     level = np.stack([unit[:, _UP], np.zeros(len(unit)), -unit[:, _ALONG]], axis=1)

@@ -46,6 +46,7 @@ from catenary.solver.linear.step_operators import LineOperators
 from catenary.solver.linear.unit_responses import Windows
 from catenary.solver.model.elements import beam
 from catenary.solver.model.entries import iterate_entries
+from catenary.solver.model.links.leaning import swings_of_droppers
 from catenary.solver.model.links.links import Direction
 from catenary.solver.model.loads import ShapeLoad
 from catenary.solver.model.matrices import whole_matrix
@@ -218,6 +219,16 @@ def _compensation(
     other[model.broken] = 0.0
     total = np.zeros(model.n_dofs)
     np.add.at(total, unknowns, ((1.0 - pushed_share) * other)[:, None] * weights)
+    # What a dropper does across it goes with it.
+    slack = (tension < 0.0) & (model.dropper_gap <= 0.0) & ~model.broken
+    alpha = np.zeros(slack.size)
+    alpha[slack] = model.released_damping[slack] / model.dropper_stiffness[slack]
+    for (unknowns, weights), stiffness in swings_of_droppers(model):
+        across, rate = (
+            (weights * values[unknowns]).sum(axis=1) for values in (displacement, velocity)
+        )
+        gone = np.where(slack, (1.0 - pushed_share) * stiffness * (across + alpha * rate), 0.0)
+        np.add.at(total, unknowns, gone[:, None] * weights)
     return total
 
 

@@ -28,7 +28,9 @@ def coupled(coupling: np.ndarray, kept: float = 0.0) -> Coupled:
     band = np.zeros((m, 2 * half + 1))
     for e in range(m):
         band[e, half - e : half - e + m] = coupling[:, e]
-    return Coupled(band, np.full(m, 1.0 - kept), np.ones(m, dtype=bool), np.zeros(m))
+    return Coupled(
+        band, np.full(m, 1.0 - kept), np.ones(m, dtype=bool), np.zeros(m, int), np.zeros(m)
+    )
 
 
 @dataclass
