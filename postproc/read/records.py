@@ -22,9 +22,7 @@ from catenary.postproc.read.tables import damaged_rows
 
 # A time may be this share of a step off its place.
 _OFF = 1e-3
-# Times read at once.
-_TIMES = 1 << 16
-# Times that are checked together.
+# Times that are read and checked together.
 _TIMES = 1 << 18
 
 
@@ -76,7 +74,13 @@ def table_faults(file: h5py.File, about: dict[str, Any], sizes: dict[str, int]) 
     return found
 
 
-def scan(file: h5py.File, about: dict[str, Any], dt: float, faults: list[TableFault]) -> Records:
+def scan(
+    file: h5py.File,
+    about: dict[str, Any],
+    dt: float,
+    faults: list[TableFault],
+    complete: tuple[list[int], str] | None = None,
+) -> Records:
     """Read all records once, by blocks, and find the sound ones.
 
     Parameters
@@ -84,12 +88,13 @@ def scan(file: h5py.File, about: dict[str, Any], dt: float, faults: list[TableFa
     about : sound root attributes
     dt : time between two records [s]
     faults : from ``table_faults``, none of them essential
+    complete : what ``complete_of`` found earlier, None to find it now
     """
     unusable = {fault.path for fault in faults}
     told = [f"{path} {fault}" for path, fault, _ in faults]
     damaged: dict[str, list[tuple[int, int]]] = {}
     with_steps, apart = line_tables(about)
-    complete, fault = _complete(file)
+    n_complete, fault = complete_of(file) if complete is None else complete
     told += [fault] if fault else []
     (always, others), energies = step_tables(), _energies(file)
     of_steps = {**always, **others, **with_steps}
@@ -104,7 +109,7 @@ def scan(file: h5py.File, about: dict[str, Any], dt: float, faults: list[TableFa
             continue
         period = dt if number == 0 else None
         usable = {path: declared for path, declared in tables.items() if path not in unusable}
-        rows[number] = _rows(file, complete[number], period, usable, damaged, told)
+        rows[number] = _rows(file, n_complete[number], period, usable, damaged, told)
     damaged |= {path: [] for path in unusable if path in of_steps or path in apart}
     told += _missing_end(about, rows[0])
     last = float(file["time"][rows[0] - 1]) if rows[0] else float("nan")
@@ -164,7 +169,7 @@ def _disorder(table: h5py.Dataset, n: int, dt: float | None) -> list[tuple[int, 
     return []
 
 
-def _complete(file: h5py.File) -> tuple[list[int], str]:
+def complete_of(file: h5py.File) -> tuple[list[int], str]:
     """Rows that are whole, all where that is not known, and what is wrong with the numbers."""
     there = [_length(file, clock) for clock in ("time", "energy/time", LINE_CLOCK)]
     if not is_there(file, COMPLETE):  # a file of an earlier version

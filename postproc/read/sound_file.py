@@ -7,7 +7,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from catenary.meshgen.wires import Role
@@ -25,6 +24,7 @@ from catenary.postproc.read.file_schema import (
     step_tables,
 )
 from catenary.postproc.read.records import Records, scan, table_faults
+from catenary.postproc.read.running_file import opened
 from catenary.postproc.read.tables import PartialTable
 from catenary.solver.base.errors import InputError
 
@@ -57,8 +57,7 @@ class SoundFile:
     def __init__(self, path: Path, records: Records | None = None) -> None:
         self.path = path
         try:
-            # Without a lock, so that a run can be read while it goes on.
-            self._file = h5py.File(path, "r", locking=False)
+            self._file, self._complete = opened(path)
         except HDF5_ERRORS as error:
             reason = " ".join(str(error).split())
             raise InputError(
@@ -86,7 +85,7 @@ class SoundFile:
     @cached_property
     def records(self) -> Records:
         """Which records are sound."""
-        return scan(self._file, self.attrs, self._dt, self._faults)
+        return scan(self._file, self.attrs, self._dt, self._faults, self._complete)
 
     @property
     def _dt(self) -> float:
@@ -255,7 +254,7 @@ class SoundFile:
         if any(f.essential for f in self._faults) or not dt > 0.0:
             return "no part of it can be reported"
         about = {"n_steps": None, "outcome": "running", **self.attrs}
-        last = scan(self._file, about, dt, self._faults).last
+        last = scan(self._file, about, dt, self._faults, self._complete).last
         return f"{_up_to(last)} and can be read with h5py"
 
 

@@ -1,0 +1,72 @@
+"""Opens a result file that its run may still be writing. Not collective.
+
+HDF5 reads the index of a table, where its chunks lie, when a chunk is first wanted. In the file of
+a run that goes on the index then is newer than the end of the file that was found at opening, and
+HDF5 refuses what lies behind it. So all indices are read at opening, and stay in HDF5's cache.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import h5py
+
+from catenary.postproc.files.checked import text_of
+from catenary.postproc.files.result_file import RUNNING
+from catenary.postproc.read.attributes import HDF5_ERRORS
+from catenary.postproc.read.records import complete_of
+
+# How often a file is opened that was written meanwhile, and the pause before [s]: an append takes
+# some milliseconds.
+_ATTEMPTS, _PAUSE = 20, 0.02
+
+# Room for the indices [B]: those of a million chunks take half of it.
+_CACHE = 128 << 20
+
+Complete = tuple[list[int], str]
+
+
+def opened(path: Path) -> tuple[h5py.File, Complete | None]:
+    """A result file, without a lock, so that a run can be read while it goes on.
+
+    Returns
+    -------
+    file : with all indices read if its run goes on or was killed
+    complete : what ``complete_of`` found before that, so that no later record counts; None if the
+        run has ended
+
+    Raises
+    ------
+    OSError, RuntimeError
+        If HDF5 does not open it.
+    """
+    for attempt in range(_ATTEMPTS):
+        file = h5py.File(path, "r", locking=False)
+        try:
+            if text_of(file.attrs.get("outcome")) != RUNNING:
+                return file, None
+            complete = complete_of(file)
+            if not complete[1]:
+                _read_indices(file)
+                return file, complete
+        except HDF5_ERRORS:
+            pass
+        if attempt < _ATTEMPTS - 1:
+            file.close()
+            time.sleep(_PAUSE)
+    return file, None
+
+
+def _read_indices(file: h5py.File) -> None:
+    """Read where the chunks of all tables lie, into a cache that has room for it."""
+    cache = file.id.get_mdc_config()
+    cache.set_initial_size, cache.initial_size, cache.max_size = True, _CACHE, _CACHE
+    cache.decr_mode = 0
+    file.id.set_mdc_config(cache)
+
+    def read(name: str, item: object) -> None:
+        if isinstance(item, h5py.Dataset) and item.chunks is not None:
+            item.id.get_num_chunks()
+
+    file.visititems(read)
