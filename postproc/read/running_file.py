@@ -12,7 +12,7 @@ from pathlib import Path
 
 import h5py
 
-from catenary.postproc.files.checked import text_of
+from catenary.postproc.files.hdf5.checked import text_of
 from catenary.postproc.files.result_file import RUNNING
 from catenary.postproc.read.attributes import HDF5_ERRORS
 from catenary.postproc.read.records import complete_of

@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 import pytest
 
-from catenary.postproc.files.checked import FORMAT_BOUNDS
+from catenary.postproc.files.hdf5.checked import FORMAT_BOUNDS
 from catenary.postproc.files.result_file import COMPLETE, RUNNING
 from catenary.postproc.read.running_file import opened
 
