@@ -13,6 +13,9 @@ from scipy.linalg import lapack
 
 from catenary.solver.statics.form_finding.sparse_sum import Part
 
+# Elements whose matrices are summed at once.
+_AT_ONCE = 1 << 10
+
 
 class BandedFactors:
     """Factors of a matrix (n, n) that joins what is close to each other. Not collective.
@@ -49,16 +52,22 @@ class BandedFactors:
         reach = int(np.abs(rows - columns).max(initial=0))
         for dofs, _ in parts:
             reach = max(reach, int(np.ptp(dofs, axis=1).max(initial=0)))
-        # Compiled loops are not for a scene that is checked and nothing more.
-        from catenary.solver.statics.form_finding.band_kernels import add_elements
-
         self._reach = reach
         free, known = np.ones(size, dtype=bool), np.zeros(size)
         free[given], known[given] = False, values
         self.from_given = np.zeros(size)
         bands = np.zeros((3 * reach + 1, size), order="F")
-        for dofs, matrices in parts:
-            add_elements(bands, reach, dofs, matrices, free, known, self.from_given)
+        for all_dofs, all_matrices in parts:
+            for first in range(0, len(all_dofs), _AT_ONCE):
+                dofs = all_dofs[first : first + _AT_ONCE]
+                matrices = all_matrices[first : first + _AT_ONCE]
+                at = np.flatnonzero(~free[dofs].all(axis=1))
+                if at.size:
+                    forces_there = np.einsum("eij,ej->ei", matrices[at], known[dofs[at]])
+                    np.add.at(self.from_given, dofs[at], forces_there)
+                    matrices = matrices.copy()
+                    matrices[at] *= free[dofs[at]][:, None]
+                _add(bands, dofs, matrices)
         np.add.at(bands, (2 * reach + rows - columns, columns), numbers)
         self._factors, self._pivots, info = lapack.dgbtrf(bands, reach, reach, overwrite_ab=True)
         if info != 0:
@@ -69,3 +78,14 @@ class BandedFactors:
         reach = self._reach
         solution, _ = lapack.dgbtrs(self._factors, reach, reach, right, self._pivots)
         return np.asarray(solution)
+
+
+def _add(bands: np.ndarray, dofs: np.ndarray, matrices: np.ndarray) -> None:
+    """Add ``matrices`` (k, m, m) of elements with unknowns ``dofs`` (k, m) to the general ``bands``
+    of LAPACK, (3 reach + 1, n) in Fortran's order."""
+    depth = bands.shape[0]
+    first, last = dofs.min(), dofs.max() + 1
+    rows, columns = dofs[:, :, None], dofs[:, None, :]
+    place = (depth - 1) // 3 * 2 + rows - columns + depth * (columns - first)
+    sums = np.bincount(place.ravel(), matrices.ravel(), minlength=depth * (last - first))
+    bands.T.reshape(-1)[depth * first : depth * last] += sums
