@@ -48,6 +48,7 @@ from catenary.postproc.record.snapshots.blocks import RecordedLine
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.postproc.record.strip_watch import StripWatch
 from catenary.solver.base.errors import CatenaryError, RunBroken
+from catenary.solver.base.freed_memory import give_back_long_line
 from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all
@@ -177,8 +178,23 @@ def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
 
     ``judge`` sees the size of the run on rank 0 before the mesh is made, or once it is read.
     """
+    phases = Phases(Progress(order.comm))
+    outcome, n_unknowns = _marched(order, judge, phases)
+    # The line is not needed any more: of a long one it is a gigabyte.
+    give_back_long_line(n_unknowns)
+    order.tell(outcome.outcome)
+    with phases("report"):
+        result = _reported(order, outcome)
+    logger.debug("phases [s]: %s", {name: round(wall, 3) for name, wall in phases.wall.items()})
+    return result
+
+
+def _marched(
+    order: _Order, judge: Callable[[RunSize], None], phases: Phases
+) -> tuple[Outcome, int]:
+    """How the march ended, after which the result file is closed, and how many unknowns the line
+    had. Collective."""
     scene, comm = order.scene, order.comm
-    phases = Phases(Progress(comm))
     left = f"{order.result} is as it was" if order.resume else "nothing was written"
     with ExitStack() as stack:
         with Phase(comm, "the line was read", left) as phase:
@@ -204,17 +220,14 @@ def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
             observers, recorder = _observers(
                 order, problem, at_rest, header, phases.progress, march.n_steps
             )
+        give_back_long_line(at_rest.model.n_unknowns)
         with StopRequest() as stop:
             with phases("march"):
                 outcome = march.run(observers, stop)
             recorder.close(performance(outcome, phases, comm.size))
     if not recorder.begun:
         raise RunBroken(outcome.outcome)
-    order.tell(outcome.outcome)
-    with phases("report"):
-        result = _reported(order, outcome)
-    logger.debug("phases [s]: %s", {name: round(wall, 3) for name, wall in phases.wall.items()})
-    return result
+    return outcome, at_rest.model.n_unknowns
 
 
 def _judge_before_meshing(scene: Scene, problem: Problem, judge: Callable[[RunSize], None]) -> None:

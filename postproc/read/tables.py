@@ -106,13 +106,12 @@ def damaged_rows(
 ) -> list[tuple[int, int]]:
     """Ranges of rows that cannot be read, or hold NaN, infinity or what is beyond ``largest``."""
     found: list[tuple[int, int]] = []
-    width = int(np.prod(table.shape[1:])) if table.ndim > 1 else 1
     chunk = table.chunks[0] if table.chunks else 1
-    step = max(1, _BLOCK // max(width, 1) // chunk) * chunk
+    step = max(1, _BLOCK // _columns(table) // chunk) * chunk
     for start in range(0, n_rows, step):
         stop = min(start + step, n_rows)
         try:
-            bad = _bad(table[start:stop], largest, may_be_nan)
+            bad = _bad(table, start, stop, largest, may_be_nan)
             found += [(start + a, start + b) for a, b in _runs(bad)]
         except HDF5_ERRORS:
             found += _by_chunks(table, start, stop, chunk, largest, may_be_nan)
@@ -126,15 +125,37 @@ def _by_chunks(
     for begin in range(start, stop, chunk):
         end = min(begin + chunk, stop)
         try:
-            bad = _bad(table[begin:end], largest, may_be_nan)
+            bad = _bad(table, begin, end, largest, may_be_nan)
             found += [(begin + a, begin + b) for a, b in _runs(bad)]
         except HDF5_ERRORS:
             found.append((begin, end))
     return found
 
 
-def _bad(values: np.ndarray, largest: float, may_be_nan: bool) -> np.ndarray:
-    """Which rows hold something that cannot be, (rows,) bool."""
+def _columns(table: h5py.Dataset) -> int:
+    """Columns that are read at once, of a table of columns whole chunks; one if it has none."""
+    width = int(np.prod(table.shape[1:])) if table.ndim > 1 else 1
+    if table.ndim != 2 or not table.chunks:
+        return max(width, 1)
+    rows, columns = table.chunks
+    return int(max(1, min(width, max(1, _BLOCK // (rows * columns)) * columns)))
+
+
+def _bad(
+    table: h5py.Dataset, start: int, stop: int, largest: float, may_be_nan: bool
+) -> np.ndarray:
+    """Which rows from ``start`` to ``stop`` hold something that cannot be, (rows,) bool."""
+    if table.ndim != 2:
+        return _beyond(table[start:stop], largest, may_be_nan)
+    bad, step = np.zeros(stop - start, dtype=bool), _columns(table)
+    for first in range(0, table.shape[1], step):
+        values = table[start:stop, first : first + step]
+        bad |= _beyond(values, largest, may_be_nan)
+    return bad
+
+
+def _beyond(values: np.ndarray, largest: float, may_be_nan: bool) -> np.ndarray:
+    """Which rows of ``values`` (rows, ...) hold something that cannot be, (rows,) bool."""
     with np.errstate(invalid="ignore"):
         sound = np.abs(values) <= largest
         if may_be_nan:

@@ -33,20 +33,30 @@ def dropper_table(results: Results) -> list[DropperRow]:
     x = results.line("dropper_x")
     masts = results.line("support_x")
     length, force = results.static("dropper_length"), results.static("dropper_force")
-    rows = []
-    for i in np.argsort(x, kind="stable"):
-        number = int(np.count_nonzero((span == span[i]) & (x <= x[i])))
-        rows.append(
-            DropperRow(
-                int(span[i]) + 1,
-                number,
-                float(x[i] - masts[span[i]]),
-                float(x[i]),
-                float(length[i]),
-                float(force[i]),
-            )
+    number = _numbers_in_spans(span, x)
+    return [
+        DropperRow(
+            int(span[i]) + 1,
+            int(number[i]),
+            float(x[i] - masts[span[i]]),
+            float(x[i]),
+            float(length[i]),
+            float(force[i]),
         )
-    return rows
+        for i in np.argsort(x, kind="stable").tolist()
+    ]
+
+
+def _numbers_in_spans(span: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """How many droppers of its span stand up to each one, itself included, (n,)."""
+    order = np.lexsort((x, span))
+    of_span, at = span[order], x[order]
+    changes = (of_span[1:] != of_span[:-1]) | (at[1:] != at[:-1])
+    last = np.flatnonzero(np.append(changes, True))
+    up_to = last[np.searchsorted(last, np.arange(order.size))]
+    number = np.empty(order.size, dtype=np.int64)
+    number[order] = up_to - np.searchsorted(of_span, of_span) + 1
+    return number
 
 
 def droppers_csv(results: Results) -> str:

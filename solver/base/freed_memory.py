@@ -3,6 +3,21 @@
 from __future__ import annotations
 
 import ctypes
+import gc
+
+# Unknowns from which a line's arrays are worth a search for those that only refer to each other.
+_LONG = 200_000
+
+
+def give_back_long_line(n_unknowns: int) -> None:
+    """Give back what work on a line of so many unknowns has left, of a long one. Not collective.
+
+    A search for what only refers to itself takes a tenth of a second, which a short line is not
+    worth.
+    """
+    if n_unknowns >= _LONG:
+        gc.collect()
+        give_back()
 
 
 def give_back() -> None:

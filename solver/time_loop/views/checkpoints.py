@@ -43,19 +43,17 @@ class Checkpoints:
     def make(self, step: int) -> dict[str, Any] | None:
         """Everything needed to continue after ``step``, the latest one, on rank 0. Collective."""
         line, pantographs = self._line, self._pantographs
-        whole = {
-            name: self._comm.gather(values.copy(), root=0)
-            for name, values in line.exact_state().items()
-        }
+        numbering, in_rows = self._model.numbering, np.argsort(self._model.row_of_node)
+        result: dict[str, Any] = {}
+        # One after the other, as those of a long line are large.
+        for name, own in line.exact_state().items():
+            parts = [own] if self._comm.size == 1 else self._comm.gather(own, root=0)
+            if parts:
+                whole = parts[0] if len(parts) == 1 else np.concatenate(parts)
+                result[name] = numbering.by_node(whole)[in_rows].ravel()
         past = line.past()
         if self._comm.rank != 0:
             return None
-        numbering, in_rows = self._model.numbering, np.argsort(self._model.row_of_node)
-        result: dict[str, Any] = {
-            name: numbering.by_node(np.concatenate(parts))[in_rows].ravel()
-            for name, parts in whole.items()
-            if parts
-        }
         if past is not None:
             result["line_past"] = past
         result |= {"row_of_node": self._model.row_of_node, "step": step}
