@@ -35,6 +35,12 @@ _PROBES = 12
 # What may stand outside of windows that are made narrower, and how much wider they are than seen.
 # A column that is cut there acts like a force of this share beside its own: 1e-10 N.
 _FELT, _MARGIN = 1e-12, 1.1
+# By how much that reach grows where some column is felt further.
+_MORE = 1.5
+
+
+class _FeltFurther(RunBroken):
+    """A column reaches further than those that were tried; raised on all ranks."""
 
 
 class Windows(NamedTuple):
@@ -126,8 +132,15 @@ class UnitResponses:
         """
         places, reach = self.places(dofs, weights, x, half_length)
         like = LikeStations(self._model) if self._like is None else self._like
-        at, data = self.solve(places, like, reach)
-        return ShortColumns(places.begin, at, places.width, data, reach)
+        while True:
+            try:
+                at, data = self.solve(places, like, reach)
+                return ShortColumns(places.begin, at, places.width, data, reach)
+            except _FeltFurther:
+                # What was tried for the reach were some of the columns.
+                reach = min(self.windows.reach, _MORE * reach)
+                windows = self.windows._replace(reach=reach)
+                places = Places.of(windows, self._ownership, dofs, weights, x, places.half)
 
     def places(
         self,
@@ -161,7 +174,8 @@ class UnitResponses:
             leak = max(leak, self._fill(places, chosen[stretch], at[stretch], data))
         allowed = _LEAK if reach >= self.windows.reach else _FELT
         if self._comm.allreduce(leak, op=MPI.MAX) > allowed:
-            raise RunBroken(
+            kind = RunBroken if reach >= self.windows.reach else _FeltFurther
+            raise kind(
                 f"the response to a point load does not decay within {reach:.0f} m; give the scene "
                 "a smaller numerics.dt_s"
             )

@@ -15,7 +15,11 @@ from catenary.solver.problem.problem import Damping
 from catenary.solver.statics.form_finding.equilibrium import find_form
 
 
-def test_columns_of_long_reach_end_where_forces_are_felt(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("margin", [1.1, 0.5], ids=["as it is", "some are felt further"])
+def test_columns_of_long_reach_end_where_forces_are_felt(
+    margin: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(unit_responses, "_MARGIN", margin)
     # As much damping as the paper's lets a force along the track reach ten times as far.
     problem = problem_of(elastic_line(3), ALONG, damping=Damping(0.0275, 0.0))
     found = find_form(problem, mesh_of(elastic_line(3), 3))[0]

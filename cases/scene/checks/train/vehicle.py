@@ -49,12 +49,13 @@ def _vehicle_acts(scene: Scene) -> Iterator[Fault]:
         return
     if not on and not said:
         yield _idle(scene, "vehicle", "vehicle_motion")
-    if on and scene.vehicle.lateral is not None and not scene.switches()["head_roll"]:
+    acts = any(scene.switches()[name] for name in ("head_roll", "lateral_motion"))
+    if on and scene.vehicle.lateral is not None and not acts:
         key = "vehicle.lateral"
         yield Fault(
             key,
             f"{key} {scene.origin.of(key)} moves the wire along the strips, which acts only with "
-            "effects.head_roll = true",
+            "effects.head_roll = true or effects.lateral_motion = true",
         )
 
 
