@@ -42,10 +42,11 @@ def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out"
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(("number", "continued"), [(signal.SIGINT, True), (signal.SIGTERM, False)])
 def test_a_signal_closes_the_file_and_restart_finishes_the_run(
-    number: signal.Signals, tmp_path: Path, uninterrupted: Path
+    number: signal.Signals, continued: bool, tmp_path: Path, uninterrupted: Path
 ) -> None:
+    """Which signal it was leaves no trace in the file: one of the runs is continued."""
     out = tmp_path / "out"
     words = short_run(out, FINE, SHORT_FLUSHES)
     with catenary_started(*words, cwd=tmp_path) as program:
@@ -64,7 +65,8 @@ def test_a_signal_closes_the_file_and_restart_finishes_the_run(
         # Closed in good order: the state to continue from is that of the last step.
         assert results.checkpoint["step"] == rows - 1
     assert "interrupted" in (out / "report.html").read_text()
-
+    if not continued:
+        return
     again = catenary("restart", str(out), cwd=tmp_path)
     assert again.code == 0, again.stderr
     assert_same_histories(out, uninterrupted)
@@ -74,8 +76,7 @@ def test_a_signal_closes_the_file_and_restart_finishes_the_run(
 
 
 @needs_mpirun
-@pytest.mark.parametrize("ranks", [1, 2])
-def test_a_state_of_an_earlier_version_is_refused(ranks: int, tmp_path: Path) -> None:
+def test_a_state_of_an_earlier_version_is_refused(tmp_path: Path) -> None:
     out = tmp_path / "out"
     words = [*short_run(out, FINE, SHORT_FLUSHES), "--", "-march_ts_max_steps", "150"]
     assert catenary(*words, cwd=tmp_path).code == 1
@@ -84,11 +85,12 @@ def test_a_state_of_an_earlier_version_is_refused(ranks: int, tmp_path: Path) ->
         for slot in file["checkpoint"].values():
             del slot["row_of_node"]
     before = (out / "run.h5").read_bytes()
-    refused = catenary("restart", str(out), cwd=tmp_path, ranks=ranks)
-    assert refused.code == 2
-    (sentence,) = refused.sentences
-    assert "earlier version" in sentence and "start the run anew" in sentence
-    assert (out / "run.h5").read_bytes() == before
+    for ranks in (1, 2):
+        refused = catenary("restart", str(out), cwd=tmp_path, ranks=ranks)
+        assert refused.code == 2
+        (sentence,) = refused.sentences
+        assert "earlier version" in sentence and "start the run anew" in sentence
+        assert (out / "run.h5").read_bytes() == before
 
 
 @needs_mpirun
@@ -110,9 +112,11 @@ def test_any_number_of_ranks_continues_a_run(
 
 
 @needs_mpirun
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.study)]
+)
 def test_a_signal_to_mpirun_closes_the_file(number: signal.Signals, tmp_path: Path) -> None:
-    # Open MPI hands the signal on as SIGTERM, some versions a second late, and kills what still
+    # Open MPI hands either signal on as SIGTERM, some versions a second late, and kills what still
     # runs a second after that: the run must be long, and the report may not get done.
     out = tmp_path / "out"
     words = short_run(out, "numerics.dt_s=2e-5", SHORT_FLUSHES)

@@ -22,9 +22,9 @@ STAGES = ["mesh", "equilibrium", "distribute", "march", "report"]
 EARLY, INTERRUPTED = ["-march_ts_max_steps", "400"], 1
 
 
-def run(out: Path, *options: str, ranks: int = 1) -> str:
+def run(out: Path, *options: str) -> str:
     """What a run with options prints."""
-    done = catenary(*short_run(out), "--", *options, cwd=out.parent, ranks=ranks)
+    done = catenary(*short_run(out), "--", *options, cwd=out.parent)
     assert done.code == 0, done.stderr
     assert_sound(out / "run.h5")
     return done.stdout
@@ -152,9 +152,13 @@ def test_an_iteration_that_is_too_short_breaks_the_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
-def test_a_view_on_several_ranks_shows_the_solver_that_is_used(tmp_path: Path) -> None:
-    text = run(tmp_path / "out", "-march_ksp_view", ranks=2)
+def test_several_ranks_show_the_solver_that_is_used_and_list_their_messages(tmp_path: Path) -> None:
+    options = ["-march_ksp_view", "-log_view", *EARLY]
+    done = catenary(*short_run(tmp_path / "out"), "--", *options, cwd=tmp_path, ranks=2)
+    assert done.code == INTERRUPTED, done.stderr
+    text = done.stdout
     assert text.count("KSP Object") == 1 and "exact factors of" in text and "type: asm" not in text
+    assert listed(text) == set(NAMES) - ONE_BY_ONE - OF_BLOCKS
 
 
 @pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
@@ -177,10 +181,3 @@ def test_options_of_the_ranks_own_solvers_are_obeyed(plain: Path, tmp_path: Path
         difference = np.abs(found.channel("contact_force") - force).max() / force.max()
         print(f"relative difference {difference:.1e}, allowed 1e-09")
         assert difference < 1e-9
-
-
-@pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
-def test_several_ranks_list_their_messages(tmp_path: Path) -> None:
-    assert (
-        listed(run(tmp_path / "out", "-log_view", ranks=2)) == set(NAMES) - ONE_BY_ONE - OF_BLOCKS
-    )

@@ -100,7 +100,9 @@ def test_other_verbs(verb: str, tmp_path: Path) -> None:
 
 @needs_mpirun
 @pytest.mark.parametrize(
-    ("place", "to_rank"), [(MESH, 1), (EQUILIBRIUM, 0), (REPORT, 0)], ids=["mesh", "rest", "report"]
+    ("place", "to_rank"),
+    [(MESH, 1), pytest.param(EQUILIBRIUM, 0, marks=pytest.mark.study), (REPORT, 0)],
+    ids=["mesh", "rest", "report"],
 )
 def test_a_signal_to_one_of_several_ranks(
     place: tuple[str, str, str], to_rank: int, tmp_path: Path

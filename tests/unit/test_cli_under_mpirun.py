@@ -17,15 +17,22 @@ def under_mpirun(*words: str, cwd: Path) -> Done:
     return catenary(*words, cwd=cwd, ranks=2)
 
 
+# A scene that is read wrongly, the command line's own refusal, and a scene whose parts do not fit;
+# others of the same kinds in whole studies.
+REFUSED = [
+    (["run", "no_such_case", "-o", "out"], "there is no case or file"),
+    (["run", "en50318_2002"], "Missing option"),
+    (["check", "en50318_2002", "--set", "line.encumbrance_m=0.1"], "below the contact wire"),
+]
+MORE_REFUSED = [
+    (["run", "en50318_2002", "-o", "out", "--set", "train.speed_km_h=-1"], "must be at least"),
+    (["run", "en50318_2002", "-o", "out", "fast"], "neither key=value nor"),
+]
+
+
 @pytest.mark.parametrize(
     ("words", "sentence"),
-    [
-        (["run", "en50318_2002", "-o", "out", "--set", "train.speed_km_h=-1"], "must be at least"),
-        (["run", "no_such_case", "-o", "out"], "there is no case or file"),
-        (["run", "en50318_2002"], "Missing option"),
-        (["run", "en50318_2002", "-o", "out", "fast"], "neither key=value nor"),
-        (["check", "en50318_2002", "--set", "line.encumbrance_m=0.1"], "below the contact wire"),
-    ],
+    [*REFUSED, *(pytest.param(*one, marks=pytest.mark.study) for one in MORE_REFUSED)],
 )
 def test_bad_input_is_told_once_and_every_rank_ends_with_2(
     words: list[str], sentence: str, tmp_path: Path

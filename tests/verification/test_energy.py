@@ -59,7 +59,7 @@ def test_energy_of_line_and_pantograph_stays_while_they_are_in_contact() -> None
     and the potential of the constant lift. The line's own weights are in equilibrium.
     """
     line = en50318_line(3)
-    lift, dt, duration = 80.0, 1e-3, 10.0
+    lift, dt, duration = 80.0, 1e-3, 4.0
     data = LumpedData((7.2, 15.0), (4200.0, 50.0), (0.0, 0.0))
     # Moves by a nanometre: its power is the force times 1e-10 m/s times a slope below 1.
     creep = 1e-10
