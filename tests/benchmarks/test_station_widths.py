@@ -48,7 +48,7 @@ MOST = {
 
 def passes(widths: tuple[int, ...]) -> Callable[[], None]:
     """A free step of a line of such stations."""
-    matrix = line(N_STATIONS, PERIOD, widths)
+    matrix = line(N_STATIONS, PERIOD, widths, full=True)
     lanes = layout(matrix)
     product, factors = station_product(matrix, 0, lanes), station_factors(matrix, lanes)
     assert product is not None and factors is not None and lanes.widths == widths

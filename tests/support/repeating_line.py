@@ -15,6 +15,10 @@ from catenary.solver.linear.stations.station_products import layout_of
 # Unknowns of stations, plane by plane, whose loops shipped cases need in any case. Loops of others
 # take some seconds each to compile, and are left to whole studies.
 SHIPPED_WIDTHS = ((4,), (6,), (4, 4))
+# Which unknowns of a station the matrices of a line join, by the exclusive or of their places in a
+# plane: of two wires deflections and slopes with each other, of three as in a compound line.
+# Matrices like these have the loops of real lines, which are compiled once.
+_JOINED = {4: (0, 1, 2), 6: (0, 1, 2, 6)}
 
 
 def widths_of(*widths: tuple[int, ...]) -> list[Any]:
@@ -31,11 +35,14 @@ def line(
     widths: tuple[int, ...] = (4,),
     joined: bool = False,
     wire: np.ndarray | None = None,
+    full: bool = False,
 ) -> sparse.bsr_matrix:
     """A positive definite block tridiagonal matrix that repeats but at its ends.
 
     Stations have planes of ``widths`` unknowns, and are joined by pairs of unknowns, unless all of
     a plane is ``joined`` between them; with a ``wire`` (size,) of each only those of one wire are.
+    Within a station unknowns are joined as in a line, or all of a plane if it is ``full`` or
+    ``joined``.
     """
     rng = np.random.default_rng(7)
     size = sum(widths)
@@ -43,6 +50,8 @@ def line(
     together = plane[:, None] == plane
     own = rng.standard_normal((period, size, size)) * together
     own = own @ own.transpose(0, 2, 1) + 8.0 * size * np.eye(size)
+    if not (full or joined):
+        own *= _joins(widths)
     beside = rng.standard_normal((period, size, size)) * together
     if not joined:
         pair = np.arange(size) // 2
@@ -62,6 +71,15 @@ def line(
         indptr.append(len(indices))
     shape = (size * n_stations, size * n_stations)
     return sparse.bsr_matrix((np.array(data), indices, indptr), shape=shape)
+
+
+def _joins(widths: tuple[int, ...]) -> np.ndarray:
+    """Which pairs of unknowns (size, size) a station of a line may join."""
+    place = np.concatenate([np.arange(width) for width in widths])
+    wide = np.repeat(widths, widths)
+    apart = place[:, None] ^ place
+    known = [np.isin(apart, terms) | (wide != width) for width, terms in _JOINED.items()]
+    return np.logical_and.reduce(known)
 
 
 def layout(matrix: sparse.bsr_matrix) -> Layout:
