@@ -23,7 +23,8 @@ from catenary.cases.scene.scene import Scene
 from catenary.solver.base.errors import InputError
 
 COMM = MPI.COMM_WORLD
-SHORT = ("evaluation.to_m=250", "evaluation.from_m=200", "train.pantographs=[{name='lumped'}]")
+SPANS = ("window.spans_ahead=2", "window.spans_behind=2")
+SHORT = ("evaluation.from_m=200", "evaluation.to_m=250", "train.end_m=260")
 
 
 @pytest.fixture
@@ -45,7 +46,7 @@ def run(scene: Scene, out: Path, comm: MPI.Comm) -> RunOutcome:
 def test_a_window_gives_on_ranks_what_it_gives_on_one(
     folder: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    scene = load_scene("ac_simple", [*SHORT, "window.mode=bounded", "window.spans_ahead=2"])
+    scene = load_scene("ac_simple", [*SHORT, "window.mode=bounded", *SPANS])
     with caplog.at_level(logging.WARNING, "catenary.runner"):
         outcome = run(scene, folder / "ranks", COMM)
     assert outcome.outcome == "done" and outcome.summary
