@@ -33,6 +33,9 @@ START_PER_OWN_NODE = 5.0e-5  # [s]
 # are alike, report included, within 11 %: program and libraries, then per unknown.
 MEMORY_BASE = 3.6e8  # [B]
 MEMORY_PER_UNKNOWN = 800.0  # [B]
+# The same where a window of spans moves with the train, of 10 000 spans: matrices and factors are
+# made near the train alone, and the line makes room for the report.
+MEMORY_PER_UNKNOWN_AT_REST = 420.0  # [B]
 # What a step adds, as the report takes the history of one pantograph after the other.
 MEMORY_PER_STEP = 40.0  # [B]
 
@@ -73,6 +76,10 @@ def cost_of_stations(stations: Mapping[int, int]) -> float:
     return float(several * 4.0 * (counts @ costs) / (counts @ sizes))
 
 
-def estimate_memory(n_dofs: int, n_steps: int = 0) -> float:
-    """Resident memory of a run on one rank, its report included [B]."""
-    return MEMORY_BASE + MEMORY_PER_UNKNOWN * n_dofs + MEMORY_PER_STEP * n_steps
+def estimate_memory(n_dofs: int, n_steps: int = 0, by_pieces: bool = False) -> float:
+    """Resident memory of a run on one rank, its report included [B].
+
+    ``by_pieces`` is whether matrices are made of what a window of spans needs alone.
+    """
+    each = MEMORY_PER_UNKNOWN_AT_REST if by_pieces else MEMORY_PER_UNKNOWN
+    return MEMORY_BASE + each * n_dofs + MEMORY_PER_STEP * n_steps

@@ -101,13 +101,13 @@ def needs_of(
         stations = {sum(len(names) for group in groups for names in group.values()): 1}
     scheme, n_substeps = problem.numerics.scheme, _substeps(problem)
     gusts = problem.wind is not None and problem.wind.gusts is not None
-    n_moving = round(n_dofs * moving_share(problem))
+    n_moving, by_motion = round(n_dofs * moving_share(problem)), problem.window.by_motion > 0.0
     n_steps = max(1, math.floor(simulated_time(problem) / problem.numerics.dt + 1e-9))
     recording = recording_of(scene.output, problem, extent, n_steps)
     flush_every = scene.output.flush_every_steps or flush_cadence(problem, n_dofs, recording)
     return Needs(
         n_steps=n_steps,
-        memory=estimate_memory(n_dofs, n_steps),
+        memory=estimate_memory(n_dofs, n_steps, problem.window.moves and not by_motion),
         march=_slower(detour, n_substeps)
         * estimate_march(n_moving, n_steps, scheme, n_substeps, stations, gusts),
         files=estimate_files(scene, problem, recording, n_dofs, flush_every),

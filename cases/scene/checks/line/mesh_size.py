@@ -31,19 +31,20 @@ MANY_NODES = 50_000
 
 
 class Size(NamedTuple):
-    """Number of spans, droppers, nodes of all wires, and unknowns of a line, and how many kinds of
-    spans there are."""
+    """Number of spans, droppers, nodes of all wires, and unknowns of a line, how many kinds of
+    spans there are, and whether matrices are made of what a window of spans needs alone."""
 
     spans: int
     droppers: int
     nodes: int
     unknowns: int
     kinds: int
+    by_pieces: bool = False
 
     def sentence(self) -> str:
         """What it is and what it takes, in one sentence."""
-        memory = estimate_memory(self.unknowns)
-        start = estimate_start(self.nodes, self.kinds / self.spans)
+        memory = estimate_memory(self.unknowns, by_pieces=self.by_pieces)
+        start = estimate_start(self.nodes, 0.0 if self.by_pieces else self.kinds / self.spans)
         return (
             f"{self.spans} spans and {self.droppers} droppers make {self.nodes} nodes and "
             f"{self.unknowns} unknowns: its start takes about {start:.0f} s and a "
@@ -102,7 +103,8 @@ def _size(scene: Scene, n_droppers: int, nodes: dict[str, int], wires: Sequence[
     kinds = len(set(span_lengths(scene.line)))
     if irregular.contact_wire_height is not None or irregular.dropper_lengths is not None:
         kinds = n_spans
-    return Size(n_spans, n_droppers, sum(nodes.values()), unknowns, kinds)
+    by_pieces = scene.window.mode == "bounded" and scene.window.tolerance is None
+    return Size(n_spans, n_droppers, sum(nodes.values()), unknowns, kinds, by_pieces)
 
 
 def _sample(scene: Scene, lengths: tuple[float, ...]) -> tuple[Line, np.ndarray]:
