@@ -129,3 +129,26 @@ def test_the_criterion_fails_where_energy_is_made(monkeypatch: pytest.MonkeyPatc
     hard_runs_balance = hard_runs.LineBalance
     monkeypatch.setattr(hard_runs, "LineBalance", half)
     assert not energy_is_kept(case)
+
+
+def test_only_droppers_that_slacken_leave_a_load_across_them() -> None:
+    """What one that breaks did across it is gone with it: no load on the line that is left."""
+    broken = "incidents=[{type='dropper_break',at_s=0.05,span=3,dropper=5}]"
+    found = []
+    for words in ([], [broken]):
+        common = ["line.n_spans=6", "mesh.elements_per_gap=1", "train.start_m=80"]
+        ways = ["train.end_m=200", "evaluation.from_m=150", "evaluation.to_m=160"]
+        rest = hard_runs.at_rest(
+            load_scene("ac_simple_3d", [*common, *ways, *words]), MPI.COMM_SELF
+        )
+        balance = hard_runs.LineBalance(rest.model, rest.problem, rest.form.dropper_force)
+        # All wires but the contact wire go aside, which takes no dropper's force.
+        moved = np.zeros((2, rest.model.n_dofs))
+        moved[1, rest.model.dofs(rest.mesh.droppers[:, 0], "v")] = 1e-3
+        states = {"displacement": moved, "velocity": np.zeros_like(moved)}
+        slack = np.zeros((2, len(rest.mesh.droppers)), dtype=bool)
+        found.append(float(balance.across(states, slack)[1][0]))
+    length = 1.0  # of droppers, roughly [m]
+    force = float(rest.form.dropper_force.sum())
+    assert 0.2 * force * 1e-6 / 2 / length < found[0] < 5 * force * 1e-6 / 2 / length
+    assert found[1] == 0.0

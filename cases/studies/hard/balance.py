@@ -89,6 +89,8 @@ class LineBalance:
             model.released_damping, self._stiffness, where=hangs, out=np.zeros(hangs.size)
         )
         share = np.where(hangs, 1.0 - model.simulated.kept_ratio, 0.0)
+        if problem.incidents:  # one that breaks carries nothing either, but is no part of the line
+            share = np.zeros(hangs.size)
         self._swings = [
             (direction, share * pull, alpha) for direction, pull in swings_of_droppers(model)
         ]
