@@ -20,7 +20,8 @@ MARCH, REPORT = "march and records", "report"
 
 
 def one_run(case: str, out: Path) -> dict[str, float]:
-    words = [sys.executable, str(DRIVER), case, "-o", str(out), "--force", "--quiet"]
+    # As the program itself, whatever the shell says of Python's own settings, such as of bytecode.
+    words = [sys.executable, "-E", str(DRIVER), case, "-o", str(out), "--force", "--quiet"]
     done = subprocess.run(words, capture_output=True, text=True, check=True, env=dict(os.environ))
     found = json.loads(done.stdout.splitlines()[-1])
     assert found["code"] == 0, done.stderr

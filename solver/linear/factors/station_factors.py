@@ -30,11 +30,9 @@ from catenary.solver.linear.stations.station_layout import Layout
 from catenary.solver.linear.stations.station_products import kinds_by_make_up
 from catenary.solver.linear.stations.station_rows import StationRows, rows_of
 
-# Bytes of factors from which on they share blocks: more would leave no room for the state in a
-# cache next to a processor, of 1 to 2 MB; a product with a transpose waits some longer.
+# Bytes of factors from which on they keep the matrix's own blocks and half of what is symmetric:
+# more would leave no room for the state in a cache next to a processor, of 1 to 2 MB.
 LARGE = 2**19
-# Unknowns of a plane up to which large factors join all of it, too.
-NARROW = 4
 # Where factors do not keep the matrix's own blocks.
 NO_BESIDES = np.zeros(0, dtype=np.int32), np.zeros(0)
 
@@ -47,11 +45,10 @@ class StationFactors:
     layout : Layout
     starts : (n + 1,) first unknown of each station, and how many unknowns there are
     places, kinds : of the stations, see ``kinds_by_make_up``
-    blocks : of each kind S^-1, -S^-1 B with its block B towards the middle, and, unless the
-        layout shares these, the transpose of the second of the station before it in elimination,
-        which that multiplies with; packed by the layout. S is a diagonal block after elimination.
-        In the middle the second is for elimination from the other end. Half of S^-1 alone if the
-        layout is sparse
+    blocks : of each kind S^-1, -S^-1 B with its block B towards the middle, and the transpose of
+        the second of the station before it in elimination, which that multiplies with; packed by
+        the layout. S is a diagonal block after elimination. In the middle the second is for
+        elimination from the other end. Half of S^-1 alone if the layout is sparse
     beside_kinds, besides : then the kinds of the matrix's own blocks between stations, and of each
         kind those to the stations before and after it, negative; else empty
     low : first station of a rank's own
@@ -186,16 +183,12 @@ def _packed(
     make_up = stations.make_up[rows.chosen][found.kinds]
     kinds, numbers, n_kinds, unfit = packed_factors(layout, make_up, lacks, found)
     besides: tuple[np.ndarray, np.ndarray] | None = NO_BESIDES
-    if max(layout.widths) > NARROW and (unfit or share * numbers.nbytes > LARGE):
+    if unfit or share * numbers.nbytes > LARGE:
         layout = _sparse(layout, rows.blocks)
         kinds, numbers, n_kinds, unfit = packed_factors(layout, make_up, lacks, found)
         besides = besides_of(layout, stations, rows)
     if unfit or besides is None:
         return None
-    sharing = layout.changed(shares=True)
-    if share * numbers.nbytes > LARGE and sharing.shares and not (layout.varies or layout.sparse):
-        layout = sharing
-        kinds, numbers, n_kinds, _ = packed_factors(layout, make_up, lacks, found)
     return layout, kinds, numbers, n_kinds, besides
 
 
@@ -203,9 +196,8 @@ def packed_blocks(layout: Layout, factors: np.ndarray) -> np.ndarray:
     """Numbers (m, k) of ``factors`` (m, 3, b, b) as ``StationFactors`` keeps them."""
     if layout.sparse:
         return layout.packed_halves(factors[:, 0])
-    n_blocks = 2 if layout.shares else 3
-    packed = layout.packed(factors[:, :n_blocks], layout.whole_terms)
-    return packed.reshape(packed.shape[0], n_blocks * layout.whole_terms.sources.size)
+    packed = layout.packed(factors, layout.whole_terms)
+    return packed.reshape(packed.shape[0], 3 * layout.whole_terms.sources.size)
 
 
 def packed_factors(
@@ -221,7 +213,7 @@ def packed_factors(
     kinds, numbers, n_kinds, count = kinds_by_make_up(layout, make_up, pack)
     if not layout.varies:
         return kinds, numbers, n_kinds, False
-    n_blocks = 1 if layout.sparse else 2 if layout.shares else 3
+    n_blocks = 1 if layout.sparse else 3
     if layout.sparse:
         # Halves hold some numbers twice, others of each make-up.
         count = sum(

@@ -11,7 +11,6 @@ from catenary.solver.base.kernels.pointers import borrowed
 from catenary.solver.linear.stations.lane_products import (
     add_beside,
     add_symmetric,
-    add_transposed,
     add_whole,
     numbers_from,
     sums_from,
@@ -23,7 +22,6 @@ from catenary.solver.linear.stations.lanes import (
     is_sparse,
     load,
     narrowed,
-    shares,
     store,
     whole_size,
     widened,
@@ -58,8 +56,6 @@ def factors_of(part, factored, station):
     size = np.uint64(3) * whole_size(part)
     if is_sparse(part):
         size = half_size(part)
-    elif shares(part):
-        size = np.uint64(2) * whole_size(part)
     return numbers_from(factored.blocks, block_at(part, factored.kinds, station, size))
 
 
@@ -108,12 +104,8 @@ def eliminate(part, factored, sums, station, before, outward, answer):
         left = total_of(part, sums)
         store(part, answer, first_of(factored, station), left)
         return widened(part, divided(part, factored, station, left))
-    if shares(part):
-        numbers, total = factors_of(part, factored, before), total_of(part, sums)
-        left = add_transposed(part, total, numbers, whole_size(part), outward)
-    else:
-        numbers, skipped = factors_of(part, factored, station), np.uint64(2) * whole_size(part)
-        left = total_of(part, add_whole(part, sums, numbers, skipped, outward))
+    numbers, skipped = factors_of(part, factored, station), np.uint64(2) * whole_size(part)
+    left = total_of(part, add_whole(part, sums, numbers, skipped, outward))
     store(part, answer, first_of(factored, station), left)
     return widened(part, left)
 
@@ -142,9 +134,6 @@ def _meet(part, factored, middle, towards_end, answer):
     if is_sparse(part):
         sums = sums_from(part, left)
         left = total_of(part, add_joined(part, factored, sums, middle, True, towards_end))
-    elif shares(part):
-        beyond = factors_of(part, factored, min(middle + 1, factored.kinds.size - 1))
-        left = add_transposed(part, left, beyond, whole_size(part), towards_end)
     else:
         numbers, sums = factors_of(part, factored, middle), sums_from(part, left)
         left = total_of(part, add_whole(part, sums, numbers, whole_size(part), towards_end))

@@ -129,32 +129,6 @@ def add_symmetric(typing_context, layout, sums, numbers, x):
     return sums(layout, sums, numbers, x), generate
 
 
-@inlined
-def add_transposed(typing_context, layout, total, numbers, skipped, x):
-    """``total`` plus the transpose of a block for ``add_whole`` times x; the layout shares such."""
-
-    def generate(context, builder, signature, arguments):
-        _, total, numbers, skipped, x = arguments
-        if not signature.args[0].layout.shares:
-            return total  # never called then
-        terms = signature.args[0].layout.whole_terms
-        data, lane = builder.gep(numbers, [skipped]), np.arange(x.type.count)
-        # What the block's rows and columns are exchanged by; one register holds all lanes.
-        sums = {0: total}
-        for term, (source, target) in enumerate(zip(terms.sources, terms.targets, strict=True)):
-            stored = _stored(builder, data, term * lane.size, lane.size)
-            product = builder.fmul(stored, gathered(builder, [x], target), flags=FUSED)
-            turned = int(source[0])
-            before = sums.get(turned)
-            sums[turned] = product if before is None else builder.fadd(before, product, flags=FUSED)
-        parts = [gathered(builder, [one], lane ^ turned) for turned, one in sums.items()]
-        while len(parts) > 1:
-            parts = [builder.fadd(*parts[k : k + 2]) for k in range(0, len(parts), 2)]
-        return parts[0]
-
-    return total(layout, total, numbers, skipped, x), generate
-
-
 def _stored(builder: Any, data: Any, at: int, size: int) -> Any:
     """Numbers of a block from ``at`` on."""
     place = builder.gep(data, [ir.Constant(ir.IntType(64), at)])

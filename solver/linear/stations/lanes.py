@@ -105,9 +105,6 @@ remembers = _constant(
 is_by_mass = _constant(
     lambda layout: layout.by_mass, "Whether steps make their right-hand side by M."
 )
-shares = _constant(
-    lambda layout: layout.shares, "Whether factors keep one block for both ways between stations."
-)
 is_sparse = _constant(
     lambda layout: layout.sparse, "Whether factors keep the matrix's own blocks between stations."
 )

@@ -18,7 +18,7 @@ WIDEST = LANES[-1]
 REGISTER = 8
 # Parameters of a layout.
 _SETTINGS = (
-    *("widths", "own", "beside", "damped", "remembers", "shares", "make_ups", "sparse"),
+    *("widths", "own", "beside", "damped", "remembers", "make_ups", "sparse"),
     *("by_mass", "strands"),
 )
 
@@ -80,8 +80,6 @@ class Layout:
     damped : whether a product with K is one with C as well
     remembers : whether steps need an acceleration known before, as the generalized-alpha method's
     by_mass : whether steps make their right-hand side by M in place of K
-    shares : whether factors keep one block for both ways between two stations; only if it turns
-        and one register holds all lanes
     sparse : whether factors keep the matrix's own blocks between stations, of the terms
         ``beside``, in place of products with these, which join all of a plane, and of S^-1 one half
     strands : sets of unknowns, of one plane each, to whose own the blocks between stations join
@@ -109,7 +107,6 @@ class Layout:
         beside: tuple[int, ...] | None = None,
         damped: bool = False,
         remembers: bool = False,
-        shares: bool = False,
         make_ups: tuple[tuple[int, ...], ...] = (),
         sparse: bool = False,
         by_mass: bool = False,
@@ -127,7 +124,6 @@ class Layout:
         self.n_lanes = self._plane * len(self.widths)
         # Columns where there are fewer of these than of differences.
         self.turns = self._plane <= REGISTER and max(self.widths) > self._plane - 2
-        self.shares = bool(shares) and self.turns and self.n_lanes <= REGISTER
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Layout) and self.key == other.key
@@ -139,7 +135,7 @@ class Layout:
     def key(self) -> tuple[object, ...]:
         """All that makes a layout."""
         own = (
-            *(self.widths, self.own, self.beside, self.damped, self.remembers, self.shares),
+            *(self.widths, self.own, self.beside, self.damped, self.remembers),
             *(self.make_ups, self.sparse, self.by_mass, self.strands),
         )
         return own if self.whole is None else (*own, self.number, self.whole.key)

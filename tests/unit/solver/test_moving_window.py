@@ -58,11 +58,11 @@ def steps(problem: Problem, mesh: LineMesh, window: WindowChoice) -> tuple[Histo
 
 
 @pytest.mark.parametrize("behind", [(0.0,), (0.0, 100.0)])
-@pytest.mark.parametrize("shares", [False, True])
+@pytest.mark.parametrize("sparse", [False, True])
 def test_an_exact_window_gives_the_forces_of_the_whole_line(
-    behind: tuple[float, ...], shares: bool, monkeypatch: pytest.MonkeyPatch
+    behind: tuple[float, ...], sparse: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if shares:
+    if sparse:
         monkeypatch.setattr(station_factors, "LARGE", 0)
     problem, mesh = scene(2.0)
     train = replace(

@@ -38,7 +38,7 @@ def test_passes_over_stations_of_any_width(widths: tuple[int, ...], loaded: bool
 
 
 @pytest.mark.parametrize("widths", widths_of((4,), (8,)))
-def test_passes_with_factors_that_keep_one_block_for_both_ways(
+def test_passes_with_factors_that_keep_the_blocks_of_the_matrix(
     widths: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "LARGE", 0)

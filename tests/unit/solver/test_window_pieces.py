@@ -119,16 +119,16 @@ def test_a_piece_where_no_window_can_end_breaks_the_run_in_words(
 
 
 @pytest.mark.usefixtures("small")
-def test_factors_of_pieces_may_be_shared_and_must_be_finite(
+def test_factors_of_pieces_may_be_sparse_and_must_be_finite(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     problem, mesh = scene(1.0)
     apart, _, _ = histories(problem, mesh)
     monkeypatch.setattr(station_factors, "LARGE", 0)
-    shared, operators, _ = histories(problem, mesh)
-    assert operators.factors.factors.layout.shares
+    sparse, operators, _ = histories(problem, mesh)
+    assert operators.factors.factors.layout.sparse
     expected = apart["contact_force"]
-    check("force", shared["contact_force"], expected, within=ROUND_OFF * expected.max())
+    check("force", sparse["contact_force"], expected, within=ROUND_OFF * expected.max())
     factors, made = operators.factors, operators.pieces.first()
     rows = operators.rows_of(made)
     broken = rows._replace(blocks=np.full_like(rows.blocks, np.nan))
