@@ -47,8 +47,8 @@ def march_of(*settings: str) -> RepeatedMarch:
 
 
 @pytest.fixture(scope="module")
-def times() -> dict[str, float]:
-    """Least time of a step of each [us]."""
+def times(processor_time: None) -> dict[str, float]:
+    """Least processor time of a step of each [us]."""
     marches = {name: march_of(*settings) for name, settings in MARCHES.items()}
     widths = {name: march.widths for name, march in marches.items()}
     least = in_turns(marches, ROUNDS)

@@ -39,6 +39,7 @@ def march_of(case: str, changes: list[str]) -> RepeatedMarch:
     return RepeatedMarch(MPI.COMM_SELF, line_at_rest(problem_of(scene), mesh_of(scene)))
 
 
+@pytest.mark.usefixtures("processor_time")
 @pytest.mark.parametrize("name", LINES)
 def test_a_topology_costs_what_its_wires_cost(name: str) -> None:
     case, without, most = LINES[name]
