@@ -82,6 +82,11 @@ def test_an_exact_window_costs_what_waves_have_reached(
     end = problem.train.start + SECONDS * problem.train.speed
     problem = replace(problem, train=replace(problem.train, end=end))
     rest = line_at_rest(problem, mesh_of(scene))
+    short = replace(problem, train=replace(problem.train, end=problem.train.start + 1.0))
+    for mode in (EXACT, OFF):
+        # Loops are compiled, or loaded, before anything is timed.
+        for seen in (None, Forces()):
+            marched(rest._replace(problem=short), WindowChoice(mode), seen)
     bare, shown = {}, {}
     forces = {EXACT: Forces(), OFF: Forces()}
     for kept in (False, True):
