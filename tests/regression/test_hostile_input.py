@@ -237,8 +237,9 @@ def test_a_mesh_is_counted_before_it_is_made(case: str) -> None:
         size, mesh = size_of(scene), mesh_of(scene)
         assert size is not None
         assert (size.nodes, size.droppers) == (mesh.n_nodes, mesh.droppers.shape[0])
-        planes = 2 if scene.switches()["lateral_motion"] else 1
-        assert size.unknowns == 2 * planes * mesh.n_nodes
+        on = scene.switches()
+        of_a_node = 2 + 2 * on["lateral_motion"] + on["axial_motion"]  # w, slope; v, slope; u
+        assert size.unknowns == of_a_node * mesh.n_nodes
 
 
 def test_ten_thousand_spans_are_allowed_and_their_size_is_told(

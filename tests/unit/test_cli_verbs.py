@@ -135,8 +135,9 @@ def test_plan_names_all_effects_and_the_size(case: str) -> None:
     for name, effect in effects.registry().items():
         assert (f"\n  {name} " in simulated) != (f"\n  {name} " in left_out)
         assert effect.title in result.stdout
-    sideways = ", v, theta_z" if load_scene(case).switches()["lateral_motion"] else ""
-    assert f"nodes x {4 if sideways else 2} (w, theta_y{sideways})" in simulated
+    on = load_scene(case).switches()
+    names = ["w", "theta_y"] + ["u"] * on["axial_motion"] + ["v", "theta_z"] * on["lateral_motion"]
+    assert f"nodes x {len(names)} ({', '.join(names)})" in simulated
     assert "real-time factor" in simulated
 
 
