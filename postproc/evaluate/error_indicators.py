@@ -39,6 +39,8 @@ RESOLVED = 0.01
 _WAVE_NUMBERS = 400
 # Records longer than this are thinned before their spectrum is taken, to this rate at least [Hz].
 _SPECTRUM, _SAMPLED_HZ = 100_000, 1000.0
+# Of longer ones the spectrum is the mean over stretches of so many values, some minutes.
+_STRETCH = 1 << 18
 # Waves of two elements belong to the lower branch, whatever rounding says.
 _ZONE = np.pi * (1.0 + 1e-9)
 _NEEDED = (
@@ -131,7 +133,7 @@ def step_error(force: np.ndarray, dt: float, method: Method) -> float:
     deviation = float(force.std())
     # What is filtered needs few samples; a long record has more than a spectrum has use for.
     every = max(1, min(force.size // _SPECTRUM, int(1.0 / (_SAMPLED_HZ * dt))))
-    omega, power = _spectrum(force[::every], every * dt)
+    omega, power = _power(force[::every], every * dt)
     if deviation == 0.0 or power.sum() == 0.0:
         return 0.0
     power = power * deviation**2 / power.sum()
@@ -144,6 +146,15 @@ def step_error(force: np.ndarray, dt: float, method: Method) -> float:
     phase = memory(omega, method.alpha, method.beta) * np.hypot(shift, decay)
     phase = np.minimum(phase, _LARGEST_PHASE)
     return float(np.sqrt(np.sum(power * (2.0 - 2.0 * np.cos(phase)))))
+
+
+def _power(values: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
+    """As ``_spectrum``, of a longer record the mean over stretches of ``_STRETCH`` values."""
+    if values.size < 2 * _STRETCH:
+        return _spectrum(values, dt)
+    stretches = values[: values.size // _STRETCH * _STRETCH].reshape(-1, _STRETCH)
+    found = [_spectrum(stretch, dt) for stretch in stretches]
+    return found[0][0], np.sum([power for _, power in found], axis=0)
 
 
 def _spectrum(values: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:

@@ -47,6 +47,15 @@ def test_a_single_tone_is_late_by_the_period_elongation_of_the_method(dt: float)
     check("rms error [N]", found, expected, within=0.02 * expected)
 
 
+def test_a_long_record_is_wrong_by_as_much_as_a_short_one() -> None:
+    """Of 15 minutes the spectrum is a mean over three stretches: the tone's lines are narrower."""
+    dt = 1e-3
+    omega, total = 2.0 * np.pi * 10.0, LINE_MEMORY + NEAR_MEMORY
+    expected = np.sqrt(2.0) * 10.0 * np.sin(0.5 * total * omega * (omega * dt) ** 2 / 12.0)
+    found = step_error(tone(10.0, dt, 900.0), dt, UNDAMPED)
+    check("rms error [N]", found, expected, within=1e-4 * expected)
+
+
 def test_numerical_damping_counts_to_the_first_order_of_the_step() -> None:
     """Damping ratio (gamma - 1/2) w dt / 2: halving the step halves the error."""
     damped = Method(0.0, 0.0, Integration(0.3025, 0.6))
