@@ -33,6 +33,8 @@ from catenary.solver.linear.stations.station_rows import StationRows, rows_of
 # Bytes of factors from which on they keep the matrix's own blocks and half of what is symmetric:
 # more would leave no room for the state in a cache next to a processor, of 1 to 2 MB.
 LARGE = 2**19
+# Unknowns of a plane up to which stations are narrow.
+NARROW = 4
 # Where factors do not keep the matrix's own blocks.
 NO_BESIDES = np.zeros(0, dtype=np.int32), np.zeros(0)
 
@@ -183,7 +185,9 @@ def _packed(
     make_up = stations.make_up[rows.chosen][found.kinds]
     kinds, numbers, n_kinds, unfit = packed_factors(layout, make_up, lacks, found)
     besides: tuple[np.ndarray, np.ndarray] | None = NO_BESIDES
-    if unfit or share * numbers.nbytes > LARGE:
+    # Narrow stations of several make-ups are quicker with blocks that join all of a plane.
+    few = layout.varies and max(layout.widths) <= NARROW
+    if unfit or (share * numbers.nbytes > LARGE and not few):
         layout = _sparse(layout, rows.blocks)
         kinds, numbers, n_kinds, unfit = packed_factors(layout, make_up, lacks, found)
         besides = besides_of(layout, stations, rows)
