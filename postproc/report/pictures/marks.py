@@ -11,6 +11,9 @@ from matplotlib.collections import LineCollection
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures.figures import COLOURS, GREY, LIGHT, SHADE
 
+# More supports or droppers than these are no marks but a grey ground: they are left out.
+_MOST_SUPPORTS, _MOST_DROPPERS = 200, 1000
+
 
 def mark_line(axes: Axes, results: Results, start: float, end: float) -> None:
     """Supports as lines, droppers as ticks at the bottom, the evaluation stretch shaded."""
@@ -21,18 +24,18 @@ def mark_line(axes: Axes, results: Results, start: float, end: float) -> None:
     _uprights(axes, support, 0.9)
     dropper = results.line("dropper_x")
     dropper = dropper[(dropper >= start) & (dropper <= end)]
-    transform = axes.get_xaxis_transform()
-    axes.plot(
-        dropper,
-        np.full(dropper.size, 0.015),
-        "|",
-        color=GREY,
-        markersize=5,
-        markeredgewidth=0.7,
-        transform=transform,
-        label="dropper",
-        clip_on=True,
-    )
+    if dropper.size <= _MOST_DROPPERS:
+        axes.plot(
+            dropper,
+            np.full(dropper.size, 0.015),
+            "|",
+            color=GREY,
+            markersize=5,
+            markeredgewidth=0.7,
+            transform=axes.get_xaxis_transform(),
+            label="dropper",
+            clip_on=True,
+        )
     axes.set_xlim(start, end)
 
 
@@ -61,8 +64,8 @@ def mark_static(axes: Axes, results: Results, start: float, end: float) -> None:
 
 
 def _uprights(axes: Axes, support: np.ndarray, width: float) -> None:
-    """Supports as lines over the whole height: one collection, however many there are."""
-    if not support.size:
+    """Supports as lines over the whole height, in one collection."""
+    if not 0 < support.size <= _MOST_SUPPORTS:
         return
     lines = [((x, 0.0), (x, 1.0)) for x in support]
     transform = axes.get_xaxis_transform()
