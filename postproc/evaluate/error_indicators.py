@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import linalg, optimize
+from scipy import linalg, optimize, signal
 
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.facts import FACTS, WIRE
@@ -133,7 +133,7 @@ def step_error(force: np.ndarray, dt: float, method: Method) -> float:
     deviation = float(force.std())
     # What is filtered needs few samples; a long record has more than a spectrum has use for.
     every = max(1, min(force.size // _SPECTRUM, int(1.0 / (_SAMPLED_HZ * dt))))
-    omega, power = _power(force[::every], every * dt)
+    omega, power = _spectrum(force[::every], every * dt)
     if deviation == 0.0 or power.sum() == 0.0:
         return 0.0
     power = power * deviation**2 / power.sum()
@@ -148,24 +148,12 @@ def step_error(force: np.ndarray, dt: float, method: Method) -> float:
     return float(np.sqrt(np.sum(power * (2.0 - 2.0 * np.cos(phase)))))
 
 
-def _power(values: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
-    """As ``_spectrum``, of a longer record the mean over stretches of ``_STRETCH`` values."""
-    if values.size < 2 * _STRETCH:
-        return _spectrum(values, dt)
-    stretches = values[: values.size // _STRETCH * _STRETCH].reshape(-1, _STRETCH)
-    found = [_spectrum(stretch, dt) for stretch in stretches]
-    return found[0][0], np.sum([power for _, power in found], axis=0)
-
-
 def _spectrum(values: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
     """Angular frequencies [rad/s], without zero, and what each has of the power of values
-    (n,) about their mean, under a Hann window and but for a common factor."""
-    n = values.size
-    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(n) / n)
-    spectrum = np.fft.rfft((values - values.mean()) * window)
-    power = spectrum.real**2 + spectrum.imag**2
-    power[1 : (n + 1) // 2] *= 2.0  # the half below zero; the highest one of an even n has none
-    return 2.0 * np.pi * np.fft.rfftfreq(n, dt)[1:], power[1:]
+    (n,) about their mean, under a Hann window; of a long record the mean over stretches."""
+    stretch = min(values.size, _STRETCH)
+    frequency, power = signal.welch(values, 1.0 / dt, nperseg=stretch, noverlap=0)
+    return 2.0 * np.pi * frequency[1:], power[1:]
 
 
 def memory(omega: np.ndarray, alpha: float, beta: float) -> np.ndarray:
