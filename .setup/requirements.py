@@ -6,11 +6,7 @@ MPI build of h5py carries a name that pip does not recognise.
 
 import re
 import sys
-
-try:
-    import tomllib
-except ModuleNotFoundError:  # Python 3.10
-    from pip._vendor import tomli as tomllib
+import tomllib
 
 FROM_SYSTEM = {"numpy", "scipy", "h5py", "mpi4py", "petsc4py"}
 

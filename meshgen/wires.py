@@ -6,7 +6,7 @@ SI units. Axes: x along the track from the first anchor, y lateral, z up from th
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import Enum
+from enum import StrEnum
 
 import numpy as np
 
@@ -14,7 +14,7 @@ import numpy as np
 _SAME_PLACE = 1e-6
 
 
-class Role(str, Enum):
+class Role(StrEnum):
     """What a wire is there for."""
 
     CONTACT = "contact"
@@ -23,7 +23,7 @@ class Role(str, Enum):
     STITCH = "stitch"
 
 
-class End(str, Enum):
+class End(StrEnum):
     """How a piece of wire ends: held in height by a tensioner, or carried by a clamp there."""
 
     HELD = "held"

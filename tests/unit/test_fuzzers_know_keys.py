@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-
 import tomllib
+
 from fuzzing import topology_scene, wide_scene
 
 from catenary.cases.scene.keys.keys import known_keys

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-import sys
+import tomllib
 from datetime import date
 from importlib import metadata
 from pathlib import Path
@@ -11,11 +11,6 @@ from pathlib import Path
 from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 ROOT = Path(__file__).parents[2]
 VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import re
-import sys
+import tomllib
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from catenary.cases.scene.input.origin import COMMAND_LINE, shown
 from catenary.cases.scene.input.plain_text import DEEPEST, decode, plain, read_whole
 from catenary.solver.base.errors import InputError
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 # A key part and its dot; more of them in a row make a table that is nested too deeply, which would
 # take the parser a time that grows with their square.
