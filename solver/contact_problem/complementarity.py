@@ -15,10 +15,10 @@ master is not zero: `model.switching_links`.
 
 With the law linear, or replaced by its tangent, this is a linear complementarity problem. Its
 matrix is a P-matrix, so that it has one solution, unless the convective part of a contact damper
-outweighs the compliances (docs/theory.md). An active-set iteration (semismooth Newton) finds it,
-mostly in one or two rounds; a set that cycles is handed to least-index pivoting, and a step without
-solution ends the run with a sentence. A law that is not linear is linearised again at what was
-found: Newton's method, which for a convex spring comes from one side and cannot overshoot.
+outweighs the compliances, or there are riders (docs/theory.md). An active-set iteration (semismooth
+Newton) finds it, mostly in one or two rounds; a set that cycles is handed to `pivoting`, and a step
+without solution ends the run with a sentence. A law that is not linear is linearised again at what
+was found: Newton's method, which for a convex spring comes from one side and cannot overshoot.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ from catenary.solver.contact.train.head_states import Heads
 from catenary.solver.contact_problem import complementarity_kernels
 from catenary.solver.contact_problem.complementarity_kernels import SmallProblem, Unknowns
 from catenary.solver.contact_problem.law_tangents import LawInSteps
+from catenary.solver.contact_problem.pivoting import pivot
 
 # Mostly one or two rounds are needed; a set that cycles shows within a few.
 _MAX_ROUNDS = 30
@@ -181,7 +182,7 @@ class InnerProblem:
         )
         if rounds <= 0:
             self.pivoted = True
-            _pivot(matrix, right, always, behind, solution)
+            pivot(matrix, right, always, behind, solution)
         return solution
 
     def covers(self, line: LineResponse, force: np.ndarray, slack: np.ndarray) -> bool:
@@ -247,7 +248,7 @@ class InnerProblem:
         """Rounds that pivoting needs for the first ``size`` unknowns, whose solution it finds."""
         always, behind, matrix, right, solution = self.unknowns
         whole = matrix[:size, :size].copy(), right[:size].copy()
-        return _pivot(*whole, always[:size], behind[:size], solution[:size])
+        return pivot(*whole, always[:size], behind[:size], solution[:size])
 
     def problem(self, heads: Affine, line: LineResponse) -> SmallProblem:
         """Arguments of the kernel; ``unknowns`` are others when more links need room."""
@@ -277,33 +278,3 @@ class InnerProblem:
         room = np.zeros((size, size)), np.zeros(size), np.zeros(size)
         self.unknowns = Unknowns(always, behind, *room)
         self._bound_to = None, None
-
-
-def _pivot(
-    matrix: np.ndarray,
-    right: np.ndarray,
-    always: np.ndarray,
-    behind: np.ndarray,
-    solution: np.ndarray,
-) -> int:
-    """Murty's least-index pivoting: slower, but it cannot cycle for a P-matrix. Riders go with
-    their masters.
-
-    Fills the solution and returns the rounds needed.
-    """
-    acts, master = always.copy(), np.arange(behind.size) - behind
-    scale = 1e-12 * (1.0 + np.abs(right).max())
-    for rounds in range(1, 20 * right.size + 100):
-        complementarity_kernels.solve_on(matrix, right, acts, solution)
-        residual = matrix @ solution - right
-        wrong = np.where(acts, (solution < -scale) & ~always, residual < -scale)
-        wrong &= behind == 0
-        if not wrong.any():
-            return rounds
-        first = int(np.argmax(wrong))
-        acts[first] = not acts[first]
-        acts = acts[master]
-    raise NotConverged(
-        "contacts and slack droppers of this step have no common solution; take a smaller "
-        "numerics.dt_s or less contact damping"
-    )

@@ -67,10 +67,6 @@ MAY_STOP = (
     "finds no solution within",
 )
 
-# Steps [s] from which on a law that is not linear need not have forces that hold: a light head on a
-# stiff contact moves through more than a radian of its own period in one.
-COARSE = 4e-3
-
 # What form finding says of droppers that cannot be.
 NOT_AT_REST = (
     "would be slack at",
@@ -138,6 +134,16 @@ def test_scenes_of_any_topology_run_or_say_why_not(seeds: range) -> None:
     assert ends["done"] >= max(1, len(seeds) // 4) or "FUZZ_CASES" in os.environ
 
 
+@pytest.mark.skipif(WORLD.size > 1, reason="processes of their own: test_fuzz_processes")
+def test_a_dropper_that_is_neither_taut_nor_slack_does_not_end_a_run() -> None:
+    """An auxiliary wire's short droppers, leaning in a curve, under light heads at steps of 8 ms:
+    in one of them no set of slack droppers fits."""
+    made = topology_scene(30280)
+    rest = hard_runs.at_rest(load_scene(made.base, made.assignments), MPI.COMM_SELF)
+    run = hard_runs.run(rest, MPI.COMM_SELF)
+    assert run.outcome == "done" and run.counters["pivoted_steps"] > 0
+
+
 def check_topology(made: RandomScene) -> str:
     """How the run ended, see `check_wide`, or that parts were refused in a sentence."""
     return "refused" if is_refused(made) else check_wide(made)
@@ -200,7 +206,6 @@ def check_end(scene: Scene, run: Watched) -> None:
         numerics.scheme in ("fixed_point", "ts_alpha2")
         or numerics.coupling in ("iterated", "explicit")
         or scene.contact.law == "kinematic"
-        or (scene.contact.law != "linear" and numerics.dt_s > COARSE)
     ), run.outcome
     assert any(words in run.outcome for words in MAY_STOP), run.outcome
     assert all(words in run.outcome for words in ("t = ", "with the train at ", "; take "))
