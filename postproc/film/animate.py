@@ -23,6 +23,7 @@ from catenary.postproc.film.view import View
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 from catenary.solver.base.errors import InputError
+from catenary.solver.waves.excitation import Blow
 
 _EGL = "libEGL.so.1"
 MP4, GIF = "film.mp4", "film.gif"
@@ -98,7 +99,7 @@ def animate(
     _check_libraries()
     with Results(folder, records) as results:
         data = film_data(results)
-        with Snapshots(folder, len(data.points)) as snapshots:
+        with Snapshots(folder, len(data.points), until=float(data.time[-1])) as snapshots:
             numbers = chosen(snapshots.times, wish)
             pantographs = MovingPantographs(data, snapshots, shapes)
             from catenary.postproc.film import video
@@ -169,7 +170,7 @@ def _pictures(
     """The pictures (height, width, 3) uint8 of the snapshots, in order."""
     import pyvista
 
-    from catenary.postproc.film.force_curve import ForceCurve
+    from catenary.postproc.film.force_curve import ForceCurve, RingingCurve
     from catenary.postproc.film.line_view import LineView
 
     times = snapshots.times[numbers]
@@ -189,7 +190,11 @@ def _pictures(
     plotter.enable_parallel_projection()
     words = plotter.add_text(" ", position=(12, 12), font_size=10, color="black")
     plotter.subplot(1, 0)
-    curve = ForceCurve(plotter, data, rows)
+    curve: ForceCurve | RingingCurve
+    if isinstance(data.excitation, Blow):
+        curve = RingingCurve(plotter, data, data.excitation, snapshots, numbers)
+    else:
+        curve = ForceCurve(plotter, data, rows)
     # A chart has its place in the picture when it was drawn once.
     plotter.show(auto_close=False)
     plotter.subplot(0, 0)

@@ -35,7 +35,7 @@ class FilmData:
     supports : (n_supports,) masts along the track [m]
     time : (n,) [s]
     position, force, filtered, head_height : (n, p) [m], [N], [N] below 20 Hz, [m]; filtered is all
-        NaN where the record is too coarse for it
+        NaN where the record is too coarse for it, and the force itself where that is given
     names : of the pantographs
     excitation : what sets the line into motion in place of a train, whose place and force then
         stand in place of those of a pantograph; None with a train
@@ -125,10 +125,10 @@ def film_data(results: Results) -> FilmData:
         results.pantograph_names(),
     )
     facts = results.attributes.get("excitation")
-    return _excited(data, excitation_of_facts(facts), results.dt) if facts else data
+    return _excited(data, excitation_of_facts(facts)) if facts else data
 
 
-def _excited(data: FilmData, excitation: Excitation, dt: float) -> FilmData:
+def _excited(data: FilmData, excitation: Excitation) -> FilmData:
     """The same of a line that an excitation sets into motion."""
     position, force = (of(data.time)[:, None] for of in (excitation.place, excitation.value))
     return replace(
@@ -136,7 +136,7 @@ def _excited(data: FilmData, excitation: Excitation, dt: float) -> FilmData:
         speed=excitation.speed if isinstance(excitation, MovingForce) else 0.0,
         position=position,
         force=force,
-        filtered=_filtered(force, dt),
+        filtered=force,
         head_height=data.rest_height(position[:, 0])[:, None],
         names=[excitation.kind],
         excitation=excitation,

@@ -19,6 +19,8 @@ from catenary.solver.base.errors import InputError
 FIELDS_FILE = "fields.h5"
 # Snapshots that are looked through for the largest uplift.
 _SAMPLED = 400
+# Times that are no further apart are the same [s].
+_SAME_TIME = 1e-9
 _UP = 2
 
 
@@ -53,8 +55,10 @@ class Snapshots:
 
     Parameters
     ----------
-    folder : of a run
+    folder : of a run, which may go on
     n_nodes : nodes of its line
+    until : later snapshots are left out, as those of a run that goes on and whose records were read
+        before [s]
 
     Raises
     ------
@@ -62,7 +66,7 @@ class Snapshots:
         If the folder has no snapshots, or damaged ones, those of another line or without uplift.
     """
 
-    def __init__(self, folder: Path, n_nodes: int) -> None:
+    def __init__(self, folder: Path, n_nodes: int, until: float = np.inf) -> None:
         path = folder / FIELDS_FILE
         if not path.is_file():
             raise InputError(
@@ -71,8 +75,9 @@ class Snapshots:
             )
         if not survives(path):
             raise InputError(f"{path} is damaged: HDF5 does not read it")
-        self._path, self._n_nodes = path, n_nodes
-        self._file = h5py.File(path, "r")
+        self._path, self._n_nodes, self._until = path, n_nodes, until
+        # Without a lock: a run may be writing it, or be continued while this is open.
+        self._file = h5py.File(path, "r", locking=False)
         try:
             self._open()
         except BaseException:
@@ -90,9 +95,13 @@ class Snapshots:
         except (KeyError, OSError, TypeError, ValueError) as error:
             raise InputError(f"{path} is damaged: it has no times of snapshots") from error
         n = int(np.append(np.isfinite(times), False).argmin()) if times.ndim == 1 else 0
-        self.times = times[:n]
-        if n < 2 or not (np.diff(self.times) > 0).all():
-            raise InputError(f"{path} has fewer than two snapshots in order of time")
+        times, n_places = times[:n], times.size
+        self.times = times[times <= self._until + _SAME_TIME]
+        if self.times.size < 2 or not (np.diff(self.times) > 0).all():
+            raise InputError(
+                f"{path} has fewer than two snapshots in order of time; if its run has just "
+                "begun, wait for more"
+            )
         try:
             self.parts = tuple(json.loads(text_of(file.attrs["parts"])))
             self._of_this_line = int(file.attrs["n_nodes"]) == self._n_nodes
@@ -107,7 +116,7 @@ class Snapshots:
             self.field = "uplift" if scalar else "displacement_Z"
             self.has_vectors = all(wire.vectors is not None for wire in self._wires)
             self._sizes = np.asarray(file[SIZES][...], dtype=int)
-            if file[PLACES].shape != (times.size, self._sizes.size + int(self._sizes.sum())):
+            if file[PLACES].shape != (n_places, self._sizes.size + int(self._sizes.sum())):
                 raise ValueError(f"{PLACES} has another size")
         except (KeyError, OSError, TypeError, ValueError) as error:
             raise InputError(f"{path} is damaged: {error}") from error
@@ -205,13 +214,20 @@ class Snapshots:
         """How far a wire has moved to the left at a place along the track in a snapshot [m]."""
         if not self.has_vectors or name not in self.parts:
             return 0.0
-        wire = self._wires[[part for part in self.parts if part not in OTHER_PARTS].index(name)]
+        wire = self._wire(name)
         assert wire.vectors is not None
-        first = int(wire.first[number])
-        last = first + int(wire.count[number]) - 2
-        at = int(np.clip(wire.x.searchsorted(x) - 1, first, max(first, last)))
-        values = np.asarray(wire.vectors[wire.rows(number, at, 2), 1], dtype=float)
-        return float(np.interp(x, wire.x[at : at + 2], values))
+        return _between(wire, number, x, wire.vectors, 1)
+
+    def uplift_at(self, number: int, name: str, x: float) -> float:
+        """How far a wire has risen at a place along the track in a snapshot, NaN where it is not
+        shown [m]."""
+        if name not in self.parts:
+            return np.nan
+        wire = self._wire(name)
+        return _between(wire, number, x, wire.values, _UP)
+
+    def _wire(self, name: str) -> _Wire:
+        return self._wires[[part for part in self.parts if part not in OTHER_PARTS].index(name)]
 
     def _shown(self, number: int, vectors: bool) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Nodes of each wire that a snapshot shows, and their values, which are finite."""
@@ -233,6 +249,17 @@ class Snapshots:
                 f"{self._path} does not belong to the run.h5 beside it, or is damaged at "
                 f"t = {self.times[number]:g} s"
             )
+
+
+def _between(wire: _Wire, number: int, x: float, table: h5py.Dataset, axis: int) -> float:
+    """Value of a table in a snapshot between the two points of a wire next to a place."""
+    first = int(wire.first[number])
+    last = first + int(wire.count[number]) - 2
+    at = int(np.clip(wire.x.searchsorted(x) - 1, first, max(first, last)))
+    values = np.asarray(table[wire.rows(number, at, 2)], dtype=float)
+    if values.ndim > 1:
+        values = values[:, axis]
+    return float(np.interp(x, wire.x[at : at + 2], values))
 
 
 def _wire(group: h5py.Group) -> _Wire:

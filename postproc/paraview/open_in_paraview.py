@@ -54,7 +54,7 @@ def write_script(
     target = folder / FOLDER
     with Results(folder, records) as results:
         data = film_data(results)
-        with Snapshots(folder, len(data.points)) as snapshots:
+        with Snapshots(folder, len(data.points), until=float(data.time[-1])) as snapshots:
             pantographs = MovingPantographs(data, snapshots, shapes)
             settings = _settings(folder, data, snapshots, motion, pantographs, look)
             try:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import pyvista
 from measuring import check
 from mpi4py import MPI
 
@@ -19,6 +20,7 @@ from catenary.cases.studies.waves.excited import Asked, Watch, excitation_of, wi
 from catenary.cases.studies.waves.seen import WavesSeen, WireMotion, course_of, waves_seen
 from catenary.postproc.film import animate
 from catenary.postproc.film.film_data import film_data
+from catenary.postproc.film.force_curve import RingingCurve
 from catenary.postproc.film.pantograph_shape import MovingPantographs
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.paraview import open_in_paraview
@@ -96,6 +98,29 @@ def test_paraview_shows_a_blow_without_a_train(struck: tuple[Path, WavesSeen]) -
     names = {path.name for path in files}
     assert {"pantographs.xdmf", "forces.xdmf", "track.xdmf"} < names
     assert "train.xdmf" not in names and '"train": ""' in script.read_text()
+
+
+def test_a_film_shows_how_the_wire_rings_where_it_was_struck(
+    struck: tuple[Path, WavesSeen],
+) -> None:
+    folder, seen = struck
+    with Results(folder) as results:
+        data = film_data(results)
+        assert isinstance(data.excitation, Blow)
+        with Snapshots(folder, len(data.points)) as snapshots:
+            curve = RingingCurve(
+                pyvista.Plotter(off_screen=True), data, data.excitation, snapshots,
+                np.arange(snapshots.times.size),
+            )  # fmt: skip
+    until = seen.time[seen.time.size // 2]
+    curve.update(data.row_at(until), 0.0, 1.0)
+    shown = seen.time <= until + 1e-9
+    np.testing.assert_allclose(curve.shown.x, seen.time[shown])
+    expected = np.array([np.interp(AT, seen.x, row) for row in seen.uplift[shown]])
+    # Of a line between the points of the wire; snapshots are in single precision.
+    largest = np.abs(expected).max()
+    check("uplift [mm]", curve.shown.y, 1e3 * expected, within=1e3 * 1e-6 * largest)
+    assert curve.chart.y_range[1] > 1e3 * largest > 1.0
 
 
 @pytest.mark.study

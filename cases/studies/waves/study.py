@@ -70,7 +70,7 @@ def study_waves(folder: Path) -> Studied:
     with Results(folder, examined(folder)) as results:
         data = film_data(results)
         config = results.attributes["config"]
-        with Snapshots(folder, len(data.points)) as snapshots:
+        with Snapshots(folder, len(data.points), until=float(data.time[-1])) as snapshots:
             snapshots.need_whole("a space-time picture")
             scene = scene_from(config, Origin(str(folder)))
             problem = problem_of(scene)

@@ -40,7 +40,7 @@ def write_vtkhdf(numbers: Path) -> Path:
         If the numbers cannot be read, or the file not written.
     """
     path = numbers.with_suffix(SUFFIX)
-    with h5py.File(numbers, "r") as source, appears_whole(path) as part:
+    with h5py.File(numbers, "r", locking=False) as source, appears_whole(path) as part:
         times = whole_array(source, "times")
         times = times[np.isfinite(times)]
         # Readers go through links in the order in which they were made.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 from pathlib import Path
 from typing import Any
@@ -23,9 +24,11 @@ from catenary.postproc.film.pantograph_shape import LOWER_ARM, UPPER_ARM, Moving
 from catenary.postproc.film.projection import Projection
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.film.view import View
+from catenary.postproc.read.guard import survives
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
+from catenary.postproc.record.snapshots.vtkhdf import write_vtkhdf
 from catenary.solver.base.errors import InputError
 
 # HDF5's files are examined, and films written, by processes of their own.
@@ -146,6 +149,27 @@ def test_snapshots_of_a_killed_run_end_where_it_ended(folder: Path) -> None:
         _cut_times(file)
     with Snapshots(folder, 10) as snapshots:
         assert snapshots.times.size == 6
+
+
+def test_a_run_may_go_on_while_its_snapshots_are_read(folder: Path) -> None:
+    """HDF5 locks what it writes, as when a run is continued; nobody waits for a film."""
+    with (folder / "fields.h5").open("rb") as writer:
+        fcntl.flock(writer, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        assert survives(folder / "fields.h5")
+        write_vtkhdf(folder / "fields.h5")
+        with Snapshots(folder, 10) as snapshots:
+            assert snapshots.times.size == 21
+        fcntl.flock(writer, fcntl.LOCK_UN)
+        with Snapshots(folder, 10):
+            fcntl.flock(writer, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def test_snapshots_later_than_the_records_that_were_read_are_left_out(folder: Path) -> None:
+    """In them pantographs would stand where they were last."""
+    with Snapshots(folder, 10, until=0.25) as snapshots:
+        np.testing.assert_allclose(snapshots.times, 0.05 * np.arange(6))
+    with pytest.raises(InputError, match="fewer than two .* wait for more"):
+        Snapshots(folder, 10, until=0.02)
 
 
 def test_what_cannot_be_shown_is_refused(folder: Path) -> None:
