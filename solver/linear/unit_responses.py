@@ -15,9 +15,9 @@ from scipy import linalg
 
 from catenary.solver.base.errors import RunBroken
 from catenary.solver.base.kernels.compiled import compiled
+from catenary.solver.linear.operator_bands import OperatorBands
 from catenary.solver.linear.stations.like_stations import LikeStations
 from catenary.solver.linear.stations.unique_rows import kinds_of
-from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.unknowns.registry import Unknowns
@@ -169,9 +169,11 @@ class UnitResponses:
         size = places.width[chosen] * places.dofs.shape[1]
         at = np.concatenate([np.zeros(1, np.int64), np.cumsum(size)])
         data = np.zeros(at[-1])
-        leak = 0.0
+        leak, further = 0.0, (1.0 + _SEEN) * self.windows.reach
+        end = float((places.x[chosen] + places.half[chosen]).max(initial=-np.inf)) + further
+        bands = self._bands(end)
         for stretch in _stretches(places.x, chosen):
-            leak = max(leak, self._fill(places, chosen[stretch], at[stretch], data))
+            leak = max(leak, self._fill(bands, places, chosen[stretch], at[stretch], data))
         allowed = _LEAK if reach >= self.windows.reach else _FELT
         if self._comm.allreduce(leak, op=MPI.MAX) > allowed:
             kind = RunBroken if reach >= self.windows.reach else _FeltFurther
@@ -190,7 +192,8 @@ class UnitResponses:
         for place in np.unique(np.linspace(0, x.size - 1, _PROBES).astype(int)):
             near, to_side = slice(place, place + 1), half[place] + self.windows.reach
             first, last = numbering.within(x[place] - to_side, x[place] + to_side)
-            answers = np.abs(self._answers(dofs[near], weights[near], first, last))
+            bands = self._bands(x[place] + to_side)
+            answers = np.abs(self._answers(bands, dofs[near], weights[near], first, last))
             felt = (answers > _FELT * answers.max(axis=1, keepdims=True)).any(axis=0)
             if not felt.any():
                 continue
@@ -200,7 +203,14 @@ class UnitResponses:
             furthest = max(furthest, *(float(way) - half[place] for way in ways))
         return min(self.windows.reach, _MARGIN * furthest)
 
-    def _answers(self, dofs: np.ndarray, weights: np.ndarray, first: int, last: int) -> np.ndarray:
+    def _bands(self, end: float) -> OperatorBands:
+        """Of A up to a place [m]."""
+        _, last = self.windows.numbering.within(-np.inf, end)
+        return OperatorBands(self._model, self._coefficients, last)
+
+    def _answers(
+        self, bands: OperatorBands, dofs: np.ndarray, weights: np.ndarray, first: int, last: int
+    ) -> np.ndarray:
         """Answers (n k, m) of the unknowns from ``first`` to before ``last``, alone, to forces with
         ``weights`` on ``dofs``, both (n, k, m')."""
         n, each = dofs.shape[:2]
@@ -208,8 +218,10 @@ class UnitResponses:
         column = np.repeat(np.arange(n * each), dofs.shape[2])
         np.add.at(right, (column, dofs.ravel() - first), weights.ravel())
         try:
-            bands = self._banded(first, last)
-            answers = linalg.solveh_banded(bands, right.T, lower=True, check_finite=False)
+            own = bands.between(first, last)
+            answers = linalg.solveh_banded(
+                own, right.T, overwrite_b=True, lower=True, check_finite=False
+            )
         except linalg.LinAlgError as error:
             raise RunBroken("the step operator cannot be factored: it is not positive") from error
         return np.ascontiguousarray(answers.T)
@@ -229,7 +241,14 @@ class UnitResponses:
         ]
         return kinds_of(np.stack([row.astype(float) for row in rows], axis=1))
 
-    def _fill(self, places: Places, chosen: np.ndarray, at: np.ndarray, data: np.ndarray) -> float:
+    def _fill(
+        self,
+        bands: OperatorBands,
+        places: Places,
+        chosen: np.ndarray,
+        at: np.ndarray,
+        data: np.ndarray,
+    ) -> float:
         """Fill in the columns of ``chosen`` places; how much of one is outside of its window,
         relative to its peak."""
         owned = chosen[places.width[chosen] > 0]
@@ -240,7 +259,7 @@ class UnitResponses:
         first, last = numbering.within(
             float(places.x[owned].min()) - half - more, float(places.x[owned].max()) + half + more
         )
-        answers = self._answers(places.dofs[owned], places.weights[owned], first, last)
+        answers = self._answers(bands, places.dofs[owned], places.weights[owned], first, last)
         begin = places.begin[owned] + self._ownership.first - first
         starts = numbering.starts
         window = np.stack([starts[places.first[owned]], starts[places.last[owned]]]) - first
@@ -254,19 +273,6 @@ class UnitResponses:
                 data,
             )
         )
-
-    def _banded(self, first: int, last: int) -> np.ndarray:
-        """Lower bands of A for the unknowns from ``first`` to before ``last``."""
-        parts = list(iterate_entries(self._model, first, last, *self._coefficients))
-        held = self._model.constrained_between(first, last)
-        parts.append((held, held, np.ones(held.size)))
-        rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
-        lower = (columns <= rows) & (columns >= first)
-        rows, columns, values = rows[lower], columns[lower], values[lower]
-        apart, n = rows - columns, last - first
-        bands = int(apart.max(initial=0)) + 1
-        flat = np.bincount(n * apart + columns - first, weights=values, minlength=n * bands)
-        return np.asarray(flat).reshape(bands, n)
 
 
 class Places(NamedTuple):

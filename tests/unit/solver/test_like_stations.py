@@ -9,7 +9,9 @@ import pytest
 from measuring import COMM, matrix_of
 from small_lines import HANGING, ac_simple_line, mesh_of, problem_of
 
+from catenary.solver.linear import operator_bands
 from catenary.solver.linear.decay_length import reach
+from catenary.solver.linear.operator_bands import OperatorBands
 from catenary.solver.linear.stations.like_stations import LikeStations
 from catenary.solver.linear.unit_responses import ShortColumns, UnitResponses, Windows
 from catenary.solver.model.model import Model
@@ -119,3 +121,23 @@ def test_columns_of_a_longer_line_take_hardly_more_room() -> None:
     sizes = {n: columns_of(model_of(n))[0].data.nbytes for n in (30, 60)}
     print({n: f"{size / 1e6:.2f} MB" for n, size in sizes.items()})
     assert sizes[60] < 1.3 * sizes[30]
+
+
+@pytest.mark.parametrize("at_once", [1, 500, 2**14])
+def test_bands_of_a_stretch_are_those_of_its_own_matrix(
+    long_line: Model, at_once: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whether put together alone or with others: terms are added in one order."""
+    monkeypatch.setattr(operator_bands, "_AT_ONCE", at_once)
+    starts, n = long_line.numbering.starts, long_line.n_dofs
+    whole = matrix_of(long_line, *COEFFICIENTS).toarray()
+    whole[np.diag_indices(n)] += np.isin(np.arange(n), long_line.constrained)
+    bands = OperatorBands(long_line, COEFFICIENTS, n)
+    for begin, end in ((0, 4), (1, 60), (40, 120), (10, 50), (200, starts.size - 1)):
+        first, last = int(starts[begin]), int(starts[end])
+        found, own = bands.between(first, last), whole[first:last, first:last]
+        assert found.shape[1] == last - first
+        for number, band in enumerate(found):
+            assert np.array_equal(band[: last - first - number], np.diagonal(own, -number))
+        further = np.tril(own, -len(found))
+        assert not further.any()
