@@ -15,7 +15,10 @@ class Table(BaseModel):
     predicate ("must be ...") that ``messages.sentence`` completes with key, value and place.
     """
 
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+    # A validator is built when it is first used: that of a scene has those of all tables in it.
+    model_config = ConfigDict(
+        strict=True, extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True
+    )
 
 
 # How to get rid of a key that a case file gives, for sentences about keys that exclude others.
