@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from catenary.mbs.air.air_forces import AirForces, SteadyForces
 from catenary.mbs.air.airflow import Airflow
 from catenary.mbs.control.regulation import Regulator
+from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph, Lowering
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.mechanism.head_rotation import PITCH, head_turning
 from catenary.mbs.mechanism.pantograph_data import (
     MultibodyData,
@@ -28,6 +28,9 @@ from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantog
 from catenary.mbs.roll import roll_of
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.base.errors import InputError
+
+if TYPE_CHECKING:
+    from catenary.mbs.mechanism.full_pantograph import FullPantograph
 
 # What a pantograph can be described by.
 PantographData = LumpedData | MultibodyData
@@ -67,7 +70,7 @@ def make_pantograph(data: PantographData, operation: Operation) -> Pantograph:
         A pantograph with all its bodies in the loop has laws, or a regulated lift.
     """
     model = _model(data, operation)
-    if not isinstance(model, FullPantograph):
+    if isinstance(model, SteppedHead):
         model.regulate(operation.regulator)
     elif operation.regulator is not None or data.laws:
         raise InputError(
@@ -92,6 +95,9 @@ def _model(
     if isinstance(data, MultibodyData):
         pressing = force + on_frame
         if data.all_bodies is not None:
+            # Its methods are imported for those that are simulated with it.
+            from catenary.mbs.mechanism.full_pantograph import FullPantograph
+
             way = data.all_bodies
             return FullPantograph(data, pressing, height, *moved, way.handling, way.substeps)
         raising = raising_data(data, pressing, height)

@@ -49,6 +49,8 @@ def main() -> None:
     # small here, and MPI is what runs in parallel.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    # No package checks scenes but Pydantic itself: it need not look through all that are installed.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     # A crash ends the process: Open MPI's handler, which prints a trace, may wait for ever.
     os.environ.setdefault("OMPI_MCA_opal_signal", "")
     logging.getLogger("catenary").addHandler(console.LogHandler())

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from catenary.cases.process.versions import versions
 from catenary.cases.run.describe.arrivals import arrival_facts
 from catenary.cases.run.describe.defects import defect_facts
 from catenary.cases.run.describe.incidents import incident_facts
 from catenary.cases.run.describe.pantographs import header_words
-from catenary.cases.run.excited_run import ExcitedRun
 from catenary.cases.run.planning.plan import effect_rows
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.scene import Scene
@@ -18,6 +18,9 @@ from catenary.postproc.channels.header import Header, line_datasets, static_data
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.window.choice import window_sentence
+
+if TYPE_CHECKING:
+    from catenary.cases.run.excited_run import ExcitedRun
 
 
 def header_of(

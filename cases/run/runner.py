@@ -1,6 +1,7 @@
 """From a scene to a judged contact force: mesh, equilibrium, march, recorder, report.
 
-Data flows one way; every phase is timed and is a PETSc log stage of the same name.
+Data flows one way; every phase is timed and is a PETSc log stage of the same name. What reads a
+result file is imported by runs that continue one.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,8 +24,6 @@ from catenary.cases.result_folder.output_folder import (
     check_size,
     prepare,
 )
-from catenary.cases.run.continuing import refuse_other_run, state_to_continue
-from catenary.cases.run.excited_run import ExcitedRun
 from catenary.cases.run.header import header_of
 from catenary.cases.run.performance import Phases, performance
 from catenary.cases.run.planning.needs import (
@@ -39,14 +38,11 @@ from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.channels.header import Header
-from catenary.postproc.files.later_end import BEGUN_FOR, CHANGED, let_go_on
 from catenary.postproc.files.own_files import remove_stale
-from catenary.postproc.read.results import Results
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.snapshots.blocks import RecordedLine
 from catenary.postproc.record.snapshots.fields import FieldRecorder
-from catenary.postproc.record.strip_watch import StripWatch
 from catenary.solver.base.errors import CatenaryError, RunBroken
 from catenary.solver.base.freed_memory import give_back_long_line
 from catenary.solver.base.parallel import on_root
@@ -54,6 +50,9 @@ from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all
 from catenary.solver.time_loop.march import March, Outcome
 from catenary.solver.time_loop.views.observers import Observer
+
+if TYPE_CHECKING:
+    from catenary.cases.run.excited_run import ExcitedRun
 
 logger = logging.getLogger("catenary.runner")
 
@@ -141,6 +140,8 @@ def restart_case(
         If there is nothing to continue, if another process writes into the folder, or if there is
         no room for the rest.
     """
+    from catenary.cases.run.continuing import state_to_continue
+
     with held(out_dir, comm, f"catenary restart {out_dir}"):
         state = on_root(comm, lambda: state_to_continue(out_dir / RESULT, extends))
         order = _Order(scene, out_dir, comm, petsc_options, tell, state, False, extends=extends)
@@ -314,6 +315,8 @@ def _observers(
     first: list[Observer] = [] if fields is None else [fields]
     half_lengths = [place.data.strips.half_length for place in problem.train.placements]
     if "lateral_motion" in problem.effects and np.isfinite(half_lengths).any():
+        from catenary.postproc.record.strip_watch import StripWatch
+
         first.append(StripWatch(half_lengths))
     if excited is not None:
         first += excited.watching(at_rest)
@@ -357,12 +360,17 @@ def _report(out_dir: Path, outcome: Outcome, only_summary: bool) -> RunOutcome:
 
 
 def _refuse_other_run(order: _Order, header: Header | None, problem: Problem) -> None:
+    from catenary.cases.run.continuing import refuse_other_run
+    from catenary.postproc.files.later_end import CHANGED
+
     assert header is not None
     n_strips = tuple(len(place.data.strip_offsets) for place in problem.train.placements)
     refuse_other_run(order.result, header, n_strips, CHANGED if order.extends else ())
 
 
 def _let_go_on(order: _Order, header: Header | None, n_steps: int) -> None:
+    from catenary.postproc.files.later_end import let_go_on
+
     assert header is not None
     let_go_on(order.result, header, n_steps)
 
@@ -371,5 +379,8 @@ def _begun_for(order: _Order) -> int | None:
     """Steps for which a run was begun that got a later end, None if it did not."""
     if not order.resume:
         return None
+    from catenary.postproc.files.later_end import BEGUN_FOR
+    from catenary.postproc.read.results import Results
+
     with Results(order.result) as results:
         return results.attributes.get(BEGUN_FOR)

@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy.integrate import quad
 from scipy.interpolate import BSpline, make_interp_spline
 
 from catenary.mbs.rigid.bodies import Motion, Vector
@@ -139,6 +138,8 @@ class SpringDamper(_BetweenPoints):
             return 0.5 * self.stiffness * extension**2
         if isinstance(self.stiffness, Table):
             return self.stiffness.integral(0.0, extension)
+        from scipy.integrate import quad  # of which few runs have need
+
         return float(quad(self.stiffness, 0.0, extension)[0])
 
 

@@ -12,7 +12,6 @@ from catenary.solver.integrators.detour import (
     log_detour,
     method_detour,
 )
-from catenary.solver.integrators.generalized_alpha import GeneralizedAlphaLine
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.newmark import NewmarkLine
 from catenary.solver.linear.pieces.operator_pieces import WantedPieces
@@ -40,6 +39,8 @@ def make_line(
     if numerics.integrator == NEWMARK:
         line: LineIntegrator = NewmarkLine(comm, model, ownership, numerics, wanted)
     else:
+        from catenary.solver.integrators.generalized_alpha import GeneralizedAlphaLine
+
         chosen = integration_of(numerics.integrator, numerics.spectral_radius)
         line = GeneralizedAlphaLine(comm, model, ownership, numerics.dt, chosen, wanted)
     if only_free:

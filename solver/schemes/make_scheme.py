@@ -1,4 +1,7 @@
-"""All that steps a line and its train with steps of one size, made from a problem."""
+"""All that steps a line and its train with steps of one size, made from a problem.
+
+Schemes but the usual one are imported where they are wanted.
+"""
 
 from __future__ import annotations
 
@@ -18,11 +21,8 @@ from catenary.solver.model.partition import Ownership
 from catenary.solver.model.switching_links import switching_links
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.problem import Placement, Problem
-from catenary.solver.schemes.fixed_point import FixedPoint
-from catenary.solver.schemes.monolithic_system import WholeSystem
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
-from catenary.solver.schemes.ts_alpha2 import TSAlpha2
 from catenary.solver.statics.changed_line.after_incidents import ChangedLine
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 from catenary.solver.window.moving_window import MovingWindow, wanted_pieces
@@ -137,6 +137,8 @@ class SchemeFactory:
     def _fixed_point(
         self, problem: Problem, model: Model, interaction: ForcesOnLine, pantographs: Pantographs
     ) -> Scheme:
+        from catenary.solver.schemes.fixed_point import FixedPoint
+
         return FixedPoint(
             self.comm,
             interaction,
@@ -148,6 +150,9 @@ class SchemeFactory:
     def _ts_alpha2(
         self, problem: Problem, model: Model, interaction: ForcesOnLine, pantographs: Pantographs
     ) -> Scheme:
+        from catenary.solver.schemes.monolithic_system import WholeSystem
+        from catenary.solver.schemes.ts_alpha2 import TSAlpha2
+
         loads = interaction.line.loads
         system = WholeSystem(problem, model, self.form, self.nominal_height, loads)
         return TSAlpha2(self.comm, interaction, pantographs, system, problem.numerics)

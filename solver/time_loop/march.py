@@ -33,7 +33,6 @@ from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import Happened, LineIncident, in_steps
 from catenary.solver.problem.problem import Problem, steps_of
-from catenary.solver.schemes.adaptive_steps import StepLevels
 from catenary.solver.schemes.make_scheme import Parts, SchemeFactory
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.changed_line.after_incidents import (
@@ -162,6 +161,8 @@ class March:
 
     def _in_levels(self, changed: ChangedLine, whole: Parts) -> Scheme:
         """The scheme of ``whole`` steps, with shorter ones where they are needed. Collective."""
+        from catenary.solver.schemes.adaptive_steps import StepLevels
+
         problem = self._problem
 
         def finer(level: int) -> Parts:

@@ -22,7 +22,6 @@ from catenary.postproc.files.disk import MARGIN, check_in_place, opened, reserve
 from catenary.postproc.files.hdf5.array_writes import put_array
 from catenary.postproc.files.hdf5.checked import set_attribute, text_of
 from catenary.postproc.files.own_files import part_of
-from catenary.postproc.read.guard import survives
 from catenary.postproc.record.snapshots.blocks import Block
 from catenary.postproc.record.snapshots.field_layout import FieldRecord, Slots, layout_of
 from catenary.postproc.record.snapshots.field_values import FieldValues, Gathered
@@ -123,6 +122,9 @@ class FieldsFile:
         """
         if not self.path.exists():
             return False
+        # Of all that reads files this alone is for runs that continue one.
+        from catenary.postproc.read.guard import survives
+
         try:
             if not survives(self.path):
                 raise ValueError("HDF5 does not read it")

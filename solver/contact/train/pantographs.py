@@ -5,10 +5,9 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from scipy import integrate
 
 from catenary.mbs.build import Operation, has_joints, make_pantograph, steady_forces
 from catenary.mbs.head.head_kernels import N_DRIVE
@@ -17,7 +16,6 @@ from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.head.wire_crossing import CrossingPath, FollowedPath, LateralPath, SeveralPaths
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph
-from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.roll import roll_of
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.base.kernels.bound import bound
@@ -33,6 +31,9 @@ from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.problem import Placement, Problem
 from catenary.solver.problem.simulated import Simulated
 from catenary.solver.statics.elasticity import Elasticity
+
+if TYPE_CHECKING:
+    from catenary.mbs.mechanism.full_pantograph import FullPantograph
 
 
 class Pantographs:
@@ -133,7 +134,8 @@ class Pantographs:
         self.across = np.zeros((3, self.n_contacts if simulated.lateral else 0))
         self.lateral_displacement = self.across[2]
         self.lateral_place = np.zeros(self.lateral_displacement.size)
-        self.joints_in_loop = any(has_joints(placement.data) for placement in train.placements)
+        self._has_joints = [has_joints(placement.data) for placement in train.placements]
+        self.joints_in_loop = any(self._has_joints)
         self.constraint_violation[:] = np.nan
         self.models: list[Pantograph] = []
         self._followed: list[FollowedPath] = []
@@ -243,9 +245,10 @@ class Pantographs:
     def measure_joints(self) -> None:
         """Measure by how much joints are open now; nothing where there are no models."""
         for number, model in enumerate(self.models):
-            moved = model.model if isinstance(model, LoweredPantograph) else model
-            if isinstance(moved, FullPantograph):
-                self.constraint_violation[number] = moved.constraint_violation()
+            if self._has_joints[number]:
+                moved = model.model if isinstance(model, LoweredPantograph) else model
+                jointed = cast("FullPantograph", moved)
+                self.constraint_violation[number] = jointed.constraint_violation()
 
     def take_over(self, other: Pantographs) -> None:
         """Go on from where ``other`` are, the same train made for another step. Not collective."""
@@ -366,6 +369,7 @@ def nominal_height_rule(
         if air_speed is not None and placement.data.meets_air:
             force += steady_forces(placement.data, air_speed).whole
         lifted = elasticity.pressed(at_rest, force)
-        return float(integrate.trapezoid(lifted, x) / (x[-1] - x[0]))
+        area = (np.diff(x) * (lifted[1:] + lifted[:-1]) / 2.0).sum()
+        return float(area / (x[-1] - x[0]))
 
     return height
