@@ -80,24 +80,32 @@ class Piece:
 
 
 @dataclass(frozen=True)
+class Section:
+    """Where a wire runs level in a tension section, and how far it rises to either end of it.
+
+    ends, running : from and to of the section, and of where the wire is level [m]
+    rise : height gained from there to the start, and to the end [m]
+    """
+
+    ends: tuple[float, float]
+    running: tuple[float, float]
+    rise: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
 class Profile:
     """Heights that a wire is to have at rest where it is held: at its droppers' lower ends.
 
     height : at the masts of the running spans [m]
     sag_x, sag : pre-sag below that height at positions along the track, linear between them [m]
-    rise : height gained over all transition spans at the start, and at the end [m]
-    ends, running : from and to of the wire and of where it is level [m]
-    end_rise : height gained at the end if it is another one [m]
+    sections : in which the wire runs, ascending
     above_x, above : further height at positions along the track, linear between them [m]
     """
 
     height: float
     sag_x: tuple[float, ...]
     sag: tuple[float, ...]
-    rise: float
-    ends: tuple[float, float]
-    running: tuple[float, float]
-    end_rise: float | None = None
+    sections: tuple[Section, ...]
     above_x: tuple[float, ...] = ()
     above: tuple[float, ...] = ()
 
@@ -109,25 +117,31 @@ class Profile:
     @property
     def rises(self) -> bool:
         """Whether it is higher anywhere than where it is level, pre-sag aside."""
-        at_end = self.rise if self.end_rise is None else self.end_rise
-        rising = self.rise > 0.0 and self.running[0] > self.ends[0]
-        return rising or (at_end > 0.0 and self.running[1] < self.ends[1])
+        return any(
+            (own.rise[0] > 0.0 and own.running[0] > own.ends[0])
+            or (own.rise[1] > 0.0 and own.running[1] < own.ends[1])
+            for own in self.sections
+        )
 
     def level(self, x: np.ndarray) -> np.ndarray:
         """Height without pre-sag at positions ``x`` [m], shape as ``x``.
 
-        ``base`` in the running spans; in the transition spans with a parabola that leaves the
-        running height without a kink and has gained its rise at the anchor.
+        ``base`` where a section is level; from there a parabola that leaves this height without a
+        kink and has gained its rise at the end of the section.
         """
         x = np.asarray(x, dtype=float)
-        start, end = self.running
+        ends, running, rise = (
+            np.array([getattr(own, name) for own in self.sections])
+            for name in ("ends", "running", "rise")
+        )
+        which = np.searchsorted(ends[:, 0], x + _SAME_PLACE, side="right") - 1
+        which = np.clip(which, 0, None)
         height = self.base(x)
-        if start > self.ends[0]:
-            into = np.clip((start - x) / (start - self.ends[0]), 0.0, None)
-            height += self.rise * into**2
-        if end < self.ends[1]:
-            into = np.clip((x - end) / (self.ends[1] - end), 0.0, None)
-            height += (self.rise if self.end_rise is None else self.end_rise) * into**2
+        for side, sign in enumerate((-1.0, 1.0)):
+            over = sign * (ends[:, side] - running[:, side])
+            rises = np.where(over > 0.0, rise[:, side], 0.0)[which]
+            into = sign * (x - running[which, side]) / np.where(over > 0.0, over, 1.0)[which]
+            height += rises * np.clip(into, 0.0, None) ** 2
         return height
 
     def pre_sag(self, x: np.ndarray) -> np.ndarray:

@@ -70,6 +70,7 @@ def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
     new_file(path, DRAWN, force)
     # Matplotlib takes long to import.
     from catenary.cases.run.describe.defects import defect_facts
+    from catenary.cases.scene.convert.line.overlaps import overlaps_of
     from catenary.cases.scene.convert.problem import problem_of
     from catenary.postproc.report.pictures.line_drawing import Mark, draw_line
     from catenary.solver.statics.form_finding.equilibrium import find_form
@@ -77,9 +78,9 @@ def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
     problem, mesh = problem_of(scene), mesh_of(scene)
     _, form = find_form(problem, mesh)
     line, masts = problem.line, problem.line.support_positions
-    overlap = scene.line.overlap
-    if overlap is not None:
-        spans = overlap.first_span - 2, overlap.first_span + overlap.n_spans
+    overlaps = overlaps_of(scene.line)
+    if overlaps is not None:
+        spans = overlaps.first[0] - 1, overlaps.first[0] + overlaps.n_spans + 1
     else:
         first, last = line.n_transition[0], line.n_spans - line.n_transition[1]
         middle = (first + last) // 2

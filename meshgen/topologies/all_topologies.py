@@ -14,7 +14,7 @@ from catenary.meshgen.topologies import (  # noqa: F401  register themselves
     twin,
 )
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.meshgen.topologies.overlap import with_overlap
+from catenary.meshgen.topologies.overlaps import with_overlaps
 from catenary.meshgen.topologies.registry import registered
 from catenary.solver.base.errors import InputError
 
@@ -36,7 +36,7 @@ def make_line(data: LineData) -> Line:
             raise InputError(f"the topology {data.topology} needs {part}")
     data.check()
     line = topology.make(data)
-    line = line if data.overlap is None else with_overlap(line, data.overlap)
+    line = line if data.overlaps is None else with_overlaps(line, data.overlaps)
     return replace(line, curve=data.curve)
 
 

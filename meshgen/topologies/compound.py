@@ -26,9 +26,7 @@ def compound_catenary(data: LineData) -> Line:
     contact, _ = simple.wires
     (low,) = simple.droppers
     over = data.profile
-    level = Profile(
-        data.contact_height + auxiliary.height, (0.0,), (0.0,), over.rise, over.ends, over.running
-    )
+    level = Profile(data.contact_height + auxiliary.height, (0.0,), (0.0,), over.sections)
     heights = level.level(data.support_positions).tolist()
     masts = tuple(data.support_positions.tolist())
     course = Piece(masts, data.over_track(data.support_positions), tuple(heights))

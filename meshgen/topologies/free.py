@@ -240,9 +240,6 @@ def _profile(data: LineData, free: FreeWire) -> Profile:
         height,
         tuple(x[order].tolist()),
         tuple(sag[order].tolist()),
-        data.transition_rise,
-        (float(masts[0]), float(masts[-1])),
-        data.running_range,
-        None,
+        (data.whole(data.transition_rise),),
         *course,
     )

@@ -11,7 +11,7 @@ from catenary.meshgen.curve import Curve
 from catenary.meshgen.hardware import DropperKind, SteadyArm
 from catenary.meshgen.spans import Spans
 from catenary.meshgen.topologies.free_data import FreeDroppers, FreeLink, FreeWire
-from catenary.meshgen.wires import Conductor, Profile, Role
+from catenary.meshgen.wires import Conductor, Profile, Role, Section
 from catenary.solver.base.errors import InputError
 
 # Two cuts of a wire closer than this are taken for a slip of the pen [m].
@@ -64,17 +64,18 @@ class Bridle(ClampedWire):
 
 
 @dataclass(frozen=True)
-class Overlap:
+class Overlaps:
     """Spans in which one tension section ends and the next one begins.
 
     Attributes
     ----------
-    first, n_spans : number of its first span, from 0, and how many there are
+    first : numbers of the first spans of each, ascending, from 0
+    n_spans : of each, so many that none begins before the last one has ended
     rise : height that contact wires gain from its middle to the end of their section [m]
     distance : of the wires of the two sections from each other, sideways [m]
     """
 
-    first: int
+    first: tuple[int, ...]
     n_spans: int
     rise: float
     distance: float
@@ -99,7 +100,7 @@ class LineData(Spans):
     messenger_stagger : lateral position of the messenger wire at each support, as ``stagger``; None
         if it stays above the middle of the track
     curve : of the track, None if it is straight
-    overlap : where the line consists of two tension sections, None if of one
+    overlaps : where the next tension section begins, None if there is only one
     wires, links : of a free line, None of others
     """
 
@@ -119,7 +120,7 @@ class LineData(Spans):
     stitch_wire: StitchWire | None = None
     twin: Twin | None = None
     bridle: Bridle | None = None
-    overlap: Overlap | None = None
+    overlaps: Overlaps | None = None
     messenger_stagger: tuple[float, ...] | None = None
     curve: Curve | None = None
     wires: tuple[FreeWire, ...] | None = None
@@ -159,10 +160,13 @@ class LineData(Spans):
             self.contact_height,
             tuple(x[order].tolist()),
             tuple(sag[order].tolist()),
-            self.transition_rise,
-            (float(masts[0]), float(masts[-1])),
-            self.running_range,
+            (self.whole(self.transition_rise),),
         )
+
+    def whole(self, rise: float) -> Section:
+        """The line from anchor to anchor, with a ``rise`` over the transition spans [m]."""
+        masts = self.support_positions
+        return Section((float(masts[0]), float(masts[-1])), self.running_range, (rise, rise))
 
     @property
     def lowest_contact(self) -> float:

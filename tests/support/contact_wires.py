@@ -11,7 +11,7 @@ from small_lines import WHOLE, en50318_line, numerics, problem_of, train
 from catenary.meshgen.hardware import Droppers
 from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.all_topologies import make_line
-from catenary.meshgen.wires import Piece, Role
+from catenary.meshgen.wires import Piece, Role, Section
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Problem
 
@@ -74,9 +74,8 @@ def overlap() -> Line:
     for number, (low, high) in enumerate(ends):
         # The running height between the droppers, a rise towards the end in the overlap.
         name = wire.name + ("_2" if number else "")
-        rise = replace(
-            profile, rise=0.15, ends=(low, high), running=((0.0, 28.0), (20.0, 48.0))[number]
-        )
+        running = ((0.0, 28.0), (20.0, 48.0))[number]
+        rise = replace(profile, sections=(Section((low, high), running, (0.15, 0.15)),))
         y = float(piece.y[0])
         own = Piece((low, high), (y, y), (profile.height, profile.height), piece.ends)
         wires.append(replace(wire, name=name, pieces=(own,), profile=rise))

@@ -15,8 +15,8 @@ from catenary.meshgen.hardware import SteadyArm
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line
-from catenary.meshgen.topologies.line_data import Bridle, LineData, Overlap, Twin
-from catenary.meshgen.topologies.overlap import of_next
+from catenary.meshgen.topologies.line_data import Bridle, LineData, Overlaps, Twin
+from catenary.meshgen.topologies.overlaps import of_next
 from catenary.meshgen.topologies.single import BRIDLE_WIRE
 from catenary.meshgen.topologies.twin import second
 from catenary.meshgen.wires import Conductor, Role
@@ -167,7 +167,7 @@ def test_two_sections_of_an_overlap_are_each_other_s_mirror_image(
     if topology == "single":
         spans = {"span_lengths": (30.0,) * n, "dropper_positions": ((),) * n, "pre_sag": ((),) * n}
         data = replace(data, **spans, stagger=(0.0,) * (n + 1))  # type: ignore[arg-type]
-    line = make_line(replace(data, overlap=Overlap(2, n_spans, 0.6, 0.4)))
+    line = make_line(replace(data, overlaps=Overlaps((2,), n_spans, 0.6, 0.4)))
     mesh, form = at_rest(line, 2)
     length = float(line.support_positions[-1])
     for name in {wire.name.removesuffix("_next") for wire in line.wires}:
@@ -189,7 +189,7 @@ def test_two_sections_of_an_overlap_are_each_other_s_mirror_image(
 
 def test_wires_in_an_overlap_are_in_equilibrium() -> None:
     """Over a whole line, supports, arms' weights and ends' slopes balance what weighs."""
-    data = replace(ac_simple_line(9), overlap=Overlap(2, 4, 0.6, 0.4))
+    data = replace(ac_simple_line(9), overlaps=Overlaps((2,), 4, 0.6, 0.4))
     line = make_line(data)
     mesh, form = at_rest(line, 3)
     model, _ = find_form(problem_of(line), mesh)

@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 from catenary.meshgen.build import make_mesh
 from catenary.meshgen.hardware import Droppers, SteadyArms, Supports
 from catenary.meshgen.line import Line
-from catenary.meshgen.wires import Conductor, Piece, Profile, Wire
+from catenary.meshgen.wires import Conductor, Piece, Profile, Section, Wire
 from catenary.solver.effects.build_model import build
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.elements import beam
@@ -113,7 +113,9 @@ def _model(bench: Bench, problem: Problem) -> Model:
         # Heights are of no effect, but droppers have a length.
         height = 5.0 + number
         piece = Piece(masts, (0.0,) * len(masts), (height,) * len(masts))
-        level = Profile(height, masts, (0.0,) * len(masts), 0.0, (0.0, length), (0.0, length))
+        level = Profile(
+            height, masts, (0.0,) * len(masts), (Section((0.0, length), (0.0, length)),)
+        )
         wires.append(Wire.of(wire, wire.name, wire.role, (piece,), level))
     line = Line(
         tuple(np.diff(masts).tolist()),

@@ -87,20 +87,19 @@ def _arms(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 def _held(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Sections with a tensioner at both ends and nothing in between that holds their wires."""
-    along, masts, overlap = along_of(scene.line), line.support_positions, line.overlap
-    sections = [(0.0, float(masts[-1]), along.start, along.end, "line.ends.end.along")]
-    if overlap is not None:
-        first = float(masts[overlap.first])
-        last = float(masts[overlap.first + overlap.n_spans])
-        sections = [
-            (0.0, last, along.start, along.overlap, "line.overlap.along"),
-            (first, float(masts[-1]), along.overlap, along.end, "line.ends.end.along"),
-        ]
-    for start, end, *tensioned, key in sections:
-        if all(tensioned) and not any(start < x < end for x in along.mid_points):
+    along, masts, overlaps = along_of(scene.line), line.support_positions, line.overlaps
+    first = () if overlaps is None else overlaps.first
+    n_spans = 0 if overlaps is None else overlaps.n_spans
+    starts = [0.0, *(float(masts[span]) for span in first)]
+    ends = [*(float(masts[span + n_spans]) for span in first), float(masts[-1])]
+    between = [along.overlap] * len(first)
+    tensioned = zip([along.start, *between], [*between, along.end], strict=True)
+    keys = [*["line.overlap.along"] * len(first), "line.ends.end.along"]
+    for start, end, both, key in zip(starts, ends, tensioned, keys, strict=True):
+        if all(both) and not any(start < x < end for x in along.mid_points):
             yield refusal(
                 scene.origin,
-                str(key),
+                key,
                 TENSIONER,
                 f"the wires from {start:g} to {end:g} m would have tensioners at both ends and "
                 "nothing to hold them in between: name a mast there in line.mid_points_m, or hold "

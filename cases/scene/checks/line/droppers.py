@@ -119,7 +119,7 @@ def estimated_dropper_lengths(line: LineData, gravity: float) -> list[np.ndarray
 def check_dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
     """A messenger wire that would hang below the contact wire."""
     gravity = Problem.gravity if scene.switches().get("gravity", True) else 0.0
-    if line.overlap is not None and line.wires is None:
+    if line.overlaps is not None and line.wires is None:
         find_cuts(make_line(line))  # refuses wires that would cross
     lengths = estimated_dropper_lengths(line, gravity)
     shortest = [float(v.min(initial=np.inf)) for v in lengths] or [np.inf]

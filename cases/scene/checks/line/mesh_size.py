@@ -11,6 +11,7 @@ import numpy as np
 from catenary.cases.scene.checks.line.free_places import free_counts
 from catenary.cases.scene.convert.line.free import free_wires
 from catenary.cases.scene.convert.line.line import line_of, span_lengths
+from catenary.cases.scene.convert.line.overlaps import overlaps_of
 from catenary.cases.scene.cost_model import estimate_memory, estimate_start
 from catenary.cases.scene.input.faults import Fault, SceneError
 from catenary.cases.scene.tables.line.line import TransitionTable
@@ -75,9 +76,9 @@ def size_of(scene: Scene) -> Size | None:
     nodes = dict.fromkeys((wire.name for wire in sample.wires), 0)
     for piece in cuts.pieces:
         last = piece.first + len(piece.points) - 1
-        # A piece of less than a span is there as often as the support that it goes by.
+        # As often as the section that begins there; of less than a span, as the support it goes by.
         whole = piece.points[-1, 0] - piece.points[0, 0] >= min(lengths)
-        often = 1 if whole else times[span_of_gap[last - 1]]
+        often = times[span_of_gap[piece.first if whole else last - 1]]
         nodes[piece.wire] += int(weighted[piece.first : last].sum() + often)
     hanging = np.searchsorted(masts, sample.dropper_x) - 1
     return _size(scene, int(times[hanging].sum()), nodes, sample.wires)
@@ -108,8 +109,8 @@ def _size(scene: Scene, n_droppers: int, nodes: dict[str, int], wires: Sequence[
 
 
 def _sample(scene: Scene, lengths: tuple[float, ...]) -> tuple[Line, np.ndarray]:
-    """A line of the first span, of one span of each length, of those of an overlap, and of the last
-    span; how often each of these is in the line of the scene.
+    """A line of the first span, of one span of each length, of those of each kind of overlap, and
+    of the last span; how often each of these is in the line of the scene.
 
     Raises
     ------
@@ -117,15 +118,24 @@ def _sample(scene: Scene, lengths: tuple[float, ...]) -> tuple[Line, np.ndarray]
         If there is no such line.
     """
     table, n = scene.line, len(lengths)
-    both = range(0)
-    if table.overlap is not None:
-        first = table.overlap.first_span - 1
-        both = range(first, first + table.overlap.n_spans)
-        if both.stop > n:
+    overlaps = overlaps_of(table)
+    inner = Counter(lengths[1:-1])
+    kinds: Counter[tuple[float, ...]] = Counter()
+    if overlaps is not None:
+        both = [range(first, first + overlaps.n_spans) for first in overlaps.first]
+        if any(ahead.stop >= n for ahead in both):
             raise InputError("the overlap is beyond the line")
-    inner = Counter(lengths[i] for i in range(1, n - 1) if i not in both)
-    kept = [lengths[i] for i in both if i < n - 1]
-    spans = [lengths[0], *inner, *kept, lengths[-1]][:n]
+        kinds = Counter(tuple(lengths[i] for i in spans) for spans in both)
+        inner -= Counter(length for kind, often in kinds.items() for length in kind * often)
+    kept: list[float] = []
+    numbers: list[int] = []
+    first_spans: list[int] = []
+    for kind, often in kinds.items():
+        first_spans.append(2 + len(inner) + len(kept))
+        # A span of no weight parts it from the next overlap.
+        kept += [*kind, kind[-1]]
+        numbers += [*(often for _ in kind), 0]
+    spans = [lengths[0], *inner, *kept, lengths[-1]][: n + len(kinds)]
     changes: dict[str, Any] = {
         "n_spans": len(spans),
         "span_m": spans,
@@ -134,10 +144,10 @@ def _sample(scene: Scene, lengths: tuple[float, ...]) -> tuple[Line, np.ndarray]
         "messenger_stagger_m": None,
     }
     if table.overlap is not None:
-        overlap = table.overlap.model_copy(update={"first_span": 2 + len(inner)})
-        changes["overlap"] = overlap
+        alike = {"first_span": first_spans, "repeat_every_spans": None}
+        changes["overlap"] = table.overlap.model_copy(update=alike)
     sample = scene.model_copy(update={"line": table.model_copy(update=changes)})
-    return line_of(sample), np.array([1, *inner.values(), *(1 for _ in kept), 1])
+    return line_of(sample), np.array([1, *inner.values(), *numbers, 1])
 
 
 def size_faults(scene: Scene) -> Iterator[Fault]:

@@ -153,24 +153,32 @@ def _auxiliary_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 
 def _overlap(scene: Scene, line: LineData) -> Iterator[Fault]:
-    overlap = line.overlap
-    if overlap is None:
+    overlaps, table = line.overlaps, scene.line.overlap
+    if overlaps is None or table is None:
         return
-    first, last = line.n_transition[0] + 2, line.n_spans - line.n_transition[1] - overlap.n_spans
-    if not first <= overlap.first + 1 <= last:
-        inside = f"from {first} to {last}" if first <= last else "none, as the line is too short"
+    needs = f"an overlap of {overlaps.n_spans} spans needs a running span before it and behind it"
+    first, last = line.n_transition[0] + 2, line.n_spans - line.n_transition[1] - overlaps.n_spans
+    for i, number in enumerate(table.first_span):
+        if not first <= number <= last:
+            inside = (
+                f"from {first} to {last}" if first <= last else "none, as the line is too short"
+            )
+            key = "line.overlap.first_span" + (f".{i}" if len(table.first_span) > 1 else "")
+            yield refusal(scene.origin, key, number, f"{needs}: possible are {inside}")
+        first = number + overlaps.n_spans + 1
+    every = table.repeat_every_spans
+    if every is not None and every <= overlaps.n_spans:
         yield refusal(
             scene.origin,
-            "line.overlap.first_span",
-            overlap.first + 1,
-            f"an overlap of {overlap.n_spans} spans needs a running span before it and behind it: "
-            f"possible are {inside}",
+            "line.overlap.repeat_every_spans",
+            every,
+            f"{needs}: it must be at least {overlaps.n_spans + 1}",
         )
     free = line.encumbrance - (line.auxiliary_wire.height if line.auxiliary_wire else 0.0)
-    if line.messenger_wire is not None and overlap.rise >= free:
+    if line.messenger_wire is not None and overlaps.rise >= free:
         yield refusal(
             scene.origin,
             "line.overlap.rise_m",
-            overlap.rise,
+            overlaps.rise,
             f"it must be less than the {free:g} m that the messenger wire is above at the supports",
         )

@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from catenary.cases.scene.convert.line.free import free_links, free_wires
+from catenary.cases.scene.convert.line.overlaps import overlaps_of
 from catenary.cases.scene.convert.line.parts import (
     conductor,
     dropper_kind,
@@ -31,7 +32,6 @@ from catenary.meshgen.topologies.line_data import (
     AuxiliaryWire,
     Bridle,
     LineData,
-    Overlap,
     StitchWire,
     Twin,
 )
@@ -112,10 +112,7 @@ def line_data_of(scene: Scene) -> LineData:
         stitch_wire=_optional(_stitch, table.stitch_wire),
         twin=_optional(lambda own: Twin(own.spacing_m, own.droppers == "alternating"), table.twin),
         bridle=_optional(_bridle, table.bridle),
-        overlap=_optional(
-            lambda own: Overlap(own.first_span - 1, own.n_spans, own.rise_m, own.distance_m),
-            table.overlap,
-        ),
+        overlaps=overlaps_of(table),
         wires=wires,
         links=links,
     )

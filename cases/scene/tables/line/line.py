@@ -6,13 +6,14 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from catenary.cases.scene.tables.line.along import Along, TemperatureTable, TensionerTable
+from catenary.cases.scene.tables.line.along import TemperatureTable, TensionerTable
 from catenary.cases.scene.tables.line.damping import DampingTable
 from catenary.cases.scene.tables.line.droppers import DropperTable
 from catenary.cases.scene.tables.line.ends import EndsTable
 from catenary.cases.scene.tables.line.fittings import FittingTable
 from catenary.cases.scene.tables.line.free import FreeLinkTable, FreeWireTable
 from catenary.cases.scene.tables.line.hardware import SteadyArmTable, SupportTable
+from catenary.cases.scene.tables.line.overlap import OverlapTable
 from catenary.cases.scene.tables.line.spans import Span
 from catenary.cases.scene.tables.line.track.curve import CurveTable
 from catenary.cases.scene.tables.line.track.tunnels import TunnelTable
@@ -38,25 +39,6 @@ class TransitionTable(Table):
     rise_m: float = Field(0.0, ge=0, le=5, description="height gained over all of one end's spans")
     span_m: Span | None = Field(
         None, description="length of the transition spans; line.span_m counts for them if absent"
-    )
-
-
-class OverlapTable(Table):
-    """Spans in which one tension section ends and the next one begins."""
-
-    first_span: int = Field(ge=2, le=20_000, description="number of its first span, from 1")
-    n_spans: int = Field(4, ge=3, le=5, description="number of its spans")
-    rise_m: float = Field(
-        gt=0,
-        le=5,
-        description="height that a contact wire gains from the middle to the end of its section",
-    )
-    distance_m: float = Field(
-        0.4, gt=0, le=2, description="distance of the wires of both sections from each other"
-    )
-    along: Along = Field(
-        "tensioner",
-        description="what wires end at inside the overlap; acts with effects.axial_motion",
     )
 
 
