@@ -85,9 +85,15 @@ class FilmData:
         """Heights of the contact wires (n_wires, n) [m]; of those that are not there infinite, but
         at places where none is."""
         chains = [self.points[self.wires[name]] for name in self.contacts]
-        there = np.array([(x >= at[0, 0] - _NEAR) & (x <= at[-1, 0] + _NEAR) for at in chains])
+        there = np.array([self._is_there(name, x) for name in self.contacts])
         heights = np.array([np.interp(x, at[:, 0], at[:, 2]) for at in chains])
         return np.where(there | ~there.any(axis=0), heights, np.inf)
+
+    def _is_there(self, wire: str, x: np.ndarray) -> np.ndarray:
+        """Whether an element of a wire is at places along the track, bool, shape as ``x``."""
+        low, high = self.points[self.elements[wire], 0].T
+        which = np.clip(np.searchsorted(high, x - _NEAR), None, high.size - 1)
+        return (x >= low[which] - _NEAR) & (x <= high[which] + _NEAR)
 
     def row_at(self, time: float) -> int:
         """The record nearest to a time [s]."""

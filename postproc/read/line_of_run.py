@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,6 +11,25 @@ from catenary.meshgen.mesh import elements_of
 from catenary.meshgen.wires import Role
 from catenary.postproc.read.registration import Registration
 from catenary.postproc.read.sound_file import SoundFile
+
+
+class ContactProfile(NamedTuple):
+    """A contact wire at rest.
+
+    breaks : places among its nodes at which further pieces of it begin
+    x, height : of its nodes along the track, and above the rail [m]
+    y : of its nodes to the left [m]; None where no wire moves sideways
+    """
+
+    breaks: np.ndarray
+    x: np.ndarray
+    height: np.ndarray
+    y: np.ndarray | None = None
+
+    def drawn(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places along the track and values at the nodes, with a gap between pieces."""
+        x = np.insert(self.x, self.breaks, self.x[self.breaks])
+        return x, np.insert(values, self.breaks, np.nan)
 
 
 class LineOfRun:
@@ -40,21 +60,28 @@ class LineOfRun:
         """Names of the wires of a role, in the order of the line."""
         return [name for name, own in self.roles.items() if own is role]
 
-    def contact_profiles(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """Positions and heights at rest of the nodes of each contact wire by its name [m]."""
+    def contact_profiles(self) -> dict[str, ContactProfile]:
+        """Each contact wire at rest by its name."""
         names, wires = self.wires_of(Role.CONTACT), self.wires()
         ends = np.cumsum([wires[name].size for name in names])[:-1]
-        x, height = (np.split(self.static(f"contact_{own}"), ends) for own in ("x", "height"))
-        return {name: (x[i], height[i]) for i, name in enumerate(names)}
+        columns = [
+            np.split(self.static(f"contact_{own}"), ends)
+            for own in ("x", "height", "y")
+            if own != "y" or self.has_static("contact_y")
+        ]
+        return {
+            name: ContactProfile(self._breaks(name), *own)
+            for name, *own in zip(names, *columns, strict=True)
+        }
 
     def elements(self) -> dict[str, np.ndarray]:
         """Nodes of the elements of each wire, (n, 2) each, in order of x."""
-        given = self._file["line/breaks"].items() if "line/breaks" in self._file else ()
-        breaks = {name: np.asarray(at[...]) for name, at in given}
-        none = np.zeros(0, dtype=np.int64)
-        return {
-            name: elements_of(nodes, breaks.get(name, none)) for name, nodes in self.wires().items()
-        }
+        return {name: elements_of(own, self._breaks(name)) for name, own in self.wires().items()}
+
+    def _breaks(self, wire: str) -> np.ndarray:
+        """Places among the nodes of a wire at which further pieces of it begin."""
+        path = f"line/breaks/{wire}"
+        return np.asarray(self._file[path][...] if path in self._file else [], dtype=np.int64)
 
     def static(self, name: str) -> np.ndarray:
         """A dataset of ``/static``, for instance ``dropper_length``.

@@ -256,13 +256,11 @@ def _lateral_places(results: Results) -> list[tuple[str, float, float]]:
     running spans, to the left [m]."""
     if not results.has_static("contact_y"):
         return []
-    profiles = results.contact_profiles()
-    ends = np.cumsum([x.size for x, _ in profiles.values()])[:-1]
     first, last = results.line("running_range")
     found = []
-    places = np.split(results.static("contact_y"), ends)
-    for (name, (x, _)), y in zip(profiles.items(), places, strict=True):
-        own = y[(x >= first) & (x <= last)]
+    for name, wire in results.contact_profiles().items():
+        assert wire.y is not None
+        own = wire.y[(wire.x >= first) & (wire.x <= last)]
         found.append((name, float(own.min()), float(own.max())))
     return found
 

@@ -242,6 +242,31 @@ def test_a_mesh_is_counted_before_it_is_made(case: str) -> None:
         assert size.unknowns == of_a_node * mesh.n_nodes
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [
+        ["line.overlap.first_span=[4,9,20]"],
+        ["line.overlap.first_span=6", "line.overlap.repeat_every_spans=5"],
+        ["line.overlap.first_span=[4,9,14,19]", "line.span_m=[55,50,55,45,50]"],
+        # Stitch wires are kept whole: those about the ends of a section fall away.
+        [
+            "line.overlap.first_span=[4,9,20]",
+            "line.topology=stitched",
+            "line.stitch_wire={tension_N=2800,mass_kg_per_m=0.31,bending_stiffness_N_m2=1.6,"
+            "length_m=26}",
+        ],
+    ],
+    ids=["three", "repeated", "unlike", "stitched"],
+)
+def test_a_mesh_of_several_overlaps_is_counted_before_it_is_made(changes: list[str]) -> None:
+    scene = load_scene("overlap", ["line.dropper.pre_sag_mm=", "line.dropper.count=5",
+                                   "line.dropper.positions_m=", "line.dropper.spacing_m=8",
+                                   "line.dropper.pre_sag_mid_mm=0", *changes])  # fmt: skip
+    size, mesh = size_of(scene), mesh_of(scene)
+    assert size is not None
+    assert (size.nodes, size.droppers) == (mesh.n_nodes, mesh.droppers.shape[0])
+
+
 def test_ten_thousand_spans_are_allowed_and_their_size_is_told(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -157,8 +157,12 @@ def _overlap(rng: random.Random, words: Words) -> None:
     _leave_out(words, _ON_THE_WIRE)
     n_spans = rng.randint(3, 5)
     words["line.n_spans"] = n = max(n_spans + 2, int(str(words["line.n_spans"])))
+    first = [rng.randint(2, n - n_spans)]
+    while rng.random() < 0.5 and first[-1] + 2 * n_spans + 1 <= n:
+        first.append(rng.randint(first[-1] + n_spans + 1, n - n_spans))
+    again = f"repeat_every_spans={rng.randint(n_spans + 1, 9)}," if rng.random() < 0.3 else ""
     words["line.overlap"] = (
-        f"{{first_span={rng.randint(2, n - n_spans)},n_spans={n_spans},"
+        f"{{first_span={first if len(first) > 1 else first[0]},n_spans={n_spans},{again}"
         f"rise_m={rng.uniform(0.05, 0.8)!r},distance_m={rng.uniform(0.1, 1.0)!r}}}"
     )
 

@@ -82,6 +82,15 @@ REFUSED = {
         OVERLAP, ["line.overlap.first_span=27"],
         "first_span is 27 .*an overlap of 4 spans needs a running span before it and behind it: "
         "possible are from 2 to 26"),
+    "overlap upon overlap": (
+        OVERLAP, ["line.overlap.first_span=[8,12]"],
+        "first_span.1 is 12 .*an overlap of 4 spans needs a running span before it and behind it: "
+        "possible are from 13 to 26"),
+    "overlaps without order": (
+        OVERLAP, ["line.overlap.first_span=[14,8]"], "in ascending order, but 8 follows 14"),
+    "dense overlaps": (
+        OVERLAP, ["line.overlap.n_spans=5", "line.overlap.repeat_every_spans=5"],
+        "repeat_every_spans is 5 .* it must be at least 6"),
     "overlap of a short line": (OVERLAP, ["line.n_spans=5", "train.start_m=201",
                                 "evaluation.from_m=201", "evaluation.to_m=202",
                                 "train.raise_time_s=0"],

@@ -187,9 +187,57 @@ def test_two_sections_of_an_overlap_are_each_other_s_mirror_image(
     assert ends[0][-1] == step[1] and ends[1][0] == line.support_positions[2]
 
 
+@pytest.mark.parametrize("topology", ["simple", "stitched"])
+def test_each_of_several_overlaps_hangs_as_it_does_alone(topology: str) -> None:
+    """What is a span and a half from the middle of an overlap feels the next one, a span further,
+    through supports alone: some 100 N more press one down by 0.2 mm, of which it passes on T/(kL),
+    6e-4, to the next."""
+    first, n_spans, n = (2, 6, 10), 3, 15
+    data = data_of(topology, n)
+    line = make_line(replace(data, overlaps=Overlaps(first, n_spans, 0.6, 0.4)))
+    mesh, form = at_rest(line, 2)
+    masts = line.support_positions
+    for number, span in enumerate(first):
+        alone = make_line(replace(data, overlaps=Overlaps((span,), n_spans, 0.6, 0.4)))
+        its_mesh, its_form = at_rest(alone, 2)
+        middle = 0.5 * (masts[span] + masts[span + n_spans])
+        for wire in make_line(data).wires:
+            for before in (True, False):
+                own = wire.name if (number % 2 == 0) == before else of_next(wire.name)
+                its = wire.name if before else of_next(wire.name)
+                found, expected = (
+                    near(a_mesh, a_form, name, middle, 1.5 * 50.0)
+                    for a_mesh, a_form, name in ((mesh, form, own), (its_mesh, its_form, its))
+                )
+                check(f"{own} [m]", found, expected, within=1e-6)
+
+
+def near(mesh: LineMesh, form: Equilibrium, wire: str, middle: float, reach: float) -> np.ndarray:
+    """Places, lateral places and heights of a wire within a reach of a place, (3, n) [m]."""
+    nodes = mesh.wires[wire][np.abs(mesh.x(mesh.wires[wire]) - middle) < reach]
+    return np.stack([mesh.x(nodes), np.abs(mesh.points[nodes, 1]), form.height[nodes]])
+
+
+def test_wires_of_three_sections_run_where_they_should() -> None:
+    """Sections take turns between two wires, each level where it is alone."""
+    data = ac_simple_line(15)
+    line = make_line(replace(data, overlaps=Overlaps((2, 8), 4, 0.6, 0.4)))
+    masts = line.support_positions
+    odd, even = (line.wire(name) for name in (CONTACT_WIRE, of_next(CONTACT_WIRE)))
+    assert [(own.x[0], own.x[-1]) for own in odd.pieces] == [
+        (masts[0], masts[6]),
+        (masts[8], masts[15]),
+    ]
+    assert [(own.x[0], own.x[-1]) for own in even.pieces] == [(masts[2], masts[12])]
+    for wire, level, risen in ((odd, (3, 12), (6, 8)), (even, (5, 9), (2, 12))):
+        assert wire.profile is not None
+        found = wire.profile.level(masts[list((*level, *risen))]) - wire.profile.height
+        check("level, risen [m]", found, [0.0, 0.0, 0.6, 0.6], within=1e-12)
+
+
 def test_wires_in_an_overlap_are_in_equilibrium() -> None:
     """Over a whole line, supports, arms' weights and ends' slopes balance what weighs."""
-    data = replace(ac_simple_line(9), overlaps=Overlaps((2,), 4, 0.6, 0.4))
+    data = replace(ac_simple_line(15), overlaps=Overlaps((2, 8), 4, 0.6, 0.4))
     line = make_line(data)
     mesh, form = at_rest(line, 3)
     model, _ = find_form(problem_of(line), mesh)
@@ -202,10 +250,12 @@ def test_wires_in_an_overlap_are_in_equilibrium() -> None:
     np.testing.assert_allclose(mesh.x(at), places, atol=1e-6)
     held = float((line.supports[0].stiffness * (tops - form.height[at])).sum())
     for wire in line.wires:
-        first, last = mesh.wires[wire.name][[0, -1]]
-        for end, inner in ((first, mesh.wires[wire.name][1]), (last, mesh.wires[wire.name][-2])):
+        pieces = mesh.pieces(wire.name)
+        ends = [(own[0], own[1], -1.0) for own in pieces] + [
+            (own[-1], own[-2], 1.0) for own in pieces
+        ]
+        for end, inner, out in ends:
             h = abs(float(np.diff(mesh.x(np.array([end, inner])))[0]))
-            out = 1.0 if end == last else -1.0
             u = np.array([form.height[inner], out * form.slope[inner], form.height[end],
                           out * form.slope[end]])  # fmt: skip
             row = beam.stiffness(np.array([h]), wire.bending_stiffness, np.array([wire.tension]))

@@ -144,8 +144,9 @@ def static_line(results: Results) -> Figure:
     figure, (profile, compliance) = stacked(5.2, 2)
 
     start, end = masts[max(span - 1, 0)], masts[min(span + 2, masts.size - 1)]
-    level = min(float(np.interp(masts[span], x, height)) for x, height in profiles.values())
-    for number, (name, (x, height)) in enumerate(profiles.items()):
+    level = min(float(np.interp(masts[span], wire.x, wire.height)) for wire in profiles.values())
+    for number, (name, wire) in enumerate(profiles.items()):
+        x, height = wire.drawn(wire.height)
         shown = (x >= start) & (x <= end)
         profile.plot(
             x[shown],

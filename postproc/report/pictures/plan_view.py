@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures.figures import (
     COLOURS,
@@ -27,11 +25,10 @@ def plan_view(results: Results) -> Figure | None:
         return None
     figure, (plan, forces) = stacked(5.2, 2)
     profiles = results.contact_profiles()
-    ends = np.cumsum([x.size for x, _ in profiles.values()])[:-1]
-    places = np.split(results.static("contact_y"), ends)
-    for number, ((name, (x, _)), y) in enumerate(zip(profiles.items(), places, strict=True)):
+    for number, (name, wire) in enumerate(profiles.items()):
+        assert wire.y is not None
         label = "contact wire" if len(profiles) == 1 else name
-        plan.plot(x, y, color=colour(number), linewidth=1.2, label=label)
+        plan.plot(*wire.drawn(wire.y), color=colour(number), linewidth=1.2, label=label)
     plan.plot(registration.x, registration.stagger, "o", ms=3, color=GREY, label="steady arm")
     plan.axhline(0.0, color=GREY, linewidth=0.6, linestyle="--")
     tidy(plan, "position along the track [m]", "to the left [m]", "Contact wire from above")

@@ -91,9 +91,9 @@ def test_each_contact_wire_has_its_name_role_facts_and_profile(
         }  # fmt: skip
         assert results.fact("wave_speed") == min(w.wave_speed for w in line.wires_of(Role.CONTACT))
         points, wires = results.line("node_points"), results.wires()
-        for name, (x, height) in results.contact_profiles().items():
-            np.testing.assert_allclose(x, points[wires[name], 0], atol=1e-12)
-            np.testing.assert_allclose(height, points[wires[name], 2], atol=1e-12)
+        for name, profile in results.contact_profiles().items():
+            np.testing.assert_allclose(profile.x, points[wires[name], 0], atol=1e-12)
+            np.testing.assert_allclose(profile.height, points[wires[name], 2], atol=1e-12)
         own = results.static("elasticity_of_wires")
         assert own.shape == (results.static("elasticity").size, 2)
         # A wire of 0.3 of the stiffness gives way more than one of 0.7, and both together least.
@@ -150,7 +150,10 @@ def test_films_show_the_wire_that_is_touched(tmp_path: Path, usual: dict[str, An
     assert data.contacts == [FIRST, SECOND]
     assert data.touched(10.0) == FIRST and data.touched(40.0) == SECOND
     x = np.array([2.0, 16.0, 24.0, 32.0, 46.0])
-    each = [np.interp(x, *profile, left=np.inf, right=np.inf) for profile in profiles.values()]
+    each = [
+        np.interp(x, profile.x, profile.height, left=np.inf, right=np.inf)
+        for profile in profiles.values()
+    ]
     np.testing.assert_allclose(data.rest_height(x), np.min(each, axis=0), atol=1e-12)
     assert data.touched(16.0) == FIRST and data.touched(32.0) == SECOND
 
