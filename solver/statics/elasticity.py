@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from catenary.meshgen.spans import Spans
+from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role
 from catenary.solver.model.links.links import Direction, at_nodes, at_places
 from catenary.solver.model.matrices import part_of
@@ -202,9 +202,20 @@ def _condensed(
     return (inner - change).tocsc(), given_way
 
 
-def middle_span(line: Spans) -> tuple[float, float]:
-    """Ends of the running span in the middle of the line [m]."""
+def middle_span(line: Line) -> tuple[float, float]:
+    """Ends of the running span in the middle of the line, outside overlaps [m].
+
+    Of the spans under the fewest contact wires it is the one that is nearest to the middle.
+    """
     masts = line.support_positions
     first, last = line.n_transition[0], line.n_spans - line.n_transition[1]
-    span = (first + last) // 2 if last > first else line.n_spans // 2
+    if last <= first:
+        first, last = 0, line.n_spans
+    wires = np.zeros(line.n_spans)
+    for piece in (piece for wire in line.wires_of(Role.CONTACT) for piece in wire.pieces):
+        begun = masts[:-1] < piece.x[-1] - _SAME_PLACE
+        wires += begun & (masts[1:] > piece.x[0] + _SAME_PLACE)
+    running = np.arange(first, last)
+    fewest = running[wires[first:last] == wires[first:last].min()]
+    span = int(fewest[np.argmin(np.abs(fewest - (first + last) // 2))])
     return float(masts[span]), float(masts[span + 1])

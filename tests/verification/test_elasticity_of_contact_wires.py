@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from contact_wires import one_wire, overlap, problem_on, twins
 from measuring import check, free_dofs, free_matrices
-from small_lines import mesh_of, train
+from small_lines import ac_simple_line, mesh_of, train
 
 from catenary.meshgen.line import Line
+from catenary.meshgen.topologies.all_topologies import make_line
+from catenary.meshgen.topologies.line_data import Overlaps
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.train.pantographs import nominal_height_rule
 from catenary.solver.model.model import Model
@@ -105,3 +109,12 @@ def test_the_nominal_height_of_twins_is_that_of_the_wire() -> None:
         rule = nominal_height_rule(wires, elasticity(model, *middle_span(line)))
         heights.append(rule(run.placements[0]))
     check("nominal height [m]", heights[1], heights[0], within=1e-9)
+
+
+def test_the_middle_span_is_outside_overlaps() -> None:
+    """An overlap over the middle leaves the nearest span beside it, under one contact wire."""
+    data = ac_simple_line(15)
+    for first, n_spans, span in (((5,), 4, 9), ((5,), 5, 4), ((1, 10), 4, 7), ((6,), 3, 5)):
+        line = make_line(replace(data, overlaps=Overlaps(first, n_spans, 0.6, 0.4)))
+        masts = line.support_positions
+        assert middle_span(line) == (masts[span], masts[span + 1]), (first, n_spans)

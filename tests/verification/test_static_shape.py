@@ -18,6 +18,7 @@ from small_lines import (
 )
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
+from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.base.errors import InputError
 from catenary.solver.statics.elasticity import middle_span
@@ -39,7 +40,7 @@ def flexible(line: LineData) -> LineData:
 
 def middle_droppers(line: LineData) -> slice:
     """The droppers of the middle span; all spans have equally many."""
-    span = round(middle_span(line)[0] / line.span_lengths[0])
+    span = round(middle_span(make_line(line))[0] / line.span_lengths[0])
     count = len(line.dropper_positions[0])
     return slice(span * count, (span + 1) * count)
 
@@ -135,7 +136,7 @@ def test_messenger_wire_is_the_funicular_curve_of_its_loads() -> None:
     wire = replace(line.messenger_wire, bending_stiffness=tension * rounding**2)
     line = replace(line, messenger_wire=wire)
     model, form = find_form(problem_of(line, WEIGHTS), mesh_of(line, 24))
-    start, end = middle_span(line)
+    start, end = middle_span(model.problem.line)
     nodes = model.mesh.wires[MESSENGER_WIRE]
     x = model.mesh.x(nodes)
     inside = (x > start - 1e-9) & (x < end + 1e-9)
