@@ -205,7 +205,7 @@ def _condensed(
 def middle_span(line: Line) -> tuple[float, float]:
     """Ends of the running span in the middle of the line, outside overlaps [m].
 
-    Of the spans under the fewest contact wires it is the one that is nearest to the middle.
+    Of the spans that the fewest contact wires reach, it is the one that is nearest to the middle.
     """
     masts = line.support_positions
     first, last = line.n_transition[0], line.n_spans - line.n_transition[1]
@@ -213,8 +213,8 @@ def middle_span(line: Line) -> tuple[float, float]:
         first, last = 0, line.n_spans
     wires = np.zeros(line.n_spans)
     for piece in (piece for wire in line.wires_of(Role.CONTACT) for piece in wire.pieces):
-        begun = masts[:-1] < piece.x[-1] - _SAME_PLACE
-        wires += begun & (masts[1:] > piece.x[0] + _SAME_PLACE)
+        begun = masts[:-1] < piece.x[-1] + _SAME_PLACE
+        wires += begun & (masts[1:] > piece.x[0] - _SAME_PLACE)
     running = np.arange(first, last)
     fewest = running[wires[first:last] == wires[first:last].min()]
     span = int(fewest[np.argmin(np.abs(fewest - (first + last) // 2))])
