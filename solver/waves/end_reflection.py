@@ -20,8 +20,9 @@ from catenary.solver.model.model import Model
 from catenary.solver.problem.ends import AbsorbingLayer, Periodic
 from catenary.solver.problem.problem import Damping
 
-# epsilon [1/s], and the least group velocity of a wave that counts as one that travels [m/s].
-_GROWTH, _SLOWEST = 1e-3, 2.0
+# epsilon [1/s], and the least group velocity of a wave that counts as one that travels [m/s], and
+# what of its amplitude is left after a span.
+_GROWTH, _SLOWEST, _LEFT = 1e-3, 2.0, 0.01
 
 
 @dataclass(frozen=True)
@@ -41,10 +42,24 @@ class EndReflection:
 
     def of_faster(self, speed: float) -> tuple[float, float]:
         """Largest and rms reflection of waves that outrun a train [m/s]; NaN if none does."""
-        found = self.reflected[self.group_velocity > speed]
+        found = self._of_faster(speed)
         if not found.size:
             return np.nan, np.nan
         return float(found.max()), float(np.sqrt((found**2).mean()))
+
+    def energy_of_faster(self, speed: float) -> tuple[float, float]:
+        """Largest and mean share of the energy of waves that outrun a train [m/s] that comes back,
+        the same energy coming at all frequencies with each wave; NaN if none does."""
+        largest, rms = self.of_faster(speed)
+        return largest**2, rms**2
+
+    def share_below(self, amplitude: float, speed: float) -> float:
+        """Of how many of the waves that outrun a train [m/s] less than an amplitude comes back."""
+        found = self._of_faster(speed)
+        return float((found < amplitude).mean()) if found.size else np.nan
+
+    def _of_faster(self, speed: float) -> np.ndarray:
+        return np.asarray(self.reflected[self.group_velocity > speed])
 
 
 def end_reflection(
@@ -54,7 +69,7 @@ def end_reflection(
 
     The line before the end is taken to repeat its span next to that. ``own_damping`` is whether
     both have the damping of the line, alpha and beta of the whole; it counts from where the end
-    begins.
+    begins. Waves of which it leaves less than a hundredth after a span do not count.
 
     Raises
     ------
@@ -166,7 +181,7 @@ def _reflection(
         here = answer[i] - line.end[i]
         # Imaginary parts are energy that goes by, in either direction.
         out = _flux(leaving, before[i])
-        for w in np.flatnonzero(speed > _SLOWEST):
+        for w in np.flatnonzero((speed > _SLOWEST) & (np.abs(factors) > _LEFT)):
             wave = waves[:, w]
             come = back @ wave / factors[w] + here @ wave
             gone = np.linalg.solve(leaving, np.linalg.solve(back @ inwards + here, -come))

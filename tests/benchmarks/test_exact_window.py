@@ -71,8 +71,16 @@ def marched(rest: LineAtRest, window: WindowChoice, seen: Forces | None) -> floa
             1 / 8,
         ),
         ("en50318_2002", (), 1 / 5),
+        (
+            "en50318_2002",
+            (
+                "train.pantographs=[{name='reference'},{name='reference',behind_m=200}]",
+                "train.start_m=300",
+            ),
+            1 / 5,
+        ),
     ],
-    ids=["paper, average", "paper, light", "EN 50318"],
+    ids=["paper, average", "paper, light", "reference", "reference, two pantographs"],
 )
 def test_an_exact_window_costs_what_waves_have_reached(
     case: str, words: tuple[str, ...], at_most: float

@@ -17,28 +17,44 @@ from catenary.solver.waves.end_reflection import EndReflection, end_reflection
 
 # Frequencies, and the least reflection that is drawn.
 _FIRST, _STEP, _LEAST = 0.5, 0.05, 1e-5
+# Of a layer, whose reflection changes within a tenth of a hertz beside the gaps between bands.
+_STEP_OF_LAYER = 0.02
+# Share of the energy that a line in the picture stands for.
+_LITTLE = 0.02
 
 
 def reflections_of(rest: LineAtRest) -> list[EndReflection]:
-    """What both ends send back, start first; none if the line's spans there are not alike. Not
-    collective."""
-    frequency = np.arange(_FIRST, HIGHEST + 0.5 * _STEP, _STEP)
-    try:
-        return [end_reflection(rest.model, side, frequency) for side in range(len(SIDES))]
-    except InputError:
-        return []
+    """What both ends send back, start first, with the line's own damping from where they begin.
+
+    None if the line's spans there are not alike. Not collective.
+    """
+    found = []
+    for side, end in enumerate(rest.problem.ends):
+        step = _STEP_OF_LAYER if isinstance(end, AbsorbingLayer) else _STEP
+        frequency = np.arange(_FIRST, HIGHEST + 0.5 * step, step)
+        try:
+            found.append(end_reflection(rest.model, side, frequency, own_damping=True))
+        except InputError:
+            return []
+    return found
 
 
 def reflection_rows(found: list[EndReflection], speed: float) -> list[dict[str, Any]]:
     """Figures of waves that outrun a train [m/s]."""
     rows = []
     for side, end in zip(SIDES, found, strict=False):
-        for name, value in zip(("largest", "rms"), end.of_faster(speed), strict=True):
-            meaning = f"{name} reflection of the {side} of the line, of waves that outrun the train"
-            rows.append(
-                {"name": f"{name}_reflection_{side}", "value": value, "unit": "-"}
-                | {"meaning": meaning}
-            )
+        of_what = f"the {side} of the line sends back of waves that outrun the train"
+        figures_of = (
+            ("largest_reflection", end.of_faster(speed)[0], "largest amplitude"),
+            ("rms_reflection", end.of_faster(speed)[1], "root mean square amplitude"),
+            ("largest_energy", end.energy_of_faster(speed)[0], "largest share of the energy"),
+            ("mean_energy", end.energy_of_faster(speed)[1], "mean share of the energy"),
+        )
+        rows += [
+            {"name": f"{name}_{side}", "value": value, "unit": "-"}
+            | {"meaning": f"{what} that {of_what}"}
+            for name, value, what in figures_of
+        ]
     return rows
 
 
@@ -79,6 +95,11 @@ def picture(
     axes.scatter(
         [], [], s=8.0, facecolors="none", edgecolors=figures.GREY, linewidths=0.5,
         label="slower waves",
+    )  # fmt: skip
+    axes.axhline(_LITTLE**0.5, color=figures.GREY, linewidth=0.8, linestyle="--", zorder=0)
+    axes.annotate(
+        f"{100.0 * _LITTLE:g} % of the energy", (HIGHEST, _LITTLE**0.5), (-3.0, 2.0),
+        textcoords="offset points", ha="right", va="bottom", fontsize="small", color=figures.GREY,
     )  # fmt: skip
     axes.set_yscale("log")
     axes.set_xlim(0.0, HIGHEST)
