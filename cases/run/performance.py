@@ -47,6 +47,7 @@ def performance(outcome: Outcome, phases: Phases, n_ranks: int) -> dict[str, Any
     return {
         "n_ranks": n_ranks,
         "march_wall_s": outcome.wall,
+        "march_cpu_s": outcome.cpu,
         "phase_wall_s": phases.wall,
         "inner_iterations": counted,
         "detour": outcome.detour,

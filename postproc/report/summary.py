@@ -44,6 +44,7 @@ def summarise(
         "dt_s": results.dt,
         "simulated_s": results.simulated,
         "march_wall_s": attributes.get("march_wall_s"),
+        "march_cpu_s": attributes.get("march_cpu_s"),
         "real_time_factor": real_time_factor(results),
         "phase_wall_s": attributes.get("phase_wall_s", {}),
         "inner_iterations": attributes.get("inner_iterations", {}),

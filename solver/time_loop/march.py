@@ -58,16 +58,18 @@ from catenary.solver.window.moving_columns import MovingColumns
 class Outcome:
     """How a march ended.
 
-    ``outcome`` is "done", "interrupted" or the sentence of what broke; ``wall`` [s] the time of
-    the time loop alone, changes of the line on the way included; ``simulated`` [s]; ``n_steps``
-    taken; ``counters`` of the scheme; ``traffic`` is how many messages and bytes a rank sent a
-    step since the line changed last, the one that sent most: to its neighbours, and each sum and
-    broadcast as one; None on one rank, or if not counted; ``detour`` says why steps of the line
-    took longer than they could, empty if they did not.
+    ``outcome`` is "done", "interrupted" or the sentence of what broke; ``wall`` [s] the time of the
+    time loop alone, changes of the line on the way included, and ``cpu`` [s] what of it this
+    process computed, whatever else the machine did; ``simulated`` [s]; ``n_steps`` taken;
+    ``counters`` of the scheme; ``traffic`` is how many messages and bytes a rank sent a step since
+    the line changed last, the one that sent most: to its neighbours, and each sum and broadcast as
+    one; None on one rank, or if not counted; ``detour`` says why steps of the line took longer than
+    they could, empty if they did not.
     """
 
     outcome: str
     wall: float
+    cpu: float
     simulated: float
     n_steps: int
     counters: dict[str, int] = field(default_factory=dict)
@@ -281,7 +283,7 @@ class March:
         except RunBroken:
             ts.destroy()
             raise
-        begin = clock.perf_counter()
+        begin, computed = clock.perf_counter(), clock.process_time()
         try:
             audience.show(lambda: self._showing.view(first, first * dt))
         except RunBroken as error:
@@ -300,7 +302,7 @@ class March:
             since = happened.step
             ts = self._make_ts(audience, stop_requested, since, end)
             self._advance(ts)
-        wall = clock.perf_counter() - begin
+        wall, cpu = clock.perf_counter() - begin, clock.process_time() - computed
         if self._stepper.broken:
             # The error's traceback may still hold the TS, which PETSc would then free, with the
             # help of Python, when Python has ended.
@@ -317,6 +319,7 @@ class March:
         return Outcome(
             outcome,
             wall,
+            cpu,
             n_steps * self._problem.numerics.dt,
             n_steps,
             self._scheme.counters.as_dict(),

@@ -34,6 +34,7 @@ TOP = {
     "dt_s": NUMBER,
     "simulated_s": NUMBER,
     "march_wall_s": NUMBER,
+    "march_cpu_s": NUMBER,
     "real_time_factor": NUMBER,
     "phase_wall_s": dict,
     "evaluation_m": list,

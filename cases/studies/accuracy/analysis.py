@@ -66,7 +66,7 @@ class Row:
     errors : quantity -> difference from the reference in its unit, of the pantograph where it is
         largest, signed (``HISTORY``: rms)
     percent : quantity -> its magnitude in percent of the reference's scale
-    cost : wall time of the march per simulated second, the least of all timings [s/s]
+    cost : processor time of the march per simulated second, the least of all timings [s/s]
     timings : how many runs that is the least of
     estimate : the run's own estimate of the error of the history [N]
     iterations : rounds a step takes: of its small problem, or corrections (whole solves)

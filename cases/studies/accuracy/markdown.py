@@ -36,8 +36,8 @@ def page(
         f"{counted(round(found.wall / 60.0), 'minute')}. Errors in percent: of the reference's own "
         "value for mean, deviations and uplift, of its standard deviation for maximum, minimum and "
         'the force "history" (rms). "est/true" is the error that a run estimates itself over the '
-        'true one, "rounds" the solves of the small problem a step, "s/s" wall time of the march '
-        "per simulated second, the least of those timed: only ratios within this page mean "
+        'true one, "rounds" the solves of the small problem a step, "s/s" processor time of the '
+        "march per simulated second, the least of those timed: only ratios within this page mean "
         "anything. Where step and mesh are refined together, errors of the history by the step and "
         "by the mesh alone stand beside the whole error, in which they may cancel.",
     ]

@@ -136,7 +136,7 @@ def draw(found: Measured) -> Figure:
     _name(axes, fronts)
     figures.tidy(
         axes,
-        "wall time of the march per simulated second [s/s]",
+        "processor time of the march per simulated second [s/s]",
         "error of the force history, 0-20 Hz [% of sigma]",
         f"{found.plan.case}: accuracy and cost",
     )
