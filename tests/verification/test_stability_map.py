@@ -33,13 +33,14 @@ def bench() -> Bench:
     rest = line_at_rest(problem, mesh_of(en50318_line(3), 3))
     wire = ContactWires(rest.model, rest.form, distribute(rest.model, 1, 0))
     place = theory.lightest_place(rest.model, wire, 60.0, 120.0)
+    assert place is not None
     return Bench(rest, EN_PANTOGRAPH, place, MPI.COMM_SELF)
 
 
 def line_at(bench: Bench, n_vectors: int = theory.N_VECTORS) -> theory.PointModel:
     model = bench.rest.model
     wire = ContactWires(model, bench.rest.form, distribute(model, 1, 0))
-    return theory.point_model(model, theory.load_at(wire, bench.x, model.n_dofs), n_vectors)
+    return theory.point_model(model, theory.loads_at(wire, bench.x, model.n_dofs), n_vectors)
 
 
 def head(mass: float) -> LumpedData:
@@ -88,7 +89,7 @@ def test_a_line_as_a_point_sees_it_is_the_line(bench: Bench) -> None:
     radius beyond the limit, where one eigenvalue of the contact stands out."""
     model = bench.rest.model
     wire = ContactWires(model, bench.rest.form, distribute(model, 1, 0))
-    load = theory.load_at(wire, bench.x, model.n_dofs)
+    load = theory.loads_at(wire, bench.x, model.n_dofs)
     mass, stiffness, damping = (part.toarray() for part in theory.matrices(model))
     line = line_at(bench)
     step = theory.Step(2e-3, *NEWMARK)
@@ -96,11 +97,14 @@ def test_a_line_as_a_point_sees_it_is_the_line(bench: Bench) -> None:
         linalg.block_diag(mass, np.diag(EN_PANTOGRAPH.masses)),
         linalg.block_diag(stiffness, EN_PANTOGRAPH.chain(EN_PANTOGRAPH.stiffnesses)),
         linalg.block_diag(damping, EN_PANTOGRAPH.chain(EN_PANTOGRAPH.dampings)),
-        np.concatenate([-load, [1.0, 0.0]]),
+        np.concatenate([-load, [[1.0], [0.0]]]),
     )
     reduced = theory.couple(line, EN_PANTOGRAPH)
     check(
-        "effective mass [kg]", line.mass, 1.0 / (load @ np.linalg.solve(mass, load)), within=1e-12
+        "effective mass [kg]",
+        line.mass,
+        1.0 / float((load.T @ np.linalg.solve(mass, load))[0, 0]),
+        within=1e-12,
     )
     # Round-off of Lanczos's method, orthogonalised twice.
     ratios = [theory.exchange_ratio(both, step, 1e6) for both in (reduced, whole)]
@@ -150,3 +154,27 @@ def test_the_map_of_a_case_is_found_drawn_and_written() -> None:
     # A march that contradicts theory is told, not hidden.
     wrong = replace(found.limits[1], stable=2 * rule, unstable=2.1 * rule)
     assert not wrong.agrees
+
+
+@pytest.mark.parametrize(
+    ("case", "n_wires"),
+    [
+        ("re330_stitched", 1),
+        ("shinkansen_compound", 1),
+        ("dc_twin", 2),
+        ("overlap", 2),
+        ("ac_simple_3d", 1),
+    ],
+)
+def test_lines_of_other_topologies_have_maps(case: str, n_wires: int) -> None:
+    """The head touches all wires above it: two of a twin line and of an overlap, which the rule for
+    one wire would give steps that are too long by a sixth and more."""
+    grid = Grid((1e6,), (2.0,), (1e6,), (2.0,))
+    found = make_map(case, [], True, MPI.COMM_SELF, grid)
+    for one in found.limits:
+        print(f"{case} {one.coupling}: theory {one.theory:.4g}, marched {one.marched:.4g} s")
+    assert found.n_wires == n_wires
+    assert all(one.agrees for one in found.limits)
+    explicit = found.of("explicit")[0]
+    check("omega dt = 2", explicit.theory, explicit.closed_form, within=2e-3 * explicit.theory)
+    assert ("2 contact wires meet" in draw(found).get_suptitle()) == (n_wires == 2)

@@ -1,18 +1,19 @@
-"""Stability of the coupling schemes from the matrices of a step: line, head and penalty contact.
+"""Stability of the coupling schemes from the matrices of a step: line, head and penalty contacts.
 
-The line is reduced to what a force on one point of the contact wire can move: Lanczos's method
-on M^-1 K from M^-1 b, b being the load of a unit force there. What it leaves out is moved only
+A head touches each contact wire that runs over its place. The line is reduced to what forces there
+can move: Lanczos's method on M^-1 K from M^-1 b, b being the loads of unit forces, one after the
+other (a band of them: A. Ruhe, Math. Comp. 33 (1979) 680-687). What it leaves out is moved only
 later, by way of what is in (a step of n vectors is exact to 2 n moments; B. N. Parlett, The
 Symmetric Eigenvalue Problem, chapter 13). With proportional damping the reduced C is exact too.
 
-With d = (line, masses of the pantograph) and r so that the contact's depth is r . d, a step of
-Newmark's method is
+With d = (line, masses of the pantograph) and columns r so that depths of contacts are r^T d, a step
+of Newmark's method is
 
-    A a = -C v* - K d* - k_i r (r . d) - k_e r (r . d*),        A = M + gamma dt C + beta dt^2 K
+    A a = -C v* - K d* - k_i r r^T d - k_e r r^T d*,        A = M + gamma dt C + beta dt^2 K
 
 with predictions d*, v* and the contact stiffness k as k_i (implicit) or k_e (explicit). Exchanges
-of forces and motions, by ``iterated`` or the fixed-point correction, multiply an error of the
-force by k beta dt^2 r . A^-1 r.
+of forces and motions, by ``iterated`` or the fixed-point correction, multiply errors of the forces
+by k beta dt^2 r^T A^-1 r.
 """
 
 from __future__ import annotations
@@ -34,14 +35,16 @@ N_VECTORS = 40
 # Radii up to this are stable: eigenvalues of a mass that nothing holds are 1 twice, with a block
 # of Jordan's, whose eigenvalues are only found to the root of round-off.
 STABLE = 1.0 + 1e-6
+# A head meets wires together whose heights differ by no more [m], some times the depth of a march.
+_AS_HIGH = 5e-3
 
 
 @dataclass(frozen=True)
 class PointModel:
-    """The line reduced to one point of the contact wire.
+    """The line reduced to one place, where c contact wires run.
 
-    ``stiffness`` and ``damping`` (n, n) for a mass matrix of ones; ``load`` (n,) of a unit force,
-    and height there of unit displacements [1/sqrt(kg)].
+    ``stiffness`` and ``damping`` (n, n) for a mass matrix of ones; ``load`` (n, c) of a unit force
+    on each wire, and heights there of unit displacements [1/sqrt(kg)].
     """
 
     stiffness: np.ndarray
@@ -50,8 +53,9 @@ class PointModel:
 
     @property
     def mass(self) -> float:
-        """What a force at the point meets before anything else has moved [kg]: 1 / b . M^-1 b."""
-        return float(1.0 / (self.load @ self.load))
+        """What forces there meet before anything else has moved [kg], at the least: of one wire
+        1 / b . M^-1 b."""
+        return 1.0 / _largest(self.load.T @ self.load)
 
 
 @dataclass(frozen=True)
@@ -65,9 +69,9 @@ class Step:
 
 @dataclass(frozen=True)
 class Coupled:
-    """Line and pantograph on two sides of a contact.
+    """Line and pantograph on two sides of c contacts.
 
-    ``mass``, ``stiffness``, ``damping`` (n, n) of both; ``depth`` (n,) the contact's depth for
+    ``mass``, ``stiffness``, ``damping`` (n, n) of both; ``depth`` (n, c) the contacts' depths for
     unit displacements.
     """
 
@@ -86,70 +90,93 @@ def matrices(model: Model) -> tuple[csc_matrix, csc_matrix, csc_matrix]:
     )
 
 
-def load_at(wire: ContactWires, x: float, n_dofs: int) -> np.ndarray:
-    """Load of a unit force on the contact wire at ``x`` [m], shape (n_dofs,)."""
-    touch = wire.touches(np.array([x]))[0]
-    dofs = wire.dofs[touch["element"] + np.array([0, 1])].ravel()
-    load = np.zeros(n_dofs)
-    load[dofs] = touch["whole_value"]
-    return load
+def loads_at(wires: ContactWires, x: float, n_dofs: int) -> np.ndarray:
+    """Loads of unit forces on the c contact wires that run at ``x`` [m], shape (n_dofs, c)."""
+    touches = wires.touches(np.full(wires.n_wires, x), np.arange(wires.n_wires))
+    touches = touches[touches["present"] > 0.0]
+    loads = np.zeros((n_dofs, touches.size))
+    for load, touch in zip(loads.T, touches, strict=True):
+        dofs = wires.dofs[touch["element"] + np.array([0, 1])].ravel()
+        load[dofs] = touch["whole_value"]
+    return loads
 
 
-def lightest_place(model: Model, wire: ContactWires, low: float, high: float) -> float:
-    """Where in [low, high] [m] the contact wire meets a force with the least mass.
+def lightest_place(
+    model: Model, wires: ContactWires, low: float, high: float, every: bool = False
+) -> float | None:
+    """Where in [low, high] [m] the contact wires meet forces with the least mass.
 
-    An element's ends and eight places in between are tried. Not collective.
+    Ends of elements and eight places in between are tried, of those where a head meets the most
+    wires; None where wires are too far apart in height for that, or if ``every`` one is wanted and
+    nowhere met. Not collective.
     """
     mass = splu(matrices(model)[0])
-    first, last = wire.nodes_between(low, high)
-    x = wire.x[first:last]
     share = np.arange(9) / 8.0
-    places = np.unique(
-        np.concatenate([a + share * (b - a) for a, b in zip(x, x[1:], strict=False)])
-    )
+    found = [np.zeros(0)]
+    for number in range(wires.n_wires):
+        first, last = wires.nodes_between(low, high, number)
+        x = wires.x[first:last]
+        found += [a + share * (b - a) for a, b in zip(x, x[1:], strict=False)]
+    places = np.unique(np.concatenate(found))
     places = places[(places >= low) & (places <= high)]
+    heights = np.array([wires.rest_height_of(wire, places) for wire in range(wires.n_wires)])
+    there = np.isfinite(heights)
+    spread = np.where(there, heights, -np.inf).max(0) - np.where(there, heights, np.inf).min(0)
+    met = np.where(spread <= _AS_HIGH, there.sum(axis=0), 0)
+    most = met.max(initial=0)
+    if most == 0 or (every and most < wires.n_wires):
+        return None
+    places = places[met == most]
 
     def softness(place: float) -> float:
-        load = load_at(wire, place, model.n_dofs)
-        return float(load @ mass.solve(load))
+        loads = loads_at(wires, place, model.n_dofs)
+        return _largest(loads.T @ mass.solve(loads))
 
     return float(max(places, key=softness))
 
 
-def point_model(model: Model, load: np.ndarray, n_vectors: int = N_VECTORS) -> PointModel:
-    """The line reduced to a force with this ``load`` (n_dofs,). Not collective."""
+def _largest(symmetric: np.ndarray) -> float:
+    """The largest eigenvalue."""
+    return float(linalg.eigvalsh(symmetric)[-1])
+
+
+def point_model(model: Model, loads: np.ndarray, n_vectors: int = N_VECTORS) -> PointModel:
+    """The line reduced to forces with these ``loads`` (n_dofs, c), by so many vectors for each. Not
+    collective."""
     mass, stiffness, damping = matrices(model)
     factor = splu(mass)
-    start = factor.solve(load)
-    norm = float(np.sqrt(start @ load))
-    basis = np.zeros((model.n_dofs, n_vectors))
-    vector, n = start / norm, 0
-    while True:
-        basis[:, n] = vector
-        n += 1
-        if n == n_vectors:
-            break
-        vector = factor.solve(stiffness @ vector)
+    most = n_vectors * loads.shape[1]
+    basis, n = np.zeros((model.n_dofs, most)), 0
+    # What the loads move at once, then what each of those vectors does.
+    next_ones = [factor.solve(load) for load in loads.T]
+    done = 0
+    while n < most and (next_ones or done < n):
+        if next_ones:
+            vector = next_ones.pop(0)
+        else:
+            vector, done = factor.solve(stiffness @ basis[:, done]), done + 1
         size = float(np.sqrt(vector @ (mass @ vector)))
         for _ in range(2):  # once loses digits
             vector = vector - basis[:, :n] @ (basis[:, :n].T @ (mass @ vector))
         left = float(np.sqrt(vector @ (mass @ vector)))
-        if left < 1e-10 * size:  # the force can move no more than this
-            break
-        vector = vector / left
+        if left < 1e-10 * size:  # it moves no more than what is there
+            continue
+        basis[:, n] = vector / left
+        n += 1
     basis = basis[:, :n]
-    unit = np.zeros(n)
-    unit[0] = norm
-    return PointModel(basis.T @ (stiffness @ basis), basis.T @ (damping @ basis), unit)
+    return PointModel(basis.T @ (stiffness @ basis), basis.T @ (damping @ basis), basis.T @ loads)
 
 
 def couple(line: PointModel, data: LumpedData) -> Coupled:
-    """Line and chain of masses, without the spring of the contact."""
+    """Line and chain of masses, without the springs of the contacts."""
+    n_wires = line.load.shape[1]
+    head = np.zeros((data.n_masses, n_wires))
+    head[0] = 1.0
     return Coupled(
-        linalg.block_diag(np.eye(line.load.size), np.diag(data.masses)),
+        linalg.block_diag(np.eye(len(line.load)), np.diag(data.masses)),
         linalg.block_diag(line.stiffness, data.chain(data.stiffnesses)),
         linalg.block_diag(line.damping, data.chain(data.dampings)),
-        np.concatenate([-line.load, [1.0], np.zeros(data.n_masses - 1)]),
+        np.concatenate([-line.load, head]),
     )
 
 
@@ -159,9 +186,9 @@ def step_matrix(both: Coupled, step: Step, implicit: float, explicit: float) -> 
     ``implicit`` and ``explicit`` are the parts of the contact's stiffness [N/m] that act at the
     end of the step and at the prediction.
     """
-    n, dt, beta, gamma = both.depth.size, step.dt, step.beta, step.gamma
+    n, dt, beta, gamma = len(both.depth), step.dt, step.beta, step.gamma
     one, none = np.eye(n), np.zeros((n, n))
-    spring = np.outer(both.depth, both.depth)
+    spring = both.depth @ both.depth.T
     stiffness = both.stiffness + implicit * spring
     operator = both.mass + gamma * dt * both.damping + beta * dt**2 * stiffness
     place = np.hstack([one, one, (0.5 - beta) * one])
@@ -178,11 +205,11 @@ def radius(both: Coupled, step: Step, stiffness: float, coupling: str) -> float:
 
 
 def exchange_ratio(both: Coupled, step: Step, stiffness: float) -> float:
-    """What an exchange of forces and motions multiplies an error of the force by."""
+    """What an exchange of forces and motions multiplies errors of the forces by, at most."""
     operator = both.mass + step.gamma * step.dt * both.damping
     operator = operator + step.beta * step.dt**2 * both.stiffness
     answer = linalg.solve(operator, both.depth, assume_a="sym")
-    return float(stiffness * step.beta * step.dt**2 * (both.depth @ answer))
+    return stiffness * step.beta * step.dt**2 * _largest(both.depth.T @ answer)
 
 
 def largest_step(
@@ -218,11 +245,11 @@ def largest_step(
 
 
 def closed_form(line: PointModel, head_mass: float, stiffness: float) -> float:
-    """Step [s] at which omega dt = 2, omega^2 = k (1 / m_head + 1 / m_wire).
+    """Step [s] at which omega dt = 2: of one wire omega^2 = k (1 / m_head + 1 / m_wire).
 
     For average acceleration. At the limit of the explicit coupling the motion changes its sign
     from step to step; a = (-1)^n a_0 then leaves d = v = 0 at the ends of steps, so that neither
     springs nor dampers act, and only masses resist: a = M^-1 r f, r . d* = dt^2 / 4 r . a. For
     exchanges it is the limit where springs and dampers within the step do not count, A = M.
     """
-    return float(2.0 / np.sqrt(stiffness * (1.0 / head_mass + 1.0 / line.mass)))
+    return float(2.0 / np.sqrt(stiffness * _largest(line.load.T @ line.load + 1.0 / head_mass)))

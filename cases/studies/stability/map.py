@@ -30,6 +30,7 @@ from catenary.solver.base.errors import InputError
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.elasticity import middle_span
+from catenary.solver.statics.line_at_rest import LineAtRest
 
 # Newmark's method and a linear problem: one contact that neither parts nor damps, taut droppers.
 _LINEAR = (
@@ -124,7 +125,8 @@ class Limit:
 @dataclass(frozen=True)
 class StabilityMap:
     """A map: ``limits``, its ``grid``, where on the line [m], what a force meets there [kg], and
-    the case with its own stiffness [N/m] or None, head mass [kg] and step [s]."""
+    the case with its own stiffness [N/m] or None, head mass [kg] and step [s]; how many contact
+    wires run there, ``n_wires``."""
 
     case: str
     limits: Sequence[Limit]
@@ -132,6 +134,7 @@ class StabilityMap:
     place: float
     wire_mass: float
     own: tuple[float | None, float, float]
+    n_wires: int = 1
 
     def of(self, coupling: str, **fixed: float) -> list[Limit]:
         """Limits of a coupling with a given ``stiffness`` or ``head_mass``."""
@@ -170,9 +173,9 @@ def make_map(
     rest = at_rest(scene, comm)
     data = rest.problem.train.placements[0].data
     assert isinstance(data, LumpedData)  # the scene was refused otherwise
-    wire = ContactWires(rest.model, rest.form, distribute(rest.model, 1, 0))
-    place = theory.lightest_place(rest.model, wire, *middle_span(rest.problem.line))
-    line = theory.point_model(rest.model, theory.load_at(wire, place, rest.model.n_dofs))
+    wires = ContactWires(rest.model, rest.form, distribute(rest.model, 1, 0))
+    place = _place(rest, wires)
+    line = theory.point_model(rest.model, theory.loads_at(wires, place, rest.model.n_dofs))
     bench = Bench(rest, data, place, comm)
     pairs, limits = grid.pairs(), []
     for number, (stiffness, mass) in enumerate(pairs, start=1):
@@ -183,8 +186,25 @@ def make_map(
     linear = own.contact.law == "linear"
     own_point = (own.contact.stiffness_N_per_m if linear else None, data.masses[0])
     return StabilityMap(
-        own.case.name, limits, grid, place, line.mass, (*own_point, own.numerics.dt_s)
+        own.case.name,
+        limits,
+        grid,
+        place,
+        line.mass,
+        (*own_point, own.numerics.dt_s),
+        line.load.shape[1],
     )
+
+
+def _place(rest: LineAtRest, wires: ContactWires) -> float:
+    """Where heads are tried [m]: in the middle span, or where a head passes from one wire to the
+    next if the line has such a place and all its contact wires do not run in that span."""
+    spans = middle_span(rest.problem.line)
+    place = theory.lightest_place(rest.model, wires, *spans, every=True)
+    if place is None:
+        place = theory.lightest_place(rest.model, wires, *rest.problem.line.running_range)
+    assert place is not None  # between overlaps a head meets one wire alone
+    return place
 
 
 def find(
@@ -235,10 +255,7 @@ def as_rows(found: StabilityMap) -> list[dict[str, Any]]:
 
 def as_text(found: StabilityMap) -> str:
     """A sentence for each coupling."""
-    lines = [
-        f"{found.case} at {found.place:.2f} m, where the contact wire meets a force with "
-        f"{found.wire_mass:.3g} kg:"
-    ]
+    lines = [f"{found.case} at {found.place:.2f} m, where {meets(found)} {found.wire_mass:.3g} kg:"]
     for coupling in COUPLINGS:
         limits = found.of(coupling)
         agree = sum(one.agrees for one in limits)
@@ -249,6 +266,13 @@ def as_text(found: StabilityMap) -> str:
             text = f"marched limits within {100 * apart:.2g} % of theory's"
         lines.append(f"  {coupling:12} {text}; {agree} of {len(limits)} agree")
     return "\n".join(lines)
+
+
+def meets(found: StabilityMap) -> str:
+    """Words on what meets the head there."""
+    if found.n_wires == 1:
+        return "the contact wire meets a force with"
+    return f"{found.n_wires} contact wires meet forces with"
 
 
 def in_ms(dt: float) -> str:

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from catenary.cases.scene.tables.run.numerics import MAX_DT
-from catenary.cases.studies.stability.map import Limit, StabilityMap
+from catenary.cases.studies.stability.map import Limit, StabilityMap, meets
 from catenary.postproc.report.pictures import figures
 
 _MARKERS = {"explicit": "o", "iterated": "s", "fixed_point": "^"}
@@ -58,7 +58,7 @@ def draw(found: StabilityMap) -> Figure:
     left.text(0.03, 0.03, word, transform=left.transAxes, va="bottom", fontsize="small")
     figure.suptitle(
         f"{found.case}: stability of the couplings while contact lasts and droppers are taut (the "
-        f"linear system);\nthe wire meets a force with {found.wire_mass:.2g} kg",
+        f"linear system);\n{meets(found)} {found.wire_mass:.2g} kg",
         x=0.01,
         ha="left",
         fontsize="medium",
