@@ -180,8 +180,10 @@ def _estimate(summary: dict[str, Any]) -> float:
 def _cost(one: Ended) -> float:
     """Processor time of a march [s], which other work of the machine disturbs little; wall time of
     a run of a version that did not tell it."""
-    told = one.summary.get("march_cpu_s")
-    return float(told if is_number(told, 0.0) else one.summary["march_wall_s"])
+    told: Any = one.summary.get("march_cpu_s")
+    if not is_number(told, 0.0):
+        told = one.summary["march_wall_s"]
+    return float(told)
 
 
 def _work(one: Ended) -> float:
