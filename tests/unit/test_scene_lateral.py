@@ -49,6 +49,10 @@ def test_a_messenger_wire_has_a_stagger_of_its_own() -> None:
         ),
         ([ON, "line.steady_arm.inclination_deg=40"], "inclination_deg"),
         (
+            [ON, "line.steady_arm.inclination_deg=10", "line.steady_arm.length_m=0"],
+            "line.steady_arm .* needs length_m above 0 for inclination_deg",
+        ),
+        (
             ["line.steady_arm.stiffness_by_radial_force=true", "line.steady_arm.length_m=0"],
             "needs length_m above 0 for stiffness_by_radial_force",
         ),

@@ -68,6 +68,12 @@ class SteadyArmTable(Table):
         return self
 
     @model_validator(mode="after")
+    def _a_bar_to_incline(self) -> SteadyArmTable:
+        if self.inclination_deg is not None and not self.length_m:
+            raise ValueError("needs length_m above 0 for inclination_deg")
+        return self
+
+    @model_validator(mode="after")
     def _one_stiffness(self) -> SteadyArmTable:
         if self.stiffness_by_radial_force and self.stiffness_N_per_m:
             raise ValueError(
