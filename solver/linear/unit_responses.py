@@ -35,11 +35,14 @@ _PROBES = 12
 # What may stand outside of windows that are made narrower, and how much wider they are than seen.
 # A column that is cut there acts like a force of this share beside its own: 1e-10 N.
 _FELT, _MARGIN = 1e-12, 1.1
+# What may stand outside of windows that cannot be made wider any more: a force of 1e-7 N beside its
+# own. Columns fade with the way, so that this bears them half as wide again as those tried.
+FELT_AT_MOST = 1e-9
 # By how much that reach grows where some column is felt further.
 _MORE = 1.5
 
 
-class _FeltFurther(RunBroken):
+class FeltFurther(RunBroken):
     """A column reaches further than those that were tried; raised on all ranks."""
 
 
@@ -136,7 +139,7 @@ class UnitResponses:
             try:
                 at, data = self.solve(places, like, reach)
                 return ShortColumns(places.begin, at, places.width, data, reach)
-            except _FeltFurther:
+            except FeltFurther:
                 # What was tried for the reach were some of the columns.
                 reach = min(self.windows.reach, _MORE * reach)
                 windows = self.windows._replace(reach=reach)
@@ -158,12 +161,13 @@ class UnitResponses:
         return places, windows.reach
 
     def solve(
-        self, places: Places, like: LikeStations, reach: float
+        self, places: Places, like: LikeStations, reach: float, felt: float = _FELT
     ) -> tuple[np.ndarray, np.ndarray]:
         """Where the columns of ``places`` begin, and their numbers, as ``ShortColumns`` has them.
 
         Collective; ``like`` are marks of all stations that the windows of these reach, which is
-        ``reach`` [m]. Raises as ``columns``.
+        ``reach`` [m]. Raises as ``columns``, and FeltFurther where windows are narrower than the
+        reach of A^-1 and more than ``felt`` of a column stands outside.
         """
         chosen, kinds = self._kinds(places, like)
         size = places.width[chosen] * places.dofs.shape[1]
@@ -174,9 +178,9 @@ class UnitResponses:
         bands = self._bands(end)
         for stretch in _stretches(places.x, chosen):
             leak = max(leak, self._fill(bands, places, chosen[stretch], at[stretch], data))
-        allowed = _LEAK if reach >= self.windows.reach else _FELT
+        allowed = _LEAK if reach >= self.windows.reach else felt
         if self._comm.allreduce(leak, op=MPI.MAX) > allowed:
-            kind = RunBroken if reach >= self.windows.reach else _FeltFurther
+            kind = RunBroken if reach >= self.windows.reach else FeltFurther
             raise kind(
                 f"the response to a point load does not decay within {reach:.0f} m; give the scene "
                 "a smaller numerics.dt_s"

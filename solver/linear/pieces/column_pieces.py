@@ -6,9 +6,15 @@ from collections.abc import Callable
 
 import numpy as np
 
+from catenary.solver.base.errors import RunBroken
 from catenary.solver.linear.pieces.operator_pieces import OperatorPieces
 from catenary.solver.linear.pieces.pieces import Piece
-from catenary.solver.linear.unit_responses import ShortColumns, UnitResponses
+from catenary.solver.linear.unit_responses import (
+    FELT_AT_MOST,
+    FeltFurther,
+    ShortColumns,
+    UnitResponses,
+)
 
 Made = Callable[[ShortColumns, np.ndarray], None]
 
@@ -78,7 +84,16 @@ class ColumnPieces:
             return
         columns, first = self.columns, piece.slot * self._room
         like = self._operators.like
-        at, data = self._responses.solve(self._places.of_numbers(which), like, columns.reach)
+        places = self._places.of_numbers(which)
+        try:
+            # Room and reach are those of all pieces.
+            at, data = self._responses.solve(places, like, columns.reach, FELT_AT_MOST)
+        except FeltFurther as error:
+            raise RunBroken(
+                f"near {places.x.mean():.0f} m the line answers further from a force than the "
+                f"{columns.reach:.0f} m of where it was tried, which a window cannot follow; set "
+                "window.mode to off"
+            ) from error
         columns.at[which] = first + at
         columns.data[first : first + data.size] = data
         self._made(columns, which)
