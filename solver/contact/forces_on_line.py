@@ -38,6 +38,7 @@ class ForcesOnLine:
 
     Parameters
     ----------
+    wires : the contact wires, whose nodes get columns for this line
     range_of_run : stretch of the contact wires that pan heads will touch [m]
     candidates : pairs (n,) of strip and contact wire
     train_speed : V of the convective part of the gap rate [m/s]
@@ -51,6 +52,7 @@ class ForcesOnLine:
         comm: Any,
         model: Model,
         form: Equilibrium,
+        wires: ContactWires,
         line: LineIntegrator,
         range_of_run: tuple[float, float],
         candidates: Candidates,
@@ -60,11 +62,11 @@ class ForcesOnLine:
         across: np.ndarray,
     ) -> None:
         self.line = line
-        self.wires = ContactWires(model, form, line.ownership)
+        self.wires = wires
         self.links = FollowedLinks(table, line)
         # A force on an unknown that is held, at an anchor, moves nothing.
-        free = np.ones(model.n_dofs)
-        free[model.constrained] = 0.0
+        free = np.ones(model.n_dofs, dtype=bool)
+        free[model.constrained] = False
         self._free = free[line.ownership.first : line.ownership.last]
         node_columns, reach = self._columns_of_nodes(range_of_run, free)
         columns = NO_COLUMNS
@@ -181,7 +183,7 @@ class ForcesOnLine:
         """Columns of A^-1 for the nodes in a stretch of the wires, each with the place of its own,
         and how far off a force on them is felt [m].
 
-        Collective; ``free`` (n_dofs,) is zero for the unknowns that are held.
+        Collective; ``free`` (n_dofs,) is whether an unknown is not held.
         """
         # Places that are solved for together share their round-off. With the next ones, columns at
         # the end of a run are to the last bit those of one that goes further.
@@ -196,6 +198,6 @@ class ForcesOnLine:
             nodes["begin"][mine], nodes["at"][mine] = found.start[which], found.at[which]
             nodes["width"][mine] = found.width[which]
 
-        line, places = self.line, (dofs, free[dofs], self.wires.x[chosen])
+        line, places = self.line, (dofs, free[dofs].astype(float), self.wires.x[chosen])
         found = columns_of(line.responses, line.operators.in_pieces, places, put)
         return found.data, found.reach

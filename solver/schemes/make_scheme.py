@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.train.pantographs import Pantographs
@@ -60,10 +61,17 @@ class SchemeFactory:
     ownership: Ownership
     nominal_height: Callable[[Placement], float]
 
-    def make(self, problem: Problem, changed: ChangedLine, pantographs: Pantographs) -> Parts:
+    def make(
+        self,
+        problem: Problem,
+        changed: ChangedLine,
+        pantographs: Pantographs,
+        wires: ContactWires | None = None,
+    ) -> Parts:
         """The parts for the problem's numerics, of a line at rest. Collective.
 
-        ``pantographs`` are those of the problem, made for the same numerics.
+        ``pantographs`` are those of the problem, made for the same numerics; ``wires`` those of
+        the line that no other parts have, made here if None.
         """
         comm, model, train = self.comm, changed.model, problem.train
         # Droppers may have another tension in the first rest than they had then.
@@ -81,6 +89,7 @@ class SchemeFactory:
             comm,
             model,
             own.form,
+            wires or ContactWires(model, own.form, self.ownership),
             line,
             (train.start - trailing - pantographs.reach[0], train.end + pantographs.reach[1]),
             pantographs.candidates,

@@ -123,7 +123,8 @@ class March:
         self._pantographs = Pantographs(comm, problem, effects, self._wire, height)
         self._moving = MovingColumns()
         self._set_ups = SchemeFactory(comm, form, self.ownership, self._nominal_height)
-        self._set_up(unchanged(model, form))
+        # Of a long line they are so large that the first parts take those that there are.
+        self._set_up(unchanged(model, form), self._wire)
         self._set_off(model)
         self._showing.cross(0.0)
         give_back()
@@ -133,10 +134,10 @@ class March:
         if self.detour is not None and comm.rank == 0:
             log_detour(self.detour)
 
-    def _set_up(self, changed: ChangedLine) -> None:
+    def _set_up(self, changed: ChangedLine, wires: ContactWires | None = None) -> None:
         """Make all that steps a line and shows it, from a line that is at rest. Collective."""
         self._changed = changed
-        parts = self._set_ups.make(self._problem, changed, self._pantographs)
+        parts = self._set_ups.make(self._problem, changed, self._pantographs, wires)
         self._line, self._scheme = parts.line, parts.scheme
         if self._problem.numerics.adaptive_tolerance is not None:
             self._scheme = self._in_levels(changed, parts)

@@ -43,14 +43,17 @@ class Checkpoints:
     def make(self, step: int) -> dict[str, Any] | None:
         """Everything needed to continue after ``step``, the latest one, on rank 0. Collective."""
         line, pantographs = self._line, self._pantographs
-        numbering, in_rows = self._model.numbering, np.argsort(self._model.row_of_node)
+        by_row = self._model.numbering.numbers[np.argsort(self._model.row_of_node)].ravel()
         result: dict[str, Any] = {}
-        # One after the other, as those of a long line are large.
-        for name, own in line.exact_state().items():
+        # One after the other, none longer than it is needed, as those of a long line are large.
+        states = dict(line.exact_state())
+        for name in list(states):
+            own = states.pop(name)
             parts = [own] if self._comm.size == 1 else self._comm.gather(own, root=0)
             if parts:
                 whole = parts[0] if len(parts) == 1 else np.concatenate(parts)
-                result[name] = numbering.by_node(whole)[in_rows].ravel()
+                result[name] = whole[by_row]
+                result[name][by_row < 0] = 0.0
         past = line.past()
         if self._comm.rank != 0:
             return None
