@@ -31,7 +31,7 @@ def row(level: str, error: float) -> Row:
 
 def test_a_page_has_words_for_names_and_no_empty_column() -> None:
     rows = [row("1_elements", 4.0), row("5_elements", 1.0), Row("elements", "9_elements", "broke")]
-    plan = Plan("a_case", [planned()], [], 2)
+    plan = Plan("a_case", [planned()], [], 2, True, ["a=[1, 2]"], ["elements"])
     found = Measured(plan, rows, {"elements": dict.fromkeys(QUANTITIES, 0.1)}, 60.0)
     lines = markdown.page(found, ["A sentence."], {"elements": []}, "").splitlines()
     assert any(
@@ -40,7 +40,8 @@ def test_a_page_has_words_for_names_and_no_empty_column() -> None:
         )
         for line in lines
     )
-    assert "`catenary accuracy a_case --axes elements --repeats 2`" in lines[2]
+    again = "`catenary accuracy a_case --axes elements --quick --repeats 2 --set 'a=[1, 2]'`"
+    assert again in lines[2]
     table = [line for line in lines if line.startswith("|")]
     assert table[0] == "| elements | " + " | ".join([*QUANTITIES, "rounds", "s/s"]) + " |"
     assert {line.count("|") for line in table} == {table[0].count("|")}

@@ -151,6 +151,7 @@ def test_the_map_of_a_case_is_found_drawn_and_written() -> None:
     assert set(drawn) == {"o", "s", "^"}
     check("drawn [ms]", drawn["o"], 1e3 * rule, within=0.02 * 1e3 * rule)
     assert right.get_xlabel() == "head mass [kg]"
+    assert "contact 10⁶ N/m" in [text.get_text() for text in right.texts]
     # A march that contradicts theory is told, not hidden.
     wrong = replace(found.limits[1], stable=2 * rule, unstable=2.1 * rule)
     assert not wrong.agrees

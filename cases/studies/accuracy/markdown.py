@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import shlex
 from collections.abc import Mapping, Sequence
 
 from catenary.cases.studies.accuracy.analysis import HISTORY, QUANTITIES, Row
@@ -60,10 +61,12 @@ def page(
 
 def _command(found: Measured) -> str:
     """The words that make this study again, the folder left out."""
-    names = [planned.axis.name for planned in found.plan.axes]
+    names = list(found.plan.asked)
     some = "" if names == list(AXES) else f" --axes {','.join(names)}"
+    quick = " --quick" if found.plan.quick else ""
     repeats = "" if found.plan.repeats == _USUAL_REPEATS else f" --repeats {found.plan.repeats}"
-    return f"catenary accuracy {found.plan.case}{some}{repeats}"
+    changes = "".join(f" --set {shlex.quote(one)}" for one in found.plan.overrides)
+    return f"catenary accuracy {found.plan.case}{some}{quick}{repeats}{changes}"
 
 
 def uncertainty_text(planned: PlannedAxis, percent: Mapping[str, float]) -> str:

@@ -40,12 +40,17 @@ class PlannedAxis:
 
 @dataclass(frozen=True)
 class Plan:
-    """All that is to be run: the case's name, axes, jobs, and how often short runs are timed."""
+    """All that is to be run: the case's name, axes, jobs, how often short runs are timed, and
+    whether levels are those of the short form; ``overrides`` are those of the command line,
+    ``asked`` the axes, of which some may have nothing to vary."""
 
     case: str
     axes: Sequence[PlannedAxis]
     jobs: Sequence[Job]
     repeats: int
+    quick: bool = False
+    overrides: Sequence[str] = ()
+    asked: Sequence[str] = ()
 
 
 @dataclass
@@ -95,16 +100,17 @@ def make_plan(
         If the case itself or a reference is wrong. A level that is not possible for it is left
         out, and reported.
     """
-    overrides = [*overrides, *_ALWAYS]
-    scene = load_scene(case, overrides, shortened)
-    collected = _Jobs(case, overrides, shortened)
+    all_of_them = [*overrides, *_ALWAYS]
+    scene = load_scene(case, all_of_them, shortened)
+    collected = _Jobs(case, all_of_them, shortened)
     planned = [one for axis in axes for one in _planned(axis, scene, collected, quick)]
     if not planned:
         raise InputError(
             f"the axes {', '.join(axis.name for axis in axes)} have nothing to vary in "
             f"{scene.case.name}, whose mesh is the user's own"
         )
-    return Plan(scene.case.name, planned, collected.jobs, repeats)
+    asked = [axis.name for axis in axes]
+    return Plan(scene.case.name, planned, collected.jobs, repeats, quick, tuple(overrides), asked)
 
 
 def _planned(axis: Axis, scene: Scene, jobs: _Jobs, quick: bool) -> Iterator[PlannedAxis]:

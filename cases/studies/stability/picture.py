@@ -12,6 +12,7 @@ from catenary.cases.studies.stability.map import Limit, StabilityMap, meets
 from catenary.postproc.report.pictures import figures
 
 _MARKERS = {"explicit": "o", "iterated": "s", "fixed_point": "^"}
+_RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _STABLE, _ONLY_IMPLICIT = "#eef3e6", "#fbeee6"
 
 
@@ -128,7 +129,8 @@ def _key() -> list[Line2D]:
 
 
 def _power(value: float) -> str:
+    """A number as a power of ten, without marks of mathematics, which pictures do not read."""
     exponent = int(np.floor(np.log10(value)))
     lead = value / 10**exponent
-    front = "" if np.isclose(lead, 1.0) else rf"{lead:.2g} \cdot "
-    return rf"${front}10^{{{exponent}}}$"
+    front = "" if np.isclose(lead, 1.0) else f"{lead:.2g} · "
+    return f"{front}10{str(exponent).translate(_RAISED)}"
