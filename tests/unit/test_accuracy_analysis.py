@@ -190,6 +190,8 @@ def test_advice_is_a_sentence_with_settings_and_speed() -> None:
         "0.83 %, 10 times faster than real time."
     )
     assert "0.2 times the speed of real time" in advice([row(1e-3, 0.2, 0.5, 5.0)], "std", 1.0)
+    coarse = replace(row(8e-3, 0.2, 0.4, 0.01), percent={"std": 0.4, HISTORY: 51.0})
+    assert "; the force history is wrong by 51 % there" in advice([coarse], "std", 1.0)
     assert "reliably within 0.1 %" in advice(rows, "std", 0.1)
     assert "smallest error among them is 0.83 %" in advice(rows, "std", 0.1)
     assert advice([], "std", 1.0).startswith("No setting")

@@ -239,6 +239,8 @@ def cheapest(rows: Sequence[Row], quantity: str, target: float) -> Row | None:
 
 # The reference's own uncertainty is at most this share of the target, or nothing is recommended.
 _SHARE = 1.0 / 3.0
+# Beyond this error of the force history [%] an advice on another quantity says so.
+_WRONG_COURSE = 10.0
 
 
 def advice(
@@ -278,6 +280,10 @@ def advice(
     times = f"{speed:.3g} times {'faster' if speed >= 1 else 'the speed'}"
     times += " than real time" if speed >= 1 else " of real time"
     aside = f"; the error of the {without} comes on top and is not judged" if without else ""
+    history = row.percent.get(HISTORY, 0.0)
+    if quantity != HISTORY and history > _WRONG_COURSE:
+        # A deviation may be right over a whole stretch while no maximum is.
+        aside += f"; the force history is wrong by {history:.2g} % there, and with it its extremes"
     return (
         f"For {target:g} % in {what}: {', '.join(parts)}; error {row.percent[quantity]:.2g} %"
         f"{alone}, {times}{aside}."
