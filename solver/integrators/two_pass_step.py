@@ -147,8 +147,11 @@ def predict_velocities(motion, changes, begin, end):
     """Fill in the velocities that the generalized-alpha method predicts from unknown ``begin`` to
     ``end``, if products read them."""
     _, y, z, _, known, predicted = motion
-    for i in range(begin, min(end, predicted.size)):
-        predicted[i] = y[i] + changes[6] * z[i] + changes[7] * known[i]
+    # Slices, whose indices are never negative: such a loop becomes vector instructions.
+    ahead = predicted[begin : min(end, predicted.size)]
+    velocity, latest, before = y[begin:end], z[begin:end], known[begin:end]
+    for i in range(ahead.size):
+        ahead[i] = velocity[i] + changes[6] * latest[i] + changes[7] * before[i]
 
 
 @inner

@@ -38,6 +38,7 @@ LINES = {
 MOST = {
     "25 spans, damping by component": ("25 spans", 1.5),
     "25 spans, HHT": ("25 spans", 1.5),
+    "25 spans, HHT, damping by component": ("25 spans", 1.7),
     "100 spans, no two alike": ("100 spans, alike", 1.4),
 }
 

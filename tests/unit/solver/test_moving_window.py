@@ -83,8 +83,12 @@ def test_an_exact_window_gives_the_forces_of_the_whole_line(
     [
         {"numerics": numerics(1e-3, integrator="hht", spectral_radius=0.8)},
         {"damping": Damping(2e-3, 0.0, {"droppers": (1e-4, 0.0)})},
+        {
+            "numerics": numerics(1e-3, integrator="hht", spectral_radius=0.8),
+            "damping": Damping(2e-3, 0.0, {"droppers": (1e-4, 0.0)}),
+        },
     ],
-    ids=["hht", "components"],
+    ids=["hht", "components", "both"],
 )
 def test_other_methods_and_dampings_have_windows_too(changes: dict[str, Any]) -> None:
     problem, mesh = scene(0.6, **changes)
