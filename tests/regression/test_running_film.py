@@ -7,19 +7,21 @@ import signal
 from pathlib import Path
 
 import numpy as np
+import pytest
 from program import catenary, catenary_started, n_rows
 
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.read.results import Results
 
-# A run of a minute, of which snapshots are 20 ms apart.
+# A run that takes longer than film and view, with snapshots 20 ms apart.
 LONG = (
-    "line.n_spans=30", "train.end_m=1600", "numerics.dt_s=2e-4", "output.field_every_s=0.02",
+    "line.n_spans=60", "train.end_m=3400", "numerics.dt_s=2e-4", "output.field_every_s=0.02",
     "output.flush_every_steps=500",
 )  # fmt: skip
 FILM = ("--from", "0.2", "--to", "0.4", "--fps", "10")
 
 
+@pytest.mark.study
 def test_films_and_views_of_a_run_that_goes_on(tmp_path: Path) -> None:
     out = tmp_path / "out"
     words = ["run", "en50318_2002", "-o", str(out), "--set", *LONG]
