@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 
 import numpy as np
 
@@ -74,9 +75,15 @@ class Piece:
     ends: tuple[End, End] = (End.HELD, End.HELD)
     tensioned: tuple[bool | None, bool | None] = (None, None)
 
+    @cached_property
+    def course(self) -> np.ndarray:
+        """The points that it passes, (3, n) [m]."""
+        return np.array([self.x, self.y, self.z])
+
     def points(self, x: np.ndarray) -> np.ndarray:
         """Points of the piece at positions ``x`` (n,) along the track, shape (n, 3) [m]."""
-        return np.column_stack([x, np.interp(x, self.x, self.y), np.interp(x, self.x, self.z)])
+        at, y, z = self.course
+        return np.column_stack([x, np.interp(x, at, y), np.interp(x, at, z)])
 
 
 @dataclass(frozen=True)
@@ -146,7 +153,11 @@ class Profile:
 
     def pre_sag(self, x: np.ndarray) -> np.ndarray:
         """Pre-sag at positions ``x`` [m], shape as ``x``."""
-        return np.interp(x, self.sag_x, self.sag)
+        return np.interp(x, *self._sags)
+
+    @cached_property
+    def _sags(self) -> np.ndarray:
+        return np.array([self.sag_x, self.sag])
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,7 @@ def write_mesh_of(scene: Scene, path: Path, force: bool) -> LineMesh:
 def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
     """Draw a scene's line at rest into a new file; from where to where [m]. Not collective.
 
-    Three running spans in the middle, or the overlap with a span on either side.
+    Three running spans in the middle, or the first overlap with a span on either side.
 
     Raises
     ------

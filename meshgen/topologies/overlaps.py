@@ -224,15 +224,16 @@ class _Sections:
 
     def _parts(self, piece: Piece) -> list[Piece]:
         """What the sections have of a piece."""
-        masts = self._line.support_positions
+        masts, at = self._line.support_positions, piece.course[0]
         if piece.ends[0] is End.CLAMPED:
-            sections = np.array([[piece.x[0], piece.x[-1]]])[: int(self._keeps(piece))]
+            sections = np.array([[at[0], at[-1]]])[: int(self._keeps(piece))]
         else:
             sections = self._ends[self._reached(piece)]
-        parts, at = [], np.array(piece.x)
+        parts = []
         for start, end in sections:
             low, high = max(start, at[0]), min(end, at[-1])
-            x = np.concatenate([[low], at[(at > low) & (at < high)], [high]])
+            between = slice(np.searchsorted(at, low, side="right"), np.searchsorted(at, high))
+            x = np.concatenate([[low], at[between], [high]])
             points = piece.points(x)
             y = points[:, 1] + np.interp(x, masts, self._sideways)
             parts.append(
