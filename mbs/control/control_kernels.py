@@ -19,13 +19,13 @@ from catenary.mbs.control.control_arrays import (
     TIME,
     WAITING,
 )
-from catenary.solver.base.kernels.compiled import compiled, in_line
+from catenary.solver.base.kernels.compiled import called, in_line, inner
 
 # Part of a step by which a sample may come early: times are sums.
 _EARLY = 1e-6
 
 
-@compiled
+@called
 def gains_at(gains, x):
     """The three gains where ``x`` is measured, those of the ends beyond the table."""
     n = gains.shape[0]
@@ -43,7 +43,7 @@ def gains_at(gains, x):
     )
 
 
-@compiled
+@called
 def regulate(settings, gains, memory, measured):
     """Take in what is measured at the end of a step; put the added force of the next one.
 
@@ -87,7 +87,7 @@ def watch(control, head, contact_force):
     regulate(settings, gains, memory, measure(settings, head, contact_force))
 
 
-@in_line
+@inner
 def measure(settings, head, contact_force):
     """What a controller sees at the end of a step: mean height of the strips, or their force."""
     n, s = head.state.size // 3, contact_force.size

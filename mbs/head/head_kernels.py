@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.mbs.head.law_kernels import settle
-from catenary.solver.base.kernels.compiled import compiled, in_line
+from catenary.solver.base.kernels.compiled import compiled, in_line, inner
 from catenary.solver.base.kernels.inverse import invert
 
 # Columns of a row of what a head depends on in a step besides its state. A chain of lumped masses
@@ -115,7 +115,7 @@ class Chain(NamedTuple):
     carrier: np.ndarray
 
 
-@in_line
+@inner
 def respond(inverse, newmark, head):
     """Fill ``head.by_force`` and ``head.out`` for accelerations by ``inverse`` (n, n)."""
     touch, free, by_force, out = head.touch, head.free, head.by_force, head.out

@@ -24,7 +24,7 @@ from catenary.mbs.head.head_kernels import (
     RaisedHead,
 )
 from catenary.mbs.head.laws import LawArrays
-from catenary.solver.base.kernels.compiled import in_line
+from catenary.solver.base.kernels.compiled import inner
 from catenary.solver.base.kernels.pointers import address_of, cube_at, numbers_at, table_at_address
 
 # Models, as `head_kernels` steps them.
@@ -73,7 +73,7 @@ def drive_width(n_strips: int) -> int:
     return N_DRIVE + 2 * n_strips
 
 
-@in_line
+@inner
 def arrays_of(head):
     """The arrays at the addresses of a record."""
     n, s = head.n, head.s
@@ -86,7 +86,7 @@ def arrays_of(head):
     )
 
 
-@in_line
+@inner
 def laws_of(head):
     """The laws at the addresses of a record, which may be none."""
     m, k = head.n_laws, head.n_points
@@ -102,7 +102,7 @@ def laws_of(head):
     )
 
 
-@in_line
+@inner
 def control_of(head):
     """The controller at the addresses of a record that has one."""
     return ControlArrays(
@@ -112,7 +112,7 @@ def control_of(head):
     )
 
 
-@in_line
+@inner
 def cross(head, drive, across, touches, place):
     """Add to a row ``drive`` what ``across`` (3, n) says of where wires are at n contacts, and note
     in ``place`` (n,) where they are on the strips then, NaN where none is ``present``."""
@@ -124,7 +124,7 @@ def cross(head, drive, across, touches, place):
         place[contact] = drive[N_DRIVE + j] if touches[contact].present != 0.0 else np.nan
 
 
-@in_line
+@inner
 def predict(head, drive, numbers, n_contacts):
     """Predict a head from a row ``drive`` of numbers: its strips' part of ``numbers``.
 
@@ -191,7 +191,7 @@ def predict(head, drive, numbers, n_contacts):
     return within
 
 
-@in_line
+@inner
 def move(head, force):
     """Move a head on under the forces (n,) at all contacts, after ``predict``."""
     arrays, contact_force = arrays_of(head), force[head.first : head.first + head.s]

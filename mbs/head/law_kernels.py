@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.base.kernels.compiled import compiled
+from catenary.solver.base.kernels.compiled import called
 from catenary.solver.base.kernels.inverse import invert
 
 # Segments of tables mostly settle in two rounds; what goes round in circles is left there.
 _MAX_ROUNDS = 20
 
 
-@compiled
+@called
 def settle(laws, newmark, head, position, velocity, base, force, matrix):
     """Add laws to a step's ``force`` (n,) and ``matrix`` (n, n), and invert the latter in place.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.base.kernels.compiled import compiled
+from catenary.solver.base.kernels.compiled import called, compiled
 
 
 @compiled
@@ -52,7 +52,7 @@ def move(position: np.ndarray, parameters: np.ndarray, step: np.ndarray) -> None
         parameters[i, 2], parameters[i, 3] = q2 / norm, q3 / norm
 
 
-@compiled
+@called
 def _turn(matrix: np.ndarray, v: np.ndarray) -> tuple[float, float, float]:
     return (
         matrix[0, 0] * v[0] + matrix[0, 1] * v[1] + matrix[0, 2] * v[2],
@@ -61,7 +61,7 @@ def _turn(matrix: np.ndarray, v: np.ndarray) -> tuple[float, float, float]:
     )
 
 
-@compiled
+@called
 def _cross(
     a: tuple[float, float, float], b: tuple[float, float, float]
 ) -> tuple[float, float, float]:
@@ -72,12 +72,12 @@ def _cross(
     )
 
 
-@compiled
+@called
 def _dot(a: tuple[float, float, float], b: tuple[float, float, float]) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@compiled
+@called
 def _add_moment(
     row: np.ndarray, body: int, matrix: np.ndarray, w: tuple[float, float, float], sign: float
 ) -> None:
@@ -88,7 +88,7 @@ def _add_moment(
         )
 
 
-@compiled
+@called
 def _end(
     position: np.ndarray,
     rotation: np.ndarray,

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.kernels.compiled import in_line
+from catenary.solver.base.kernels.compiled import in_line, inner
 from catenary.solver.contact.link_kernels import watch
 from catenary.solver.integrators.state_kernels import displacement_at, velocity_at
 from catenary.solver.model.elements.shape_functions import shape_slopes, shape_values
@@ -101,7 +101,7 @@ class Gains(NamedTuple):
     reach: float
 
 
-@in_line
+@inner
 def find_surface(place, surface, touch):
     """Height and slope of the running surface at a place, cubic between samples, zero beyond."""
     first, last = touch.samples[0], touch.samples[1] - 1
@@ -164,7 +164,7 @@ def locate(x, wires, touches):
             find_surface(place, surface, touch)
 
 
-@in_line
+@inner
 def put_columns(nodes, data, weights, answer, filled):
     """Make ``answer`` the weighted columns of two ``nodes`` beside each other, two of each, and
     zero elsewhere.
@@ -205,7 +205,7 @@ def put_columns(nodes, data, weights, answer, filled):
     filled[0], filled[1] = low, end
 
 
-@in_line
+@inner
 def add_columns(node, data, by_height, by_slope, answer):
     """Add the weighted columns of a node's two unknowns."""
     # Slices, whose indices are never negative: such loops become vector instructions.
@@ -216,7 +216,7 @@ def add_columns(node, data, by_height, by_slope, answer):
         changed[j] += by_height * first[j] + by_slope * second[j]
 
 
-@in_line
+@inner
 def clear(answer, low, high):
     """Make the numbers from ``low`` to ``high`` zero, if there are any."""
     if low < high:
@@ -270,7 +270,7 @@ def heights(motion, touches, train_speed, height, rate):
         rate[i] = rising + train_speed * (steep + share * touch.surface[1])
 
 
-@in_line
+@inner
 def answer_at(local, weights, answer):
     """Interpolation of an answer (n_local,), which may have no numbers."""
     total = 0.0
@@ -280,7 +280,7 @@ def answer_at(local, weights, answer):
     return total
 
 
-@in_line
+@inner
 def meet(motion, touches, gains, answers, line):
     """A rank's share of heights, rates and what forces add to both, into ``line`` (``Affine``).
 
@@ -322,7 +322,7 @@ def respond(motion, touches, gains, answers, bounds, followed, share):
     flags.missing = count if count > room else 0
 
 
-@in_line
+@inner
 def add_answer(force, answer, begin, motion, gains):
     """Add the answer to a force, of the unknowns from ``begin`` on, to the state."""
     size = answer.size

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.kernels.compiled import in_line
+from catenary.solver.base.kernels.compiled import inner
 from catenary.solver.integrators.state_kernels import Riders, reserve_of_many
 from catenary.solver.model.switching_links import LinkArrays
 
@@ -27,7 +27,7 @@ class Followed(NamedTuple):
     riding: np.ndarray
 
 
-@in_line
+@inner
 def n_beyond(reserve, moving, margin):
     """How many reserves of ``moving`` links are below a margin, or not finite."""
     count = 0
@@ -36,7 +36,7 @@ def n_beyond(reserve, moving, margin):
     return count
 
 
-@in_line
+@inner
 def spread(link, links, answer):
     """Stretch of a link in an answer (n_local,)."""
     unknowns, weights, _ = links
@@ -48,7 +48,7 @@ def spread(link, links, answer):
     return total
 
 
-@in_line
+@inner
 def put_row(rows, at, of_link, links, link, answers, gains):
     """Make row ``at`` that of one of ``links``; ``of_link`` are its number and its reserve."""
     by_force, by_slope = answers
@@ -65,7 +65,7 @@ def put_row(rows, at, of_link, links, link, answers, gains):
             rows.rise[at, i] = gains.velocity * apart + gains.train_speed * gains.position * along
 
 
-@in_line
+@inner
 def watch(motion, followed, bounds, touches, answers, gains, rows):
     """Number of links that may switch within ``bounds``, riders included; a row each, as far as
     they fit, those of riders behind those of their masters.

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.kernels.compiled import compiled, in_line
+from catenary.solver.base.kernels.compiled import compiled, in_line, inner
 from catenary.solver.contact.line_response import Affine, Bounds, Coupled, Rows
 
 
@@ -93,7 +93,7 @@ def subtract(heads, line, present, gap):
     return np.isfinite(total)
 
 
-@in_line
+@inner
 def press(gap, tangents, push, softness):
     """Right-hand side and matrix of the contact forces when no link has switched."""
     own, offset, by_depth, by_rate = tangents
@@ -166,7 +166,7 @@ def couple(rows, count, coupled, by_depth, by_rate, behind, matrix, right):
         matrix[row, row] += 1.0
 
 
-@in_line
+@inner
 def solve_two(matrix, right, acts, solution):
     """The same for two that act, in the same order of operations."""
     first = 0

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.kernels.compiled import compiled, in_line
+from catenary.solver.base.kernels.compiled import called, compiled, in_line, inner
 
 
 @compiled
@@ -80,7 +80,7 @@ def velocities(motion, result):
         result[i] = velocity_at(i, motion)
 
 
-@in_line
+@inner
 def reserve_of_pair(vectors, shares, unknowns, weights, law, link):
     """Reserve of a link between two unknowns, in terms of these vectors with ``shares``."""
     x, y, z = vectors
@@ -92,7 +92,7 @@ def reserve_of_pair(vectors, shares, unknowns, weights, law, link):
     return law.rest + law.stiffness * stretch + law.damping * speed
 
 
-@in_line
+@inner
 def reserve_of_many(vectors, shares, unknowns, weights, law, link):
     """The same of a link between any number of unknowns."""
     x, y, z = vectors
@@ -105,7 +105,7 @@ def reserve_of_many(vectors, shares, unknowns, weights, law, link):
     return law.rest + law.stiffness * stretch + law.damping * speed
 
 
-@compiled
+@called
 def reserves_within(motion, links, begin, end, result):
     """Reserves of the links from ``begin`` to ``end``, as ``reserves``."""
     x, y, z, shares = motion
@@ -178,13 +178,13 @@ def energy_of_switching(displacement, links, riders, begin, end):
     return energy
 
 
-@in_line
+@inner
 def share_of(law, reserve):
     """Share of its reserve with which a link pulls."""
     return law.carried - law.released if reserve < 0.0 else law.carried
 
 
-@compiled
+@called
 def forces_within(motion, links, begin, end, result):
     """Force of each of the links from ``begin`` to ``end`` [N], positive where it pulls."""
     x, y, z, shares = motion

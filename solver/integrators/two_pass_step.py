@@ -12,13 +12,11 @@ import numpy as np
 
 from catenary.solver.base.kernels.bound import bound
 from catenary.solver.base.kernels.compiled import compiled, inner
-from catenary.solver.base.kernels.pointers import borrowed
+from catenary.solver.base.kernels.pointers import pointed
 from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps, PredictedLineState, Steps
 from catenary.solver.integrators.state_kernels import reserves_within
 from catenary.solver.linear.factors.substitution import (
     eliminate,
-    first_of,
-    make_up_at,
     meet,
     solved,
 )
@@ -33,7 +31,7 @@ from catenary.solver.linear.stations.lanes import (
     widened,
     zero,
 )
-from catenary.solver.linear.stations.make_ups import by_make_up
+from catenary.solver.linear.stations.make_ups import by_make_up, start_of
 from catenary.solver.linear.stations.station_products import read_station, row_sums
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
@@ -190,59 +188,29 @@ def go_on_by_alpha(layout, at, solution, motion, changes):
     store(layout, z, at, total)
 
 
-@inner
-def _eliminate_row(part, multiplied, factored, loads, station, before, states, outward, answer):
-    to_start, here, to_end = states
-    positions, velocities = (to_start[0], here[0], to_end[0]), (to_start[1], here[1], to_end[1])
-    of_product = same_part(multiplied[0], part)
-    sums = row_sums(of_product, multiplied, station, positions, velocities)
-    if loads.size > 0:
-        sums = add(sums[0], load(part, loads, first_of(factored, station))), sums[1]
-    return eliminate(part, factored, sums, station, before, outward, answer)
-
-
-eliminate_in = by_make_up(_eliminate_row)
-
-
-@inner
-def eliminate_row(multiplied, factored, loads, station, before, states, outward, answer):
+@by_make_up
+def eliminate_row(
+    layout,
+    places,
+    station,
+    multiplied,
+    factored,
+    loads,
+    towards_end,
+    states,
+    outward,
+    answer,
+):
     """``eliminate`` with the right-hand side from a row of the product, and of ``loads`` if there
     are any; ``states`` are what ``read_station`` gives to the start, at and to the end of it."""
-    layout, make_up = factored.layout, make_up_at(factored, station)
-    return eliminate_in(
-        layout, make_up, multiplied, factored, loads, station, before, states, outward, answer
-    )
-
-
-@compiled
-def forth(multiplied, factored, loads, answer):
-    """Leave in ``answer`` what elimination leaves of the right-hand side; see ``StationPasses``."""
-    multiplied, factored, loads, answer = borrowed((multiplied, factored, loads, answer))
-    layout, ends = factored.layout, factored.ends
-    n, begin, end, middle = factored.kinds.size, ends[0], ends[1], ends[4]
-    pairs = min(middle - begin, end - 1 - middle)
-    left = right = zero(layout)
-    before, here = read_station(multiplied, begin - 1), read_station(multiplied, begin)
-    beyond, there = read_station(multiplied, end), read_station(multiplied, end - 1)
-    for k in range(pairs):
-        i, j = begin + k, end - 1 - k
-        after, ahead = read_station(multiplied, i + 1), read_station(multiplied, j - 1)
-        states, others = (before, here, after), (ahead, there, beyond)
-        last, following = max(i - 1, 0), min(j + 1, n - 1)
-        left = eliminate_row(multiplied, factored, loads, i, last, states, left, answer)
-        right = eliminate_row(multiplied, factored, loads, j, following, others, right, answer)
-        before, here, beyond, there = here, after, there, ahead
-    for j in range(end - 1 - pairs, middle, -1):
-        ahead = read_station(multiplied, j - 1)
-        others, following = (ahead, there, beyond), min(j + 1, n - 1)
-        right = eliminate_row(multiplied, factored, loads, j, following, others, right, answer)
-        beyond, there = there, ahead
-    for i in range(begin + pairs, middle + 1):
-        after = read_station(multiplied, i + 1)
-        states, last = (before, here, after), max(i - 1, 0)
-        left = eliminate_row(multiplied, factored, loads, i, last, states, left, answer)
-        before, here = here, after
-    meet(factored, middle, right, answer)
+    to_start, here, to_end = states
+    positions, velocities = (to_start[0], here[0], to_end[0]), (to_start[1], here[1], to_end[1])
+    of_product = same_part(multiplied[0], layout)
+    sums = row_sums(of_product, multiplied, station, positions, velocities)
+    if loads[1]:
+        loaded = load(layout, loads[0], start_of(layout, places, station))
+        sums = add(sums[0], loaded), sums[1]
+    return eliminate(layout, factored, sums, station, towards_end, outward, answer)
 
 
 @inner
@@ -286,70 +254,79 @@ def follow(number, motion, followed):
     reserves_within(motion[:4], links, before[1], now[1], reserve)
 
 
-@inner
-def _go_back(part, factored, station, inward, answer, motion, changes):
-    own = solved(part, factored, station, inward, answer)
-    at = first_of(factored, station) - first_of(factored, factored.low)
-    go_on(part, at, own, motion, changes)
-    return widened(part, own)
-
-
-go_back_in = by_make_up(_go_back)
-
-
-@inner
-def go_back(factored, station, inward, answer, motion, changes):
+@by_make_up
+def go_back(layout, places, station, factored, inward, answer, motion, changes):
     """Solve for an own station from those ``inward`` of it, and take its motion on."""
-    layout, make_up = factored.layout, make_up_at(factored, station)
-    return go_back_in(layout, make_up, factored, station, inward, answer, motion, changes)
+    own = solved(layout, factored, station, inward, answer)
+    at = start_of(layout, places, station) - start_of(layout, places, factored.low)
+    go_on(layout, at, own, motion, changes)
+    return widened(layout, own)
 
 
-@inner
-def _begin_back(part, factored, middle, answer, motion, changes):
-    own = load(part, answer, first_of(factored, middle))
-    at = first_of(factored, middle) - first_of(factored, factored.low)
-    go_on(part, at, own, motion, changes)
-    return widened(part, own)
-
-
-begin_back = by_make_up(_begin_back)
-
-
-@compiled
-def back(factored, motion, answer, changes, followed):
-    """Take the rank's own motion on from what ``forth`` has left in ``answer``, and find the
-    reserve of its links, which come with their ranges of ``left_behind``."""
-    factored, motion, answer, followed = borrowed((factored, motion, answer, followed))
-    layout, ends = factored.layout, factored.ends
-    stretch = followed[3]
-    low, high, middle = ends[2], ends[3], ends[4]
-    pairs = min(middle - low, high - 1 - middle)
-    make_up = make_up_at(factored, middle)
-    x = y = begin_back(layout, make_up, factored, middle, answer, motion, changes)
-    number = 1
-    for start in range(1, pairs + 1, stretch):
-        for k in range(start, min(start + stretch, pairs + 1)):
-            x = go_back(factored, middle - k, x, answer, motion, changes)
-            y = go_back(factored, middle + k, y, answer, motion, changes)
-        follow(number, motion, followed)
-        number += 1
-    # Those that one side has more: one, or as many as the middle lies off.
-    for i in range(middle - pairs - 1, low - 1, -1):
-        x = go_back(factored, i, x, answer, motion, changes)
-    for j in range(middle + pairs + 1, high):
-        y = go_back(factored, j, y, answer, motion, changes)
-    follow(number, motion, followed)
+@by_make_up
+def begin_back(layout, places, middle, factored, answer, motion, changes):
+    """Take the motion of the middle station on, for which ``meet`` has solved."""
+    here = start_of(layout, places, middle)
+    own = load(layout, answer, here)
+    go_on(layout, here - start_of(layout, places, factored.low), own, motion, changes)
+    return widened(layout, own)
 
 
 @compiled
 def forth_and_back(multiplied, factored, loads, answer, motion, changes, followed, window):
-    """Both passes, over the stations in a ``window`` if there is one."""
-    begin, end = 0, motion[0].size
+    """Both passes, over the stations in a ``window`` if there is one; see ``StationPasses``.
+
+    Forth they leave in ``answer`` what elimination leaves of the right-hand side. Back they take
+    the rank's own motion on, and find the reserve of its links, which come with their ranges of
+    ``left_behind``.
+    """
+    first, last = 0, motion[0].size
     if window.state.size > 0:
         if look(window, motion[:4]):
             links, reserve, _, _ = followed
             reserves_within(motion[:4], links, 0, reserve.size, reserve)
-        begin, end = window.starts[window.ends[0]], window.starts[window.ends[1]]
-    predict_velocities(motion, changes, begin, end)
-    forth(multiplied, factored, loads, answer)
-    back(factored, motion, answer, changes, followed)
+        first, last = window.starts[window.ends[0]], window.starts[window.ends[1]]
+    predict_velocities(motion, changes, first, last)
+
+    layout, ends = factored.layout, factored.ends
+    begin, end, low, high, middle = ends[0], ends[1], ends[2], ends[3], ends[4]
+    product, known, found, moved = pointed((multiplied, factored, answer, motion))
+    added, places = (pointed(loads), loads.size > 0), known.places
+    pairs = min(middle - begin, end - 1 - middle)
+    x = y = zero(layout)
+    before, here = read_station(product, begin - 1), read_station(product, begin)
+    beyond, there = read_station(product, end), read_station(product, end - 1)
+    for k in range(pairs):
+        i, j = begin + k, end - 1 - k
+        after, ahead = read_station(product, i + 1), read_station(product, j - 1)
+        states, others = (before, here, after), (ahead, there, beyond)
+        x = eliminate_row(layout, places, i, product, known, added, False, states, x, found)
+        y = eliminate_row(layout, places, j, product, known, added, True, others, y, found)
+        before, here, beyond, there = here, after, there, ahead
+    for j in range(end - 1 - pairs, middle, -1):
+        ahead = read_station(product, j - 1)
+        others = ahead, there, beyond
+        y = eliminate_row(layout, places, j, product, known, added, True, others, y, found)
+        beyond, there = there, ahead
+    for i in range(begin + pairs, middle + 1):
+        after = read_station(product, i + 1)
+        states = before, here, after
+        x = eliminate_row(layout, places, i, product, known, added, False, states, x, found)
+        before, here = here, after
+    meet(layout, places, middle, known, y, found)
+
+    pairs = min(middle - low, high - 1 - middle)
+    x = y = begin_back(layout, places, middle, known, found, moved, changes)
+    number, stretch = 1, followed[3]
+    for start in range(1, pairs + 1, stretch):
+        for k in range(start, min(start + stretch, pairs + 1)):
+            x = go_back(layout, places, middle - k, known, x, found, moved, changes)
+            y = go_back(layout, places, middle + k, known, y, found, moved, changes)
+        follow(number, motion, followed)
+        number += 1
+    # Those that one side has more: one, or as many as the middle lies off.
+    for i in range(middle - pairs - 1, low - 1, -1):
+        x = go_back(layout, places, i, known, x, found, moved, changes)
+    for j in range(middle + pairs + 1, high):
+        y = go_back(layout, places, j, known, y, found, moved, changes)
+    follow(number, motion, followed)

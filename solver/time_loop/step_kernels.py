@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.mbs.head import head_records
-from catenary.solver.base.kernels.compiled import compiled, in_line
+from catenary.solver.base.kernels.compiled import compiled, inner
 from catenary.solver.base.kernels.pointers import borrowed, call_held, numbers_at
 from catenary.solver.contact import contact_kernels
 from catenary.solver.contact.crossing_kernels import find_across
@@ -104,7 +104,7 @@ class Steps(NamedTuple):
     taps: np.ndarray
 
 
-@in_line
+@inner
 def report(time, force, law):
     """Whether the contact law holds for ``force`` (n,) at ``time`` [s]; if so it is remembered.
 
@@ -125,7 +125,7 @@ def report(time, force, law):
     return True
 
 
-@in_line
+@inner
 def find_forces(time, problem, law, switched, n, counts):
     """Contact forces and compensations into the solution of the problem.
 
@@ -148,7 +148,7 @@ def find_forces(time, problem, law, switched, n, counts):
     return size - n
 
 
-@in_line
+@inner
 def widen(bounds):
     """Double the bounds of what may switch."""
     bounds.loss[0] *= 2.0
@@ -156,7 +156,7 @@ def widen(bounds):
         bounds.force[i] *= 2.0
 
 
-@in_line
+@inner
 def keep(kept, number, motion, columns):
     """Keep the motion of a step as that of a number; whether there is room for it."""
     begin, end = columns.starts[kept.moved[0]], columns.starts[kept.moved[1]]

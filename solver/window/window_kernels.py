@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.base.kernels.compiled import compiled, in_line
+from catenary.solver.base.kernels.compiled import called, compiled, in_line, inner
 from catenary.solver.linear.factors.meeting_station import middle_of, turn
 
 # Numbers of ``WindowArrays.state``.
@@ -101,7 +101,7 @@ NO_WINDOW = WindowArrays(
 )
 
 
-@compiled
+@called
 def look(window, motion):
     """Let the window follow contacts and motion, at some steps; whether it was the first look."""
     state = window.state
@@ -135,21 +135,21 @@ def look(window, motion):
     return is_fresh
 
 
-@compiled
+@called
 def span_of(masts, x):
     """Span in which a place [m] is, as a number with a fraction."""
     i = min(max(np.searchsorted(masts, x, side="right") - 1, 0), masts.size - 2)
     return i + (x - masts[i]) / (masts[i + 1] - masts[i])
 
 
-@compiled
+@called
 def place_of_span(masts, number):
     """Place [m] of a number with a fraction of spans; beyond the line if there are not as many."""
     i = min(max(int(np.floor(number)), 0), masts.size - 2)
     return masts[i] + (number - i) * (masts[i + 1] - masts[i])
 
 
-@compiled
+@called
 def find_peak(window, motion):
     """Find the largest motion in the window."""
     x, y = motion[0], motion[1]
@@ -159,7 +159,7 @@ def find_peak(window, motion):
     window.peak[0], window.peak[1] = largest_x, largest_y
 
 
-@compiled
+@called
 def moves(window, motion, begin, end):
     """Whether any of the stations from ``begin`` to ``end`` moves, or holds what is no number."""
     x, y = motion[0], motion[1]
@@ -171,7 +171,7 @@ def moves(window, motion, begin, end):
     return False
 
 
-@compiled
+@called
 def follow_motion(window, motion, begin, end):
     """Range of stations that move, at least from ``begin`` to ``end``."""
     n, guard, ends = window.low.size, window.guard, window.ends
@@ -189,7 +189,7 @@ def follow_motion(window, motion, begin, end):
     return min(low, begin), max(high, end)
 
 
-@in_line
+@inner
 def rest(window, motion, begin, end):
     """Bring the stations from ``begin`` to ``end`` to rest."""
     x, y, z, shares = motion
@@ -202,7 +202,7 @@ def rest(window, motion, begin, end):
             window.known[i] = 0.0
 
 
-@compiled
+@called
 def move(window, motion, begin, end):
     """Make the window that from station ``begin`` to ``end``; what leaves it comes to rest."""
     ends = window.ends
@@ -230,7 +230,7 @@ def turn_to(window, begin, end):
     window.ranges[2, 1] = last
 
 
-@compiled
+@called
 def fade(window, motion, first, last):
     """Slow down the outer part of what is behind the place ``first`` and ahead of ``last`` [m].
 
@@ -254,14 +254,14 @@ def fade(window, motion, first, last):
         i -= 1
 
 
-@in_line
+@inner
 def damping(into):
     """Damping at a share ``into`` of the way into what fades, in terms of its scale."""
     x = _TAKEN * _C * into
     return _A * x - _B * x**3 + 4.0 / (_C - x) ** 2 - 4.0 / (_C + x) ** 2
 
 
-@in_line
+@inner
 def slow_down(window, motion, station, decay):
     """Let the velocity of a station decay, by so much for little; it stays where it is."""
     x, y, z, shares = motion

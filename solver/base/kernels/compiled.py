@@ -13,6 +13,7 @@ from numba import njit
 
 from catenary.solver.base.kernels import loop_cache
 
+_NO_ENTRY = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _settings: Any = numba.config  # Numba makes its attributes while it is imported
 
 
@@ -30,13 +31,18 @@ def in_line(function: Any) -> Any:
     return _compile(function, forceinline=True)
 
 
-def inner(function: Any) -> Any:
-    """Likewise, for lines that only compiled code calls.
+def called(function: Any) -> Any:
+    """As ``compiled``, for what only compiled code calls.
 
-    No entry from Python is made, which takes as long as compiling the lines; a call from there
+    No entry from Python is made, which takes as long as compiling a few lines; a call from there
     would end the process.
     """
-    return _compile(function, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    return _compile(function, **_NO_ENTRY)
+
+
+def inner(function: Any) -> Any:
+    """As ``in_line``, for lines that only compiled code calls."""
+    return _compile(function, forceinline=True, **_NO_ENTRY)
 
 
 def _compile(function: Any, **options: Any) -> Any:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from catenary.solver.base.kernels.compiled import compiled
+from catenary.solver.base.kernels.compiled import called
 
 
-@compiled
+@called
 def invert(matrix):
     """Invert in place a matrix (n, n) that needs no exchange of rows.
 

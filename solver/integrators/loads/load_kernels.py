@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.base.kernels.compiled import compiled
+from catenary.solver.base.kernels.compiled import called, compiled
 from catenary.solver.integrators.loads.memory_kernels import remember
 from catenary.solver.model.loads import CONSTANT, TABLE
 
 
-@compiled
+@called
 def factor_at(time, kind, numbers):
     """The function of time that ``TimeFunction`` holds."""
     if kind == CONSTANT:
@@ -30,7 +30,7 @@ def factor_at(time, kind, numbers):
     return total
 
 
-@compiled
+@called
 def add_samples(time, sampled, values):
     """Add what is linear in time between slices; ``sampled`` as in ``evaluate``."""
     bounds, held, times, places, samples = sampled

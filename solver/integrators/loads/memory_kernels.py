@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from catenary.solver.base.kernels.compiled import compiled
+from catenary.solver.base.kernels.compiled import called, compiled
 
 # Lags below this are summed one by one; a power of two.
 NEAR = 128
@@ -123,7 +123,7 @@ def recall(tables, n_steps):
         done[e] = n_steps
 
 
-@compiled
+@called
 def fold(tables, e, step):
     """Add what the last step before ``step`` does by near lags, and blocks of steps that end there
     by far ones, to the sums of those to come."""
@@ -187,7 +187,7 @@ def _forth(values, turns):
         half //= 2
 
 
-@compiled
+@called
 def _back(values, turns):
     """From what ``_forth`` leaves back to the numbers, times their count."""
     half = 1

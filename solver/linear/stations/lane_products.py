@@ -17,6 +17,7 @@ from catenary.solver.linear.stations.lanes import (
     Registers,
     gathered,
     inlined,
+    place_of,
     register_ranges,
     spread,
     vector_type,
@@ -32,7 +33,7 @@ def numbers_from(typing_context, array, at):
 
     def generate(context, builder, signature, arguments):
         array, at = arguments
-        data = context.make_array(signature.args[0])(context, builder, array).data
+        data = place_of(context, builder, signature.args[0], array)
         place = builder.gep(data, [at])
         # Unknown to the compiler, which else computes the address anew for each number.
         unchanged = ir.FunctionType(place.type, [place.type])

@@ -165,6 +165,13 @@ def widened(typing_context, part, x):
     return Lanes(whole.n_lanes)(part, x), generate
 
 
+def place_of(context: Any, builder: Any, kind: Any, array: Any) -> Any:
+    """Where the numbers of an array are, of which this may be the place already."""
+    if isinstance(kind, types.CPointer):
+        return array
+    return context.make_array(kind)(context, builder, array).data
+
+
 @inlined
 def zero(typing_context, layout):
     """0 in all lanes."""
@@ -177,11 +184,11 @@ def zero(typing_context, layout):
 
 @inlined
 def load(typing_context, layout, array, at):
-    """The unknowns of a station, from ``array[at]`` on; ``array`` is contiguous."""
+    """The unknowns of a station, from ``array[at]`` on; ``array`` is contiguous, or ``pointed``."""
 
     def generate(context, builder, signature, arguments):
         _, array, at = arguments
-        data = context.make_array(signature.args[1])(context, builder, array).data
+        data = place_of(context, builder, signature.args[1], array)
         unknowns = signature.args[0].layout.unknowns
         result = []
         for first, size in register_ranges(unknowns.size):
@@ -197,7 +204,7 @@ def store(typing_context, layout, array, at, x):
 
     def generate(context, builder, signature, arguments):
         _, array, at, x = arguments
-        data = context.make_array(signature.args[1])(context, builder, array).data
+        data = place_of(context, builder, signature.args[1], array)
         unknowns = signature.args[0].layout.unknowns
         parts = Registers(unknowns.size).apart(builder, x)
         for part, (first, size) in zip(parts, register_ranges(unknowns.size), strict=True):

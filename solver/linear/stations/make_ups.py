@@ -11,11 +11,11 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from llvmlite import ir
+from numba import njit, types
 from numba.extending import overload
 
-from catenary.solver.base.kernels.compiled import inner
-from catenary.solver.linear.stations.lanes import load, part_of, pitch, varies, widened
+from catenary.solver.linear.stations.lanes import inlined, load, part_of, widened
 from catenary.solver.linear.stations.station_layout import Layout
 
 
@@ -35,35 +35,67 @@ class Places(NamedTuple):
 ALIKE = Places(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.uint8))
 
 
-@inner
-def start_of(layout, places, station):
-    """First unknown of a station in vectors."""
-    # Indices are unsigned, which spares a check for negative ones.
-    if varies(layout):
-        return np.uint64(places[0][np.uint64(station)])
-    return pitch(layout) * np.uint64(station)
+@inlined
+def start_of(typing_context, layout, places, station):
+    """First unknown of a station in vectors; ``places`` are ``pointed``."""
+
+    def generate(context, builder, signature, arguments):
+        _, places, station = arguments
+        if signature.args[0].layout.varies:
+            return _entry(builder, builder.extract_value(places, 0), station)
+        return builder.mul(ir.Constant(station.type, signature.args[0].layout.pitch), station)
+
+    return types.uint64(layout, places, types.uint64), generate
 
 
-@inner
-def make_up_of(layout, places, station):
-    """Make-up of a station."""
-    if varies(layout):
-        return places[1][np.uint64(station)]
-    return np.uint8(0)
+@inlined
+def make_up_of(typing_context, layout, places, station):
+    """Make-up of a station; ``places`` are ``pointed``."""
+
+    def generate(context, builder, signature, arguments):
+        _, places, station = arguments
+        if signature.args[0].layout.varies:
+            return _entry(builder, builder.extract_value(places, 1), station)
+        return ir.Constant(ir.IntType(8), 0)
+
+    return types.uint8(layout, places, types.uint64), generate
+
+
+@inlined
+def block_at(typing_context, layout, kinds, station, size):
+    """Where the blocks of a station begin, of ``size`` numbers each; ``kinds``, which are
+    ``pointed``, hold that itself where make-ups vary."""
+
+    def generate(context, builder, signature, arguments):
+        layout, kinds, station, size = arguments
+        kind = _entry(builder, kinds, station)
+        if signature.args[0].layout.varies:
+            return kind
+        return builder.mul(size, builder.zext(kind, size.type) if kind.type != size.type else kind)
+
+    return types.uint64(layout, kinds, types.uint64, types.uint64), generate
+
+
+def _entry(builder: Any, place: Any, number: Any) -> Any:
+    """The entry of a number in what is at a place."""
+    return builder.load(builder.gep(place, [number]))
 
 
 def by_make_up(kernel: Any) -> Any:
-    """The function (layout, make_up, ...) that calls ``kernel`` with the layout of a make-up, and
-    the other arguments, in compiled code."""
-    names = list(inspect.signature(kernel.py_func).parameters)[1:]
+    """The function ``kernel`` (layout, places, station, ...) with the layout of the station's
+    make-up in place of that of the line, for compiled code.
+
+    Its arguments have no defaults. Where stations are alike nothing is added to it.
+    """
+    names = list(inspect.signature(kernel).parameters)
 
     def choose(*arguments: Any) -> Any:
         raise NotImplementedError("called in compiled code only")
 
     def implementation(layout: Any, *others: Any) -> Any:
-        return _chain(kernel, names, layout.layout, 0)
+        return _chain(kernel, names, layout.layout, 0) if layout.layout.varies else kernel
 
-    typed = _function(names, "implementation(layout, make_up)", implementation=implementation)
+    typed = _function(names, f"implementation({', '.join(names)})", implementation=implementation)
     function = _function(names, "choose()", choose=choose)
     overload(function, jit_options=_OPTIONS)(typed)
     return function
@@ -74,41 +106,26 @@ _OPTIONS: Any = {"forceinline": True, "error_model": "numpy"}
 
 def _chain(kernel: Any, names: list[str], layout: Layout, number: int) -> Callable[..., Any]:
     """A function that chooses among make-ups from ``number`` on."""
-    others = ", ".join(names)
-    if not layout.varies:
-        return _function(names, f"kernel(layout, {others})", kernel=kernel)
-    this = f"kernel(part_of(layout, {number}), {others})"
+    layout_name, places, station, *others = names
+    words = ", ".join((places, station, *others))
+    known = {"kernel": njit(**_OPTIONS)(kernel), "part_of": part_of, "make_up_of": make_up_of}
+    this = f"kernel(part_of({layout_name}, {number}), {words})"
     if number == len(layout.parts) - 1:
-        return _function(names, this, kernel=kernel, part_of=part_of)
+        return _function(names, this, **known)
     further = njit(**_OPTIONS)(_chain(kernel, names, layout, number + 1))
+    chosen = f"make_up_of({layout_name}, {places}, {station}) == {number}"
     return _function(
-        names,
-        f"{this} if make_up == {number} else further(layout, make_up, {others})",
-        kernel=kernel,
-        part_of=part_of,
-        further=further,
+        names, f"{this} if {chosen} else further({', '.join(names)})", further=further, **known
     )
 
 
 def _function(names: list[str], body: str, **known: Any) -> Any:
-    """The function (layout, make_up, ...) that returns ``body``. Numba keeps count of the arrays in
-    a tuple of arguments at each call, which takes ten times as long as the call."""
-    return eval(f"lambda layout, make_up, {', '.join(names)}: {body}", known)  # noqa: S307
+    """The function of these arguments that returns ``body``. Numba keeps count of the arrays in a
+    tuple of arguments at each call, which takes ten times as long as the call."""
+    return eval(f"lambda {', '.join(names)}: {body}", known)  # noqa: S307
 
 
-@inner
-def block_at(layout, kinds, station, size):
-    """Where the blocks of a station begin, of ``size`` numbers each; ``kinds`` holds that itself
-    where make-ups vary."""
-    if varies(layout):
-        return np.uint64(kinds[np.uint64(station)])
-    return size * np.uint64(kinds[np.uint64(station)])
-
-
-@inner
-def _load(part, array, at):
-    return widened(part, load(part, array, at))
-
-
-# The unknowns of a station, from ``array[at]`` on, in lanes of a whole cross-section.
-load_at = by_make_up(_load)
+@by_make_up
+def load_at(layout, places, station, array):
+    """The unknowns of a station in an array, in lanes of a whole cross-section."""
+    return widened(layout, load(layout, array, start_of(layout, places, station)))

@@ -17,7 +17,7 @@ from scipy import sparse
 from catenary.solver.base.kernels import aligned_arrays
 from catenary.solver.base.kernels.bound import bound
 from catenary.solver.base.kernels.compiled import compiled, inner
-from catenary.solver.base.kernels.pointers import borrowed
+from catenary.solver.base.kernels.pointers import pointed
 from catenary.solver.linear.stations.lane_products import (
     add_beside,
     add_own,
@@ -38,7 +38,6 @@ from catenary.solver.linear.stations.make_ups import (
     block_at,
     by_make_up,
     load_at,
-    make_up_of,
     start_of,
 )
 from catenary.solver.linear.stations.sections import Sections
@@ -259,34 +258,31 @@ def read_station(multiplied, row):
     """What the factor and the velocity hold at the station of a row, which may be one before or
     after all rows."""
     layout, places, _, _, first, factor, velocity = multiplied
-    at, make_up = start_of(layout, places, first + row), make_up_of(layout, places, first + row)
-    position = load_at(layout, make_up, factor, at)
+    position = load_at(layout, places, first + row, factor)
     if is_damped(layout):
-        return position, load_at(layout, make_up, velocity, at)
+        return position, load_at(layout, places, first + row, velocity)
     return position, position
 
 
-@inner
-def _put_row(part, multiplied, row, positions, velocities, result):
-    layout, places, _, _, first, _, _ = multiplied
-    total = total_of(part, row_sums(part, multiplied, row, positions, velocities))
-    at = start_of(layout, places, first + row) - start_of(layout, places, first)
-    store(part, result, at, total)
-
-
-put_row = by_make_up(_put_row)
+@by_make_up
+def put_row(layout, places, station, multiplied, positions, velocities, result):
+    """Fill in the row of a station of the product."""
+    first = multiplied[4]
+    row = station - first
+    total = total_of(layout, row_sums(layout, multiplied, row, positions, velocities))
+    at = start_of(layout, places, station) - start_of(layout, places, first)
+    store(layout, result, at, total)
 
 
 @compiled
 def multiply(layout, places, kinds, blocks, first, begin, end, factor, velocity, result):
     """Rows from ``begin`` to ``end`` of ``result`` = K ``factor``, less C ``velocity``; see
     ``StationProduct``."""
-    multiplied = borrowed((layout, places, kinds, blocks, first, factor, velocity))
-    result = borrowed(result)
+    multiplied = pointed((layout, places, kinds, blocks, first, factor, velocity))
+    filled = pointed(result)
     before, here = read_station(multiplied, begin - 1), read_station(multiplied, begin)
     for i in range(begin, end):
         after = read_station(multiplied, i + 1)
         positions, velocities = (before[0], here[0], after[0]), (before[1], here[1], after[1])
-        make_up = make_up_of(layout, multiplied[1], first + i)
-        put_row(layout, make_up, multiplied, i, positions, velocities, result)
+        put_row(layout, multiplied[1], first + i, multiplied, positions, velocities, filled)
         before, here = here, after
