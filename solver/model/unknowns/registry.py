@@ -203,7 +203,11 @@ def _names_of(group: Group) -> tuple[str, ...]:
 
 
 def _make_ups(stations: Stations, padded: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Slots of each make-up, (n, n_slots), and make-up of each station, the commonest first."""
+    """Slots of each make-up, (n, n_slots), and make-up of each station.
+
+    The smallest are first, which mostly are the commonest, whatever the line: lines of the same
+    make-ups then have loops in common.
+    """
     present = stations.present | padded
     if present.all():
         return present[:1], np.zeros(len(present), dtype=np.int64)
@@ -211,8 +215,8 @@ def _make_ups(stations: Stations, padded: bool) -> tuple[np.ndarray, np.ndarray]
     if stations.join_neighbours and counts.size > MOST_MAKE_UPS:
         rare = np.argsort(-counts, kind="stable")[MOST_MAKE_UPS - 1 :]
         present = present | np.isin(make_up, rare)[:, None]
-        rows, make_up, counts = np.unique(present, axis=0, return_inverse=True, return_counts=True)
-    order = np.argsort(-counts, kind="stable")
+        rows, make_up = np.unique(present, axis=0, return_inverse=True)
+    order = np.argsort(rows.sum(axis=1), kind="stable")
     return rows[order], np.argsort(order)[make_up]
 
 

@@ -176,6 +176,14 @@ def test_a_station_has_the_wires_that_pass_it_or_those_beside_it() -> None:
     assert (np.diff(padded.starts) == 6).all() and padded.block == 6
 
 
+@pytest.mark.parametrize(("first", "last"), [(20, 30), (5, 75)])
+def test_make_ups_come_in_one_order_whichever_is_the_commonest(first: int, last: int) -> None:
+    mesh = with_wire(paired(), STITCH, first, last)
+    found = number_unknowns(mesh, [vertical(mesh)], padded=False)
+    assert found.make_ups == ((0, 1, 2, 3), (0, 1, 2, 3, 4, 5))
+    check(mesh, found)
+
+
 def test_a_wire_takes_the_slot_of_one_that_has_ended() -> None:
     last = paired().wires[MESSENGER_WIRE].size
     mesh = paired()
