@@ -82,7 +82,7 @@ def _refuse_other_line(result: Path, results: Results, datasets: Mapping[str, np
         group, _, name = path.partition("/")
         there = results.line(name) if group == "line" else results.static(name)
         if np.shape(there) != np.shape(values) or not np.allclose(
-            there, values, rtol=_RELATIVE, atol=_ABSOLUTE
+            there, values, rtol=_RELATIVE, atol=_ABSOLUTE, equal_nan=True
         ):
             raise _refusal(result, f"its {path} is not that of its scene")
 

@@ -86,7 +86,7 @@ def test_an_effect_sets_target_heights_and_lifts_limits() -> None:
     """A contact wire that rises by RISE towards the middle of the line, for fast trains."""
 
     def rise(wanted: Profile, x: np.ndarray) -> np.ndarray:
-        return np.asarray(RISE * np.sin(np.pi * x / wanted.ends[1]))
+        return np.asarray(RISE * np.sin(np.pi * x / wanted.sections[-1].ends[1]))
 
     def law(laws: Simulated, problem: Problem) -> Simulated:
         return replace(laws, target_heights=(*laws.target_heights, rise))
