@@ -19,5 +19,9 @@ def processor_time() -> Iterator[None]:
     from catenary.solver.time_loop import march
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(march, "clock", SimpleNamespace(perf_counter=time.thread_time))
+        patched.setattr(
+            march,
+            "clock",
+            SimpleNamespace(perf_counter=time.thread_time, process_time=time.process_time),
+        )
         yield

@@ -18,7 +18,7 @@ from catenary.solver.statics.line_at_rest import line_at_rest
 # stations of six unknowns of those of four: a pass reads 2.25 times the numbers of a block, and
 # such stations take 1.8 times as long. So do twin wires, which is the least that they can cost in
 # one plane; the second contact of a strip adds to it, as wide columns are laid over the state for
-# each. In an overlap only spans beside each other have eight unknowns, and a strip answers to contact
+# each. In an overlap only spans beside each other have eight unknowns, and a strip answers to the
 # wires that are there. It is measured on the shipped line, which has four such spans of 30, as many
 # of 24 as a tension section of 1.2 km has; the line for tests has four of 14.
 STITCHED, COMPOUND = "line.stitch_wire=", "line.auxiliary_wire="
@@ -27,7 +27,7 @@ LINES: dict[str, tuple[str, list[str], float]] = {
     "stitched": ("re330_stitched", [SIMPLE, STITCHED], 2.0),
     "compound": ("shinkansen_compound", [SIMPLE, COMPOUND], 3.0),
     "twin": ("dc_twin", [SIMPLE, "line.twin="], 2.5),
-    "overlap": ("overlap", ["line.overlap="], 1.4),
+    "overlap": ("overlap", ["line.overlap="], 1.6),
 }
 WHOLE = {"overlap"}
 SHORT = ["numerics.dt_s=1e-3", "train.raise_time_s=0.1"]
