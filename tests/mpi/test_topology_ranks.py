@@ -31,7 +31,7 @@ CASES = {
     "shinkansen_compound": [],
     "dc_twin": [],
     "tramway": [],
-    "overlap": ["line.overlap={first_span=[2,6],n_spans=3,rise_m=0.6}", "line.n_spans=11"],
+    "overlap": ["line.overlap.first_span=[3,8]", "line.n_spans=12"],
 }
 N_SPANS = 8
 
