@@ -80,6 +80,12 @@ class Overlaps:
     rise: float
     distance: float
 
+    def sections(self, masts: np.ndarray) -> np.ndarray:
+        """From and to of the tension sections of a line with these masts (n,), (k, 2) [m]."""
+        first = np.array(self.first, dtype=np.int64)
+        starts = np.append(masts[0], masts[first])
+        return np.column_stack([starts, np.append(masts[first + self.n_spans], masts[-1])])
+
 
 @dataclass(frozen=True)
 class LineData(Spans):

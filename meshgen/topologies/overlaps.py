@@ -37,7 +37,6 @@ def with_overlaps(line: Line, overlaps: Overlaps) -> Line:
     masts = line.support_positions
     first = np.array(overlaps.first, dtype=np.int64)
     last = first + overlaps.n_spans
-    starts, ends = np.append(masts[0], masts[first]), np.append(masts[last], masts[-1])
     middles = 0.5 * (masts[first] + masts[last])
     running = np.column_stack([np.append(-np.inf, middles), np.append(middles, np.inf)])
     sideways = np.zeros(masts.size)
@@ -46,7 +45,7 @@ def with_overlaps(line: Line, overlaps: Overlaps) -> Line:
     own, others = (
         _Sections(
             line,
-            np.column_stack([starts, ends])[turn::2],
+            overlaps.sections(masts)[turn::2],
             running[turn::2],
             overlaps.rise,
             side * sideways,

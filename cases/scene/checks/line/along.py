@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -88,14 +89,13 @@ def _arms(scene: Scene, line: LineData) -> Iterator[Fault]:
 def _held(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Sections with a tensioner at both ends and nothing in between that holds their wires."""
     along, masts, overlaps = along_of(scene.line), line.support_positions, line.overlaps
-    first = () if overlaps is None else overlaps.first
-    n_spans = 0 if overlaps is None else overlaps.n_spans
-    starts = [0.0, *(float(masts[span]) for span in first)]
-    ends = [*(float(masts[span + n_spans]) for span in first), float(masts[-1])]
-    between = [along.overlap] * len(first)
-    tensioned = zip([along.start, *between], [*between, along.end], strict=True)
-    keys = [*["line.overlap.along"] * len(first), "line.ends.end.along"]
-    for start, end, both, key in zip(starts, ends, tensioned, keys, strict=True):
+    sections = [[0.0, float(masts[-1])]]
+    if overlaps is not None:
+        sections = overlaps.sections(masts).tolist()
+    between = len(sections) - 1
+    tensioned = [along.start, *[along.overlap] * between, along.end]
+    keys = [*["line.overlap.along"] * between, "line.ends.end.along"]
+    for (start, end), both, key in zip(sections, pairwise(tensioned), keys, strict=True):
         if all(both) and not any(start < x < end for x in along.mid_points):
             yield refusal(
                 scene.origin,
