@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from scipy import integrate
 
 from catenary.mbs.build import Operation, has_joints, make_pantograph, steady_forces
 from catenary.mbs.head.head_kernels import N_DRIVE
@@ -369,7 +370,6 @@ def nominal_height_rule(
         if air_speed is not None and placement.data.meets_air:
             force += steady_forces(placement.data, air_speed).whole
         lifted = elasticity.pressed(at_rest, force)
-        area = (np.diff(x) * (lifted[1:] + lifted[:-1]) / 2.0).sum()
-        return float(area / (x[-1] - x[0]))
+        return float(integrate.trapezoid(lifted, x) / (x[-1] - x[0]))
 
     return height
