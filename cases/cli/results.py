@@ -167,7 +167,7 @@ def _shapes(folder: Path, records: Records | None) -> list[Shape] | None:
     with Results(folder, records) as results:
         config = results.attributes["config"]
     try:
-        problem = problem_of(scene_from(config, Origin(str(folder))))
+        problem = problem_of(scene_from(config, Origin(str(folder), recorded=True)))
         return [shape_of(placement.data) for placement in problem.train.placements]
     except InputError as error:
         console.warn(f"pantographs are drawn as schematics: {error}")

@@ -50,4 +50,4 @@ def extended_scene(
         raw["evaluation"] |= {"from_m": first, "to_m": last}
         where = f"on the command line ({EVALUATED})"
         given += [("evaluation.from_m", where), ("evaluation.to_m", where)]
-    return scene_from(raw, Origin(file, tuple(given)))
+    return scene_from(raw, Origin(file, tuple(given), recorded=True))

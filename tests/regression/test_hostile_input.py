@@ -294,7 +294,7 @@ def test_the_scene_of_a_result_file_is_judged_like_any_other() -> None:
     config = json.loads(json.dumps(resolved(load_scene("en50318_2002"))))
     config["petsc"] = {"log_view": ":canary"}
     with pytest.raises(InputError, match=NOT_FOR_A_SCENE):
-        scene_from(config, Origin("run.h5"))
+        scene_from(config, Origin("run.h5", recorded=True))
 
 
 def test_a_variant_gives_petsc_no_option() -> None:

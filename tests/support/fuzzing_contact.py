@@ -39,7 +39,7 @@ def impact(rng: random.Random, words: Words) -> None:
 def kinematic(rng: random.Random, words: Words) -> None:
     """A contact without elasticity, and steps that damp what it excites."""
     words["contact.law"] = "'kinematic'"
-    words["contact.stiffness_N_per_m"] = ""
+    words["contact.stiffness_N_per_m"] = words["effects.contact_loss"] = ""
     words["train.start_below_m"] = 0.0
     words["numerics.newmark_gamma"], words["numerics.newmark_beta"] = 0.55, 0.28
 

@@ -59,7 +59,7 @@ def test_kinematic_contact_has_no_loss_to_simulate() -> None:
 )
 def test_the_resolved_scene_is_the_same_again(overrides: list[str]) -> None:
     scene = load_scene(CASE, overrides)
-    again = scene_from(resolved(scene), Origin("a result"))
+    again = scene_from(resolved(scene), Origin("a result", recorded=True))
     assert problem_of(again) == problem_of(scene)
 
 

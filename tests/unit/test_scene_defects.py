@@ -71,7 +71,7 @@ def test_defects_are_converted() -> None:
 
 def test_a_resolved_scene_is_the_same_again() -> None:
     first = scene()
-    again = scene_from(resolved(first), Origin("the result file"))
+    again = scene_from(resolved(first), Origin("the result file", recorded=True))
     assert problem_of(again) == problem_of(first)
     assert len(again.defects) == 6
 

@@ -11,8 +11,9 @@ import pytest
 from catenary.cases.run.planning.plan import effect_rows
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.keys.keys import known_keys
-from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.scene.scene import Scene
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
@@ -54,6 +55,77 @@ def test_an_effect_without_what_it_requires_is_refused(name: str) -> None:
     for required in effects.registry()[name].requires:
         with pytest.raises(InputError, match=rf"requires effects\.{required}, which is off"):
             load_scene("ac_simple", [f"effects.{name}=true", f"effects.{required}=false"])
+
+
+# Effects whose own checks say what they lack, and how their sentences begin.
+OWN_SENTENCE = {
+    "residual_dropper_stiffness": "line.dropper.residual_stiffness_ratio is 0 in ",
+    "contact_damping": "contact.damping_N_s_per_m is 0 N s/m in ",
+    "axial_motion": "effects.axial_motion is on, but line.contact_wire (contact wire) in ",
+}
+# Without anything that an optional effect could act on but slack droppers and the contact's loss.
+BARE = [
+    "line.steady_arm.stiffness_N_per_m=0",
+    "line.damping.alpha_s=0",
+    "line.damping.beta_per_s=0",
+]
+WINDY = [
+    "wind.speed_m_per_s=10",
+    "line.contact_wire.diameter_mm=13",
+    "line.messenger_wire.diameter_mm=14",
+]
+RIGID = [
+    "contact.law=kinematic",
+    "contact.stiffness_N_per_m=",
+    "numerics.newmark_gamma=0.55",
+    "numerics.newmark_beta=0.28",
+]
+PERMISSIONS = [name for name, effect in effects.registry().items() if effect.lifts]
+
+
+@pytest.mark.parametrize(
+    "name", [n for n, e in effects.registry().items() if e.data and n not in PERMISSIONS]
+)
+def test_an_effect_with_nothing_to_act_on_is_refused(name: str) -> None:
+    effect = effects.registry()[name]
+    words = [*BARE, *(f"effects.{required}=true" for required in effect.requires)]
+    # A requirement that lacks data itself would be told in its place.
+    words += WINDY if "wind" in effect.requires else []
+    words += RIGID if name == "contact_loss" else []
+    load_scene("en50318_2002", words)
+    with pytest.raises(InputError) as refused:
+        load_scene("en50318_2002", [*words, f"effects.{name}=true"])
+    if name in OWN_SENTENCE:
+        assert str(refused.value).startswith(OWN_SENTENCE[name])
+    else:
+        assert str(refused.value) == (
+            f"effects.{name} is true on the command line (--set); it acts only with {effect.data}; "
+            "give that, or leave the effect out"
+        )
+
+
+def test_a_recorded_scene_names_effects_that_have_nothing_to_act_on() -> None:
+    """Every effect that was on stands in a result, also one that its author did not write."""
+    record = resolved(load_scene("en50318_2002"))
+    assert record["effects"]["gusts"] is True
+    scene_from(record, Origin("run.h5", recorded=True))
+    with pytest.raises(InputError, match=r"effects\.pre_sag is true in case\.toml; it acts only"):
+        scene_from(record, Origin("case.toml"))
+
+
+def test_an_effect_that_permits_something_may_be_on_without_it() -> None:
+    """Variants of one sweep may be on both sides of the limit that it lifts."""
+    assert PERMISSIONS == ["several_pantographs", "supercritical_speed"]
+    for name in PERMISSIONS:
+        scene = load_scene("ac_simple", [f"effects.{name}=true"])
+        assert name not in [row.name for row in effect_rows(scene, problem_of(scene))[0]]
+
+
+def test_an_effect_that_does_not_act_says_what_does_instead() -> None:
+    words = ["effects.lateral_motion=true", "line.steady_arm.stiffness_N_per_m=150"]
+    load_scene("ac_simple_3d", words)
+    with pytest.raises(InputError, match=r"arm_stiffness is true .* with lateral motion they are"):
+        load_scene("ac_simple_3d", [*words, "effects.arm_stiffness=true"])
 
 
 @pytest.mark.parametrize("case", ["en50318_2002", "ac_simple", "ambrosio2012"])

@@ -30,7 +30,7 @@ Raw = dict[str, Any]
 
 
 def scene_of(raw: Raw) -> Scene:
-    return scene_from(raw, Origin("case.toml"))
+    return scene_from(raw, Origin("case.toml", recorded=True))
 
 
 def example() -> Raw:

@@ -95,7 +95,7 @@ def test_files_are_taken_in_and_the_resolved_scene_needs_them_no_more(tmp_path: 
     assert scene.vehicle is not None and scene.vehicle.vertical is not None
     assert scene.vehicle.vertical.by_place == pairs
     file.unlink()
-    again = scene_from(resolved(scene), Origin("a result"))
+    again = scene_from(resolved(scene), Origin("a result", recorded=True))
     assert problem_of(again) == problem_of(scene)
 
 
@@ -138,10 +138,10 @@ def test_a_run_ends_before_the_foremost_strip_leaves_the_line() -> None:
             "beside the strips' middle (line.stagger_m), so that they must be at least 0.4 m long",
         ),
         ([ROLL[0]], "roll on the command line (--set) acts only with effects.head_roll = true"),
-        ([ROLL[1]], "no head of the train can roll; give one a table such as"),
+        ([ROLL[1]], "it acts only with a head that can roll (pantographs.*.roll)"),
         (ROLL, f"it needs {KIND}.strips.length_m"),
         ([FRA], "vehicle on the command line (--set) acts only with effects.vehicle_motion"),
-        ([MOVES], "there is no table [vehicle]"),
+        ([MOVES], "it acts only with a table [vehicle]; give that, or leave the effect out"),
         (["vehicle.irregularity.spectrum=fra_1", MOVES], "it must be fra_4, fra_5, fra_6"),
         ([FRA, "vehicle.irregularity.shortest_m=200", MOVES], "must have waves"),
         ([FRA, "numerics.dt_s=6e-3", MOVES], "a wave must take 8 of these"),
@@ -193,10 +193,10 @@ def test_strips_of_neighbours_must_not_overlap() -> None:
     two["pantographs"]["three_masses"]["strips"] = {"number": 2, "spacing_m": 0.56}
     two["train"]["pantographs"].append({"name": "three_masses", "behind_m": 1.5})
     with pytest.raises(InputError, match="at least 1.56 m more than the 0 m .* strips") as refused:
-        scene_from(two, Origin("here"))
+        scene_from(two, Origin("here", recorded=True))
     assert "train.pantographs.1.behind_m is 1.5 m" in str(refused.value)
     two["train"]["pantographs"][1]["behind_m"] = MIN_SEPARATION + 0.56
-    assert len(problem_of(scene_from(two, Origin("here"))).train.placements) == 2
+    assert len(problem_of(scene_from(two, Origin("here", recorded=True))).train.placements) == 2
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,7 @@ def test_incidents_are_converted_and_rounded_to_steps() -> None:
 
 def test_a_resolved_scene_is_the_same_again() -> None:
     first = scene()
-    again = scene_from(resolved(first), Origin("the result file"))
+    again = scene_from(resolved(first), Origin("the result file", recorded=True))
     assert problem_of(again) == problem_of(first)
     assert len(again.incidents) == 3
 

@@ -73,7 +73,7 @@ def test_any_content_of_a_table(key: str, value: object) -> None:
     if isinstance(table, dict):
         table[parts[-1]] = value
     try:
-        scene_from(raw, Origin("case.toml"))
+        scene_from(raw, Origin("case.toml", recorded=True))
     except InputError as error:
         one_sentence(error)
 

@@ -132,4 +132,4 @@ def test_arms_of_a_free_line_are_checked_too() -> None:
     arms["inclination_deg"] = 9
     raw["effects"].pop("lateral_motion")
     with pytest.raises(InputError, match=rf"links.{number}.inclination_deg is 9 .*acts only with"):
-        scene_from(raw, Origin("case.toml"))
+        scene_from(raw, Origin("case.toml", recorded=True))

@@ -7,6 +7,7 @@ import pytest
 from catenary.cases.run.describe.pantographs import kind_lines
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.scene.convert.problem import problem_of
+from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.control.regulation import Regulation
@@ -64,7 +65,7 @@ def test_a_regulation_is_data() -> None:
 
 def test_the_resolved_scene_is_the_same_again_and_names_what_acts() -> None:
     scene = load(f"{KIND}.laws=[{','.join(LAWS)}]", f"{KIND}.regulation={{{PI}}}")
-    again = scene_from(resolved(scene), scene.origin)
+    again = scene_from(resolved(scene), Origin("a result", recorded=True))
     assert problem_of(again) == problem_of(scene)
     active = {effect.name for effect in effects.active(problem_of(scene))}
     assert {"pantograph_laws", "regulated_lift"} <= active

@@ -56,7 +56,7 @@ def test_every_shipped_case_loads(case: str, shortened: bool) -> None:
 def test_the_resolved_configuration_loads_to_the_same_problem(case: str) -> None:
     scene = load_scene(case, ["train.raise_time_s=0.25"])
     carried = json.loads(json.dumps(resolved(scene), allow_nan=False))
-    again = scene_from(carried, Origin("the result file"))
+    again = scene_from(carried, Origin("the result file", recorded=True))
     assert problem_of(again) == problem_of(scene)
     assert resolved(again) == resolved(scene)
 

@@ -71,7 +71,7 @@ def test_resolved_scene_is_the_same_again_and_holds_only_what_acts(overrides: li
     scene = load(*overrides)
     table = resolved(scene)["pantographs"]["seven_body"]
     assert OWN_KEYS & set(table) == (OWN_KEYS if overrides else set())
-    again = scene_from(resolved(scene), Origin("a result"))
+    again = scene_from(resolved(scene), Origin("a result", recorded=True))
     assert problem_of(again) == problem_of(scene)
 
 

@@ -42,6 +42,24 @@ def check_requirements_of_chosen(scene: Scene) -> Iterator[Fault]:
         yield from _requirements(scene, name, "on", f"effects.{name}")
 
 
+def check_chosen_act(scene: Scene) -> Iterator[Fault]:
+    """Effects that the scene switches on without anything for them to act on.
+
+    One that lifts a limit is a permission, of which a scene need not make use.
+    """
+    from catenary.cases.scene.convert.problem import problem_of
+
+    if scene.origin.recorded:
+        return
+    problem = functools.cache(lambda: problem_of(scene))
+    for name, on in scene.effects.items():
+        effect = effects.registry()[name]
+        if on and not effect.lifts and not effect.applies(problem()):
+            lacking = f"it acts only with {effect.data}; give that, or leave the effect out"
+            why = effect.instead(problem()) or lacking
+            yield refusal(scene.origin, f"effects.{name}", True, why)
+
+
 def check_requirements_of_defaults(scene: Scene) -> Iterator[Fault]:
     """Of effects that are on by default, unless the scene holds nothing for them to act on."""
     from catenary.cases.scene.convert.problem import problem_of

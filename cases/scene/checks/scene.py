@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from catenary.cases.scene.checks.effects import (
+    check_chosen_act,
     check_effect_data,
     check_effect_names,
     check_requirements_of_chosen,
@@ -110,6 +111,7 @@ def faults_of(scene: Scene) -> list[Fault]:
     if found.nothing_by(check_mechanisms, scene, line):
         found.nothing_by(check_uplift, scene)
         found.nothing_by(check_requirements_of_defaults, scene)
+        found.nothing_by(check_chosen_act, scene)
         found.nothing_by(check_vehicle, scene, line)
         if found.nothing_by(check_incidents, scene, line):
             found.nothing_by(check_window, scene)

@@ -14,11 +14,13 @@ COMMAND_LINE = "on the command line (--set)"
 @dataclass(frozen=True)
 class Origin:
     """Where a scene's keys were written: its file, pairs of a key that was assigned and the place
-    of that, and pairs of a key and the file that its value was read from."""
+    of that, and pairs of a key and the file that its value was read from. Of a scene that a result
+    recorded every key is written, also what its author left to the defaults."""
 
     file: str
     overridden: tuple[tuple[str, str], ...] = ()
     taken_in: tuple[tuple[str, str], ...] = ()
+    recorded: bool = False
 
     def of(self, key: str) -> str:
         """Place of a key, with its preposition, for use in a sentence."""

@@ -72,7 +72,7 @@ def study_waves(folder: Path) -> Studied:
         config = results.attributes["config"]
         with Snapshots(folder, len(data.points), until=float(data.time[-1])) as snapshots:
             snapshots.need_whole("a space-time picture")
-            scene = scene_from(config, Origin(str(folder)))
+            scene = scene_from(config, Origin(str(folder), recorded=True))
             problem = problem_of(scene)
             rest = line_at_rest(problem, mesh_of(scene))
             energy = EnergyMotion(rest, _numbers_in(data, rest))

@@ -42,9 +42,6 @@ def check_vehicle(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 def _vehicle_acts(scene: Scene) -> Iterator[Fault]:
     on, said = scene.switches()["vehicle_motion"], "vehicle_motion" in scene.effects
-    if on and scene.vehicle is None:
-        why = "there is no table [vehicle] that says how it moves"
-        yield refusal(scene.origin, "effects.vehicle_motion", True, why)
     if scene.vehicle is None:
         return
     if not on and not said:
@@ -72,9 +69,6 @@ def _roll_acts(scene: Scene) -> Iterator[Fault]:
     rolling = [
         name for name in names if roll_of(pantograph_of(name, scene.pantographs[name], speed))
     ]
-    if not rolling:
-        why = f"no head of the train can roll; give one a table such as pantographs.{names[0]}.roll"
-        yield refusal(scene.origin, "effects.head_roll", True, why)
     for name in rolling:
         if scene.pantographs[name].strips.length_m is None:
             why = (
