@@ -2,7 +2,8 @@
 
 What is imported here, none of which starts MPI, is not imported again by every process: that is
 most of what a short run costs. It is packages and half of the program's modules; the others, PETSc,
-MPI and HDF5 are imported by each. Pictures of reports are laid out, but not painted unless
+MPI and HDF5 are imported by each. Of PETSc the libraries are loaded here, without being started,
+and the checks of scenes are put together. Pictures of reports are laid out, but not painted unless
 ``pictures`` is true.
 
 A request is a line of JSON on standard input: ``words``, ``folder``, ``environment``, ``pictures``
@@ -10,19 +11,22 @@ and the files ``stdout`` and ``stderr``. It is answered with the number of the p
 exit code when it has ended, negative for a signal.
 """
 
+import ctypes
 import gc
 import importlib
+import importlib.util
 import json
 import os
 import sys
+from pathlib import Path
 
 PACKAGES = (
     "gmsh", "jinja2", "matplotlib.backends.backend_agg", "matplotlib.figure", "meshio", "numba",
     "pydantic", "scipy.integrate", "scipy.interpolate", "scipy.optimize", "scipy.signal",
     "scipy.sparse.linalg", "tqdm", "typer",
     # Of the program, with what they import:
-    "catenary.cases.run.planning.file_sizes", "catenary.cases.run.scene_mesh",
-    "catenary.cases.scene.load",
+    "catenary.cases.cli.main", "catenary.cases.run.planning.file_sizes",
+    "catenary.cases.run.scene_mesh", "catenary.cases.scene.load",
     "catenary.postproc.evaluate.filters", "catenary.solver.contact_problem.coupling",
     "catenary.solver.statics.form_finding.equilibrium", "catenary.solver.time_loop.step_kernels",
 )  # fmt: skip
@@ -50,6 +54,10 @@ for name in PACKAGES:
     importlib.import_module(name)
 started = {"mpi4py.MPI", "petsc4py.PETSc", "h5py"} & set(sys.modules)
 assert not started, f"what processes are forked from must not have imported {started}"
+for place in importlib.util.find_spec("petsc4py").submodule_search_locations:
+    for library in Path(place).glob("lib/**/PETSc.*.so"):
+        ctypes.CDLL(str(library))  # with what it needs; PETSc is started by each process
+sys.modules["catenary.cases.scene.scene"].Scene.model_rebuild()  # put off until it is needed
 sys.modules["numba"].njit(lambda number: number + 1)(1)  # loads what all compiled loops need
 gc.freeze()
 for line in sys.stdin:
