@@ -249,7 +249,7 @@ class CompiledSteps:
             taps=self._showing.layout.taps,
         )
         rows = self.rows, (self._moved.now, self._moved.behind)
-        return steps, self.times, self._drives, *rows, self._kept, self._counts, self._shows
+        return *steps, self.times, self._drives, *rows, self._kept, self._counts, self._shows
 
 
 def compiled_steps(

@@ -57,7 +57,10 @@ class KeptMotions(NamedTuple):
 
 
 class Steps(NamedTuple):
-    """What steps are made of.
+    """What steps are made of: the first arguments of ``take``, in its order.
+
+    It takes them one by one. Each use of a tuple is compiled with the types of all that is in it,
+    which as one took twice as long.
 
     Attributes
     ----------
@@ -177,8 +180,41 @@ def keep(kept, number, motion, columns):
 
 
 @compiled
-def take(steps, times, drives, rows, moved, kept_motions, counts, shows, first, n_steps):
+def take(
+    speed,
+    moving,
+    placing,
+    free,
+    loading,
+    clock,
+    records,
+    heads,
+    responding,
+    problem,
+    law,
+    superposing,
+    compensating,
+    crossing,
+    lateral_place,
+    switched,
+    ends,
+    of_step,
+    outputs,
+    shown,
+    taps,
+    times,
+    drives,
+    rows,
+    moved,
+    kept_motions,
+    counts,
+    shows,
+    first,
+    n_steps,
+):
     """Take the steps from ``first`` on of ``n_steps`` to ``times`` [s], with ``drives`` of heads.
+
+    See ``Steps`` for what comes before ``times``.
 
     If ``shows``, ``rows`` take what each shows; ``moved`` are ``now`` and ``behind`` of
     ``MovedStations``, beside which a row is up to date. ``kept_motions`` are ``KeptMotions``; where
@@ -187,16 +223,16 @@ def take(steps, times, drives, rows, moved, kept_motions, counts, shows, first, 
     Returns how many were taken, and whether the next one is begun: up to its free step, as its
     forces are left to others.
     """
-    steps, times, drives, rows, kept_motions = borrowed((steps, times, drives, rows, kept_motions))
-    now, behind = borrowed(moved)
-    kept = kept_motions
-    moving, speed, loading = steps.moving, steps.speed, steps.loading
-    records, heads, taps, shown = steps.records, steps.heads, steps.taps, steps.shown
-    problem, law, switched, outputs = steps.problem, steps.law, steps.switched, steps.outputs
-    clock, free, placing, responding = steps.clock, steps.free, steps.placing, steps.responding
-    superposing, compensating = steps.superposing, steps.compensating
-    ends, of_step = steps.ends, steps.of_step
-    crossing, lateral_place = steps.crossing, steps.lateral_place
+    times, drives, rows = borrowed(times), borrowed(drives), borrowed(rows)
+    now, behind = borrowed(moved[0]), borrowed(moved[1])
+    kept, moving, clock = borrowed(kept_motions), borrowed(moving), borrowed(clock)
+    placing, responding = borrowed(placing), borrowed(responding)
+    records, heads = borrowed(records), borrowed(heads)
+    problem, law, switched = borrowed(problem), borrowed(law), borrowed(switched)
+    superposing, compensating = borrowed(superposing), borrowed(compensating)
+    crossing, lateral_place = borrowed(crossing), borrowed(lateral_place)
+    ends, of_step, outputs = borrowed(ends), borrowed(of_step), borrowed(outputs)
+    shown, taps = borrowed(shown), borrowed(taps)
     solution, depth, motion = problem.unknowns.solution, problem.found[0], shown.motion
     pressed = problem.heads
     n, n_outputs = problem.gap.place.size, outputs.size
