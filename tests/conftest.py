@@ -8,17 +8,17 @@ from pathlib import Path
 
 import pytest
 
-# Files to begin with, as cores become free: those that compile most. The first and the third share
-# loops, the second has others and takes as long as both: no two cores compile the same at a time.
+# Files to begin with, as cores become free: those that compile most. The first compiles the loop of
+# steps, which takes longest and which nearly all later files need; the next ones compile parts of
+# lines of other widths in the meantime. No two cores compile the same at a time.
 FIRST = (
-    "unit/solver/test_repeated_blocks.py",
-    "regression/test_hard_cases.py",
-    "unit/solver/test_station_passes.py",
-    "unit/solver/test_varying_stations.py",
-    "unit/solver/test_lines_in_two_passes.py",
-    "unit/solver/test_wires_that_come_and_go.py",
-    # Both of these compile lines of many topologies, which others need later.
     "regression/test_cases.py",
+    "unit/solver/test_repeated_blocks.py",
+    "unit/solver/test_station_passes.py",
+    "unit/solver/test_lines_in_two_passes.py",
+    "unit/solver/test_varying_stations.py",
+    "unit/solver/test_wires_that_come_and_go.py",
+    "regression/test_hard_cases.py",
     "regression/test_fuzz.py",
 )
 
