@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 # Files to begin with, as cores become free: those that compile most. The first compiles the loop of
 # steps, which takes longest and which nearly all later files need; the next ones compile parts of
@@ -21,6 +22,12 @@ FIRST = (
     "regression/test_hard_cases.py",
     "regression/test_fuzz.py",
 )
+
+# Hypothesis draws the same examples for everybody: what fails in one place fails in all. Others are
+# drawn by `make fuzz`.
+settings.register_profile("same", derandomize=True)
+settings.register_profile("others", derandomize=False)
+settings.load_profile("same")
 
 sys.path.insert(0, str(Path(__file__).with_name("support")))
 

@@ -10,15 +10,17 @@ riders that carry in part (docs/theory.md, section 16).
 from __future__ import annotations
 
 import numpy as np
-from scipy import optimize
 
 from catenary.solver.base.errors import NotConverged
 from catenary.solver.contact_problem import complementarity_kernels
+from catenary.solver.contact_problem.simplicial_path import find_zero
 
-# Masters are gone over by turns; they feel each other's riders by way of their lean alone.
-_TURNS = 50
-# What may be missing in a row, of the largest right-hand side.
+# Shares go from 0 to 1; paths on a grid of some of that take the fewest steps.
+_FIRST_GRID = 0.25
+# What may be missing in a row, of the largest right-hand side; and, as that makes the problem jump
+# from shares to shares, what shares and tensions may disagree by.
 _ROUNDING = 1e-12
+_AGREEMENT = 10.0 * _ROUNDING
 
 
 def pivot(
@@ -38,7 +40,7 @@ def pivot(
     NotConverged
         If there is no solution.
     """
-    found, rounds = _pivot(matrix, right, always, behind, solution)
+    found, rounds = _pivot(matrix, right, always, behind, solution, always.copy())
     if not found and behind.any():
         found, more = _share(matrix, right, always, behind, solution)
         rounds += more
@@ -56,9 +58,10 @@ def _pivot(
     always: np.ndarray,
     behind: np.ndarray,
     solution: np.ndarray,
+    acts: np.ndarray,
 ) -> tuple[bool, int]:
-    """Whether a set was right, and the rounds to get there."""
-    acts, master = always.copy(), np.arange(behind.size) - behind
+    """Whether a set was right, and the rounds to get there from ``acts``, which it overwrites."""
+    master = np.arange(behind.size) - behind
     scale = _ROUNDING * (1.0 + np.abs(right).max())
     most = 20 * right.size + 100
     for rounds in range(1, most):
@@ -70,7 +73,7 @@ def _pivot(
             return True, rounds
         first = int(np.argmax(wrong))
         acts[first] = not acts[first]
-        acts = acts[master]
+        acts[:] = acts[master]
     return False, most
 
 
@@ -88,37 +91,31 @@ def _share(
     were found, and the rounds of pivoting.
     """
     master, rides = np.arange(behind.size) - behind, behind > 0
+    masters, size = np.unique(master[rides]), 1.0 + np.abs(right).max()
     shares, none, total = np.zeros(behind.size), np.zeros_like(behind), 0
+    free = always | rides
+    acts = free | (solution > 0.0)  # near what was right for the shares before
 
-    def excess(one: int, share: float) -> float:
-        """Tension of a master where it is above zero, less its compensation where it is not."""
+    def excess(of_masters: np.ndarray) -> np.ndarray:
+        """Tension of masters where it is above zero, less their compensation where it is not."""
         nonlocal total
-        shares[one] = share
+        shares[masters] = of_masters
         part = np.where(rides, shares[master], 1.0)
         partly = matrix * part[:, None]
         partly[np.diag_indices(part.size)] += 1.0 - part
-        found, rounds = _pivot(partly, right * part, always | rides, none, solution)
+        found, rounds = _pivot(partly, right * part, free, none, solution, acts)
         total += rounds
-        return float(matrix[one] @ solution - right[one] - solution[one]) if found else np.nan
+        left = (matrix[masters] @ solution - right[masters] - solution[masters]) / size
+        return left if found else np.full(masters.size, np.nan)
 
-    def agrees(one: int) -> bool:
-        """Whether the share of a master goes with its tension; False where there is none."""
-        share, left = shares[one], excess(one, shares[one])
-        return bool((left >= -scale or share == 1.0) and (left <= scale or share == 0.0))
+    def beyond(place: np.ndarray) -> np.ndarray:
+        """Zero where shares, a place cut to 0 to 1, agree with tensions, as far as it lies outside:
+        the normal map of a variational inequality."""
+        share = np.clip(place, 0.0, 1.0)
+        return excess(share) + place - share
 
-    scale = _ROUNDING * (1.0 + np.abs(right).max())
-    for _ in range(_TURNS):
-        settled = True
-        for one in np.unique(master[rides]):
-            if agrees(one):
-                continue
-            settled = False
-            taut, slack = excess(one, 0.0), excess(one, 1.0)
-            if np.isnan(taut + slack):
-                return False, total
-            shares[one] = float(taut < 0.0)
-            if taut < 0.0 < slack:
-                shares[one] = optimize.brentq(lambda at, one=one: excess(one, at), 0.0, 1.0)
-        if settled:
-            return True, total
-    return False, total
+    slack = (solution[masters] > 0.0).astype(float)
+    place, found = find_zero(beyond, slack - excess(slack), _FIRST_GRID, _AGREEMENT)
+    if found:
+        excess(np.clip(place, 0.0, 1.0))
+    return found, total
