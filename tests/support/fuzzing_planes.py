@@ -113,6 +113,9 @@ def _sway(rng: random.Random, words: Words) -> None:
 # ---- along the track ----------------------------------------------------------------------------
 
 
+_ENDS = ("ends.start", "ends.end", "overlap")
+
+
 def _along(rng: random.Random, words: Words, topology: str) -> None:
     """Axial stiffness of all wires, ends, tensioners, mid-points and a temperature."""
     words["effects.axial_motion"] = "true"
@@ -143,6 +146,9 @@ def _along(rng: random.Random, words: Words, topology: str) -> None:
         tension = float(str(words["line.contact_wire.tension_N"]))
         mass = tension / (9.81 * float(str(words["line.tensioner.ratio"])))
         words["line.tensioner.weights_kg.contact_wire"] = mass
+    if not any(words.get(f"line.{end}.along") == "'tensioner'" for end in _ENDS):
+        for key in [key for key in words if key.startswith("line.tensioner.")]:
+            del words[key]
     if rng.random() < 0.5:
         words["line.temperature.difference_K"] = rng.uniform(-40.0, 60.0)
 

@@ -94,6 +94,8 @@ def test_a_blow_is_marched_until_its_waves_have_come_to_the_far_end() -> None:
         ("pulse", Asked(frequency=2.0), "--frequency-Hz belongs to --excite force, not to pulse"),
         ("pulse", Asked(at=60.0), "--at-m is 60, but must lie on the line, from 0 to 60 m"),
         ("pulse", Asked(at=np.nan), "--at-m is nan, but must be finite"),
+        ("hammer", Asked(impulse=0.0), "--impulse-Ns is 0, which excites nothing"),
+        ("force", Asked(force=0.0), "--force-N is 0, which excites nothing"),
         ("force", Asked(frequency=101.0), "--frequency-Hz is 101, but must be from 0 to 100"),
         ("force", Asked(frequency=-1.0), "--frequency-Hz is -1, but must be from 0 to 100"),
         ("hammer", Asked(duration=0.005), "--duration-s is 0.005, but must be from 0.01"),

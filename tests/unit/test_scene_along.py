@@ -55,6 +55,18 @@ def test_a_tensioner_has_all_that_the_scene_gives() -> None:
             "takes axial_stiffness_N or section_mm2, but both are given",
         ),
         (["line.ends.start.along=tensioner"], "acts only with effects.axial_motion = true"),
+        (
+            ["line.tensioner.ratio=4"],
+            "line.tensioner .* has ratio, but no wire ends at a tensioner",
+        ),
+        (
+            [*WHOLE, "line.tensioner={efficiency=0.9, travel_m=1}"],
+            r"has efficiency, travel_m, but no wire ends at a tensioner: line.ends.start.along or",
+        ),
+        (
+            [*WHOLE, "line.ends.end.along=tensioner", "line.tensioner.stop_stiffness_N_per_m=1e5"],
+            "stop_stiffness_N_per_m is 100000 N/m .* acts only with line.tensioner.travel_m",
+        ),
         (["line.mid_points_m=[660]"], "acts only with effects.axial_motion = true"),
         (["line.temperature.difference_K=20"], "acts only with effects.axial_motion = true"),
         ([*WHOLE, "line.temperature.difference_K=200"], "it must be at most 150"),
@@ -71,7 +83,7 @@ def test_a_tensioner_has_all_that_the_scene_gives() -> None:
         ([*TENSIONED, "line.tensioner.weights_kg.stitch=700"], "the line has contact_wire"),
         (
             [*TENSIONED, "line.tensioner.weights_kg.contact_wire=700"],
-            r"would hold 20601 to 20601 N .* has 20000 N, which 679\.579 kg hold",
+            r"would hold 20601 N .* has 20000 N, which 679\.579 kg hold",
         ),
         ([*WHOLE, "line.ends.end.kind=periodic"], "ends fixed or in an absorbing_layer"),
         ([*WHOLE, "window.mode=bounded"], "waves along the track run far ahead"),

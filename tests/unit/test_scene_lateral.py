@@ -64,7 +64,10 @@ def test_a_messenger_wire_has_a_stagger_of_its_own() -> None:
             "takes stiffness_N_per_m or stiffness_by_radial_force, but both are given",
         ),
         (["line.messenger_stagger_m=0.2"], "line.messenger_stagger_m .* acts only with"),
-        (["line.curve.radius_m=3000"], "acts only with effects.lateral_motion = true"),
+        (
+            ["line.curve.radius_m=3000"],
+            "line.curve.radius_m is 3000 m .* acts only with effects.lat",
+        ),
         ([ON, "line.curve.radius_m=50"], "line.curve.radius_m"),
         ([ON, "line.curve={radius_m=3000, side='up'}"], "left.* or .*right"),
         ([ON, "line.curve={radius_m=3000, from_m=100}"], "needs from_m and to_m together"),

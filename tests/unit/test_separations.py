@@ -103,6 +103,9 @@ def test_a_period_is_found_in_a_decaying_curve(period: float) -> None:
     assert found.travel == pytest.approx(SPAN * (WAVES + SPEED) / WAVES)
     few = curve._replace(separation=d[:5], trailing={"std_N": sigma[:5]})
     assert np.isnan(separation.period_of(few, theory(), SPAN).fitted)
+    few.alone["std_N"] = 60.0
+    told = separation.as_text([few], theory(), SPAN)
+    assert "; no period below 12 separations; ringing" in told and "nan" not in told
 
 
 @pytest.mark.process

@@ -92,6 +92,8 @@ def excitation_of(kind: str, asked: Asked, problem: Problem, dt: float) -> Excit
             raise InputError(f"{option} belongs to --excite {' or '.join(kinds)}, not to {kind}")
         if not np.isfinite(value):
             raise InputError(f"{option} is {value:g}, but must be finite")
+        if value == 0.0 and name in ("force", "impulse"):
+            raise InputError(f"{option} is 0, which excites nothing; it may be above or below")
     ends, train = problem.line.support_positions[[0, -1]], problem.train
     if kind == FORCE:
         frequency = asked.frequency or 0.0

@@ -278,11 +278,15 @@ def as_text(curves: Sequence[Curve], theory: WaveTheory, span: float) -> str:
         if not np.isfinite(sigma).any():
             continue
         worst, best = int(np.nanargmax(sigma)), int(np.nanargmin(sigma))
+        period = (
+            f"period {one.fitted:.0f} m explains {100 * one.explains:.0f} % of the variance"
+            if np.isfinite(one.fitted)
+            else f"no period below {_LEAST_FOR_PERIOD} separations"
+        )
         lines.append(
             f"{curve.name or 'trailing'}: deviation {curve.alone['std_N']:.1f} N alone, trailing "
             f"{sigma[worst]:.1f} N at {curve.separation[worst]:g} m, {sigma[best]:.1f} N at "
-            f"{curve.separation[best]:g} m; period {one.fitted:.0f} m explains "
-            f"{100 * one.explains:.0f} % of the variance; ringing {one.ringing[0]:.0f} to "
+            f"{curve.separation[best]:g} m; {period}; ringing {one.ringing[0]:.0f} to "
             f"{one.ringing[1]:.0f} m, travel {one.travel:.0f} m"
         )
     return "\n".join(lines)

@@ -111,7 +111,7 @@ ASSIGNMENTS = {
     ),
     "a second opinion on waves": (
         ["numerics.scheme=ts_alpha2", "effects.kink=false"],
-        "effects.running_surface is true",
+        "write effects.running_surface = false",
     ),
     "no heights": ([f"{HEIGHT}.standard_deviation_mm="], "needs standard_deviation_mm or by_place"),
     "negative heights": ([f"{HEIGHT}.standard_deviation_mm=-1"], "must be greater than 0 [mm]"),

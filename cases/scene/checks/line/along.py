@@ -39,6 +39,8 @@ def check_along(scene: Scene, line: LineData) -> Iterator[Fault]:
             yield refusal(scene.origin, key, value, why)
     yield from _mid_points(scene, line)
     yield from _weights(scene, line)
+    if not scene.origin.recorded:
+        yield from _idle_tensioners(scene)
     if on:
         yield from _wires(scene)
         yield from _arms(scene, line)
@@ -57,6 +59,27 @@ def _data_of_effect(table: LineTable) -> dict[str, object]:
     if table.mid_points_m:
         found["line.mid_points_m"] = table.mid_points_m
     return found
+
+
+def _idle_tensioners(scene: Scene) -> Iterator[Fault]:
+    """What is said of tensioners on a line without any, and of a stop that nothing reaches."""
+    table = scene.line
+    said = table.tensioner.model_fields_set
+    if not said or scene.effects.get("tensioners") is False:
+        return
+    ends = [table.ends.start.along, table.ends.end.along]
+    ends += [] if table.overlap is None else [table.overlap.along]
+    if TENSIONER not in ends:
+        key = "line.tensioner"
+        yield Fault(
+            key,
+            f"{key} {scene.origin.of(key)} has {', '.join(sorted(said))}, but no wire ends at a "
+            "tensioner: line.ends.start.along or line.ends.end.along must be tensioner",
+        )
+    elif "stop_stiffness_N_per_m" in said and table.tensioner.travel_m is None:
+        key, value = "line.tensioner.stop_stiffness_N_per_m", table.tensioner.stop_stiffness_N_per_m
+        why = "it acts only with line.tensioner.travel_m, where the stop stands"
+        yield refusal(scene.origin, key, value, why)
 
 
 def _wires(scene: Scene) -> Iterator[Fault]:
@@ -129,11 +152,12 @@ def _weights(scene: Scene, line: LineData) -> Iterator[Fault]:
         low, high = tensioner.band(name, wires[name], _GRAVITY)
         if not low * (1 - _FITS) <= tension <= high * (1 + _FITS):
             fits = tension / (tensioner.ratio * _GRAVITY)
+            holds = f"{low:g} N" if low == high else f"{low:g} to {high:g} N"
             yield refusal(
                 scene.origin,
                 key,
                 mass,
-                f"it would hold {low:g} to {high:g} N by line.tensioner.ratio and efficiency, but "
+                f"it would hold {holds} by line.tensioner.ratio and efficiency, but "
                 f"the wire has {tension:g} N, which {fits:.6g} kg hold",
             )
 

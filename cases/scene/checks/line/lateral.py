@@ -24,7 +24,7 @@ def check_lateral(scene: Scene) -> Iterator[Fault]:
     given: dict[str, object] = {
         **{f"{key}.inclination_deg": arm.inclination_deg for key, arm in _arms(scene).items()},
         "line.messenger_stagger_m": line.messenger_stagger_m,
-        "line.curve": line.curve and line.curve.radius_m,
+        "line.curve.radius_m": line.curve and line.curve.radius_m,
     }
     for key, value in given.items():
         if value is not None and _EFFECT not in scene.effects:

@@ -36,8 +36,9 @@ def check_scheme(scene: Scene) -> Iterator[Fault]:
         if defect.type == "kink" and switches["kink"]:
             yield refusal(scene.origin, f"defects.{i}.type", defect.type, f"{knows} smooth wires")
     if scene.irregularities.running_surface is not None and switches["running_surface"]:
-        key = "effects.running_surface"
-        yield refusal(scene.origin, key, True, f"{knows} smooth wires: switch it off")
+        key = "irregularities.running_surface"
+        why = f"{knows} smooth wires: write effects.running_surface = false"
+        yield Fault(key, f"{key} {scene.origin.of(key)} is not smooth; {why}")
     for name in ("head_roll", "vehicle_motion"):
         if switches[name]:
             yield refusal(
@@ -55,9 +56,9 @@ def check_scheme(scene: Scene) -> Iterator[Fault]:
         switches_of = {"laws": "pantograph_laws", "regulation": "regulated_lift"}
         for part, effect in switches_of.items():
             if getattr(table, part) and switches[effect]:
-                key = f"effects.{effect}"
-                why = f"{knows} linear pantographs, but {name} has {part}: switch it off"
-                yield refusal(scene.origin, key, True, why)
+                key = f"pantographs.{name}.{part}"
+                why = f"{knows} linear pantographs: write effects.{effect} = false"
+                yield Fault(key, f"{key} {scene.origin.of(key)} is not linear; {why}")
         key = f"pantographs.{name}.strips"
         if table.strips.number != 1:
             yield refusal(scene.origin, f"{key}.number", table.strips.number, f"{knows} one strip")
