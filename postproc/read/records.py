@@ -100,7 +100,12 @@ def scan(
     of_steps = {**always, **others, **with_steps}
     there = {path: d for path, d in of_steps.items() if is_there(file, path)}
     rows = [0, 0, 0]
-    parts = ({"time": CLOCK, **there}, energies, apart)
+    # What is missing is a fault already, but for a file whose attributes are damaged.
+    energies, lines = (
+        {path: declared for path, declared in tables.items() if is_there(file, path)}
+        for tables in (energies, apart)
+    )
+    parts = ({"time": CLOCK, **there}, energies, lines)
     for number, tables in enumerate(parts):
         clock = next(iter(tables), "")
         if not clock or clock in unusable or not is_there(file, clock):

@@ -44,7 +44,8 @@ def opened(path: Path) -> tuple[h5py.File, Complete | None]:
     for attempt in range(_ATTEMPTS):
         file = h5py.File(path, "r", locking=False)
         try:
-            if text_of(file.attrs.get("outcome")) != RUNNING:
+            outcome = text_of(file.attrs.get("outcome"))
+            if not isinstance(outcome, str) or outcome != RUNNING:
                 return file, None
             complete = complete_of(file)
             if not complete[1]:

@@ -249,8 +249,8 @@ class SoundFile:
 
     def _usable(self) -> str:
         """What can still be used of a file of which no report can be made."""
-        step = self.facts.get("time_step", np.nan)
-        dt = float(step) if np.isrealobj(step) else np.nan
+        step = np.asarray(self.facts.get("time_step", np.nan))
+        dt = float(step) if step.ndim == 0 and step.dtype.kind in "fiu" else np.nan
         if any(f.essential for f in self._faults) or not dt > 0.0:
             return "no part of it can be reported"
         about = {"n_steps": None, "outcome": "running", **self.attrs}

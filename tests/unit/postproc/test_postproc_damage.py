@@ -270,6 +270,37 @@ def test_a_state_without_the_records_before_it_is_refused(copy: Path) -> None:
         results.checkpoint  # noqa: B018
 
 
+# Damage that once ended without a sentence, and whether checksums stand beside it.
+@pytest.mark.parametrize(
+    ("name", "sealed"),
+    [
+        ("attribute_crc32 = bytes", True),  # what tables a line has is not known then
+        ("facts/time_step is more dimensions", False),
+    ],
+)
+def test_damage_that_hides_other_damage_is_told(
+    name: str, sealed: bool, copy: Path, tmp_path: Path
+) -> None:
+    every = [*attribute_mutations(copy), *dataset_mutations(copy)]
+    (mutation,) = [one for one in every if one.name == name]
+    with h5py.File(copy, "r+") as file:
+        mutation.apply(file)
+        if not sealed:
+            unseal(file)
+    with pytest.raises(InputError) as refused:
+        report.write_summary(copy, tmp_path)
+    assert "is damaged" in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_an_outcome_that_is_no_text_is_left_out(copy: Path, tmp_path: Path) -> None:
+    with h5py.File(copy, "r+") as file:
+        unseal(file)
+        file.attrs["outcome"] = np.arange(3)
+    report.write_summary(copy, tmp_path)
+    with Results(copy) as results:
+        assert "outcome" in results.damage[0]
+
+
 @pytest.mark.parametrize("sealed", [True, False])
 @pytest.mark.parametrize("mutations", [attribute_mutations, dataset_mutations])
 def test_random_damage_is_told_in_a_sentence(
