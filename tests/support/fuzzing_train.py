@@ -90,7 +90,7 @@ def nonlinear_laws(rng: random.Random, words: Words) -> None:
                     f"{{type='damper',{at},up_N_s_per_m={up!r},down_N_s_per_m={down!r}}}",
                     f"{{type='friction',{at},force_N={rng.uniform(0.1, 30.0)!r}}}",
                     f"{{type='spring',{at},force_by_extension="
-                    f"[[-0.1,{-rng.uniform(0.0, 900.0)!r}],[-0.02,-3.0],[0.05,0.0]]}}",
+                    f"[[-0.1,{-3.0 - rng.uniform(0.0, 900.0)!r}],[-0.02,-3.0],[0.05,0.0]]}}",
                 )
             )
         )

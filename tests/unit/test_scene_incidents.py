@@ -12,6 +12,7 @@ from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.lowering import Lowering
+from catenary.solver.base.errors import InputError
 from catenary.solver.problem.incidents import DropperBreak, TensionLoss
 
 INCIDENTS = (
@@ -72,6 +73,12 @@ def test_an_effect_that_is_left_out_is_not_told(kind: str) -> None:
     plan = make_plan(found)
     assert kind in [row.name for row in plan.off]
     assert len(plan.incidents) == 2
+
+
+def test_an_incident_that_cannot_be_is_told_beside_a_chosen_effect() -> None:
+    """Whether an effect has something to act on is asked of sound scenes only."""
+    with pytest.raises(InputError, match=r"incidents\.1\.span is 622"):
+        scene("effects.contact_loss=true", "incidents.1.span=622")
 
 
 def test_a_dropper_that_breaks_has_its_place() -> None:

@@ -111,10 +111,12 @@ def faults_of(scene: Scene) -> list[Fault]:
     if found.nothing_by(check_mechanisms, scene, line):
         found.nothing_by(check_uplift, scene)
         found.nothing_by(check_requirements_of_defaults, scene)
-        found.nothing_by(check_chosen_act, scene)
         found.nothing_by(check_vehicle, scene, line)
         if found.nothing_by(check_incidents, scene, line):
             found.nothing_by(check_window, scene)
+    if not found.faults:
+        # It asks the problem, which is made of a sound scene only.
+        found.nothing_by(check_chosen_act, scene)
     return found.faults
 
 
