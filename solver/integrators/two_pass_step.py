@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.solver.base.kernels.bound import bound
-from catenary.solver.base.kernels.compiled import compiled, inner
+from catenary.solver.base.kernels.compiled import addressed, compiled, inner
 from catenary.solver.base.kernels.pointers import pointed
 from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps, PredictedLineState, Steps
 from catenary.solver.integrators.state_kernels import reserves_within
@@ -272,7 +272,7 @@ def begin_back(layout, places, middle, factored, answer, motion, changes):
     return widened(layout, own)
 
 
-@compiled
+@addressed
 def forth_and_back(multiplied, factored, loads, answer, motion, changes, followed, window):
     """Both passes, over the stations in a ``window`` if there is one; see ``StationPasses``.
 

@@ -13,12 +13,19 @@ from numba import njit
 
 from catenary.solver.base.kernels import loop_cache
 
-_NO_ENTRY = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+# Without an entry at a plain address, which only what is `addressed` needs.
+_NO_ADDRESS = {"no_cfunc_wrapper": True}
+_NO_ENTRY = {"no_cpython_wrapper": True, **_NO_ADDRESS}
 _settings: Any = numba.config  # Numba makes its attributes while it is imported
 
 
 def compiled(function: Any) -> Any:
     """A compiled ``function``, its machine code kept in ``loop_cache.folder()`` if there is one."""
+    return _compile(function, **_NO_ADDRESS)
+
+
+def addressed(function: Any) -> Any:
+    """As ``compiled``, for what compiled loops call by its address, see ``pointers.HeldCall``."""
     return _compile(function)
 
 
@@ -28,7 +35,7 @@ def in_line(function: Any) -> Any:
     A call copies seven numbers for each array among its arguments, in records and tuples as well,
     and counts references to it: many a kernel takes less time than that.
     """
-    return _compile(function, forceinline=True)
+    return _compile(function, forceinline=True, **_NO_ADDRESS)
 
 
 def called(function: Any) -> Any:

@@ -26,7 +26,14 @@ _LEAST_SPACE = 50e6  # [bytes], of which a run's loops take half
 _OLD = 30 * 86400.0  # [s] without use, after which the loops of other sources are removed
 
 # What a file with loops has; a file that only mentions it does no harm.
-_MARKS = (b"\n@compiled", b"\n@in_line", b"\n@inner", b"\n@called", b"\n@intrinsic")
+_MARKS = (
+    b"\n@compiled",
+    b"\n@addressed",
+    b"\n@in_line",
+    b"\n@inner",
+    b"\n@called",
+    b"\n@intrinsic",
+)
 _IMPORT = re.compile(rb"(?:from|import) catenary\.([\w.]+)(?: import (\([^)]*\)|.*))?")
 _NAME = re.compile(rb"\w+")
 

@@ -14,7 +14,7 @@ from llvmlite import ir
 from numba import carray, typeof, types
 from numba.extending import intrinsic
 
-from catenary.solver.base.kernels.compiled import called, compiled
+from catenary.solver.base.kernels.compiled import addressed, called, compiled
 
 _inlined: Any = intrinsic
 # Integers that a tuple of arguments takes at most; an array of two dimensions takes nine.
@@ -29,7 +29,7 @@ def address_of(array: np.ndarray) -> int:
 
 
 class HeldCall:
-    """A compiled function with its arguments, which a compiled loop calls by ``address``.
+    """An ``addressed`` function with its arguments, which a compiled loop calls by ``address``.
 
     The loop's own machine code depends on neither. Arrays are kept alive as long as this is.
 
@@ -214,7 +214,7 @@ def _hold(arguments, held):
     return _store(borrowed(arguments), held)
 
 
-@compiled
+@addressed
 def _go(kernel, place):
     call(kernel, _loaded(place))
 

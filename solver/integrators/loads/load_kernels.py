@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.base.kernels.compiled import called, compiled
+from catenary.solver.base.kernels.compiled import addressed, called
 from catenary.solver.integrators.loads.memory_kernels import remember
 from catenary.solver.model.loads import CONSTANT, TABLE
 
@@ -49,7 +49,7 @@ def add_samples(time, sampled, values):
             values[places[first + j]] += (1.0 - share) * here[j] + share * then[j]
 
 
-@compiled
+@addressed
 def evaluate(clock, values, constant, changing, shapes, functions, sampled, memories):
     """Make ``values`` those at the time ``clock[0]`` [s].
 

@@ -10,7 +10,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[3]
 FILES = sorted(path for part in ("solver", "mbs", "tests") for path in (ROOT / part).rglob("*.py"))
 INNER = {"inner", "called"}
-COMPILED = {"compiled", "in_line", "by_make_up"} | INNER
+COMPILED = {"compiled", "addressed", "in_line", "by_make_up"} | INNER
 
 
 def module_of(path: Path) -> str:
