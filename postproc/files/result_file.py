@@ -26,6 +26,7 @@ from catenary.postproc.files.hdf5.array_writes import append_rows, grow, put_arr
 from catenary.postproc.files.hdf5.checked import (
     FORMAT_BOUNDS,
     create_checked,
+    put_sealed_arrays,
     seal_arrays,
     seal_attributes,
     set_attribute,
@@ -239,9 +240,7 @@ class ResultFile:
             place = group.require_group(slot)
             for name in set(place) - set(state):  # of the line as it was before an incident
                 del place[name]
-            for name, value in state.items():
-                put_array(place, name, value)
-            seal_arrays(place, state)
+            put_sealed_arrays(place, state)
             self._settle()
             set_attribute(group, "latest", slot)
         self._n_states += 1

@@ -194,7 +194,7 @@ class Recorder:
         """Gather the buffers, append them, and store the state of ``view``. Collective."""
         self._take_waiting()
         line = self._line()
-        state = view.checkpoint() if view is not None else None
+        state = view.state() if view is not None else None
         self._guarded(lambda: self._append(self._blocks(), self._block(line), state))
         self._rows = self._n_taken = 0
         self._energies.clear()

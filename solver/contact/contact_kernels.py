@@ -19,22 +19,24 @@ from catenary.solver.model.elements.shape_functions import shape_slopes, shape_v
 # Far more than the round-off of a position, far less than an element [m].
 SLIP = 1e-6
 
-# A node of a contact wire: where it is along the track and across it [m]; whether an element joins
-# it to the next one; of its unknowns (w, theta_y) the numbers on this rank, 0 where another rank
-# owns them, whether this one does, what they are at rest [m], [-]; the columns of A^-1 for both,
-# one after the other from ``at`` on and ``width`` long each, for local unknowns from ``begin`` on.
+# A node of a contact wire: where it is along the track and across it [m]; what its unknowns (w,
+# theta_y) are at rest [m], [-]; where its columns of A^-1 for both begin, one after the other,
+# ``width`` long each, for local unknowns from ``begin`` on; of its unknowns the numbers on this
+# rank, 0 where another rank owns them, and whether this one does; whether an element joins it to
+# the next one. As short as can be, since a line has very many.
 NODE = np.dtype(
     [
         ("x", np.float64),
         ("y", np.float64),
-        ("joined", np.float64),
-        ("local", np.int64, (2,)),
-        ("owned", np.float64, (2,)),
         ("rest", np.float64, (2,)),
-        ("begin", np.int64),
         ("at", np.int64),
-        ("width", np.int64),
-    ]
+        ("begin", np.int32),
+        ("width", np.int32),
+        ("local", np.int32, (2,)),
+        ("owned", np.int8, (2,)),
+        ("joined", np.int8),
+    ],
+    align=True,
 )
 
 # A sample of the running surface of a contact wire: where along the track [m], its height above the

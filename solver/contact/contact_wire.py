@@ -38,7 +38,6 @@ class ContactWires:
     x : (n_nodes,) positions of their nodes [m], ascending in each wire, wire by wire
     ranges : (n_wires, 2) first node of each wire, and the one after its last
     mesh_nodes : (n_nodes,) their numbers in the mesh
-    dofs : (n_nodes, 2) unknowns (w, theta_y) of its nodes
     nodes : (n_nodes,) records of ``NODE``, of no columns until a ``ForcesOnLine`` has some
     shapes : WireShapes, these nodes and the wires' running surfaces
     """
@@ -52,8 +51,8 @@ class ContactWires:
         self._at_rest = form.lateral is not None
         self.mesh_nodes = nodes = np.concatenate(chains)
         self.x = model.mesh.x(nodes)
-        self.dofs = np.stack([model.dofs(nodes), model.dofs(nodes, "theta_y")], axis=1)
-        mine = ownership.owned(self.dofs)
+        dofs = dofs_at(model, nodes)
+        mine = ownership.owned(dofs)
         self.nodes = np.zeros(self.x.size, dtype=NODE)
         course = model.mesh.points[:, 1] if form.lateral is None else form.lateral.y
         self.nodes["x"], self.nodes["y"] = self.x, course[nodes]
@@ -62,7 +61,7 @@ class ContactWires:
             # No element leads from the end of a piece to the next one.
             self.nodes["joined"][end - 1] = 0.0
             self.nodes["joined"][first + model.mesh.breaks.get(name, np.zeros(0, int)) - 1] = 0.0
-        self.nodes["local"] = np.where(mine, self.dofs - ownership.first, 0)
+        self.nodes["local"] = np.where(mine, dofs - ownership.first, 0)
         self.nodes["owned"] = mine
         self.nodes["rest"] = np.stack([form.height[nodes], form.slope[nodes]], axis=1)
         surface, self._samples = surface_samples(model)
@@ -135,6 +134,11 @@ class ContactWires:
         begin = int(np.searchsorted(own, low - SLIP, side="right")) - 1
         last = int(np.searchsorted(own, high + SLIP)) + 1
         return int(first) + max(begin, 0), int(first) + min(last, own.size)
+
+
+def dofs_at(model: Model, nodes: np.ndarray) -> np.ndarray:
+    """Unknowns (w, theta_y) at mesh nodes (n,), shape (n, 2)."""
+    return np.stack([model.dofs(nodes), model.dofs(nodes, "theta_y")], axis=1)
 
 
 def _height_of(touches: np.ndarray) -> np.ndarray:

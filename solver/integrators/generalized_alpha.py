@@ -15,7 +15,7 @@ product with K is enough. Source of (*): M. Arnold, O. Brüls, Multibody Syst. D
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -122,9 +122,8 @@ class GeneralizedAlphaLine(LineIntegrator):
         self._known[:] = (1.0 - self._by.ratio) * acceleration
         super().start(displacement, velocity, acceleration)
 
-    def state(self) -> Mapping[str, np.ndarray]:
-        """All that the next step starts from, by name; to be read before that."""
-        return {**super().state(), "known_acceleration": self._known}
+    def _parts_of_state(self) -> Mapping[str, Callable[[], np.ndarray]]:
+        return {**super()._parts_of_state(), "known_acceleration": partial(np.asarray, self._known)}
 
     def kept(self) -> tuple[np.ndarray, ...]:
         """The arrays themselves that a step changes."""

@@ -8,7 +8,8 @@ right-hand side needs a single product with K: M v is eliminated by A itself.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,9 @@ from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
 from catenary.solver.window.moving_window import MovingWindow
+
+# What every state of a line has.
+MOTION = ("displacement", "velocity", "acceleration")
 
 
 class LineIntegrator(ABC):
@@ -184,23 +188,25 @@ class LineIntegrator(ABC):
 
     def state(self) -> Mapping[str, np.ndarray]:
         """All that the next step starts from, by name; to be read before that."""
-        return {
-            "displacement": self.displacement,
-            "velocity": self.velocity,
-            "acceleration": self.acceleration,
-        }
+        return {name: part() for name, part in self._parts_of_state().items()}
+
+    def _parts_of_state(self) -> Mapping[str, Callable[[], np.ndarray]]:
+        """What gives each array of ``state``."""
+        return {name: partial(getattr, self, name) for name in MOTION}
 
     def kept(self) -> tuple[np.ndarray, ...]:
         """The arrays themselves that a step changes, however the motion is kept: copied and copied
         back, they take steps of this line back."""
         return self.motion.read[:3]
 
-    def exact_state(self) -> Mapping[str, np.ndarray]:
-        """``state`` and all that steps like these need to go on as if nothing had happened."""
-        return {**self.state(), **self.motion.carried()}
+    def exact_state(self) -> Mapping[str, Callable[[], np.ndarray]]:
+        """What gives each array of ``state``, and of all that steps like these need to go on as if
+        nothing had happened; to be called before the next step, one after the other."""
+        kept = {name: partial(np.asarray, array) for name, array in self.motion.carried().items()}
+        return {**self._parts_of_state(), **kept}
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
-        """Continue from what ``state`` returned, here or elsewhere, or from an ``exact_state``."""
+        """Continue from what ``state`` or ``exact_state`` gave, here or elsewhere, as arrays."""
         self.motion.take(state)
         if self.window is not None:
             self.window.wake()

@@ -29,7 +29,7 @@ class ModelBuilder:
         self.model, self._before = model, before
         self.problem: Problem = model.problem
         self.mesh = model.mesh
-        self._hanging: list[tuple[np.ndarray, np.ndarray]] = []
+        self._hanging: list[tuple[np.ndarray, np.ndarray, np.ndarray | None]] = []
         self._constrained: list[np.ndarray] = []
         self._n_terms = 0
 
@@ -39,7 +39,7 @@ class ModelBuilder:
             number = len(self.model.blocks)
             self.add_block(self._before.blocks[number])
             if number in self._before.hanging_wires:
-                self._hang(number, *self._before.hanging_wires[number])
+                self._hang(number, self._before.hanging_wires[number])
             return
         dofs, length = wire_elements(self.model, wire, unknowns)
         data = self.problem.line.wire(wire)
@@ -47,7 +47,7 @@ class ModelBuilder:
         lengths, tensions, kind = beam.alike(length, tension)
         mass = beam.mass(lengths, data.mass_per_length)
         stiffness = beam.stiffness(lengths, data.bending_stiffness, tensions)
-        load = data.mass_per_length * beam.uniform_load(length)
+        load = data.mass_per_length * beam.uniform_load(lengths)
         if data.worn:
             section, bending = data.left_of(self.mesh.x(self.mesh.elements(wire)))
             worn = section < 1.0
@@ -58,15 +58,17 @@ class ModelBuilder:
             pulled = beam.stiffness(own, 0.0, tension[worn])
             mass = np.concatenate([mass, left * beam.mass(own, data.mass_per_length)])
             stiffness = np.concatenate([stiffness, bending[worn, None, None] * bent + pulled])
-            load *= section[:, None]
+            own_load = data.mass_per_length * beam.uniform_load(own) * section[worn, None]
+            load = np.concatenate([load, own_load])
         self.add_block(Block(wire, dofs, kind, mass, stiffness, of_shape=True))
         if unknowns[0] == "w":
-            self._hang(len(self.model.blocks) - 1, dofs.ravel(), load.ravel())
+            self._hang(len(self.model.blocks) - 1, load)
 
-    def _hang(self, number: int, dofs: np.ndarray, load: np.ndarray) -> None:
-        """Let a wire of block ``number`` weigh on unknowns (n,), with masses (n,)."""
-        self.model.hanging_wires[number] = dofs, load
-        self._hanging.append((dofs, load))
+    def _hang(self, number: int, load: np.ndarray) -> None:
+        """Let a wire of block ``number`` weigh on its unknowns, with masses (k, m) of each kind."""
+        block = self.model.blocks[number]
+        self.model.hanging_wires[number] = load
+        self._hanging.append((block.dofs, load, block.kind))
 
     def add_springs(
         self, component: str, nodes: np.ndarray, unknown: str, stiffness: float | np.ndarray
@@ -98,14 +100,14 @@ class ModelBuilder:
                 self.add_masses(component, nodes[there], values[there], unknown=name)
         if unknown == "w":
             hanging = values if hanging_mass is None else hanging_mass
-            self._hanging.append((dofs, np.broadcast_to(np.asarray(hanging), nodes.shape)))
+            self._hanging.append((dofs, np.broadcast_to(np.asarray(hanging), nodes.shape), None))
 
     def add_masses_at(self, component: str, places: Direction, mass: np.ndarray) -> None:
         """Point masses (n,) [kg] at places of wires in the vertical plane, which they weigh on."""
         unknowns, weights = places
         matrices = mass[:, None, None] * weights[:, :, None] * weights[:, None, :]
         self._add_block(component, unknowns, matrices, None)
-        self._hanging.append((unknowns.ravel(), (mass[:, None] * weights).ravel()))
+        self._hanging.append((unknowns, mass[:, None] * weights, None))
 
     def add_links(
         self, component: str, direction: Direction, law: np.ndarray, of_shape: bool = False
@@ -200,8 +202,11 @@ class ModelBuilder:
         model.weight = np.zeros(model.n_dofs)
         gravity = model.simulated.gravity
         if gravity:
-            for dofs, mass in self._hanging:
-                model.weight -= gravity * np.bincount(dofs, weights=mass, minlength=model.n_dofs)
+            for dofs, mass, kind in self._hanging:
+                own = mass if kind is None else mass[kind]
+                every = np.bincount(dofs.ravel(), weights=own.ravel(), minlength=model.n_dofs)
+                every *= gravity
+                model.weight -= every
         held = [model.numbering.missing, *self._constrained]
         model.constrained = np.unique(np.concatenate(held))
         return model

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from catenary.solver.model.loads import Load
 
 
+# Elements of a block that are looked for together: the ends of each are as long as its unknowns.
+_TOGETHER = 16
+
+
 @dataclass(frozen=True)
 class Block:
     """Equal-sized element matrices of one component, those that are alike stored once.
@@ -50,13 +54,19 @@ class Block:
         """Elements among which are all with unknowns from ``first`` to before ``last``."""
         lowest, highest, ascend = self._ranges
         if ascend:
-            return slice(int(np.searchsorted(highest, first)), int(np.searchsorted(lowest, last)))
-        return np.flatnonzero((highest >= first) & (lowest < last))
+            begin, end = np.searchsorted(highest, first), np.searchsorted(lowest, last)
+            return slice(_TOGETHER * int(begin), _TOGETHER * int(end))
+        own = _TOGETHER * np.flatnonzero((highest >= first) & (lowest < last))
+        elements = (own[:, None] + np.arange(_TOGETHER)).ravel()
+        return elements[elements < len(self.dofs)]
 
     @cached_property
     def _ranges(self) -> tuple[np.ndarray, np.ndarray, bool]:
-        """Lowest and highest unknown of each element, and whether both ascend."""
-        lowest, highest = self.dofs.min(axis=1), self.dofs.max(axis=1)
+        """Lowest and highest unknown of elements that are looked for together, and whether both
+        ascend."""
+        begins = np.arange(0, len(self.dofs), _TOGETHER)
+        lowest = np.minimum.reduceat(self.dofs, begins).min(axis=1)
+        highest = np.maximum.reduceat(self.dofs, begins).max(axis=1)
         ascend = all((np.diff(ends) >= 0).all() for ends in (lowest, highest))
         return lowest, highest, ascend
 
@@ -84,7 +94,8 @@ class Model:
     droppers : those of the mesh, in its order; they only pull where they may slacken
     hanging_at_arms : (n_arms,) what of each arm's mass hangs at its wire [kg]
     form : the shape at rest that matrices are made about, None before it is found
-    hanging_wires : by the number of a wire's block, unknowns and masses by which it weighs
+    hanging_wires : by the number of a wire's block, masses (k, m) by which each kind of its
+        elements weighs on its unknowns
     terms_of : effect name -> number of terms, laws and lifted limits that it contributes
     """
 
@@ -107,7 +118,7 @@ class Model:
     hanging_at_arms: np.ndarray = field(default_factory=lambda: np.zeros(0))
     missing: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
     dropper_gap: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    hanging_wires: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    hanging_wires: dict[int, np.ndarray] = field(default_factory=dict)
 
     @property
     def unknowns(self) -> tuple[str, ...]:

@@ -343,8 +343,14 @@ class March:
 
     def _advance(self, ts: PETSc.TS) -> None:
         """March to the end of ``ts``. Collective."""
+        # Vectors like the solution are made, of the length of the line, which only options read.
+        solution = self._line.solution
+        if not wants_single_steps():
+            solution = PETSc.Vec().createMPI((1, None), comm=self._comm)
         with flushed():
-            ts.solve(self._line.solution)
+            ts.solve(solution)
+        if solution is not self._line.solution:
+            solution.destroy()
 
     def _traffic(self, n_steps: int) -> tuple[float, float] | None:
         """Messages and bytes a step of the rank that sent most; None if none. Collective."""

@@ -41,17 +41,19 @@ def columns_of(
     """
     ends, starts = (np.array([0, 1]), np.array([0, n_unknowns])) if stations is None else stations
     n = starts.size - 1
-    first = np.empty((n + 1, len(tables)), dtype=np.int64)
+    # A line has so many stations that numbers of half the length are worth it.
+    first = np.empty((n + 1, len(tables)), dtype=np.int32)
     last = np.zeros_like(first)
     for k, unknowns in enumerate(tables):
         of_column = np.searchsorted(starts, unknowns, side="right") - 1
-        columns = np.arange(len(unknowns))
+        columns = np.arange(len(unknowns), dtype=first.dtype)
         first[:, k] = len(unknowns)
         np.minimum.at(first[:, k], of_column.max(axis=1, initial=0), columns)
         np.maximum.at(last[:, k], of_column.min(axis=1, initial=n) + 1, columns + 1)
     first = np.minimum.accumulate(first[::-1], axis=0)[::-1]
     last = np.maximum.accumulate(last, axis=0)
-    return Columns(ends, starts.astype(np.int64), np.ascontiguousarray(first), last)
+    starts = np.asarray(starts, dtype=np.int64)
+    return Columns(ends, starts, np.ascontiguousarray(first), last)
 
 
 def widen(stations: np.ndarray, begin: int, end: int) -> None:

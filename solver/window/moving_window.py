@@ -67,7 +67,7 @@ class MovingWindow:
         assert factors.turning is not None
         numbering = model.numbering
         low = np.ascontiguousarray(numbering.low)
-        starts = numbering.starts.astype(np.int64)
+        starts = np.asarray(numbering.starts, dtype=np.int64)
         n = low.size
         spacing = (low[-1] - low[0]) / max(1, n - 1)
         station = np.searchsorted(starts, links.min(axis=1, initial=starts[-1]), side="right") - 1

@@ -113,7 +113,7 @@ def make_view(step: int, share: Share) -> StepView:
         pantograph_places=lambda: np.zeros(0),
         line_state=dict,
         energies=lambda: (COMM.allreduce(1.0), float(step)),
-        checkpoint=lambda: checkpoint(step),
+        state=lambda: checkpoint(step),
     )
 
 

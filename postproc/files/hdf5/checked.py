@@ -17,7 +17,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from catenary.postproc.files.hdf5.array_writes import put_attribute, put_text
+from catenary.postproc.files.hdf5.array_writes import put_array, put_attribute, put_text
 
 # The oldest format of HDF5 whose object headers, links and attributes carry checksums. The next
 # one marks a file as open for writing: after a kill nobody could open it.
@@ -91,17 +91,31 @@ def seal_arrays(group: h5py.Group, arrays: Mapping[str, Any]) -> None:
     put_attribute(group, ARRAYS_SUM, np.asarray(sum_of_arrays(arrays)))
 
 
+def put_sealed_arrays(group: h5py.Group, arrays: Mapping[str, Any]) -> None:
+    """Store arrays by name, and their checksum; each is read from ``arrays`` once, and not kept."""
+    total = 0
+    for name in sorted(arrays):
+        array = arrays[name]
+        put_array(group, name, array)
+        total = _added(total, name, array)
+        del array  # before there is the next one
+    put_attribute(group, ARRAYS_SUM, np.asarray(total))
+
+
 def sum_of_arrays(arrays: Mapping[str, Any]) -> int:
     """CRC-32 of arrays with their names, in order of the names."""
     total = 0
     for name in sorted(arrays):
-        total = zlib.crc32(name.encode(), total)
-        values = np.asarray(arrays[name])
-        if values.dtype.kind in "OSU":
-            total = zlib.crc32(str(text_of(values.item())).encode(), total)
-        else:
-            total = zlib.crc32(np.ascontiguousarray(values).data, total)
+        total = _added(total, name, arrays[name])
     return total
+
+
+def _added(total: int, name: str, array: Any) -> int:
+    """The CRC-32 of arrays of which the latest is added to ``total``."""
+    total, values = zlib.crc32(name.encode(), total), np.asarray(array)
+    if values.dtype.kind in "OSU":
+        return zlib.crc32(str(text_of(values.item())).encode(), total)
+    return zlib.crc32(np.ascontiguousarray(values).data, total)
 
 
 def sum_is_kept(group: h5py.Group, arrays: Mapping[str, Any]) -> bool | None:

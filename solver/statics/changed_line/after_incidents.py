@@ -80,7 +80,7 @@ class ChangedLine:
 
 def unchanged(model: Model, form: Equilibrium) -> ChangedLine:
     """The line before anything has happened."""
-    return ChangedLine(model, form, np.zeros(model.n_dofs), 0.0)
+    return ChangedLine(model, form, np.broadcast_to(0.0, model.n_dofs), 0.0)
 
 
 def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncident]) -> ChangedLine:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,12 +11,28 @@ import numpy as np
 from catenary.solver.base.errors import InputError
 from catenary.solver.base.parallel import on_root
 from catenary.solver.contact.train.pantographs import Pantographs
-from catenary.solver.integrators.line_integrator import LineIntegrator
+from catenary.solver.integrators.line_integrator import MOTION, LineIntegrator
 from catenary.solver.model.model import Model
 from catenary.solver.schemes.scheme import Scheme
 
-# What every state of a line has.
-_MOTION = ("displacement", "velocity", "acceleration")
+
+class State(Mapping[str, Any]):
+    """A state by name, of which each array is made when it is read: those of a long line are large.
+
+    To be read before the next step; ``dict`` of it keeps.
+    """
+
+    def __init__(self, made_by: Mapping[str, Callable[[], Any]]) -> None:
+        self._made_by = made_by
+
+    def __getitem__(self, name: str) -> Any:
+        return self._made_by[name]()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._made_by)
+
+    def __len__(self) -> int:
+        return len(self._made_by)
 
 
 class Checkpoints:
@@ -40,33 +58,39 @@ class Checkpoints:
         self._outputs += ["contact_wire_force"] if pantographs.n_wires > 1 else []
         self._outputs += ["across"] if pantographs.lateral else []
 
-    def make(self, step: int) -> dict[str, Any] | None:
+    def make(self, step: int) -> State | None:
         """Everything needed to continue after ``step``, the latest one, on rank 0. Collective."""
         line, pantographs = self._line, self._pantographs
-        by_row = self._model.numbering.numbers[np.argsort(self._model.row_of_node)].ravel()
-        result: dict[str, Any] = {}
-        # One after the other, none longer than it is needed, as those of a long line are large.
-        states = dict(line.exact_state())
-        for name in list(states):
-            own = states.pop(name)
-            parts = [own] if self._comm.size == 1 else self._comm.gather(own, root=0)
-            if parts:
-                whole = parts[0] if len(parts) == 1 else np.concatenate(parts)
-                result[name] = whole[by_row]
-                result[name][by_row < 0] = 0.0
+        by_row = self._unknowns_by_row()
+        made_by: dict[str, Callable[[], Any]] = {}
+        for name, own in line.exact_state().items():
+            if self._comm.size == 1:
+                made_by[name] = partial(_in_rows, own, by_row)
+            elif parts := self._comm.gather(own(), root=0):
+                whole = _in_rows(partial(np.concatenate, parts), by_row)
+                made_by[name] = partial(np.asarray, whole)
         past = line.past()
         if self._comm.rank != 0:
             return None
         if past is not None:
-            result["line_past"] = past
-        result |= {"row_of_node": self._model.row_of_node, "step": step}
-        result |= {name: getattr(pantographs, name).copy() for name in self._outputs}
-        result["contacts"] = self._scheme.state()
+            made_by["line_past"] = partial(np.asarray, past)
+        made_by["row_of_node"] = partial(np.asarray, self._model.row_of_node)
+        made_by["step"] = lambda: step
+        for name in self._outputs:
+            made_by[name] = partial(np.array, getattr(pantographs, name))
+        made_by["contacts"] = self._scheme.state
         if line.window is not None:
-            result["window"] = line.window.state()
+            made_by["window"] = line.window.state
         for i, pantograph in enumerate(pantographs.models):
-            result[f"pantograph_{i}"] = pantograph.state()
-        return result
+            made_by[f"pantograph_{i}"] = pantograph.state
+        return State(made_by)
+
+    def _unknowns_by_row(self) -> np.ndarray:
+        """Numbers of all unknowns, node after node along the track; negative for none."""
+        model = self._model
+        nodes = np.empty_like(model.row_of_node)
+        nodes[model.row_of_node] = np.arange(nodes.size)
+        return model.numbering.numbers[nodes].ravel()
 
     def restore(self, checkpoint: dict[str, Any]) -> None:
         """Continue from a checkpoint, which all ranks pass. Collective.
@@ -112,7 +136,7 @@ class Checkpoints:
         owned = slice(line.ownership.first, line.ownership.last)
         states = {}
         for name in line.exact_state():
-            if name in checkpoint or name in _MOTION:
+            if name in checkpoint or name in MOTION:
                 by_row = np.reshape(like(checkpoint, name, np.empty(n_nodes * names)), (-1, names))
                 states[name] = model.numbering.as_vector(by_row[row_of_node])[owned]
         return states
@@ -125,6 +149,13 @@ class Checkpoints:
         like(checkpoint, "contacts", self._scheme.state())
         for i, pantograph in enumerate(self._pantographs.models):
             like(checkpoint, f"pantograph_{i}", pantograph.state())
+
+
+def _in_rows(vector: Callable[[], np.ndarray], by_row: np.ndarray) -> np.ndarray:
+    """A vector of the line by the numbers ``by_row``, zero where there is none."""
+    result = vector()[by_row]
+    result[by_row < 0] = 0.0
+    return result
 
 
 def like(checkpoint: dict[str, Any], name: str, wanted: np.ndarray) -> np.ndarray:

@@ -103,7 +103,8 @@ class StepView:
         names; not collective
     energies : () -> the values of ``channels.ENERGIES`` but the time, kinetic and elastic energy of
         the line relative to equilibrium first [J]; collective
-    checkpoint : () -> dict of arrays on rank 0 with which to continue, None elsewhere; collective
+    state : () -> arrays by name on rank 0 with which to continue, None elsewhere, each of which is
+        made when it is read, before the next step; collective
     """
 
     step: int
@@ -116,7 +117,12 @@ class StepView:
     pantograph_places: Callable[[], np.ndarray]
     line_state: Callable[[], Mapping[str, np.ndarray]]
     energies: Callable[[], tuple[float, ...]]
-    checkpoint: Callable[[], dict[str, Any] | None]
+    state: Callable[[], Mapping[str, Any] | None]
+
+    def checkpoint(self) -> dict[str, Any] | None:
+        """The same, to be kept. Collective."""
+        state = self.state()
+        return None if state is None else dict(state)
 
     def __getattr__(self, name: str) -> np.ndarray:
         """The values of a channel."""

@@ -27,7 +27,7 @@ from catenary.solver.time_loop.views.channels import (
     energies_follow_motion,
     energies_of,
 )
-from catenary.solver.time_loop.views.checkpoints import Checkpoints
+from catenary.solver.time_loop.views.checkpoints import Checkpoints, State
 from catenary.solver.time_loop.views.line_energy import LineEnergy
 from catenary.solver.time_loop.views.observers import Stage, StepView
 from catenary.solver.time_loop.views.row_layout import RowLayout
@@ -81,7 +81,6 @@ class Showing:
         self._arm_rows = (arms[self._owned_arms] - first).astype(np.int64)
         nodes = np.arange(model.mesh.n_nodes)
         self._owned_nodes = nodes[owned(model.dofs(nodes))]
-        self._node_rows = (model.dofs(self._owned_nodes) - first).astype(np.int64)
         n_outputs, n_arms = pantographs.outputs.size, self._arm_rows.size
         self._owned_droppers, droppers = interaction.links.shown(DROPPERS)
         self._shown = np.zeros(n_outputs + n_arms + self._owned_droppers.size)
@@ -119,7 +118,7 @@ class Showing:
             pantograph_places=self._pantograph_places,
             line_state=self._line_state,
             energies=self._energies,
-            checkpoint=self._checkpoint,
+            state=self._state,
         )
 
     def _what_is_shown(
@@ -226,6 +225,11 @@ class Showing:
         view.step, view.time, view.row = step, time, row
         return view
 
+    @cached_property
+    def _node_rows(self) -> np.ndarray:
+        """Rows of the heights of the rank's nodes."""
+        return self._model.dofs(self._owned_nodes) - self._line.ownership.first
+
     def _node_motion(self, name: str, rate: bool, among: np.ndarray | None = None, /) -> np.ndarray:
         """One unknown of the rank's nodes, or its rate, zero for nodes without it."""
         if name not in self._rows_of_unknown:
@@ -288,7 +292,7 @@ class Showing:
         kinetic, elastic = total(self._comm, parts).tolist()
         return kinetic, elastic + self._changed.energy if self._unbalanced else elastic
 
-    def _checkpoint(self) -> dict[str, Any] | None:
+    def _state(self) -> State | None:
         """Everything needed to continue after the step shown last, on rank 0. Collective."""
         self._refuse_kept_motion()
         return self.checkpoints.make(self._view.step)

@@ -256,7 +256,7 @@ class March:
             pantograph_places=lambda: self.places(t),
             line_state=dict,
             energies=lambda: (2.0 + np.sin(t), 3.0 + np.cos(t)),
-            checkpoint=lambda: {"step": step, "state": np.full(50, float(step)), "kind": "made up"},
+            state=lambda: {"step": step, "state": np.full(50, float(step)), "kind": "made up"},
         )
 
     def more(self, step: int) -> dict[str, np.ndarray]:
