@@ -236,6 +236,8 @@ def _ends_of_chains(
     points: np.ndarray, on_wire: np.ndarray, edges: np.ndarray, joins: Joins, what: str
 ) -> np.ndarray:
     """Follow chains of elements from wire node to wire node, (n, 2)."""
+    if on_wire[edges].all():
+        return np.array(edges, dtype=np.int64)
     meeting: dict[int, list[int]] = {}
     for element, pair in enumerate(edges.tolist()):
         for node in pair:
@@ -285,9 +287,10 @@ def _check_droppers(points: np.ndarray, ends: np.ndarray, joins: Joins, what: st
             f"{abs(across[leaning[0], 0]):.3g} m along the track, but at most {_LEAN_LIMIT:g} m is "
             "allowed"
         )
-    distinct, count = np.unique(ends, axis=0, return_counts=True)
+    # Both nodes as one number.
+    distinct, count = np.unique(ends @ [len(points), 1], return_counts=True)
     if (count > 1).any():
-        place = _at(points, distinct[np.argmax(count), 1])
+        place = _at(points, int(distinct[np.argmax(count)]) % len(points))
         raise InputError(f"{what}: two droppers join the same nodes at {place}")
 
 

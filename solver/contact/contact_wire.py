@@ -51,7 +51,8 @@ class ContactWires:
         self._at_rest = form.lateral is not None
         self.mesh_nodes = nodes = np.concatenate(chains)
         self.x = model.mesh.x(nodes)
-        dofs = dofs_at(model, nodes)
+        self._numbering = model.numbering
+        dofs = self.dofs
         mine = ownership.owned(dofs)
         self.nodes = np.zeros(self.x.size, dtype=NODE)
         course = model.mesh.points[:, 1] if form.lateral is None else form.lateral.y
@@ -66,6 +67,12 @@ class ContactWires:
         self.nodes["rest"] = np.stack([form.height[nodes], form.slope[nodes]], axis=1)
         surface, self._samples = surface_samples(model)
         self.shapes = WireShapes(self.nodes, surface)
+
+    @property
+    def dofs(self) -> np.ndarray:
+        """Unknowns (w, theta_y) of their nodes (n_nodes, 2); made anew when asked for."""
+        own = [self._numbering.of(self.mesh_nodes, name) for name in ("w", "theta_y")]
+        return np.stack(own, axis=1)
 
     @property
     def n_wires(self) -> int:
@@ -134,11 +141,6 @@ class ContactWires:
         begin = int(np.searchsorted(own, low - SLIP, side="right")) - 1
         last = int(np.searchsorted(own, high + SLIP)) + 1
         return int(first) + max(begin, 0), int(first) + min(last, own.size)
-
-
-def dofs_at(model: Model, nodes: np.ndarray) -> np.ndarray:
-    """Unknowns (w, theta_y) at mesh nodes (n,), shape (n, 2)."""
-    return np.stack([model.dofs(nodes), model.dofs(nodes, "theta_y")], axis=1)
 
 
 def _height_of(touches: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from catenary.solver.base.kernels.bound import bound
 from catenary.solver.contact import contact_kernels
 from catenary.solver.contact.contact_kernels import Answers, Gains
-from catenary.solver.contact.contact_wire import Candidates, ContactWires, dofs_at
+from catenary.solver.contact.contact_wire import Candidates, ContactWires
 from catenary.solver.contact.crossing_kernels import no_sideways
 from catenary.solver.contact.followed_links import FollowedLinks, LinkCoupling
 from catenary.solver.contact.line_response import LineResponse
@@ -68,7 +68,7 @@ class ForcesOnLine:
         free = np.ones(model.n_dofs, dtype=bool)
         free[model.constrained] = False
         self._free = free[line.ownership.first : line.ownership.last]
-        node_columns, reach = self._columns_of_nodes(model, range_of_run, free)
+        node_columns, reach = self._columns_of_nodes(range_of_run, free)
         columns = NO_COLUMNS
         self.link_coupling: LinkCoupling | None = None
         if table.switches:
@@ -178,7 +178,7 @@ class ForcesOnLine:
         return [(local.ravel(), pushed.ravel()), *self.links.loads(compensation)]
 
     def _columns_of_nodes(
-        self, model: Model, range_of_run: tuple[float, float], free: np.ndarray
+        self, range_of_run: tuple[float, float], free: np.ndarray
     ) -> tuple[np.ndarray, float]:
         """Columns of A^-1 for the nodes in a stretch of the wires, each with the place of its own,
         and how far off a force on them is felt [m].
@@ -190,8 +190,7 @@ class ForcesOnLine:
         begin, end = range_of_run[0], range_of_run[1] + STRETCH
         ranges = (self.wires.nodes_between(begin, end, k) for k in range(self.wires.n_wires))
         chosen = np.concatenate([np.arange(first, last) for first, last in ranges])
-        nodes = self.wires.nodes
-        dofs = dofs_at(model, self.wires.mesh_nodes[chosen])[:, :, None]
+        dofs, nodes = self.wires.dofs[chosen][:, :, None], self.wires.nodes
 
         def put(found: ShortColumns, which: np.ndarray) -> None:
             """Let nodes know of the columns of some."""

@@ -205,8 +205,7 @@ class ModelBuilder:
             for dofs, mass, kind in self._hanging:
                 own = mass if kind is None else mass[kind]
                 every = np.bincount(dofs.ravel(), weights=own.ravel(), minlength=model.n_dofs)
-                every *= gravity
-                model.weight -= every
+                model.weight -= np.multiply(every, gravity, out=every)
         held = [model.numbering.missing, *self._constrained]
         model.constrained = np.unique(np.concatenate(held))
         return model

@@ -120,7 +120,11 @@ class Unknowns:
 
         ``by_node`` may be (n_nodes, 1), the same for all unknowns of a node.
         """
-        result, there = np.full(self.size, missing), self.numbers >= 0
+        result = np.full(self.size, missing)
+        if self.n_unknowns == self.numbers.size:
+            result[self.numbers] = by_node
+            return result
+        there = self.numbers >= 0
         result[self.numbers[there]] = np.broadcast_to(by_node, there.shape)[there]
         return result
 
@@ -223,6 +227,8 @@ def _make_ups(stations: Stations, padded: bool) -> tuple[np.ndarray, np.ndarray]
 def _bounds(mesh: LineMesh, station: np.ndarray, n_stations: int) -> tuple[np.ndarray, np.ndarray]:
     """Low and high of each station, see ``Unknowns``."""
     low, high = np.full((2, n_stations), np.inf) * [[1.0], [-1.0]]
-    np.minimum.at(low, station, mesh.points[:, 0])
-    np.maximum.at(high, station, mesh.points[:, 0])
+    order = np.argsort(station, kind="stable")
+    own, begins = np.unique(station[order], return_index=True)
+    low[own] = np.minimum.reduceat(mesh.points[order, 0], begins)
+    high[own] = np.maximum.reduceat(mesh.points[order, 0], begins)
     return np.minimum.accumulate(low[::-1])[::-1], np.maximum.accumulate(high)

@@ -50,22 +50,21 @@ class BandedFactors:
     ) -> None:
         rows, columns, numbers = forces
         reach = int(np.abs(rows - columns).max(initial=0))
-        for dofs, _ in parts:
-            reach = max(reach, int(np.ptp(dofs, axis=1).max(initial=0)))
+        for part in parts:
+            reach = max(reach, int(np.ptp(part.dofs, axis=1).max(initial=0)))
         self._reach = reach
         free, known = np.ones(size, dtype=bool), np.zeros(size)
         free[given], known[given] = False, values
         self.from_given = np.zeros(size)
         bands = np.zeros((3 * reach + 1, size), order="F")
-        for all_dofs, all_matrices in parts:
-            for first in range(0, len(all_dofs), _AT_ONCE):
-                dofs = all_dofs[first : first + _AT_ONCE]
-                matrices = all_matrices[first : first + _AT_ONCE]
+        for part in parts:
+            for first in range(0, len(part.dofs), _AT_ONCE):
+                dofs = part.dofs[first : first + _AT_ONCE]
+                matrices = part.matrices[part.kind[first : first + _AT_ONCE]]
                 at = np.flatnonzero(~free[dofs].all(axis=1))
                 if at.size:
                     forces_there = np.einsum("eij,ej->ei", matrices[at], known[dofs[at]])
                     np.add.at(self.from_given, dofs[at], forces_there)
-                    matrices = matrices.copy()
                     matrices[at] *= free[dofs[at]][:, None]
                 _add(bands, dofs, matrices)
         np.add.at(bands, (2 * reach + rows - columns, columns), numbers)

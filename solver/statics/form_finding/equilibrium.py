@@ -213,7 +213,8 @@ def _springs_and_wires(model: Model, w: np.ndarray) -> tuple[list[Part], np.ndar
         if supports.holds:
             continue
         dofs = w[mesh.supports[mesh.support_group == number]]
-        parts.append((dofs[:, None], np.full((dofs.size, 1, 1), supports.stiffness)))
+        alike = np.zeros(dofs.size, dtype=np.int64)
+        parts.append(Part(dofs[:, None], np.full((1, 1, 1), supports.stiffness), alike))
         relaxed = line.wire(supports.wire).points(np.array(supports.x))[:, 2]
         np.add.at(load, dofs, supports.stiffness * relaxed)
     parts += clamp_parts(model, w)

@@ -2,14 +2,32 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy import sparse
 
 from catenary.solver.model.elements import beam
 from catenary.solver.model.model import Model
 
-# Unknowns (n, m) of n elements, and their matrices (n, m, m).
-Part = tuple[np.ndarray, np.ndarray]
+
+class Part(NamedTuple):
+    """Elements of which those that are alike share a matrix.
+
+    Attributes
+    ----------
+    dofs : (n, m) unknowns of each
+    matrices : (k, m, m)
+    kind : (n,) which of them each has
+    """
+
+    dofs: np.ndarray
+    matrices: np.ndarray
+    kind: np.ndarray
+
+    def only(self, which: slice | np.ndarray) -> Part:
+        """Some of the elements."""
+        return Part(self.dofs[which], self.matrices, self.kind[which])
 
 
 def wire_parts(model: Model, at: np.ndarray) -> list[Part]:
@@ -23,7 +41,7 @@ def wire_parts(model: Model, at: np.ndarray) -> list[Part]:
         tension = wire.tension_at(0.5 * (mesh.x(first) + mesh.x(second)))
         lengths, tensions, kind = beam.alike(length, tension)
         stiffness = beam.stiffness(lengths, wire.bending_stiffness, tensions)
-        parts.append((dofs, stiffness[kind]))
+        parts.append(Part(dofs, stiffness, kind))
     return parts
 
 
@@ -31,7 +49,7 @@ def springs_between(dofs: np.ndarray, stiffness: np.ndarray | float) -> Part:
     """Springs between pairs of unknowns (n, 2), of stiffness (n,) or all of one [N/m]."""
     unit = np.array([[1.0, -1.0], [-1.0, 1.0]])
     values = np.broadcast_to(np.asarray(stiffness, dtype=float), (len(dofs),))
-    return dofs, values[:, None, None] * unit
+    return Part(dofs, values[:, None, None] * unit, np.arange(len(dofs)))
 
 
 def clamp_parts(model: Model, at: np.ndarray) -> list[Part]:
@@ -45,20 +63,23 @@ def clamp_parts(model: Model, at: np.ndarray) -> list[Part]:
 
 def summed(parts: list[Part], size: int) -> sparse.csc_matrix:
     """The matrix (size, size) of all parts."""
+    matrices = [part.matrices[part.kind] for part in parts]
     at = [
         np.concatenate(
-            [np.broadcast_to(dofs[axes], matrix.shape).ravel() for dofs, matrix in parts]
+            [
+                np.broadcast_to(part.dofs[axes], own.shape).ravel()
+                for part, own in zip(parts, matrices, strict=True)
+            ]
         )
         for axes in (np.s_[:, :, None], np.s_[:, None, :])
     ]
-    values = np.concatenate([matrix.ravel() for _, matrix in parts])
+    values = np.concatenate([own.ravel() for own in matrices])
     return sparse.csc_matrix((values, (at[0], at[1])), shape=(size, size))
 
 
 def columns_of(parts: list[Part], columns: np.ndarray, size: int) -> sparse.csc_matrix:
     """Some columns (size, k) of the matrix of all parts."""
     near = []
-    for dofs, matrices in parts if columns.size else ():
-        touched = np.isin(dofs, columns).any(axis=1)
-        near.append((dofs[touched], matrices[touched]))
+    for part in parts if columns.size else ():
+        near.append(part.only(np.isin(part.dofs, columns).any(axis=1)))
     return summed(near, size)[:, columns] if near else sparse.csc_matrix((size, columns.size))
