@@ -9,7 +9,7 @@ from catenary.solver.model.elements import beam
 from catenary.solver.model.links.leaning import dropper_directions
 from catenary.solver.model.links.links import BOTH, PULLS, Direction, Links, law
 from catenary.solver.model.loads import Load
-from catenary.solver.model.model import Block, Model, wire_elements
+from catenary.solver.model.model import Block, Hanging, Model, wire_elements
 from catenary.solver.model.unknowns.stations import SAME_STATION
 from catenary.solver.problem.problem import Problem
 
@@ -29,7 +29,6 @@ class ModelBuilder:
         self.model, self._before = model, before
         self.problem: Problem = model.problem
         self.mesh = model.mesh
-        self._hanging: list[tuple[np.ndarray, np.ndarray, np.ndarray | None]] = []
         self._constrained: list[np.ndarray] = []
         self._n_terms = 0
 
@@ -68,7 +67,7 @@ class ModelBuilder:
         """Let a wire of block ``number`` weigh on its unknowns, with masses (k, m) of each kind."""
         block = self.model.blocks[number]
         self.model.hanging_wires[number] = load
-        self._hanging.append((block.dofs, load, block.kind))
+        self.model.hanging.append(Hanging(block.dofs, load, block.kind))
 
     def add_springs(
         self, component: str, nodes: np.ndarray, unknown: str, stiffness: float | np.ndarray
@@ -100,14 +99,15 @@ class ModelBuilder:
                 self.add_masses(component, nodes[there], values[there], unknown=name)
         if unknown == "w":
             hanging = values if hanging_mass is None else hanging_mass
-            self._hanging.append((dofs, np.broadcast_to(np.asarray(hanging), nodes.shape), None))
+            own = np.broadcast_to(np.asarray(hanging), nodes.shape)
+            self.model.hanging.append(Hanging(dofs, own))
 
     def add_masses_at(self, component: str, places: Direction, mass: np.ndarray) -> None:
         """Point masses (n,) [kg] at places of wires in the vertical plane, which they weigh on."""
         unknowns, weights = places
         matrices = mass[:, None, None] * weights[:, :, None] * weights[:, None, :]
         self._add_block(component, unknowns, matrices, None)
-        self._hanging.append((unknowns, mass[:, None] * weights, None))
+        self.model.hanging.append(Hanging(unknowns, mass[:, None] * weights))
 
     def add_links(
         self, component: str, direction: Direction, law: np.ndarray, of_shape: bool = False
@@ -197,15 +197,8 @@ class ModelBuilder:
         return count
 
     def finish(self) -> Model:
-        """The model, its weights and constraints put together."""
+        """The model, its constraints put together."""
         model = self.model
-        model.weight = np.zeros(model.n_dofs)
-        gravity = model.simulated.gravity
-        if gravity:
-            for dofs, mass, kind in self._hanging:
-                own = mass if kind is None else mass[kind]
-                every = np.bincount(dofs.ravel(), weights=own.ravel(), minlength=model.n_dofs)
-                model.weight -= np.multiply(every, gravity, out=every)
         held = [model.numbering.missing, *self._constrained]
         model.constrained = np.unique(np.concatenate(held))
         return model

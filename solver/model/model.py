@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -71,6 +71,21 @@ class Block:
         return lowest, highest, ascend
 
 
+class Hanging(NamedTuple):
+    """Masses that weigh on unknowns.
+
+    Attributes
+    ----------
+    dofs : (n, ...) unknowns
+    mass : (n, ...) on each [kg], [kg m], or (k, ...) of each kind
+    kind : (n,) which of these, None if each has its own
+    """
+
+    dofs: np.ndarray
+    mass: np.ndarray
+    kind: np.ndarray | None = None
+
+
 @dataclass
 class Model:
     """A line as matrices to be.
@@ -82,7 +97,6 @@ class Model:
     row_of_node : (n_nodes,) place of each mesh node in the order along the track
     blocks : element blocks; their sums are M and K
     constrained : (n,) int, unknowns held at zero, and numbers that are no node's
-    weight : (n_dofs,) gravity load [N], [N m]
     dropper_lengths : (n_droppers,) [m]
     dropper_stiffness, dropper_damping : (n_droppers,) [N/m], [N s/m], of the taut dropper
     released_damping : (n_droppers,) the part of ``dropper_damping`` that goes slack with the spring
@@ -94,6 +108,7 @@ class Model:
     droppers : those of the mesh, in its order; they only pull where they may slacken
     hanging_at_arms : (n_arms,) what of each arm's mass hangs at its wire [kg]
     form : the shape at rest that matrices are made about, None before it is found
+    hanging : what weighs on the line
     hanging_wires : by the number of a wire's block, masses (k, m) by which each kind of its
         elements weighs on its unknowns
     terms_of : effect name -> number of terms, laws and lifted limits that it contributes
@@ -110,7 +125,6 @@ class Model:
     links: list[Links] = field(default_factory=list)
     droppers: Links | None = None
     constrained: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    weight: np.ndarray = field(default_factory=lambda: np.zeros(0))
     loads: list[Load] = field(default_factory=list)
     terms_of: dict[str, int] = field(default_factory=dict)
     broken: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
@@ -118,6 +132,7 @@ class Model:
     hanging_at_arms: np.ndarray = field(default_factory=lambda: np.zeros(0))
     missing: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
     dropper_gap: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    hanging: list[Hanging] = field(default_factory=list)
     hanging_wires: dict[int, np.ndarray] = field(default_factory=dict)
 
     @property
@@ -134,6 +149,16 @@ class Model:
     def n_unknowns(self) -> int:
         """How many unknowns all nodes have."""
         return self.numbering.n_unknowns
+
+    @property
+    def weight(self) -> np.ndarray:
+        """Gravity load (n_dofs,) [N], [N m]; summed anew when it is asked for."""
+        weight, gravity = np.zeros(self.n_dofs), self.simulated.gravity
+        for dofs, mass, kind in self.hanging if gravity else ():
+            own = mass if kind is None else mass[kind]
+            every = np.bincount(dofs.ravel(), weights=own.ravel(), minlength=self.n_dofs)
+            weight -= np.multiply(every, gravity, out=every)
+        return weight
 
     def constrained_between(self, low: int, high: int) -> np.ndarray:
         """Numbers of ``constrained``, which ascend, from ``low`` to before ``high``."""

@@ -15,7 +15,8 @@ _LEVEL = ("v", "theta_z")
 def dead_loads(model: Model) -> np.ndarray:
     """What no shape changes, (n_dofs,) [N], [N m]: weights, their part sideways on a canted track,
     the mean wind, and what links have that do not follow the shape at rest."""
-    load = model.weight.copy()
+    weight = model.weight
+    load = weight.copy()
     for links in model.links:
         pulls = np.where(links.law["open"], 0.0, links.law["rest"])
         if not links.of_shape and pulls.any():
@@ -28,7 +29,7 @@ def dead_loads(model: Model) -> np.ndarray:
         every = np.arange(model.mesh.n_nodes)
         share = line.curve.sideways_pull_at(model.mesh.x(every))
         for sideways, own in zip(_LEVEL, ("w", "theta_y"), strict=True):
-            load[model.dofs(every, sideways)] -= share * model.weight[model.dofs(every, own)]
+            load[model.dofs(every, sideways)] -= share * weight[model.dofs(every, own)]
     if wind is None:
         return load
     for wire in line.wires:

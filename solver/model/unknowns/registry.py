@@ -231,4 +231,5 @@ def _bounds(mesh: LineMesh, station: np.ndarray, n_stations: int) -> tuple[np.nd
     own, begins = np.unique(station[order], return_index=True)
     low[own] = np.minimum.reduceat(mesh.points[order, 0], begins)
     high[own] = np.maximum.reduceat(mesh.points[order, 0], begins)
-    return np.minimum.accumulate(low[::-1])[::-1], np.maximum.accumulate(high)
+    low = np.ascontiguousarray(np.minimum.accumulate(low[::-1])[::-1])
+    return low, np.maximum.accumulate(high)
