@@ -162,7 +162,7 @@ def _details(key: Key) -> str:
 
 
 def _about_effect(name: str) -> list[str]:
-    """What an effect adds, requires and is taken from; nothing for other keys."""
+    """What an effect adds, requires, acts with and is taken from; nothing for other keys."""
     effect = effects.registry().get(name.removeprefix("effects."))
     if effect is None or not name.startswith("effects."):
         return []
@@ -170,6 +170,7 @@ def _about_effect(name: str) -> list[str]:
     return [
         f"adds {effect.adds}",
         f"requires {required}" if required else "",
+        f"acts only with {effect.data}" if effect.data else "",
         f"source: {effect.source}",
     ]
 

@@ -54,7 +54,8 @@ def check_chosen_act(scene: Scene) -> Iterator[Fault]:
     problem = functools.cache(lambda: problem_of(scene))
     for name, on in scene.effects.items():
         effect = effects.registry()[name]
-        if on and not effect.lifts and not effect.applies(problem()):
+        needs = on and effect.data and not effect.lifts
+        if needs and not effect.applies(problem()):
             lacking = f"it acts only with {effect.data}; give that, or leave the effect out"
             why = effect.instead(problem()) or lacking
             yield refusal(scene.origin, f"effects.{name}", True, why)
