@@ -35,6 +35,9 @@ from catenary.solver.linear.stations.station_rows import StationRows, rows_of
 LARGE = 2**19
 # Unknowns of a plane up to which stations are narrow.
 NARROW = 4
+# Stations from which on runs of one make-up have kernels of their own: shorter lines are marched
+# before these are compiled.
+LONG = 1000
 # Where factors do not keep the matrix's own blocks.
 NO_BESIDES = np.zeros(0, dtype=np.int32), np.zeros(0)
 
@@ -181,7 +184,8 @@ def _packed(
     """Layout, kinds of factors, their numbers, how many there are, and ``besides``, as
     ``StationFactors`` keeps them; ``share`` of them is read in a step."""
     # Factors join all of a plane, whatever matrices join: the same kernels serve them all.
-    layout = Layout(layout.widths, make_ups=layout.make_ups)
+    by_runs = layout.varies and stations.size >= LONG
+    layout = Layout(layout.widths, make_ups=layout.make_ups, by_runs=by_runs)
     make_up = stations.make_up[rows.chosen][found.kinds]
     kinds, numbers, n_kinds, unfit = packed_factors(layout, make_up, lacks, found)
     besides: tuple[np.ndarray, np.ndarray] | None = NO_BESIDES
@@ -241,7 +245,11 @@ def _sparse(layout: Layout, blocks: np.ndarray) -> Layout:
     if max(map(len, strands)) >= len(beside):
         strands = ()
     return Layout(
-        layout.widths, (0,), beside, make_ups=layout.make_ups, sparse=True, strands=strands
+        *(layout.widths, (0,), beside),
+        make_ups=layout.make_ups,
+        sparse=True,
+        strands=strands,
+        by_runs=layout.by_runs,
     )
 
 

@@ -111,9 +111,6 @@ is_sparse = _constant(
 is_damped = _constant(lambda layout: layout.damped, "Whether a product with K is one with C too.")
 
 
-varies = _constant(lambda layout: layout.varies, "Whether stations are of several make-ups.")
-
-
 @inlined
 def part_of(typing_context, layout, number):
     """The layout of a make-up by its ``number``, which is a constant."""
@@ -139,30 +136,35 @@ def same_part(typing_context, layout, part):
 @inlined
 def narrowed(typing_context, part, x):
     """Lanes of a whole layout as those of one of its parts."""
-    layout = part.layout
 
     def generate(context, builder, signature, arguments):
-        if layout.whole is None:
-            return arguments[1]
-        return _chosen(builder, arguments[1], layout.lanes_of_whole)
+        return lanes_narrowed(builder, part.layout, arguments[1])
 
-    return Lanes(layout.n_lanes)(part, x), generate
+    return Lanes(part.layout.n_lanes)(part, x), generate
+
+
+def lanes_narrowed(builder: Any, part: Layout, x: Any) -> Any:
+    """LLVM's value of what is ``narrowed``."""
+    return x if part.whole is None else _chosen(builder, x, part.lanes_of_whole)
 
 
 @inlined
 def widened(typing_context, part, x):
     """Lanes of a part as those of its whole layout, 0 where the part has none."""
-    layout = part.layout
-    whole = layout if layout.whole is None else layout.whole
 
     def generate(context, builder, signature, arguments):
-        if layout.whole is None:
-            return arguments[1]
-        lanes, own = np.full(whole.n_lanes, -1), layout.lanes_of_whole
-        lanes[own[own >= 0]] = np.flatnonzero(own >= 0)
-        return _chosen(builder, arguments[1], lanes)
+        return lanes_widened(builder, part.layout, arguments[1])
 
-    return Lanes(whole.n_lanes)(part, x), generate
+    return Lanes((part.layout.whole or part.layout).n_lanes)(part, x), generate
+
+
+def lanes_widened(builder: Any, part: Layout, x: Any) -> Any:
+    """LLVM's value of what is ``widened``."""
+    if part.whole is None:
+        return x
+    lanes, own = np.full(part.whole.n_lanes, -1), part.lanes_of_whole
+    lanes[own[own >= 0]] = np.flatnonzero(own >= 0)
+    return _chosen(builder, x, lanes)
 
 
 def place_of(context: Any, builder: Any, kind: Any, array: Any) -> Any:

@@ -64,12 +64,12 @@ def make_up_of(typing_context, layout, places, station):
 @inlined
 def block_at(typing_context, layout, kinds, station, size):
     """Where the blocks of a station begin, of ``size`` numbers each; ``kinds``, which are
-    ``pointed``, hold that itself where make-ups vary."""
+    ``pointed``, hold that itself, as 64 bits, where make-ups of the line vary."""
 
     def generate(context, builder, signature, arguments):
         layout, kinds, station, size = arguments
         kind = _entry(builder, kinds, station)
-        if signature.args[0].layout.varies:
+        if signature.args[1].dtype == types.int64:
             return kind
         return builder.mul(size, builder.zext(kind, size.type) if kind.type != size.type else kind)
 
@@ -97,22 +97,22 @@ def by_make_up(kernel: Any) -> Any:
 
     typed = _function(names, f"implementation({', '.join(names)})", implementation=implementation)
     function = _function(names, "choose()", choose=choose)
-    overload(function, jit_options=_OPTIONS)(typed)
+    overload(function, jit_options=OPTIONS)(typed)
     return function
 
 
-_OPTIONS: Any = {"forceinline": True, "error_model": "numpy"}
+OPTIONS: Any = {"forceinline": True, "error_model": "numpy"}
 
 
 def _chain(kernel: Any, names: list[str], layout: Layout, number: int) -> Callable[..., Any]:
     """A function that chooses among make-ups from ``number`` on."""
     layout_name, places, station, *others = names
     words = ", ".join((places, station, *others))
-    known = {"kernel": njit(**_OPTIONS)(kernel), "part_of": part_of, "make_up_of": make_up_of}
+    known = {"kernel": njit(**OPTIONS)(kernel), "part_of": part_of, "make_up_of": make_up_of}
     this = f"kernel(part_of({layout_name}, {number}), {words})"
     if number == len(layout.parts) - 1:
         return _function(names, this, **known)
-    further = njit(**_OPTIONS)(_chain(kernel, names, layout, number + 1))
+    further = njit(**OPTIONS)(_chain(kernel, names, layout, number + 1))
     chosen = f"make_up_of({layout_name}, {places}, {station}) == {number}"
     return _function(
         names, f"{this} if {chosen} else further({', '.join(names)})", further=further, **known

@@ -19,7 +19,7 @@ REGISTER = 8
 # Parameters of a layout.
 _SETTINGS = (
     *("widths", "own", "beside", "damped", "remembers", "make_ups", "sparse"),
-    *("by_mass", "strands"),
+    *("by_mass", "strands", "by_runs"),
 )
 
 
@@ -86,6 +86,7 @@ class Layout:
         them, as those of a wire; terms are then by the columns of all sets at once, in place of
         ``beside``
     make_ups : places in a cross-section that stations of each make-up have; none if all have all
+    by_runs : whether runs of stations of one make-up have kernels of their own
 
     Attributes
     ----------
@@ -111,6 +112,7 @@ class Layout:
         sparse: bool = False,
         by_mass: bool = False,
         strands: tuple[tuple[int, ...], ...] = (),
+        by_runs: bool = False,
     ) -> None:
         self.widths = tuple(widths)
         self._plane = min(lanes for lanes in LANES if lanes >= max(self.widths))
@@ -119,7 +121,7 @@ class Layout:
         self.beside = every if beside is None else tuple(beside)
         self.damped, self.remembers = bool(damped), bool(remembers)
         self.make_ups, self.sparse, self.by_mass = make_ups, bool(sparse), bool(by_mass)
-        self.strands = strands
+        self.strands, self.by_runs = strands, bool(by_runs)
         self.pitch = sum(self.widths)
         self.n_lanes = self._plane * len(self.widths)
         # Columns where there are fewer of these than of differences.
@@ -136,7 +138,7 @@ class Layout:
         """All that makes a layout."""
         own = (
             *(self.widths, self.own, self.beside, self.damped, self.remembers),
-            *(self.make_ups, self.sparse, self.by_mass, self.strands),
+            *(self.make_ups, self.sparse, self.by_mass, self.strands, self.by_runs),
         )
         return own if self.whole is None else (*own, self.number, self.whole.key)
 
@@ -181,6 +183,17 @@ class Layout:
         part = Layout(widths, own, beside, **settings)
         part.whole, part.places, part.number = self, self.make_ups[number], number
         return part
+
+    @cached_property
+    def runs(self) -> tuple[tuple[int, ...], ...]:
+        """Numbers of the make-ups that share a layout where all stations around are of one; none
+        unless it is ``by_runs``."""
+        found: dict[object, tuple[int, ...]] = {}
+        for number, part in enumerate(self.parts if self.by_runs else ()):
+            lanes = tuple(self._lane_of[list(part.places)])
+            key = part.changed(make_ups=()), lanes
+            found[key] = *found.get(key, ()), number
+        return tuple(found.values())
 
     @cached_property
     def _lane_of(self) -> np.ndarray:
