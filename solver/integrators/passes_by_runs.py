@@ -15,10 +15,9 @@ from catenary.solver.integrators.two_pass_kernels import (
     ends_of,
     follow,
     go_back,
-    meet_after,
     predict,
 )
-from catenary.solver.linear.factors.substitution import Factored
+from catenary.solver.linear.factors.substitution import Factored, meet
 from catenary.solver.linear.stations.lanes import zero
 from catenary.solver.linear.stations.runs import distance, in_runs, shifted
 from catenary.solver.linear.stations.station_products import read_station
@@ -51,6 +50,28 @@ def back(layout, first, other, i, j, n, x, y):
         x = go_back(layout, known.places, i - k, known, x, found, moved, changes)
         y = go_back(layout, others.places, j + k, others, y, left, moving, changes)
     return x, y
+
+
+@inner
+def meet_after(layout, pairs, ends, chain, x, y):
+    """Go forth after as many ``pairs`` of stations through those that one side has more, and solve
+    for the middle one."""
+    product, known, added, found, _, _ = chain
+    begin, end, _, _, middle = ends
+    places = known.places
+    beyond, there = read_station(product, end - pairs), read_station(product, end - 1 - pairs)
+    for j in range(end - 1 - pairs, middle, -1):
+        ahead = read_station(product, j - 1)
+        others = ahead, there, beyond
+        y = eliminate_row(layout, places, j, product, known, added, True, others, y, found)
+        beyond, there = there, ahead
+    before, here = read_station(product, begin + pairs - 1), read_station(product, begin + pairs)
+    for i in range(begin + pairs, middle + 1):
+        after = read_station(product, i + 1)
+        states = before, here, after
+        x = eliminate_row(layout, places, i, product, known, added, False, states, x, found)
+        before, here = here, after
+    meet(layout, places, middle, known, y, found)
 
 
 @inner

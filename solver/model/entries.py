@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -23,6 +23,19 @@ def iterate_entries(
     Only rows in [first, last), of these ``wanted`` (last - first,) ones if that is given; rows and
     columns of constrained unknowns are left out.
     """
+    sums = [(mass, stiffness, damping)]
+    for rows, columns, values in iterate_sums(model, first, last, sums, wanted):
+        yield rows, columns, values[0]
+
+
+def iterate_sums(
+    model: Model,
+    first: int,
+    last: int,
+    sums: Sequence[tuple[float, float, float]],
+    wanted: np.ndarray | None = None,
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """``iterate_entries`` of several ``sums`` of M, K and C, with the values (k, n) of each."""
     for block in model.blocks:
         alpha, beta = model.damping_of(block.component)
         near = block.near(first, last)
@@ -33,20 +46,24 @@ def iterate_entries(
             dofs, kind = dofs[chosen], kind[chosen]
         if not kind.size:
             continue
-        matrix = np.zeros((dofs.shape[0], dofs.shape[1], dofs.shape[1]))
-        if block.mass is not None:
-            matrix += (mass + damping * beta) * block.mass[kind]
-        if block.stiffness is not None:
-            matrix += (stiffness + damping * alpha) * block.stiffness[kind]
-        if block.damping is not None:
-            matrix += damping * block.damping[kind]
         moves = _free(model, dofs)
-        rows = np.broadcast_to(dofs[:, :, None], matrix.shape)
-        columns = np.broadcast_to(dofs[:, None, :], matrix.shape)
+        shape = *dofs.shape, dofs.shape[1]
+        rows = np.broadcast_to(dofs[:, :, None], shape)
+        columns = np.broadcast_to(dofs[:, None, :], shape)
         keep = (rows >= first) & (rows < last) & moves[:, :, None] & moves[:, None, :]
         if wanted is not None:
             keep[keep] = wanted[rows[keep] - first]
-        yield rows[keep], columns[keep], matrix[keep]
+        values = []
+        for mass, stiffness, damping in sums:
+            matrix = np.zeros(shape)
+            if block.mass is not None:
+                matrix += (mass + damping * beta) * block.mass[kind]
+            if block.stiffness is not None:
+                matrix += (stiffness + damping * alpha) * block.stiffness[kind]
+            if block.damping is not None:
+                matrix += damping * block.damping[kind]
+            values.append(matrix[keep])
+        yield rows[keep], columns[keep], np.stack(values)
 
 
 def _free(model: Model, dofs: np.ndarray) -> np.ndarray:

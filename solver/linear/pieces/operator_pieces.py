@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,10 +25,8 @@ from catenary.solver.linear.stations.station_products import (
     station_product,
     with_damping,
 )
-from catenary.solver.linear.stations.station_rows import LikeRows, StationRows
+from catenary.solver.linear.stations.station_rows import Coefficients, LikeRows, StationRows
 from catenary.solver.model.model import Model
-
-Coefficients = tuple[float, float, float]
 
 
 class WantedPieces(NamedTuple):
@@ -115,16 +114,18 @@ class OperatorPieces:
 
     def rows_of(self, piece: Piece) -> StationRows:
         """Rows of A on the stretch that a piece is worked out on."""
-        return Stretch(self._model, piece).whole(self._coefficients, 1.0)
+        return Stretch(self._model, piece).operator(self._coefficients)
 
     def _make(self, piece: Piece) -> None:
         rows = Stretch(self._model, piece)
         self.like = rows.like
-        self.factors.make(piece, rows.whole(self._coefficients, 1.0))
-        part = self._stations.make_up[piece.begin : piece.end]
-        for table, product, of, damping in self._products:
-            own = rows.whole(of).part(piece.own)
-            damped = None if damping is None else rows.whole(damping).part(piece.own)
+        sums = [of for _, _, *both in self._products for of in both if of is not None]
+        operator, *found = rows.operator_and(self._coefficients, sums)
+        self.factors.make(piece, operator)
+        part, made = self._stations.make_up[piece.begin : piece.end], iter(found)
+        for table, product, _, damping in self._products:
+            own = next(made).part(piece.own)
+            damped = None if damping is None else next(made).part(piece.own)
             packed = packed_rows(product.layout, own, damped, part)
             if packed is None:
                 raise RunBroken(JOINED_OTHERWISE)
@@ -146,9 +147,16 @@ class Stretch:
         self.like = LikeStations(model, piece.low, piece.high)
         self._rows = LikeRows(model, self.like, *self._ends)
 
-    def whole(self, of: Coefficients, held_diagonal: float = 0.0) -> StationRows:
-        """Those of a sum of M, K and C, cut off at the ends of the stretch."""
-        rows = self._rows.sum_of(of, self._ends, held_diagonal)
+    def operator(self, of: Coefficients) -> StationRows:
+        """Those of a sum of M, K and C with ones for held unknowns, cut off at the ends of the
+        stretch."""
+        return self.operator_and(of, [])[0]
+
+    def operator_and(self, of: Coefficients, sums: Sequence[Coefficients]) -> list[StationRows]:
+        """The same, and those of more ``sums``, without what is held: by one walk along the
+        elements."""
+        ones = [1.0, *[0.0] * len(sums)]
+        rows = self._rows.sums_of([of, *sums], self._ends, ones)
         if rows is None:
             raise RunBroken(JOINED_OTHERWISE)
         return rows
@@ -170,7 +178,7 @@ def layouts_of(
     if layout is None:
         return None
     piece = pieces.first()
-    rows = Stretch(model, piece).whole(coefficients, 1.0)
+    rows = Stretch(model, piece).operator(coefficients)
     part = stations.part(piece.low, piece.high)
     of_factors = layout_of_factors(layout, part, rows, n_needed / (2 * part.size))
     if of_factors is None or not _residual(rows, layout, part) <= DIRECT:

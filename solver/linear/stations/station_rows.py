@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,9 +10,11 @@ from scipy import sparse
 
 from catenary.solver.linear.stations.like_stations import LikeStations
 from catenary.solver.linear.stations.sections import Sections, neighbours, places_of
-from catenary.solver.model.entries import iterate_entries
+from catenary.solver.model.entries import iterate_sums
 from catenary.solver.model.model import Model
 
+# Shares of M, K and C.
+Coefficients = tuple[float, float, float]
 # Stations whose entries are put together at once, some 50 MB of them.
 _STRETCH = 2**14
 
@@ -76,53 +79,61 @@ class LikeRows:
         self._kinds = np.argsort(order).astype(np.int32)[kinds]
 
     def sum_of(
-        self,
-        coefficients: tuple[float, float, float],
-        columns: tuple[int, int],
-        held_diagonal: float = 0.0,
+        self, of: Coefficients, columns: tuple[int, int], held_diagonal: float = 0.0
     ) -> StationRows | None:
         """Rows of a sum of M, K and C; None if it joins stations that are no neighbours.
 
         Entries beyond ``columns`` are left out; those of held unknowns are zero but for
         ``held_diagonal``.
         """
+        found = self.sums_of([of], columns, [held_diagonal])
+        return None if found is None else found[0]
+
+    def sums_of(
+        self,
+        sums: Sequence[Coefficients],
+        columns: tuple[int, int],
+        held_diagonals: Sequence[float],
+    ) -> list[StationRows] | None:
+        """``sum_of`` several at once; None if one of them joins stations that are no neighbours."""
         width = self._model.numbering.width
-        blocks = np.zeros((3, self._chosen.size, width, width))
+        blocks = np.zeros((len(sums), 3, self._chosen.size, width, width))
         for begin in range(0, self._chosen.size, _STRETCH):
             part = slice(begin, begin + _STRETCH)
-            found = self._part(self._chosen[part], coefficients, columns, held_diagonal)
+            found = self._part(self._chosen[part], sums, columns, held_diagonals)
             if found is None:
                 return None
-            blocks[:, part] = found
-        return StationRows(self._kinds, self._chosen, blocks)
+            blocks[:, :, part] = found
+        return [StationRows(self._kinds, self._chosen, own) for own in blocks]
 
     def _part(
         self,
         chosen: np.ndarray,
-        coefficients: tuple[float, float, float],
+        sums: Sequence[Coefficients],
         columns: tuple[int, int],
-        held_diagonal: float,
+        held_diagonals: Sequence[float],
     ) -> np.ndarray | None:
-        """Blocks of the ``chosen`` stations."""
+        """Blocks of the ``chosen`` stations, of each of the ``sums``."""
         model, numbering = self._model, self._model.numbering
         stations = chosen + self._first
         begin, end = numbering.starts[stations[0]], numbering.starts[stations[-1] + 1]
         number = np.full(int(stations[-1] - stations[0]) + 1, -1)
         number[stations - stations[0]] = np.arange(stations.size)
         wanted = np.repeat(number >= 0, np.diff(numbering.starts[stations[0] : stations[-1] + 2]))
-        parts = list(iterate_entries(model, int(begin), int(end), *coefficients, wanted))
+        parts = list(iterate_sums(model, int(begin), int(end), sums, wanted))
         held = model.constrained_between(int(begin), int(end))
         held = held[wanted[held - begin]]
-        parts.append((held, held, np.full(held.size, held_diagonal)))
-        rows, others, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+        parts.append((held, held, np.tile(np.array(held_diagonals)[:, None], held.size)))
+        rows, others, values = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
         inside = (others >= columns[0]) & (others < columns[1])
-        inside &= values != 0.0
-        values, size, n = values[inside], numbering.width, stations.size
+        inside &= (values != 0.0).any(axis=0)
+        values, size, n = values[:, inside], numbering.width, stations.size
         station, place = places_of(rows[inside], self._stations)
         other, at = places_of(others[inside], self._stations)
         step = other - station
         if np.abs(step).max(initial=0) > 1:
             return None
         flat = ((step + 1) * n + number[station - stations[0]]) * size + place
-        found = np.bincount(flat * size + at, weights=values, minlength=3 * n * size * size)
-        return np.asarray(found).reshape(3, n, size, size)
+        flat = flat * size + at
+        found = [np.bincount(flat, weights=own, minlength=3 * n * size * size) for own in values]
+        return np.reshape(found, (len(sums), 3, n, size, size))
