@@ -25,7 +25,7 @@ from catenary.solver.statics.line_at_rest import line_at_rest
 STITCHED, COMPOUND = "line.stitch_wire=", "line.auxiliary_wire="
 SIMPLE = "line.topology=simple"
 LINES: dict[str, tuple[str, list[str], float]] = {
-    "stitched": ("re330_stitched", [SIMPLE, STITCHED], 2.0),
+    "stitched": ("re330_stitched", [SIMPLE, STITCHED], 2.2),
     "compound": ("shinkansen_compound", [SIMPLE, COMPOUND], 3.0),
     "twin": ("dc_twin", [SIMPLE, "line.twin="], 2.5),
     "overlap": ("overlap", ["line.overlap="], 1.4),
