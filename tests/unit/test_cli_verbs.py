@@ -124,7 +124,10 @@ def test_list_keys_names_every_key_and_every_effect() -> None:
 def test_details_of_an_effect_are_what_it_declares() -> None:
     text = " ".join(invoke("list", "--keys", "effects.pre_sag").stdout.split())
     effect = effects.registry()["pre_sag"]
-    assert f"adds {effect.adds} requires effects.gravity source: {effect.source}" in text
+    assert (
+        f"adds {effect.adds} requires effects.gravity acts only with {effect.data} "
+        f"source: {effect.source}"
+    ) in text
 
 
 @pytest.mark.parametrize("case", list(shipped()))
