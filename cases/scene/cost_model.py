@@ -27,7 +27,7 @@ SCHEME_FACTOR = {"one_solve": 1.0, "fixed_point": 9.0, "ts_alpha2": 70.0}
 ALL_BODIES_SUBSTEP = 3.0e-4  # [s]
 # Processor time from the scene to the first step, measured with 9e5 nodes of like spans and 9e4 of
 # 1000 spans of which no two are alike: matrices and factors are made once for each kind of span.
-START_PER_NODE = 1.0e-5  # [s]
+START_PER_NODE = 6.0e-6  # [s]
 START_PER_OWN_NODE = 5.0e-5  # [s]
 # Resident memory of runs of ambrosio2012 on 25, 1000 and 2000 like spans and on 500 of which no two
 # are alike, report included, within 11 %: program and libraries, then per unknown.
@@ -35,7 +35,7 @@ MEMORY_BASE = 3.6e8  # [B]
 MEMORY_PER_UNKNOWN = 800.0  # [B]
 # The same where a window of spans moves with the train, of 10 000 spans: matrices and factors are
 # made near the train alone, and the line makes room for the report.
-MEMORY_PER_UNKNOWN_AT_REST = 420.0  # [B]
+MEMORY_PER_UNKNOWN_AT_REST = 340.0  # [B]
 # What a step adds, as the report takes the history of one pantograph after the other.
 MEMORY_PER_STEP = 40.0  # [B]
 

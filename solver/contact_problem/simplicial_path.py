@@ -53,7 +53,10 @@ def find_zero(
         value = of(at)
         if np.abs(value).max() <= small:
             return at, True
-        arrived = _path(of, at, width)
+        try:
+            arrived = _path(of, at, width)
+        except np.linalg.LinAlgError:  # of a map that does not point back from afar
+            arrived = None
         if arrived is None:
             return at, False
         at, width = arrived, width * _FINER

@@ -73,3 +73,9 @@ def test_a_map_without_a_number_is_no_zero() -> None:
     ):
         _, found = find_zero(of, np.array([0.5, 0.5]), 0.25, SMALL)
         assert not found
+
+
+def test_a_map_without_a_zero_has_none() -> None:
+    """That does not point back from afar: the path ends where nothing is left to go on with."""
+    _, found = find_zero(lambda z: np.array([1.0, 0.0]), np.array([0.3, 0.4]), 0.25, SMALL)
+    assert not found
