@@ -7,15 +7,13 @@ around are of one make-up, both passes are those of a line that has no other.
 from __future__ import annotations
 
 from catenary.solver.base.kernels.compiled import addressed, inner
-from catenary.solver.base.kernels.pointers import borrowed, pointed
+from catenary.solver.base.kernels.pointers import call_held, held_at, pointed
 from catenary.solver.integrators.two_pass_kernels import (
     begin_back,
     eliminate_row,
     end_after,
     ends_of,
-    follow,
     go_back,
-    predict,
 )
 from catenary.solver.linear.factors.substitution import Factored, meet
 from catenary.solver.linear.stations.lanes import zero
@@ -101,10 +99,12 @@ back_by_runs = in_runs(back, placed, inwards=False)
 
 
 @addressed
-def forth_and_back(multiplied, factored, loads, answer, motion, changes, followed, window, runs):
+def forth_and_back(place):
     """``two_pass_kernels.forth_and_back`` by the ``runs`` of stations, see ``runs.starts_of``."""
-    predict(motion, changes, followed, window)
-    layout, ends, runs = factored.layout, ends_of(factored), borrowed(runs)
+    of_passes, runs = held_at(place)
+    multiplied, factored, loads, answer, motion, changes, stretch, ahead, following = of_passes
+    call_held(ahead)
+    layout, ends = factored.layout, ends_of(factored)
     begin, end, low, high, middle = ends
     product, known, found, moved = pointed((multiplied, factored, answer, motion))
     added, places = (pointed(loads), loads.size > 0), known.places
@@ -122,7 +122,6 @@ def forth_and_back(multiplied, factored, loads, answer, motion, changes, followe
 
     pairs = min(middle - low, high - 1 - middle)
     x = y = begin_back(layout, places, middle, known, found, moved, changes)
-    number, stretch = 1, followed[3]
     for start in range(1, pairs + 1, stretch):
         done, stop = start, min(start + stretch, pairs + 1)
         while done < stop:
@@ -130,7 +129,7 @@ def forth_and_back(multiplied, factored, loads, answer, motion, changes, followe
             x, y, ran, alone = back_by_runs(layout, chain, runs, i, j, rest, x, y)
             x, y = back(layout, chain, chain, i - ran, j + ran, alone, x, y)
             done += ran + alone
-        follow(number, motion, followed)
-        number += 1
+        if start + stretch <= pairs:
+            call_held(following)
     end_after(layout, pairs, ends, chain, x, y)
-    follow(number, motion, followed)
+    call_held(following)

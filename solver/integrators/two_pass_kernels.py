@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.solver.base.kernels.compiled import addressed, compiled, inner
-from catenary.solver.base.kernels.pointers import pointed
+from catenary.solver.base.kernels.pointers import call_held, held_at, pointed
 from catenary.solver.integrators.state_kernels import reserves_within
 from catenary.solver.linear.factors.substitution import eliminate, meet, solved
 from catenary.solver.linear.stations.lanes import (
@@ -112,11 +112,11 @@ def left_behind(low, high, stretch, starts, unknowns):
 
     They are those from the first of both numbers to the second, and have all their ``unknowns``
     (n, m) among what is known by then. Unknowns of a station begin at its ``starts`` (n_own + 1,),
-    so that few wait for the next stretch.
+    so that few wait for the next stretch. The last stretch is all that is left.
     """
     n, own, pairs = unknowns.shape[0], high - low, (high - low - 1) // 2
     middle = own // 2
-    ranges = np.empty((1 + (pairs + stretch - 1) // stretch + 1, 2), dtype=np.int64)
+    ranges = np.empty((1 + max(1, (pairs + stretch - 1) // stretch), 2), dtype=np.int64)
     first = last = np.searchsorted(unknowns[:, 0], starts[middle])
     ranges[0] = first
     for number in range(1, ranges.shape[0]):
@@ -132,13 +132,15 @@ def left_behind(low, high, stretch, starts, unknowns):
     return ranges
 
 
-@inner
-def follow(number, motion, followed):
-    """Find the reserve of links that a stretch of the pass back has left behind."""
-    links, reserve, ranges, _ = followed
-    before, now = ranges[number - 1], ranges[number]
-    reserves_within(motion[:4], links, now[0], before[0], reserve)
-    reserves_within(motion[:4], links, before[1], now[1], reserve)
+@addressed
+def follow(place):
+    """Find the reserve of links that the next stretch of the pass back has left behind; how many
+    stretches were followed is in ``count`` (1,)."""
+    motion, links, reserve, ranges, count = held_at(place)
+    before, now = ranges[count[0]], ranges[count[0] + 1]
+    count[0] += 1
+    reserves_within(motion, links, now[0], before[0], reserve)
+    reserves_within(motion, links, before[1], now[1], reserve)
 
 
 @by_make_up
@@ -159,14 +161,15 @@ def begin_back(layout, places, middle, factored, answer, motion, changes):
     return widened(layout, own)
 
 
-@inner
-def predict(motion, changes, followed, window):
+@addressed
+def predict(place):
     """Predict the velocities that products read, in the ``window`` if there is one, which is moved
-    on before where it has to be."""
+    on before where it has to be. No stretch is followed by then."""
+    motion, changes, links, reserve, count, window = held_at(place)
+    count[0] = 0
     first, last = 0, motion[0].size
     if window.state.size > 0:
         if look(window, motion[:4]):
-            links, reserve, _, _ = followed
             reserves_within(motion[:4], links, 0, reserve.size, reserve)
         first, last = window.starts[window.ends[0]], window.starts[window.ends[1]]
     predict_velocities(motion, changes, first, last)
@@ -192,14 +195,16 @@ def end_after(layout, pairs, ends, chain, x, y):
 
 
 @addressed
-def forth_and_back(multiplied, factored, loads, answer, motion, changes, followed, window):
-    """Both passes, over the stations in a ``window`` if there is one; see ``StationPasses``.
+def forth_and_back(place):
+    """Both passes, over the stations in a window if there is one; see ``StationPasses``.
 
     Forth they leave in ``answer`` what elimination leaves of the right-hand side. Back they take
-    the rank's own motion on, and find the reserve of its links, which come with their ranges of
-    ``left_behind``.
+    the rank's own motion on, and let ``following`` find the reserve of its links after each
+    ``stretch`` of stations. What is ``ahead``, ``predict``, comes first. Both are called by their
+    addresses: they are the same for all layouts, and take as long to compile as the passes.
     """
-    predict(motion, changes, followed, window)
+    multiplied, factored, loads, answer, motion, changes, stretch, ahead, following = held_at(place)
+    call_held(ahead)
     layout, ends = factored.layout, ends_of(factored)
     begin, end, low, high, middle = ends
     product, known, found, moved = pointed((multiplied, factored, answer, motion))
@@ -231,12 +236,11 @@ def forth_and_back(multiplied, factored, loads, answer, motion, changes, followe
 
     pairs = min(middle - low, high - 1 - middle)
     x = y = begin_back(layout, places, middle, known, found, moved, changes)
-    number, stretch = 1, followed[3]
     for start in range(1, pairs + 1, stretch):
         for k in range(start, min(start + stretch, pairs + 1)):
             x = go_back(layout, places, middle - k, known, x, found, moved, changes)
             y = go_back(layout, places, middle + k, known, y, found, moved, changes)
-        follow(number, motion, followed)
-        number += 1
+        if start + stretch <= pairs:
+            call_held(following)
     end_after(layout, pairs, ends, chain, x, y)
-    follow(number, motion, followed)
+    call_held(following)

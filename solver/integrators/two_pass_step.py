@@ -10,9 +10,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.base.kernels.bound import bound
+from catenary.solver.base.kernels.pointers import HeldCall
 from catenary.solver.integrators import passes_by_runs, two_pass_kernels
 from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps, PredictedLineState, Steps
+from catenary.solver.integrators.two_pass_kernels import (
+    follow,
+    left_behind,
+    predict,
+    predict_velocities,
+)
 from catenary.solver.linear.stations.runs import starts_of
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
@@ -28,8 +34,7 @@ class StationPasses:
 
     Attributes
     ----------
-    kernel, arguments : the compiled function of a step, and the tuple that it is called with, for
-        compiled loops that take steps themselves. ``track_links`` replaces the tuple
+    held : a step for compiled loops that take steps themselves; ``track_links`` replaces it
     factors : as given
     known : what the motion keeps besides x, y and z, or nothing
     by_mass : whether right-hand sides are made by M, as where that is shorter than by K
@@ -74,16 +79,23 @@ class StationPasses:
 
     def track_links(self, links: LinkArrays, reserve: np.ndarray) -> None:
         """Fill ``reserve`` on the way back, as ``LineIntegrator.track_links``."""
-        behind = two_pass_kernels.left_behind(*self._place, links.unknowns)
-        followed = links, reserve, behind, self._stretch
-        if self._window is not NO_WINDOW:
-            followed = links, reserve, self._window.ranges, self._window.low.size
-        self.kernel = two_pass_kernels.forth_and_back
-        self.arguments: tuple[object, ...] = (*self._parts, followed, self._window)
-        if self._runs is not None:
-            self.kernel = passes_by_runs.forth_and_back
-            self.arguments = *self.arguments, self._runs
-        self._step = bound(self.kernel, *self.arguments)
+        window, motion, changes = self._window, self._parts[4], self._parts[5]
+        if window is NO_WINDOW:
+            stretch, ranges = self._stretch, left_behind(*self._place, links.unknowns)
+        else:
+            stretch, ranges = window.low.size, window.ranges
+        count = np.zeros(1, dtype=np.int64)
+        ahead = motion, changes, links, reserve, count, window
+        following = motion[:4], links, reserve, ranges, count
+        # Kept, as what the passes have is where these are.
+        self._around = HeldCall(predict, ahead), HeldCall(follow, following)
+        addresses = [around.address for around in self._around]
+        arguments = *self._parts, stretch, *addresses
+        if self._runs is None:
+            self.held = HeldCall(two_pass_kernels.forth_and_back, arguments)
+        else:
+            self.held = HeldCall(passes_by_runs.forth_and_back, (arguments, self._runs))
+        self._step = self.held.caller()
 
     def open(self, window: WindowArrays, links: LinkArrays, reserve: np.ndarray) -> None:
         """Take steps of the stations in a window only from now on; links as in ``track_links``."""
@@ -94,7 +106,7 @@ class StationPasses:
         """Fill in the rank's own part of what others read of it in a product with C. A step does
         so, too, but only after these have read."""
         motion = self._parts[4]
-        two_pass_kernels.predict_velocities(motion, self._parts[5], 0, motion[0].size)
+        predict_velocities(motion, self._parts[5], 0, motion[0].size)
 
     def step(self) -> None:
         """Find the accelerations and what the next step starts from."""

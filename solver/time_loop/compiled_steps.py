@@ -96,7 +96,7 @@ class CompiledSteps:
         records, passes = pantographs.records(), interaction.line.passes
         law = scheme.coupling.law.in_loop()
         assert records is not None and passes is not None and law is not None
-        self._free = HeldCall(passes.kernel, passes.arguments)
+        self._free = passes.held
         loads = interaction.line.loads
         self._loads = loads if loads is not None and loads.changes else None
         self._loading: HeldCall | None = None
@@ -230,7 +230,7 @@ class CompiledSteps:
             moving=pantographs.moving,
             placing=interaction.placing,
             free=self._free.address,
-            loading=(0, 0, 0) if self._loading is None else self._loading.address,
+            loading=(0, 0) if self._loading is None else self._loading.address,
             clock=np.zeros(1) if self._loads is None else self._loads.clock,
             records=self._records,
             heads=self._heads,

@@ -87,8 +87,8 @@ class Steps(NamedTuple):
     speed: float
     moving: tuple[Any, ...]
     placing: tuple[Any, ...]
-    free: tuple[int, int, int]
-    loading: tuple[int, int, int]
+    free: tuple[int, int]
+    loading: tuple[int, int]
     clock: np.ndarray
     records: np.ndarray
     heads: np.ndarray

@@ -95,10 +95,10 @@ class MovingWindow:
             kinds=factors.kinds,
             turning=factors.turning.arrays,
             links=moving_links,
-            ranges=np.zeros((3, 2), dtype=np.int64),
+            ranges=np.zeros((2, 2), dtype=np.int64),
             known=known,
         )
-        self.arrays.ranges[2, 1] = len(links)
+        self.arrays.ranges[1, 1] = len(links)
         self._operators = operators
         # First station of the pieces that are there and the one after the last.
         self._covered = 0, 0

@@ -49,7 +49,7 @@ class WindowArrays(NamedTuple):
     edges : (2, n + 1) where a window that is to begin, or end, at a station does so
     ends, kinds, turning : of ``StationFactors``
     links : (2,) the first link that may switch and the one after the last
-    ranges : (3, 2) the same for the pass back, see ``two_pass_kernels.left_behind``
+    ranges : (2, 2) the same for the pass back, see ``two_pass_kernels.left_behind``
     known : what the motion keeps besides x, y and z, or nothing
     """
 
@@ -227,7 +227,7 @@ def turn_to(window, begin, end):
     window.links[0], window.links[1] = first, last
     # The pass back looks at all links at its end.
     window.ranges[:] = first
-    window.ranges[2, 1] = last
+    window.ranges[1, 1] = last
 
 
 @called

@@ -25,8 +25,11 @@ def compiled(function: Any) -> Any:
 
 
 def addressed(function: Any) -> Any:
-    """As ``compiled``, for what compiled loops call by its address, see ``pointers.HeldCall``."""
-    return _compile(function)
+    """A function of a place in memory that compiled loops call, see ``pointers.HeldCall``.
+
+    It has no entry from Python: one for many arguments takes as long to compile as their loop.
+    """
+    return _compile(function, no_cpython_wrapper=True)
 
 
 def in_line(function: Any) -> Any:

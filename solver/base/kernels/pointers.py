@@ -7,6 +7,7 @@ Whoever takes an address keeps what stands there alive.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,13 @@ from llvmlite import ir
 from numba import carray, typeof, types
 from numba.extending import intrinsic
 
-from catenary.solver.base.kernels.compiled import addressed, called, compiled
+from catenary.solver.base.kernels.bound import bound
+from catenary.solver.base.kernels.compiled import called, compiled
 
 _inlined: Any = intrinsic
 # Integers that a tuple of arguments takes at most; an array of two dimensions takes nine.
 _MOST_HELD = 512
+_INDEX = ir.IntType(32)
 
 
 def address_of(array: np.ndarray) -> int:
@@ -31,27 +34,27 @@ def address_of(array: np.ndarray) -> int:
 class HeldCall:
     """An ``addressed`` function with its arguments, which a compiled loop calls by ``address``.
 
-    The loop's own machine code depends on neither. Arrays are kept alive as long as this is.
+    The function takes where its arguments are, and reads them with ``held_at``. The loop's own
+    machine code depends on neither. Arrays are kept alive as long as this is.
 
     Attributes
     ----------
-    address : (3,) int, what ``call_held`` takes
+    address : (2,) int, what ``call_held`` takes
     """
 
     def __init__(self, kernel: Any, arguments: tuple[Any, ...]) -> None:
         self._arguments = arguments
-        kinds = tuple(typeof(argument) for argument in arguments)
-        kernel.compile(kinds)
+        kind = typeof(arguments)
+        place = types.CPointer(kind)
+        kernel.compile((place,))
         self._held = np.zeros(_MOST_HELD, dtype=np.int64)
-        if not _hold(arguments, self._held):
+        if not _hold(_in_numbers(kind, arguments), self._held):
             raise ValueError("too many arguments to be held")
-        pointed = types.CPointer(types.Tuple(kinds))
-        _go.compile((types.int64, pointed))
-        self.address = (
-            _function_at(_go, (types.int64, pointed)),
-            _function_at(kernel, kinds),
-            int(self._held.ctypes.data),
-        )
+        self.address = _function_at(kernel, (place,)), int(self._held.ctypes.data)
+
+    def caller(self) -> Callable[[], None]:
+        """A function that calls it once, from Python."""
+        return bound(call_once, self.address)
 
 
 def can_hold_calls() -> bool:
@@ -70,6 +73,17 @@ def _function_at(kernel: Any, kinds: tuple[Any, ...]) -> int:
     kind = types.FunctionType(types.none(*kinds))
     _own_address.compile((kind,))
     return int(_own_address.overloads[(kind,)].entry_point(kernel))
+
+
+def _in_numbers(kind: Any, value: Any) -> Any:
+    """A value with 0 in place of all that its type says: one ``_hold`` serves many types."""
+    if isinstance(kind, types.Dummy):
+        return 0
+    if not isinstance(kind, types.BaseTuple):
+        return value
+    parts: Any = getattr(kind, "types", ())
+    found = [_in_numbers(part, own) for part, own in zip(parts, value, strict=True)]
+    return type(value)(*found) if hasattr(value, "_fields") else tuple(found)
 
 
 @_inlined
@@ -188,15 +202,26 @@ def _store(typing_context, value, place):
 
 
 @_inlined
-def _loaded(typing_context, place):
-    """The tuple that ``_store`` has written to a place, without owners."""
+def held_at(typing_context, place):
+    """The arguments of a ``HeldCall`` that are at a place, without owners."""
 
     def generate(context, builder, signature, arguments):
         kind = context.get_value_type(signature.return_type)
-        there = builder.bitcast(arguments[0], kind.as_pointer())
-        return builder.load(there, align=8)
+        return _load_parts(builder, builder.bitcast(arguments[0], kind.as_pointer()), kind)
 
     return place.dtype(place), generate
+
+
+def _load_parts(builder: Any, place: Any, kind: Any) -> Any:
+    """The value at a place, number by number: of those that nobody uses nothing is left."""
+    if not isinstance(kind, (ir.LiteralStructType, ir.ArrayType)):
+        return builder.load(place, align=max(1, getattr(kind, "width", 64) // 8))
+    value = ir.Constant(kind, ir.Undefined)
+    parts = kind.elements if isinstance(kind, ir.LiteralStructType) else [kind.element] * kind.count
+    for number, part in enumerate(parts):
+        there = builder.gep(place, [_INDEX(0), _INDEX(number)])
+        value = builder.insert_value(value, _load_parts(builder, there, part), number)
+    return value
 
 
 @_inlined
@@ -214,15 +239,16 @@ def _hold(arguments, held):
     return _store(borrowed(arguments), held)
 
 
-@addressed
-def _go(kernel, place):
-    call(kernel, _loaded(place))
-
-
 @called
 def call_held(address):
     """Call what a ``HeldCall`` holds; ``address`` is its own."""
-    call(address[0], (address[1], address[2]))
+    call(address[0], (address[1],))
+
+
+@compiled
+def call_once(address):
+    """``call_held`` from Python."""
+    call_held(address)
 
 
 @compiled

@@ -86,7 +86,7 @@ class LineLoads:
         changing, rows = _rows_of(shapes, np.concatenate([sampled[3], remembered]))
         self.changes = bool(changing.size)
         functions = _functions_of([load for load, _, _ in shapes])
-        self.kernel: Any = load_kernels.evaluate
+        self.kernel: Any = load_kernels.evaluate_held
         self._own = (
             *(self.clock, self.values, constant, changing.astype(np.int64)),
             *(rows, functions, sampled),
@@ -99,7 +99,7 @@ class LineLoads:
             self.memories.read(motion)
         remembered = NO_MEMORIES if self.memories is None else self.memories.arguments
         self.arguments = (*self._own, remembered)
-        self._evaluate = bound(self.kernel, *self.arguments) if self.changes else None
+        self._evaluate = bound(load_kernels.evaluate, *self.arguments) if self.changes else None
 
     def at(self, time: float) -> None:
         """Make ``values`` those at a time [s]. Collective with forces that remember a motion."""

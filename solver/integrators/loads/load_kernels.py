@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.base.kernels.compiled import addressed, called
+from catenary.solver.base.kernels.compiled import addressed, called, compiled
+from catenary.solver.base.kernels.pointers import held_at
 from catenary.solver.integrators.loads.memory_kernels import remember
 from catenary.solver.model.loads import CONSTANT, TABLE
 
@@ -49,7 +50,7 @@ def add_samples(time, sampled, values):
             values[places[first + j]] += (1.0 - share) * here[j] + share * then[j]
 
 
-@addressed
+@compiled
 def evaluate(clock, values, constant, changing, shapes, functions, sampled, memories):
     """Make ``values`` those at the time ``clock[0]`` [s].
 
@@ -76,3 +77,10 @@ def evaluate(clock, values, constant, changing, shapes, functions, sampled, memo
     places, accelerations, tables = memories
     if places[0].size > 0:
         remember(clock, values, places, accelerations, tables)
+
+
+@addressed
+def evaluate_held(place):
+    """``evaluate`` for compiled loops."""
+    clock, values, constant, changing, shapes, functions, sampled, memories = held_at(place)
+    evaluate(clock, values, constant, changing, shapes, functions, sampled, memories)

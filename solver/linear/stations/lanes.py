@@ -31,7 +31,7 @@ inlined: Any = intrinsic
 FUSED = ("contract",)
 
 
-class LayoutType(types.Type):
+class LayoutType(types.Dummy):
     """Numba's type of a layout, which is all of it."""
 
     def __init__(self, layout: Layout) -> None:
