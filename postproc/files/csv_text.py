@@ -8,14 +8,15 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-# A cell that begins so is run by spreadsheets, unless it is a number.
+# A cell that begins so is run by spreadsheets, unless it is a number or a dash alone: the unit of
+# what has none.
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
 
 def begins_formula(text: str) -> bool:
     """Whether a spreadsheet would run ``text`` in a cell."""
-    return text.startswith(_FORMULA) and not _NUMBER.fullmatch(text)
+    return text != "-" and text.startswith(_FORMULA) and not _NUMBER.fullmatch(text)
 
 
 def plain_cell(value: Any) -> Any:

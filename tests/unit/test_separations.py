@@ -70,6 +70,9 @@ def test_the_trailing_pantograph_starts_where_the_scene_says() -> None:
     assert len(jobs) == 6 and len({job.variant.name for job in jobs}) == 6
     assert not any(job.keep_results for job in jobs)
     alone, near, far = jobs[:3]
+    assert [job.variant.varied[separation.WITH] for job in jobs[2:4]] == [
+        "alpha 0.00275 s", "alpha 0.0275 s"
+    ]  # fmt: skip
     assert alone.scene.train.start_m == 200.0 and len(alone.scene.train.pantographs) == 1
     assert near.scene.train.start_m == 231.0
     assert [place.behind_m for place in far.scene.train.pantographs] == [0.0, 200.0]
@@ -119,6 +122,8 @@ def test_the_verb_runs_and_draws_a_curve(tmp_path: Path) -> None:
     assert (pairs / "separations.png").stat().st_size > 1000
     rows = (pairs / "separations.csv").read_text().splitlines()
     assert len(rows) == 1 + 1 + 2
+    # The one alone has no separation, and nothing is varied.
+    assert [row.split(",")[:3] for row in rows[1:3]] == [["alone", "", ""], ["35m", "35", ""]]
     again = catenary(*words, cwd=tmp_path, pictures=True)
     assert again.code == 0 and "done already" in again.stdout
     for more, sentence in (

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from catenary.cases.scene.input.toml_input import parse_assignment
+from catenary.cases.scene.input.toml_input import REMOVED, parse_assignment
 from catenary.cases.studies.sweep.axis_words import (
     STATISTICS_IN_WORDS,
     key_in_words,
@@ -58,7 +58,8 @@ def _typed(key: str, text: str | None) -> Any:
     """The value that a varied key takes, as a scene reads it; None if the variant has none."""
     if text is None or key == NAMES:
         return text
-    return parse_assignment(f"{key}={text}", "--vary")[1]
+    value = parse_assignment(f"{key}={text}", "--vary")[1]
+    return None if value is REMOVED else value
 
 
 def failed_criteria(summary: Mapping[str, Any]) -> list[str]:

@@ -161,7 +161,7 @@ def as_rows(results: list[Result]) -> list[dict[str, Any]]:
 def picture(results: list[Result]) -> Figure:
     """Sizes of the shares over frequency: theory as lines, what is measured as dots."""
     figure = figures.new_figure(2.0 + 2.4 * ((len(results) + 1) // 2))
-    panels = figure.subplots((len(results) + 1) // 2, 2, squeeze=False, sharex=True).ravel()
+    panels = figure.subplots((len(results) + 1) // 2, 2, squeeze=False).ravel()
     for result, axes in zip(results, panels, strict=False):
         for number, (label, shares) in enumerate(_curves(result)):
             colour = figures.COLOURS[number % len(figures.COLOURS)]
@@ -169,8 +169,9 @@ def picture(results: list[Result]) -> Figure:
             axes.plot(result.frequency, expected, color=colour, linewidth=1.0, label=label)
             axes.plot(result.frequency, seen, ".", color=colour, markersize=4.0)
         figures.tidy(
-            axes, "frequency [Hz]", "share of the amplitude", result.name.replace("_", " ")
-        )
+            axes, "frequency [Hz]; dots measured, lines theory", "share of the amplitude",
+            result.name.replace("_", " "),
+        )  # fmt: skip
         axes.set_ylim(0.0, 1.05 * max(1e-3, axes.get_ylim()[1]))
         axes.legend(frameon=False, fontsize="x-small", ncols=2)
     for axes in panels[len(results) :]:

@@ -75,8 +75,9 @@ def train_frame(
     return figure
 
 
-def wavenumbers(seen: WavesSeen, theory: WaveTheory) -> Figure:
-    """Amplitude of the velocity over wavenumber and frequency, with the waves of theory."""
+def wavenumbers(seen: WavesSeen, theory: WaveTheory, what: str = "train") -> Figure:
+    """Amplitude of the velocity over wavenumber and frequency, with the waves of theory; ``what``
+    names what moves."""
     figure = figures.new_figure(6.4)
     axes = figure.add_subplot()
     k, frequency, amplitude = seen.spectrum()
@@ -99,7 +100,7 @@ def wavenumbers(seen: WavesSeen, theory: WaveTheory) -> Figure:
     if seen.position.shape[1]:
         axes.plot(
             ends, theory.speed * ends / (2 * np.pi), color=figures.LIMIT, linewidth=1.0,
-            label="what moves with the train",
+            label=f"what moves with the {what}",
         )  # fmt: skip
     for sign in (1.0, -1.0):
         axes.plot(
@@ -133,8 +134,11 @@ def transmission(found: Transmitted) -> Figure:
     return figure
 
 
-def energy_parts(energy: EnergySeen, seen: WavesSeen) -> Figure:
-    """Energy ahead of and behind what moves, over time, and where it is on the mean."""
+def energy_parts(energy: EnergySeen, seen: WavesSeen, what: str) -> Figure:
+    """Energy ahead of and behind what moves, over time, and where it is on the mean.
+
+    ``what`` names that from which distances count.
+    """
     figure = figures.new_figure(6.4)
     over_time, over_place = figure.subplots(2, 1)
     places = places_of(seen, energy.time)
@@ -159,8 +163,7 @@ def energy_parts(energy: EnergySeen, seen: WavesSeen) -> Figure:
     positive = mean[mean > 0.0]
     if positive.size:
         over_place.set_ylim(max(positive.min(), 1e-6 * positive.max()), 2.0 * positive.max())
-    where = "first pantograph, or the force" if seen.position.shape[1] else "blow"
-    figures.tidy(over_place, f"distance from the {where} [m]", "mean energy [J/m]")
+    figures.tidy(over_place, f"distance from the {what} [m]", "mean energy [J/m]")
     return figure
 
 

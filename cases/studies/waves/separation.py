@@ -22,6 +22,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.sweep.axis_words import value_in_words
 from catenary.cases.studies.sweep.jobs import Ended, Job, RunOptions, make_jobs
 from catenary.cases.studies.sweep.output import as_csv, rows
 from catenary.cases.studies.sweep.run_jobs import run_jobs
@@ -48,7 +49,7 @@ class Curve(NamedTuple):
 
     Attributes
     ----------
-    name : the assignments that tell it from the others, empty if there are none
+    name : the values that tell it from the others, empty if there are none
     separation : (n,) ascending [m]
     alone : of one pantograph by statistic
     trailing, leading : (n,) by statistic
@@ -110,13 +111,14 @@ def jobs_of(
     others = product(varied, {}) if varied else [Variant("", ())]
     variants = []
     for other in others:
+        varied_values = ", ".join(value_in_words(*each) for each in other.varied.items())
         for d in (None, *separations):
             train = [f'train.pantographs=[{{name="{kind}"}}]']
             if d is not None:
                 pair = f'[{{name="{kind}"}}, {{name="{kind}", behind_m={d:g}}}]'
                 train = [f"train.start_m={start + d:g}", f"train.pantographs={pair}"]
             name = "alone" if d is None else f"{d:g}m"
-            columns = {SEPARATION: "" if d is None else f"{d:g}", WITH: other.name}
+            columns = {SEPARATION: "" if d is None else f"{d:g}", WITH: varied_values}
             quiet = ("output.field_every_s=0", "output.energy_every_s=0")
             variants.append(
                 Variant(
@@ -251,11 +253,11 @@ def draw(curves: Sequence[Curve], period: Period) -> Figure:
             colour, name = figures.COLOURS[number % len(figures.COLOURS)], curve.name
             axes.plot(
                 curve.separation, curve.trailing[key], "o-", color=colour, ms=3.5, linewidth=1.4,
-                label=f"trailing {name}".strip(),
+                label=_joined("trailing", name),
             )  # fmt: skip
             axes.plot(
                 curve.separation, curve.leading[key], color=colour, linewidth=0.7,
-                label=f"leading {name}".strip(),
+                label=_joined("leading", name),
             )  # fmt: skip
             axes.axhline(curve.alone[key], color=colour, linestyle="--", linewidth=0.9)
         far = max(float(curve.separation[-1]) for curve in curves)
@@ -268,6 +270,10 @@ def draw(curves: Sequence[Curve], period: Period) -> Figure:
     figures.legend_above(panels[0], 2)
     panels[-1].set_xlabel("separation [m]; shaded: whole periods of the ringing; dashed: one alone")
     return figure
+
+
+def _joined(place: str, name: str) -> str:
+    return f"{place}, {name}" if name else place
 
 
 def as_text(curves: Sequence[Curve], theory: WaveTheory, span: float) -> str:

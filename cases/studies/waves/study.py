@@ -182,15 +182,15 @@ def _write(
     what: str,
 ) -> Studied:
     """Pictures and tables of what is seen and what theory says."""
-    moving = "pantographs" if what == "train" else what
+    moving, origin = ("pantographs", "first pantograph") if what == "train" else (what, what)
     reflections = ends.reflections_of(rest)
     measured = [
         *measured_rows(theory, seen), *ends.reflection_rows(reflections, theory.speed)
     ]  # fmt: skip
     content: dict[str, bytes | str] = {
         "space_time.png": figures.png(pictures.space_time(seen, theory, supports, moving)),
-        "wavenumbers.png": figures.png(pictures.wavenumbers(seen, theory)),
-        "energy.png": figures.png(pictures.energy_parts(energy, seen)),
+        "wavenumbers.png": figures.png(pictures.wavenumbers(seen, theory, what)),
+        "energy.png": figures.png(pictures.energy_parts(energy, seen, origin)),
         "energy.csv": as_csv(energy_rows(energy, seen)),
         TABLE: as_csv([*as_rows(theory), *measured]),
         "pass_bands.csv": as_csv(band_rows(theory)),
@@ -203,9 +203,8 @@ def _write(
     if spectra is not None:
         content["transmission.png"] = figures.png(pictures.transmission(spectra))
     if seen.position.shape[1]:
-        ahead_of = "first pantograph" if what == "train" else what
         content["train_frame.png"] = figures.png(
-            pictures.train_frame(seen, theory, _BEHIND, _AHEAD, ahead_of)
+            pictures.train_frame(seen, theory, _BEHIND, _AHEAD, origin)
         )
     return Studied(theory, measured, write_all(folder, content))
 
