@@ -186,7 +186,8 @@ make_environment() {
 
 # Run by the environment's Python without the user's PYTHONPATH and folder, nor do its children see them.
 pip_install() {
-    env -u PYTHONPATH .venv/bin/python -I -m pip install --quiet --no-input --disable-pip-version-check "$@" >&2
+    env -u PYTHONPATH .venv/bin/python -I -m pip install --quiet --no-input --disable-pip-version-check \
+        --no-compile "$@" >&2
 }
 
 install_python_packages() {
@@ -217,6 +218,10 @@ CODE
         pip_install "${wanted[@]}"
     fi
     pip_install --no-deps --no-build-isolation --editable .
+    # Bytecode on all cores at once: pip makes it on one, which took a third of its time. Packages
+    # may bring files that are no Python of this version.
+    .venv/bin/python -I -m compileall -q -j 0 \
+        "$(.venv/bin/python -I -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" >/dev/null || true
     # -E: the program reads the environment's packages, not those of the user's PYTHONPATH. In the
     # second line the interpreter stands if its path is too long for the first.
     sed -i -E "1s|^(#!.*/python[0-9.]*)\$|\1 -E|; 2s|^('''exec' .*/python[^ ]*) |\1 -E |" \
