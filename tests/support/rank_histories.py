@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from catenary.meshgen.mesh import LineMesh
+from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March
@@ -86,8 +88,10 @@ def relative(values: np.ndarray, reference: np.ndarray) -> float:
 
 
 def largest_difference(problem: Problem, mesh: LineMesh) -> dict[str, float]:
-    """Largest relative difference of each history between one rank and all, on all ranks."""
-    alone = histories(MPI.COMM_SELF, problem, mesh)
+    """Largest relative difference of each history between one rank and all, on all ranks. The
+    others sleep while rank 0 is alone: there may be fewer cores than ranks."""
+    on_one = partial(histories, MPI.COMM_SELF, problem, mesh)
+    alone = on_root(MPI.COMM_WORLD, on_one, takes_long=True)
     together = histories(MPI.COMM_WORLD, problem, mesh)
     found = {}
     if together is not None and alone is not None:
