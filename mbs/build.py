@@ -1,9 +1,12 @@
-"""A running pantograph from the data of its model: the only place with all models."""
+"""A running pantograph from the data of its model: the only place with all models.
+
+The machinery of multibody systems is imported for pantographs that are mechanisms.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -16,24 +19,17 @@ from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph, Lowering
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.mechanism.head_rotation import PITCH, head_turning
-from catenary.mbs.mechanism.pantograph_data import (
-    MultibodyData,
-    arm_lift,
-    head_lift,
-    reduced,
-    stand,
-)
-from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
 from catenary.mbs.roll import roll_of
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.base.errors import InputError
 
 if TYPE_CHECKING:
     from catenary.mbs.mechanism.full_pantograph import FullPantograph
+    from catenary.mbs.mechanism.pantograph_data import MultibodyData
+    from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
 
 # What a pantograph can be described by.
-PantographData = LumpedData | MultibodyData
+PantographData: TypeAlias = "LumpedData | MultibodyData"
 
 
 class Operation(NamedTuple):
@@ -92,19 +88,21 @@ def _model(
         on_frame = steady_forces(data, operation.air.speed).on_frame
     force, height = operation[:2]
     moved = *operation[2:-4], air
-    if isinstance(data, MultibodyData):
-        pressing = force + on_frame
-        if data.all_bodies is not None:
-            # Its methods are imported for those that are simulated with it.
-            from catenary.mbs.mechanism.full_pantograph import FullPantograph
+    if isinstance(data, LumpedData):
+        data = data if operation.rolls else replace(data, roll=None)
+        return LumpedPantograph(data, force, height, *moved, steady_air=on_frame)
+    pressing = force + on_frame
+    if data.all_bodies is not None:
+        # Its methods are imported for those that are simulated with it.
+        from catenary.mbs.mechanism.full_pantograph import FullPantograph
 
-            way = data.all_bodies
-            return FullPantograph(data, pressing, height, *moved, way.handling, way.substeps)
-        raising = raising_data(data, pressing, height)
-        raising = raising if operation.rolls else replace(raising, roll=None)
-        return RaisingPantograph(raising, *moved)
-    data = data if operation.rolls else replace(data, roll=None)
-    return LumpedPantograph(data, force, height, *moved, steady_air=on_frame)
+        way = data.all_bodies
+        return FullPantograph(data, pressing, height, *moved, way.handling, way.substeps)
+    from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+
+    raising = raising_data(data, pressing, height)
+    raising = raising if operation.rolls else replace(raising, roll=None)
+    return RaisingPantograph(raising, *moved)
 
 
 def steady_forces(data: PantographData, speed: float) -> SteadyForces:
@@ -113,20 +111,26 @@ def steady_forces(data: PantographData, speed: float) -> SteadyForces:
     on_head = on_frame = 0.0
     if data.uplift is not None:
         on_head, on_frame = (float(force) for force in data.uplift.at(np.array(speed)))
-    if isinstance(data, MultibodyData):
+    if not isinstance(data, LumpedData):
+        from catenary.mbs.mechanism.pantograph_data import arm_lift, head_lift
+
         on_head, on_frame = on_head + head_lift(data), on_frame + arm_lift(data)
     return SteadyForces(on_head, on_frame)
 
 
 def has_joints(data: PantographData) -> bool:
     """Whether joints of a running pantograph may open, because all its bodies are moved."""
-    return isinstance(data, MultibodyData) and data.all_bodies is not None
+    return not isinstance(data, LumpedData) and data.all_bodies is not None
 
 
 def actuator_force(data: PantographData) -> float | None:
     """Constant force of a multibody pantograph's actuator at its static force [N], None if it has
     none that was calibrated."""
-    return None if isinstance(data, LumpedData) else stand(data).actuator_force
+    if isinstance(data, LumpedData):
+        return None
+    from catenary.mbs.mechanism.pantograph_data import stand
+
+    return stand(data).actuator_force
 
 
 def touching_mass(data: PantographData) -> float:
@@ -134,8 +138,11 @@ def touching_mass(data: PantographData) -> float:
     head."""
     if data.strips.suspension is not None:
         return data.strips.suspension.mass
-    head = data.masses[0] if isinstance(data, LumpedData) else stand(data).head.mass
-    return head / data.strips.number
+    if isinstance(data, LumpedData):
+        return data.masses[0] / data.strips.number
+    from catenary.mbs.mechanism.pantograph_data import stand
+
+    return stand(data).head.mass / data.strips.number
 
 
 def raising_data(data: MultibodyData, pressing: float, nominal_height: float) -> RaisingData:
@@ -144,6 +151,10 @@ def raising_data(data: MultibodyData, pressing: float, nominal_height: float) ->
     Its arm is at the working height when the head, at ``nominal_height`` [m], is pressed down on
     the arm by ``pressing`` [N]: the static force, and what the air lifts the arm with.
     """
+    from catenary.mbs.mechanism.head_rotation import PITCH, head_turning
+    from catenary.mbs.mechanism.pantograph_data import head_lift, reduced, stand
+    from catenary.mbs.mechanism.reduced_pantograph import RaisingData
+
     standing = stand(data)
     head = standing.head
     strips = data.strips

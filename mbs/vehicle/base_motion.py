@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from catenary.mbs.vehicle import curves
 from catenary.mbs.vehicle.motion_sources import Harmonic, Source, Table, VehicleMotion
@@ -37,6 +36,8 @@ class _Course(Protocol):
 
 class _Spline:
     def __init__(self, points: Sequence[float] | np.ndarray, values: object) -> None:
+        from scipy.interpolate import CubicSpline  # not loaded for vehicles that stand still
+
         spline = CubicSpline(points, values, bc_type="natural")
         self._breaks = spline.x
         self._coefficients = np.ascontiguousarray(spline.c.T)
@@ -118,6 +119,8 @@ def _roof_course(
     source: Table, direction: str, suspension: Vehicle, speed: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Places and heights of the roof above a track that follows a spline."""
+    from scipy.interpolate import CubicSpline
+
     spline = CubicSpline(source.points, source.values, bc_type="natural")
     n = int(np.ceil((spline.x[-1] - spline.x[0]) / _FINE)) + 1
     points = np.linspace(spline.x[0], spline.x[-1], max(n, 2))

@@ -16,7 +16,6 @@ from contextlib import contextmanager
 from typing import Any, TextIO
 
 import numpy as np
-from tqdm import tqdm
 
 from catenary.postproc.files.result_file import DONE
 from catenary.solver.time_loop.views.observers import Stage, StepView
@@ -81,6 +80,8 @@ class Progress:
         self._done, self._lines = 0.0, 0
         self._next_look = self._step + 1
         if self._on_terminal:
+            from tqdm import tqdm  # not loaded where nobody looks on
+
             self._replace_line("")
             self._bar = tqdm(
                 total=round(self._total, 3),

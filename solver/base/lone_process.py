@@ -9,11 +9,13 @@ from collections.abc import Iterator
 from catenary.solver.base.parallel import launched_by_mpirun
 
 # Open MPI's daemon for processes that this one might start, its networks, and the search for them
-# take 0.3 s at the start. Other implementations do not read these variables.
+# take 0.3 s at the start. hwloc, with which it looks for processors, would call at each display and
+# each driver of a graphics card. Other implementations do not read these variables.
 SETTINGS = {
     "OMPI_MCA_ess_singleton_isolated": "1",
     "OMPI_MCA_pml": "ob1",
     "OMPI_MCA_btl": "self",
+    "HWLOC_PLUGINS_BLACKLIST": "hwloc_gl.so,hwloc_opencl.so",
 }
 
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.special import hyp2f1
 
 from catenary.solver.problem.wind import Wind
 
@@ -42,6 +41,7 @@ def variance_below(wind: Wind, part: int) -> Callable[[np.ndarray], np.ndarray]:
 
         return across
     if gusts.spectrum == "von_karman":
+        from scipy.special import hyp2f1  # not loaded for air without gusts
 
         def karman(n: np.ndarray) -> np.ndarray:
             y = n * gusts.length_scale / mean

@@ -10,8 +10,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from scipy import optimize
-
 # Share of an amplitude below which a reflected wave counts as harmless [-].
 FELT = 1e-3
 # What the start of a run leaves in the contact force after a distance of D spans, on a line without
@@ -154,6 +152,8 @@ def start_share(line: WaveLine, speed: float, run_in: float) -> float:
 
 def run_in_for(line: WaveLine, speed: float, share: float = SHORT_RUN_IN) -> float:
     """Run-in after which the start leaves ``share`` of the standard deviation [m]."""
+    from scipy import optimize  # not loaded for runs that are long enough
+
     longest = START_SHARE * line.span / share
     return float(optimize.brentq(lambda d: start_share(line, speed, d) - share, 0.0, longest))
 

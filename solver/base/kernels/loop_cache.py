@@ -26,14 +26,7 @@ _LEAST_SPACE = 50e6  # [bytes], of which a run's loops take half
 _OLD = 30 * 86400.0  # [s] without use, after which the loops of other sources are removed
 
 # What a file with loops has; a file that only mentions it does no harm.
-_MARKS = (
-    b"\n@compiled",
-    b"\n@addressed",
-    b"\n@in_line",
-    b"\n@inner",
-    b"\n@called",
-    b"\n@intrinsic",
-)
+_MARK = re.compile(rb"\n@(?:compiled|addressed|in_line|inner|called|intrinsic)")
 _IMPORT = re.compile(rb"(?:from|import) catenary\.([\w.]+)(?: import (\([^)]*\)|.*))?")
 _NAME = re.compile(rb"\w+")
 
@@ -74,7 +67,7 @@ def sources(package: Path) -> list[Path]:
         for file in files
         if file.endswith(".py")
     }
-    found = [path for path, text in texts.items() if any(mark in text for mark in _MARKS)]
+    found = [path for path, text in texts.items() if _MARK.search(text)]
     seen = set(found)
     for path in found:
         for other in _imported(texts[path], str(package)):

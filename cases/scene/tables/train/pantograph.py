@@ -262,7 +262,7 @@ class MultibodyTable(_Pressing):
     @model_validator(mode="after")
     def _corrected(self) -> MultibodyTable:
         for correction in self.corrections:
-            _number_at(self.model_dump(), correction.key)
+            _number_at(self, correction.key)
         if self.as_published and not self.corrections:
             raise ValueError("must list corrections if as_published is true")
         return self
@@ -288,13 +288,15 @@ class MultibodyTable(_Pressing):
             raise InputError(f"the published {key} is not allowed: {first['msg']}") from failed
 
 
-def _number_at(raw: Any, key: str) -> float:
+def _number_at(table: Table, key: str) -> float:
     """The number that a dotted key names; raises ValueError if there is none."""
-    here = raw
+    here: Any = table
     for part in key.split("."):
-        if isinstance(here, dict) and part in here:
+        if isinstance(here, Table) and part in type(here).model_fields:
+            here = getattr(here, part)
+        elif isinstance(here, dict) and part in here:
             here = here[part]
-        elif isinstance(here, list) and part.isdecimal() and int(part) < len(here):
+        elif isinstance(here, list | tuple) and part.isdecimal() and int(part) < len(here):
             here = here[int(part)]
         else:
             here = None
