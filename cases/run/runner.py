@@ -221,6 +221,7 @@ def _marched(
             observers, recorder = _observers(
                 order, problem, at_rest, header, phases.progress, march.n_steps
             )
+            header = None  # the recorder has it until it has written it
         give_back_long_line(at_rest.model.n_unknowns)
         with StopRequest() as stop:
             with phases("march"):

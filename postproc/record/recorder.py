@@ -272,6 +272,7 @@ class Recorder:
             resume=self._resume,
             on_begun=self._on_begun,
         )
+        self._header = None  # that of a long line is large
 
     def _append(
         self, blocks: Mapping[str, np.ndarray], line: LineBlock, state: Mapping[str, Any] | None

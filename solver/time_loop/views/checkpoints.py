@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -61,7 +61,7 @@ class Checkpoints:
     def make(self, step: int) -> State | None:
         """Everything needed to continue after ``step``, the latest one, on rank 0. Collective."""
         line, pantographs = self._line, self._pantographs
-        by_row = self._unknowns_by_row()
+        by_row = self._unknowns_by_row
         made_by: dict[str, Callable[[], Any]] = {}
         for name, own in line.exact_state().items():
             if self._comm.size == 1:
@@ -85,12 +85,15 @@ class Checkpoints:
             made_by[f"pantograph_{i}"] = pantograph.state
         return State(made_by)
 
-    def _unknowns_by_row(self) -> np.ndarray:
-        """Numbers of all unknowns, node after node along the track; negative for none."""
+    @cached_property
+    def _unknowns_by_row(self) -> np.ndarray | None:
+        """Numbers of all unknowns, node after node along the track; negative for none. None if they
+        stand in this order: a long line has room for few arrays of its size."""
         model = self._model
         nodes = np.empty_like(model.row_of_node)
         nodes[model.row_of_node] = np.arange(nodes.size)
-        return model.numbering.numbers[nodes].ravel()
+        by_row = model.numbering.numbers[nodes].ravel()
+        return None if np.array_equal(by_row, np.arange(model.n_dofs)) else by_row
 
     def restore(self, checkpoint: dict[str, Any]) -> None:
         """Continue from a checkpoint, which all ranks pass. Collective.
@@ -151,8 +154,11 @@ class Checkpoints:
             like(checkpoint, f"pantograph_{i}", pantograph.state())
 
 
-def _in_rows(vector: Callable[[], np.ndarray], by_row: np.ndarray) -> np.ndarray:
-    """A vector of the line by the numbers ``by_row``, zero where there is none."""
+def _in_rows(vector: Callable[[], np.ndarray], by_row: np.ndarray | None) -> np.ndarray:
+    """A vector of the line by the numbers ``by_row``, zero where there is none; as it stands if
+    they are None, and an array of its own."""
+    if by_row is None:
+        return np.array(vector())
     result = vector()[by_row]
     result[by_row < 0] = 0.0
     return result

@@ -79,7 +79,8 @@ class Showing:
         arms = model.dofs(model.mesh.steady_arms)
         self._owned_arms = np.flatnonzero(owned(arms))
         self._arm_rows = (arms[self._owned_arms] - first).astype(np.int64)
-        nodes = np.arange(model.mesh.n_nodes)
+        # Half as long as other numbers, since a line has very many.
+        nodes = np.arange(model.mesh.n_nodes, dtype=np.int32)
         self._owned_nodes = nodes[owned(model.dofs(nodes))]
         n_outputs, n_arms = pantographs.outputs.size, self._arm_rows.size
         self._owned_droppers, droppers = interaction.links.shown(DROPPERS)
