@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from catenary.meshgen.mesh import DROPPERS
@@ -166,7 +168,8 @@ class ModelBuilder:
 
     def add_block(self, block: Block) -> None:
         """Element matrices of any kind; those of masses carry no weight."""
-        self.model.blocks.append(block)
+        dofs, kind = (part.astype(np.int32, copy=False) for part in (block.dofs, block.kind))
+        self.model.blocks.append(replace(block, dofs=dofs, kind=kind))
         self._n_terms += block.dofs.shape[0]
 
     @property

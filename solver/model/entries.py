@@ -39,7 +39,7 @@ def iterate_sums(
     for block in model.blocks:
         alpha, beta = model.damping_of(block.component)
         near = block.near(first, last)
-        dofs, kind = block.dofs[near], block.kind[near]
+        dofs, kind = block.dofs[near].astype(np.int64), block.kind[near]
         if wanted is not None:
             inside = (dofs >= first) & (dofs < last)
             chosen = (inside & wanted[np.where(inside, dofs - first, 0)]).any(axis=1)

@@ -34,8 +34,8 @@ class Block:
 
     Attributes
     ----------
-    dofs : (n, m) int, unknowns of each element
-    kind : (n,) int, of each element, which of the matrices it has
+    dofs : (n, m) int32, unknowns of each element; a long line has very many
+    kind : (n,) int32, of each element, which of the matrices it has
     mass, stiffness : (k, m, m) or None
     damping : (k, m, m) or None, beside what the component's damping makes of the other two
     of_shape : whether the stiffness is the tangent of forces that the shape at rest decides, such
@@ -68,7 +68,7 @@ class Block:
         lowest = np.minimum.reduceat(self.dofs, begins).min(axis=1)
         highest = np.maximum.reduceat(self.dofs, begins).max(axis=1)
         ascend = all((np.diff(ends) >= 0).all() for ends in (lowest, highest))
-        return lowest, highest, ascend
+        return lowest.astype(np.int64), highest.astype(np.int64), ascend
 
 
 class Hanging(NamedTuple):

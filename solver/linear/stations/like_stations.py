@@ -87,7 +87,7 @@ def _elements_between(block: Block, low: int, high: int) -> tuple[np.ndarray, ..
     the block."""
     terms = [term for term in (block.mass, block.stiffness, block.damping) if term is not None]
     near = block.near(low, high)
-    dofs, kind = block.dofs[near], block.kind[near]
+    dofs, kind = block.dofs[near].astype(np.int64), block.kind[near]
     inside = (dofs >= low).all(axis=1) & (dofs < high).all(axis=1)
     if not inside.all():
         dofs, kind = dofs[inside], kind[inside]
