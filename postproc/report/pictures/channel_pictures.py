@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.pictures.envelope import thinned
+from catenary.postproc.report.pictures.envelope import thinned, thinned_ranges
 from catenary.postproc.report.pictures.figures import COLOURS, colour, legend_above, stacked, tidy
 from catenary.postproc.report.pictures.marks import mark_line, still_marks, travelled
 from catenary.solver.time_loop.views.channels import (
@@ -98,7 +100,9 @@ def _on_line(results: Results, channel: Channel) -> Figure:
     low, high = results.extremes(channel.name)
     figure, (axes,) = stacked(3.4, 1)
     mark_line(axes, results, float(np.min(x, initial=0.0)), float(np.max(x, initial=1.0)))
-    axes.vlines(x, low, high, color=COLOURS[0], linewidth=1.6, label="range over the run")
+    drawn = thinned_ranges(low, high)
+    how: Any = {"color": COLOURS[0], "linewidth": 1.6, "label": "range over the run"}
+    axes.vlines(x[drawn], low[drawn], high[drawn], **how)
     still_marks(axes, x, low, high)
     tidy(axes, "position along the track [m]", _label(channel))
     legend_above(axes)

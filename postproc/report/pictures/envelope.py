@@ -18,8 +18,18 @@ def thinned(y: np.ndarray) -> np.ndarray | slice:
     ----------
     y : (n,) in order; NaN leaves a gap where all values of a bin are
     """
-    if y.size <= MOST_POINTS:
+    return slice(None) if y.size <= MOST_POINTS else _extremes(y)
+
+
+def thinned_ranges(low: np.ndarray, high: np.ndarray) -> np.ndarray | slice:
+    """Likewise of ranges, from ``low`` to ``high`` (n,): the extremes of both ends are drawn."""
+    if low.size <= MOST_POINTS:
         return slice(None)
+    return np.union1d(_extremes(low), _extremes(high))
+
+
+def _extremes(y: np.ndarray) -> np.ndarray:
+    """Where the smallest and the largest value of each bin are."""
     size = -(-y.size // _BINS)
     n_whole = y.size // size
     blocks = y[: n_whole * size].reshape(n_whole, size)

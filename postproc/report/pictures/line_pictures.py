@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.pictures.envelope import thinned
+from catenary.postproc.report.pictures.envelope import thinned, thinned_ranges
 from catenary.postproc.report.pictures.figures import (
     COLOURS,
     GREY,
@@ -116,10 +116,11 @@ def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
     legend_above(history)
 
     mark_line(along, results, *with_margin(x))
+    drawn = thinned_ranges(droppers.lowest, droppers.highest)
     along.vlines(
-        x,
-        droppers.lowest,
-        droppers.highest,
+        x[drawn],
+        droppers.lowest[drawn],
+        droppers.highest[drawn],
         color=COLOURS[0],
         linewidth=1.6,
         label="range over the run",
