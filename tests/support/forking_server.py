@@ -3,8 +3,8 @@
 What is imported here, none of which starts MPI, is not imported again by every process: that is
 most of what a short run costs. It is packages and half of the program's modules; the others, PETSc,
 MPI and HDF5 are imported by each. Of PETSc the libraries are loaded here, without being started,
-and the checks of scenes are put together. Pictures of reports are laid out, but not painted unless
-``pictures`` is true.
+and the checks of scenes are put together. Pictures of reports are not painted, and drawn on
+panels that were made here, unless ``pictures`` is true.
 
 A request is a line of JSON on standard input: ``words``, ``folder``, ``environment``, ``pictures``
 and the files ``stdout`` and ``stderr``. It is answered with the number of the process, and with its
@@ -58,6 +58,8 @@ for place in importlib.util.find_spec("petsc4py").submodule_search_locations:
     for library in Path(place).glob("lib/**/PETSc.*.so"):
         ctypes.CDLL(str(library))  # with what it needs; PETSc is started by each process
 sys.modules["catenary.cases.scene.scene"].Scene.model_rebuild()  # put off until it is needed
+for panels in (1, 2, 3):
+    importlib.import_module("blank_panels").blank(panels)
 sys.modules["numba"].njit(lambda number: number + 1)(1)  # loads what all compiled loops need
 gc.freeze()
 for line in sys.stdin:

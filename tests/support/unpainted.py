@@ -1,4 +1,5 @@
-"""Imported before the program: its pictures are laid out, but not painted, which takes long."""
+"""Imported before the program: its pictures are drawn on panels that were there before, without
+labels and legends, and not painted: both take long."""
 
 from __future__ import annotations
 
@@ -6,6 +7,7 @@ import base64
 import importlib.util
 import sys
 from importlib.machinery import ModuleSpec
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -14,6 +16,17 @@ PAINTER = "catenary.postproc.report.pictures.figures"
 PIXEL = base64.b64decode(
     b"iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGP4DwABAQEAsTj2FAAAAABJRU5ErkJggg=="
 )
+
+
+def _blank_panels() -> Any:
+    """The module, imported when pictures are; this folder is not among the program's by then."""
+    name = "blank_panels"
+    if name not in sys.modules:
+        spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
+        assert spec is not None and spec.loader is not None
+        sys.modules[name] = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(sys.modules[name])
+    return sys.modules[name]
 
 
 class _Finder:
@@ -31,6 +44,10 @@ class _Finder:
             load(module)
             assert callable(module.png)
             setattr(module, "png", lambda figure: PIXEL)  # noqa: B010
+            blank = _blank_panels()
+            for name in ("stacked", "tidy", "legend_above"):
+                assert callable(getattr(module, name))
+                setattr(module, name, getattr(blank, name, blank.nothing))
 
         setattr(spec.loader, "exec_module", exec_module)  # noqa: B010
         return spec
