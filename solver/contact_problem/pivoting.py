@@ -21,6 +21,8 @@ _FIRST_GRID = 0.25
 # from shares to shares, what shares and tensions may disagree by.
 _ROUNDING = 1e-12
 _AGREEMENT = 10.0 * _ROUNDING
+# Problems that one step may solve on its way to shares: some ten seconds.
+_MOST_LOOKS = 100_000
 
 
 def pivot(
@@ -40,9 +42,10 @@ def pivot(
     NotConverged
         If there is no solution.
     """
-    found, rounds = _pivot(matrix, right, always, behind, solution, always.copy())
+    acts = always.copy()
+    found, rounds, circle = _pivot(matrix, right, always, behind, solution, acts)
     if not found and behind.any():
-        found, more = _share(matrix, right, always, behind, solution)
+        found, more = _share(matrix, right, always, behind, solution, acts, circle)
         rounds += more
     if not found:
         raise NotConverged(
@@ -59,22 +62,29 @@ def _pivot(
     behind: np.ndarray,
     solution: np.ndarray,
     acts: np.ndarray,
-) -> tuple[bool, int]:
-    """Whether a set was right, and the rounds to get there from ``acts``, which it overwrites."""
+) -> tuple[bool, int, np.ndarray]:
+    """Whether a set was right, the rounds to get there from ``acts``, which it overwrites, and, if
+    it was not, the rows that go round in a circle of sets."""
     master = np.arange(behind.size) - behind
     scale = _ROUNDING * (1.0 + np.abs(right).max())
     most = 20 * right.size + 100
+    turned: list[int] = []
+    seen: dict[bytes, int] = {}
     for rounds in range(1, most):
+        since = seen.setdefault(acts.tobytes(), len(turned))
+        if since < len(turned):  # each set has one that follows it, so they come again for ever
+            return False, rounds, np.unique(turned[since:])
         complementarity_kernels.solve_on(matrix, right, acts, solution)
         residual = matrix @ solution - right
         wrong = np.where(acts, (solution < -scale) & ~always, residual < -scale)
         wrong &= behind == 0
         if not wrong.any():
-            return True, rounds
+            return True, rounds, np.zeros(0, dtype=int)
         first = int(np.argmax(wrong))
+        turned.append(first)
         acts[first] = not acts[first]
         acts[:] = acts[master]
-    return False, most
+    return False, most, np.unique(turned)
 
 
 def _share(
@@ -83,39 +93,51 @@ def _share(
     always: np.ndarray,
     behind: np.ndarray,
     solution: np.ndarray,
+    acts: np.ndarray,
+    circle: np.ndarray,
 ) -> tuple[bool, int]:
     """Find what share of each master's riders is released: all below no tension, none above it.
 
     With shares given, what is left is a problem with a P-matrix whose solution goes continuously
-    with them; so there are shares that agree with it. Fills the solution; returns whether shares
-    were found, and the rounds of pivoting.
+    with them; so there are shares that agree with it. They are sought for the masters among the
+    rows ``circle``; others keep all or nothing, as the set ``acts`` has it, unless their tension
+    then disagrees. Fills the solution; returns whether shares were found, and the rounds of
+    pivoting.
     """
     master, rides = np.arange(behind.size) - behind, behind > 0
     masters, size = np.unique(master[rides]), 1.0 + np.abs(right).max()
-    shares, none, total = np.zeros(behind.size), np.zeros_like(behind), 0
-    free = always | rides
-    acts = free | (solution > 0.0)  # near what was right for the shares before
+    shares, none, total, looks = np.where(acts, 1.0, 0.0), np.zeros_like(behind), 0, 0
+    sought = np.isin(masters, circle)
+    sought |= not sought.any()
+    acts = always | (solution > 0.0)  # near what was right for the shares before
 
     def excess(of_masters: np.ndarray) -> np.ndarray:
         """Tension of masters where it is above zero, less their compensation where it is not."""
-        nonlocal total
-        shares[masters] = of_masters
+        nonlocal total, looks
+        shares[masters[sought]] = of_masters
         part = np.where(rides, shares[master], 1.0)
         partly = matrix * part[:, None]
         partly[np.diag_indices(part.size)] += 1.0 - part
-        found, rounds = _pivot(partly, right * part, free, none, solution, acts)
-        total += rounds
+        free = always | (rides & (part > 0.0))
+        acts[free], acts[rides & ~free] = True, False
+        found, rounds, _ = _pivot(partly, right * part, free, none, solution, acts)
+        total, looks = total + rounds, looks + 1
         left = (matrix[masters] @ solution - right[masters] - solution[masters]) / size
-        return left if found else np.full(masters.size, np.nan)
+        return left if found and looks < _MOST_LOOKS else np.full(masters.size, np.nan)
 
     def beyond(place: np.ndarray) -> np.ndarray:
         """Zero where shares, a place cut to 0 to 1, agree with tensions, as far as it lies outside:
         the normal map of a variational inequality."""
         share = np.clip(place, 0.0, 1.0)
-        return excess(share) + place - share
+        return excess(share)[sought] + place - share
 
-    slack = (solution[masters] > 0.0).astype(float)
-    place, found = find_zero(beyond, slack - excess(slack), _FIRST_GRID, _AGREEMENT)
-    if found:
-        excess(np.clip(place, 0.0, 1.0))
-    return found, total
+    while True:
+        start = shares[masters[sought]]
+        place, found = find_zero(beyond, start - excess(start)[sought], _FIRST_GRID, _AGREEMENT)
+        left = excess(np.clip(place, 0.0, 1.0))
+        all_or_nothing = np.where(shares[masters] > 0.0, left, -left)
+        more = ~sought & ~(found & (all_or_nothing <= _AGREEMENT))
+        if not more.any():
+            return found, total
+        sought |= more  # all of them, if there are no shares with the others as they are
+        shares[masters] = np.clip(np.nan_to_num(shares[masters]), 0.0, 1.0)

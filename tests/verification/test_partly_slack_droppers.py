@@ -130,6 +130,7 @@ steps = st.builds(
 @given(steps)
 @example(random_step(793718, 4, 2, 0.01))  # one dropper after the other goes in circles
 @example(random_step(8909, 8, 1, 1.0))  # its shares are in a corner of what pivoting finds
+@example(random_step(554208320, 6, 1, 0.3))  # no shares for those alone that go in circles
 @settings(max_examples=300, deadline=None)
 def test_every_step_has_an_end(step: Step) -> None:
     """With shares between taut and slack there always is a solution, and it is found."""
@@ -137,6 +138,22 @@ def test_every_step_has_an_end(step: Step) -> None:
     assert step.violation(slack) < TOLERANCE
     if not step.sets():
         assert pivoted
+
+
+def test_one_dropper_among_hundreds_has_its_share() -> None:
+    """Beside droppers that stay taut or slack a share is sought for it alone: paths through shares
+    of all 204 would not end."""
+    few, n = random_step(793718, 4, 2, 0.01), 600
+    size = few.reserve.size + n
+    reserve, coupling = np.ones(size), np.zeros((size, size))
+    reserve[: few.reserve.size], coupling[: few.reserve.size, : few.reserve.size] = (
+        few.reserve,
+        few.coupling,
+    )
+    reserve[few.reserve.size :: 6] = -1.0  # each second one is slack
+    slack, pivoted = Step(reserve, coupling, few.riders).solve()
+    assert pivoted
+    assert Step(reserve, coupling, few.riders).violation(slack) < TOLERANCE
 
 
 def test_random_lines_have_none_one_or_two_sets_of_slack_droppers() -> None:

@@ -113,6 +113,10 @@ ASSIGNMENTS = {
         ["numerics.scheme=ts_alpha2", "effects.kink=false"],
         "write effects.running_surface = false",
     ),
+    "surface beyond the line": (
+        [f"{SURFACE}.by_place=[[1310, 0], [1330, 0.001]]"],
+        f"{SURFACE}.by_place.1.0 is 1330 on the command line (--set); the line runs from 0 to 1320",
+    ),
     "no heights": ([f"{HEIGHT}.standard_deviation_mm="], "needs standard_deviation_mm or by_place"),
     "negative heights": ([f"{HEIGHT}.standard_deviation_mm=-1"], "must be greater than 0 [mm]"),
     "no waves": ([f"{HEIGHT}.shortest_m=200"], "must have waves, but longest_m is 120"),

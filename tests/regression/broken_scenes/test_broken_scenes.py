@@ -56,6 +56,19 @@ ASSIGNMENTS = {
     "damping without its effect": (["contact.damping_N_s_per_m=10"], "effects.contact_damping"),
     "effect without its damping": (["effects.contact_damping=true"], "needs a value"),
     "effect without its ratio": (["effects.residual_dropper_stiffness=true"], "needs a value"),
+    "rise of no spans": (
+        ["line.transition.rise_m=0.5"],
+        "line.transition on the command line (--set) must not have rise_m without transition spans",
+    ),
+    "length of no spans": (["line.transition.span_m=50"], "must not have span_m without"),
+    "ends of an overlap that stay": (
+        ["line.overlap={first_span=8, rise_m=0.6, along='fixed'}"],
+        'line.overlap.along is "fixed" on the command line (--set); it acts only with',
+    ),
+    "tunnel for a pantograph that is none": (
+        ["line.tunnels=[{from_m=300, to_m=400}]", "train.pantographs.0.name=third"],
+        "train.pantographs.0.name is",
+    ),
     "stiffness of a stop that is none": (
         ["line.steady_arm.uplift_stop_stiffness_N_per_m=1e5"],
         "has an uplift_stop_stiffness_N_per_m, but no uplift_stop_m; give both, or neither",

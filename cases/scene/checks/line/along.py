@@ -32,7 +32,7 @@ def check_along(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Data that motion along the track lacks, and data that only it has a use for."""
     on = scene.switches()[_EFFECT]
     if not on and _EFFECT not in scene.effects:
-        for key, value in _data_of_effect(scene.line).items():
+        for key, value in _data_of_effect(scene).items():
             why = (
                 f"it acts only with effects.{_EFFECT} = true; write that, or false to leave it out"
             )
@@ -48,9 +48,13 @@ def check_along(scene: Scene, line: LineData) -> Iterator[Fault]:
         yield from _elsewhere(scene)
 
 
-def _data_of_effect(table: LineTable) -> dict[str, object]:
+def _data_of_effect(scene: Scene) -> dict[str, object]:
     """Keys and values of a line that nothing but motion along the track reads."""
+    table = scene.line
     found: dict[str, object] = {}
+    overlap = table.overlap
+    if overlap and "along" in overlap.model_fields_set and not scene.origin.recorded:
+        found["line.overlap.along"] = overlap.along
     for side, end in (("start", table.ends.start), ("end", table.ends.end)):
         if end.along == TENSIONER:
             found[f"line.ends.{side}.along"] = end.along

@@ -69,10 +69,16 @@ def check_defects(scene: Scene, data: LineData) -> Iterator[Fault]:
 def _irregularities(scene: Scene, line: Line) -> Iterator[Fault]:
     for name in ("contact_wire_height", "running_surface"):
         table = getattr(scene.irregularities, name)
-        if table is None or table.standard_deviation_mm is None:
+        if table is None:
             continue
-        key, (start, end) = f"irregularities.{name}", stretch_of(table, line)
-        length = line.support_positions[-1]
+        key, length = f"irregularities.{name}", line.support_positions[-1]
+        for i, (x, _) in enumerate(table.by_place or []):
+            if not -_TINY <= x <= length + _TINY:
+                why = f"the line runs from 0 to {length:g} m"
+                yield refusal(scene.origin, f"{key}.by_place.{i}.0", x, why)
+        if table.standard_deviation_mm is None:
+            continue
+        start, end = stretch_of(table, line)
         for part, value in (("from_m", table.from_m), ("to_m", table.to_m)):
             if value is not None and value > length + _TINY:
                 why = f"the line ends at {length:g} m"

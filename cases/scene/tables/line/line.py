@@ -24,7 +24,7 @@ from catenary.cases.scene.tables.line.wires import (
     TwinTable,
     WireTable,
 )
-from catenary.cases.scene.tables.table import OneOrMore, Table
+from catenary.cases.scene.tables.table import TAKE_AWAY, OneOrMore, Table
 from catenary.meshgen.topologies.all_topologies import registered
 
 MidPoint = Annotated[float, Field(gt=0, le=2e6)]
@@ -40,6 +40,16 @@ class TransitionTable(Table):
     span_m: Span | None = Field(
         None, description="length of the transition spans; line.span_m counts for them if absent"
     )
+
+    @model_validator(mode="after")
+    def _of_some_spans(self) -> TransitionTable:
+        given = [name for name, on in (("rise_m", self.rise_m), ("span_m", self.span_m)) if on]
+        if given and not self.n_spans_start + self.n_spans_end:
+            raise ValueError(
+                f"must not have {' and '.join(given)} without transition spans, n_spans_start or "
+                f"n_spans_end{TAKE_AWAY}"
+            )
+        return self
 
 
 class LineTable(Table):
