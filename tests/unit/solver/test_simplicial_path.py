@@ -79,3 +79,10 @@ def test_a_map_without_a_zero_has_none() -> None:
     """That does not point back from afar: the path ends where nothing is left to go on with."""
     _, found = find_zero(lambda z: np.array([1.0, 0.0]), np.array([0.3, 0.4]), 0.25, SMALL)
     assert not found
+
+
+def test_a_map_of_numbers_beyond_the_grid_is_no_zero() -> None:
+    """It jumps by 1e17: columns of a simplex are the same to round-off, and it has no next one."""
+    matrix = np.array([[1.0, 1.0], [-1.0, 1.0]])
+    _, found = find_zero(lambda z: 1e17 * np.sign(matrix @ z + 0.3), np.zeros(2), 0.25, SMALL)
+    assert not found
