@@ -149,15 +149,18 @@ def opened(path: Path, mode: str) -> Iterator[h5py.File]:
         file.close()
 
 
-def broken_write(
-    path: Path, time: float, error: Exception, kept: str = "what was written before stays readable"
-) -> RunBroken:
+def broken_write(path: Path, time: float, error: Exception, begun: bool = True) -> RunBroken:
     """The error for the user when writing ``path`` failed at ``time`` [s] of the simulation.
 
-    ``kept`` says what the failure leaves.
+    ``begun`` says whether the run has results yet, in place of those of an earlier one.
     """
     if isinstance(error, Elsewhere):
         return RunBroken(f"the run ended at t = {time:.3f} s because {error}")
+    kept = (
+        "what was written before stays readable"
+        if begun
+        else "nothing was written, and results of an earlier run are as they were"
+    )
     return RunBroken(
         f"writing {path} failed at t = {time:.3f} s ({reason(error)}): {remedy(error)}; {kept}"
     )

@@ -27,8 +27,6 @@ from catenary.solver.time_loop.views.observers import Stage, StepView
 _NEVER = 2**62
 # Single steps of which the line's channels are taken in together.
 _WAITING = 16
-# What a run leaves that breaks before its first step.
-_NOTHING = "nothing was written, and results of an earlier run are as they were"
 
 
 class Recorder:
@@ -243,8 +241,7 @@ class Recorder:
             try:
                 work()
             except (OSError, RuntimeError) as error:  # h5py raises both when a disk is full
-                words = (self._path, self._last_time, error)
-                broken = broken_write(*words) if self.begun else broken_write(*words, _NOTHING)
+                broken = broken_write(self._path, self._last_time, error, self.begun)
                 if isinstance(error, (NoRoom, Elsewhere)) and self._file is not None:
                     self._file.conclude(str(broken))
                     self._file.close({})

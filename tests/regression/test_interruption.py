@@ -226,6 +226,8 @@ def test_a_full_disk_ends_the_run_with_a_sentence(room: str, ranks: int, tmp_pat
     (sentence,) = done.sentences
     if room == "300k":  # not even the first step
         assert "fields.h5 failed at t = 0.000 s (No space left on device)" in sentence
+        assert "; nothing was written, and results of an earlier run are as they" in sentence
+        assert not kept.exists()
         return
     with Results(kept) as results:
         assert results.time.size >= FLUSH

@@ -201,7 +201,8 @@ class FieldRecorder:
                 work()
             except (OSError, RuntimeError) as error:
                 path = self._xdmf.with_suffix(".h5")
-                raise broken_write(path, time, error) from error
+                begun = self._resume or (self._file is not None and self._file.is_published)
+                raise broken_write(path, time, error, begun) from error
 
         try:
             on_root(self._comm, attempt)

@@ -89,6 +89,11 @@ class FieldsFile:
         """Whether it can be appended to."""
         return self._handle >= 0
 
+    @property
+    def is_published(self) -> bool:
+        """Whether it has its name, in place of an earlier one."""
+        return self._published
+
     def make(self, numbers: np.ndarray) -> None:
         """Write a file without a snapshot, under another name until ``publish``.
 
