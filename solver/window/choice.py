@@ -50,7 +50,7 @@ def window_sentence(problem: Problem) -> str:
     return (
         f"{window.spans_ahead:g} spans move ahead of the train and {window.spans_behind:g} behind "
         f"(window.mode = bounded); error of the force below 20 Hz some {error:.2g} % of its "
-        "standard deviation (estimate)"
+        "standard deviation (estimate); what the line's own ends send back from beyond is left out"
     )
 
 

@@ -75,5 +75,6 @@ def test_the_plan_says_what_moves() -> None:
     bounded = plan_text(make_plan(load_scene("en50318_2002", (BOUNDED, AHEAD, BEHIND))))
     assert "6 spans move ahead of the train and 4 behind" in bounded
     assert "% of its standard deviation (estimate)" in bounded
+    assert "what the line's own ends send back from beyond is left out" in bounded
     exact = plan_text(make_plan(load_scene("en50318_2002", ("window.mode=exact",))))
     assert "whatever a wave has reached moves" in exact

@@ -27,6 +27,7 @@ from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, tr
 
 from catenary.solver.contact.line_response import Coupled, LineResponse
 from catenary.solver.contact.train.head_states import Heads
+from catenary.solver.contact_problem import complementarity_kernels
 from catenary.solver.contact_problem.complementarity import InnerProblem
 from catenary.solver.contact_problem.law_tangents import LinearInSteps
 from catenary.solver.model.links.leaning import swings_of_droppers
@@ -140,10 +141,10 @@ def test_every_step_has_an_end(step: Step) -> None:
         assert pivoted
 
 
-def test_one_dropper_among_hundreds_has_its_share() -> None:
-    """Beside droppers that stay taut or slack a share is sought for it alone: paths through shares
-    of all 204 would not end."""
-    few, n = random_step(793718, 4, 2, 0.01), 600
+def test_one_dropper_among_many_has_its_share(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside droppers that stay taut or slack a share is sought for it alone, here in 1110 solves;
+    a path through shares of all 54 took 6897, and one of 204 did not end."""
+    few, n = random_step(793718, 4, 2, 0.01), 150
     size = few.reserve.size + n
     reserve, coupling = np.ones(size), np.zeros((size, size))
     reserve[: few.reserve.size], coupling[: few.reserve.size, : few.reserve.size] = (
@@ -151,8 +152,18 @@ def test_one_dropper_among_hundreds_has_its_share() -> None:
         few.coupling,
     )
     reserve[few.reserve.size :: 6] = -1.0  # each second one is slack
+    solves, solve_on = 0, complementarity_kernels.solve_on
+
+    def counted(*arguments: np.ndarray) -> None:
+        nonlocal solves
+        solves += 1
+        solve_on(*arguments)
+
+    monkeypatch.setattr(complementarity_kernels, "solve_on", counted)
     slack, pivoted = Step(reserve, coupling, few.riders).solve()
     assert pivoted
+    print(f"solves: {solves}")
+    assert solves < 2000
     assert Step(reserve, coupling, few.riders).violation(slack) < TOLERANCE
 
 
