@@ -115,7 +115,7 @@ def half_lines(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
     Raises
     ------
     InputError
-        If waves do not fade along the line at one of the frequencies.
+        If what acts on it at one of the frequencies does not fade along the line.
     """
     after, before = chain.corner - chain.start, chain.corner - chain.end
     here = after - chain.end
@@ -130,7 +130,7 @@ def half_lines(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
         left = np.abs(forth).max(axis=(1, 2)) / np.abs(after).max(axis=(1, 2))
         if left.max() < _ROUND_OFF**2:
             return after, before
-    raise InputError("waves do not fade along it at some frequency")
+    raise InputError("what acts on one of its cross-sections does not fade along it")
 
 
 @compiled

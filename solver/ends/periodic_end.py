@@ -116,7 +116,7 @@ def periodic_end(
     Raises
     ------
     InputError
-        If waves do not fade along the line.
+        If what acts on the line does not fade along it.
     """
     zero, one = np.zeros(1), np.ones(1)
     stiffness = half_line(beyond, side, zero, zero, one)[0].real

@@ -73,6 +73,7 @@ NOT_AT_REST = (
     "would have a length of",
     "finds no rest",
     "is periodic, which repeats",
+    "is periodic, but this line cannot go on",
     "which is steeper than 60 degrees",
 )
 

@@ -20,6 +20,8 @@ from small_lines import WHOLE, ac_simple_line, en50318_line, mesh_of, numerics, 
 
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects.build_model import build
+from catenary.solver.ends import periodic_end
+from catenary.solver.ends.half_lines import Chain, half_lines
 from catenary.solver.model.matrices import stiffness_matrix
 from catenary.solver.problem.ends import AbsorbingLayer, Fixed, Periodic
 from catenary.solver.problem.problem import Damping, Numerics, Problem
@@ -184,6 +186,23 @@ def test_spans_of_two_kinds_are_refused() -> None:
         with pytest.raises(InputError, match=sentence) as refused:
             build(problem, mesh, np.full(mesh.droppers.shape[0], 1.0))
         assert "line.ends.end.kind is periodic" in str(refused.value)
+
+
+def test_a_line_on_which_a_force_is_felt_without_end_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A chain of springs that nothing holds has a half line without stiffness, which doubling its
+    length only halves; the sentence names the end."""
+    spring = np.ones((1, 1, 1))
+    with pytest.raises(InputError, match="does not fade along it"):
+        half_lines(Chain(2.0 * spring, spring * 0.0, spring * 0.0, -spring))
+
+    def without_end(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
+        raise InputError("what acts on it does not fade")
+
+    monkeypatch.setattr(periodic_end, "half_lines", without_end)
+    with pytest.raises(InputError, match=r"line\.ends\.start\.kind is periodic, but .* not fade"):
+        struck_line(3, numerics(DT), 1, (Periodic(), Fixed()))
 
 
 def test_one_end_may_go_on_and_the_other_absorb() -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from catenary.solver.base.errors import InputError
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.effects.shipped import defect_effects, lateral_effects  # noqa: F401  (built before)
 from catenary.solver.model.absorbing_layers import layer_blocks
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 # The component that lines beyond an end are in the damping: the line's.
 _BEYOND = "line_beyond"
+_SIDES = "start", "end"
 
 
 def _layers(builder: ModelBuilder) -> None:
@@ -53,7 +55,13 @@ def _lines_beyond(builder: ModelBuilder) -> None:
         if goes_on:
             beyond = line_beyond(model, side, builder.held)
             builder.hold_unknowns(beyond.held)
-            ends.append(periodic_end(beyond, side, damping, sums))
+            try:
+                ends.append(periodic_end(beyond, side, damping, sums))
+            except InputError as error:
+                raise InputError(
+                    f"line.ends.{_SIDES[side]}.kind is periodic, but this line cannot go on: {error}, "
+                    "as where nothing holds a wire"
+                ) from error
     for end in ends:  # once both are found, as these are no part of what goes on
         kind = np.zeros(1, dtype=np.int64)
         matrices = end.mass[None], end.stiffness[None]
