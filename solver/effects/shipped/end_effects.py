@@ -59,8 +59,8 @@ def _lines_beyond(builder: ModelBuilder) -> None:
                 ends.append(periodic_end(beyond, side, damping, sums))
             except InputError as error:
                 raise InputError(
-                    f"line.ends.{_SIDES[side]}.kind is periodic, but this line cannot go on: {error}, "
-                    "as where nothing holds a wire"
+                    f"line.ends.{_SIDES[side]}.kind is periodic, but this line cannot go on: "
+                    f"{error}, as where nothing holds a wire"
                 ) from error
     for end in ends:  # once both are found, as these are no part of what goes on
         kind = np.zeros(1, dtype=np.int64)
