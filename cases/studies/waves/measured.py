@@ -81,7 +81,8 @@ def arrived(
 
 def measured_rows(theory: WaveTheory, seen: WavesSeen) -> list[dict[str, Any]]:
     """Group velocities of the waves of a blow beside those of the periodic line, as rows of
-    ``waves.csv``; none without a blow, periodic line or room for two stations."""
+    ``waves.csv``; none without a blow, periodic line or room for two stations, nor where the start
+    of the line sends waves back to these stations within the record."""
     waves = theory.bloch
     if waves is None or seen.position.shape[1]:
         return []
@@ -90,6 +91,7 @@ def measured_rows(theory: WaveTheory, seen: WavesSeen) -> list[dict[str, Any]]:
         return []
     first, second = (seen.velocity[:, column].astype(float) for column in columns)
     distance = float(seen.x[columns[1]] - seen.x[columns[0]])
+    way_back = float(seen.struck + seen.x[columns[0]] - 2.0 * seen.x[0])
     rows = []
     spectrum = transmitted(theory, seen)
     if spectrum is not None:
@@ -103,7 +105,10 @@ def measured_rows(theory: WaveTheory, seen: WavesSeen) -> list[dict[str, Any]]:
         at, wide = 0.5 * (frequency[0] + frequency[-1]), frequency[-1] - frequency[0]
         width = min(_WIDEST, float(wide) / (2.2 * _WIDTHS))
         slowest = velocity[np.abs(frequency - at) < _WIDTHS * width].min()
-        if width < _NARROWEST or distance / slowest > _IN_TIME * float(np.ptp(seen.time)):
+        record = float(np.ptp(seen.time))
+        if width < _NARROWEST or distance / slowest > _IN_TIME * record:
+            continue
+        if way_back < velocity.max() * record:
             continue
         found = arrived(seen.time, first, second, distance, float(at), width)
         what = f"of energy around {at:.1f} Hz over {distance:.0f} m"
