@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from catenary.cases.scene.convert.course import resolved
@@ -21,6 +22,7 @@ _CONDUCTOR = (
     ("mass_kg_per_m", "mass_per_length"),
     ("bending_stiffness_N_m2", "bending_stiffness"),
     ("axial_stiffness_N", "axial_stiffness"),
+    ("expansion_per_K", "expansion"),
 )
 
 
@@ -118,4 +120,5 @@ def _arm(arm: SteadyArm) -> dict[str, Any]:
         "clamp_kg": arm.clamp_mass,
         "stiffness_N_per_m": arm.stiffness,
         "holds_height": arm.holds_height,
+        **({} if arm.inclination is None else {"inclination_deg": math.degrees(arm.inclination)}),
     }

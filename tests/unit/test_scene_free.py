@@ -27,6 +27,8 @@ from catenary.solver.statics.line_at_rest import line_at_rest
 
 EXAMPLE = Path(__file__).parents[2] / "docs/examples/two_messengers.toml"
 Raw = dict[str, Any]
+# What an absorbing layer has, and an end that is held does not.
+LAYER = ("spans", "damping_per_s")
 
 
 def scene_of(raw: Raw) -> Scene:
@@ -43,6 +45,12 @@ def example() -> Raw:
         ("ambrosio2012", ["line.n_spans=8", "train.pantographs.0.name=lumped"]),
         ("re330_stitched", ["line.n_spans=6"]),
         ("dc_twin", ["line.n_spans=6"]),
+        (
+            "tensioned_section",
+            ["line.n_spans=6", "line.mid_points_m=[110]"]
+            + [f"line.ends.{side}.kind=fixed" for side in ("start", "end")]
+            + [f"line.ends.{side}.{key}=" for side in ("start", "end") for key in LAYER],
+        ),
     ],
 )
 def test_a_shipped_line_as_free_tables_is_the_same_line(case: str, changes: list[str]) -> None:

@@ -120,7 +120,13 @@ def test_a_stiffness_that_bars_do_not_take_stands_among_what_is_left_out() -> No
     assert reason(ON, "line.steady_arm.stiffness_N_per_m=300").startswith(
         "of steady_arms 300 N/m are not used: with lateral motion they are bars"
     )
-    assert reason(ON, "line.steady_arm.length_m=0", "line.steady_arm.inclination_deg=") == "default"
+    arm = "line.steady_arm"
+    springs = [f"{arm}.length_m=0", f"{arm}.inclination_deg=", f"{arm}.mass_kg_per_m="]
+    assert reason(ON, *springs) == "default"
+    radial = f"{arm}.stiffness_by_radial_force=true"
+    assert reason(ON, f"{arm}.stiffness_N_per_m=0", radial).startswith(
+        "steady_arms have it as bars"
+    )
     assert reason(ON, "line.steady_arm.stiffness_N_per_m=0").startswith(
         "the scene has no data for it: "
     )

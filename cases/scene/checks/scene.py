@@ -28,11 +28,13 @@ from catenary.cases.scene.checks.line.droppers import (
 )
 from catenary.cases.scene.checks.line.ends import check_ends
 from catenary.cases.scene.checks.line.free_places import check_free_droppers
+from catenary.cases.scene.checks.line.idle import check_idle
 from catenary.cases.scene.checks.line.lateral import check_lateral
 from catenary.cases.scene.checks.line.mesh_size import size_faults
 from catenary.cases.scene.checks.line.topology import check_names, check_parts, check_topology
 from catenary.cases.scene.checks.run.contact import check_contact
 from catenary.cases.scene.checks.run.incidents import check_incidents
+from catenary.cases.scene.checks.run.iterations import check_iterations
 from catenary.cases.scene.checks.run.output import check_output, check_recorded_parts
 from catenary.cases.scene.checks.run.scheme import check_scheme
 from catenary.cases.scene.checks.run.usual import usual_faults
@@ -98,6 +100,7 @@ def faults_of(scene: Scene) -> list[Fault]:
         check_wind,
         _speed,
         check_defects,
+        check_idle,
     )
     for of_line in of_lines:
         found.nothing_by(of_line, scene, line)
@@ -307,6 +310,7 @@ _OF_TABLES: tuple[Callable[[Scene], Iterator[Fault]], ...] = (
     check_effect_data,
     check_lateral,
     check_contact,
+    check_iterations,
     _separations,
     _standard,
     _mesh_file,

@@ -128,48 +128,68 @@ _PAPER = ("numerics.coupling=", "numerics.iterations=", "numerics.scheme=fixed_p
 _LOOSENESS = ((1e-2, 1.0), (1e-4, 1e-1), (1e-5, 1e-2), (1e-7, 1e-4))
 
 
-def _newmark(name: str, gamma: float, beta: float, quick: bool = False) -> Level:
+_TOLERANCES: tuple[str, ...] = ("eps_d_m", "eps_v_m_per_s", "eps_force_N", "max_iterations")
+
+
+def _without_tolerances(scene: Scene, of: tuple[str, ...] = _TOLERANCES) -> tuple[str, ...]:
+    """What takes a scene's tolerances of iterations from a level that makes none."""
+    return tuple(f"numerics.{name}=" for name in of if name in scene.numerics.model_fields_set)
+
+
+def _one_solve(scene: Scene) -> tuple[str, ...]:
+    """One solve a step with the scene's coupling, of which exchanges have their tolerance."""
+    exchanged = scene.numerics.coupling == "iterated"
+    own = _TOLERANCES[:2] if exchanged else _TOLERANCES
+    return (*_ONE_SOLVE, *_without_tolerances(scene, own))
+
+
+def _newmark(scene: Scene, name: str, gamma: float, beta: float, quick: bool = False) -> Level:
     keys = (f"numerics.newmark_gamma={gamma}", f"numerics.newmark_beta={beta}")
-    return Level(name, (*_ONE_SOLVE, *_NEWMARK, *keys), quick=quick)
+    return Level(name, (*_one_solve(scene), *_NEWMARK, *keys), quick=quick)
 
 
-def _alpha(integrator: str, radius: float) -> Level:
-    keys = (
+def _dissipating(integrator: str, radius: float) -> tuple[str, ...]:
+    return (
         f"numerics.integrator={integrator}",
         f"numerics.spectral_radius={radius}",
         "numerics.newmark_gamma=",
         "numerics.newmark_beta=",
     )
-    return Level(f"{integrator}_{radius:g}", (*_ONE_SOLVE, *keys))
 
 
-def _ts_alpha2(radius: float) -> Level:
+def _alpha(scene: Scene, integrator: str, radius: float) -> Level:
+    keys = _dissipating(integrator, radius)
+    return Level(f"{integrator}_{radius:g}", (*_one_solve(scene), *keys))
+
+
+def _ts_alpha2(scene: Scene, radius: float) -> Level:
     """PETSc's own stepper, which runs on one rank and takes plain scenes only."""
-    own = _alpha("generalized_alpha", radius).assignments[len(_ONE_SOLVE) :]
+    own = _dissipating("generalized_alpha", radius)
     keys = ("numerics.coupling=", "numerics.iterations=", "numerics.scheme=ts_alpha2")
-    return Level(f"ts_alpha2_{radius:g}", (*keys, *own))
+    return Level(f"ts_alpha2_{radius:g}", (*keys, *_without_tolerances(scene), *own))
 
 
 def _schemes(scene: Scene) -> list[Level]:
     levels = [
-        _newmark("average_acceleration", 0.5, 0.25, True),
-        _newmark("newmark_0.55", 0.55, 0.28, True),
-        _newmark("newmark_0.6", 0.6, 0.3025),
-        *(_alpha("generalized_alpha", radius) for radius in (0.9, 0.8, 0.5, 0.0)),
-        *(_alpha("hht", radius) for radius in (0.9, 0.8)),
-        _ts_alpha2(0.8),
+        _newmark(scene, "average_acceleration", 0.5, 0.25, True),
+        _newmark(scene, "newmark_0.55", 0.55, 0.28, True),
+        _newmark(scene, "newmark_0.6", 0.6, 0.3025),
+        *(_alpha(scene, "generalized_alpha", radius) for radius in (0.9, 0.8, 0.5, 0.0)),
+        *(_alpha(scene, "hht", radius) for radius in (0.9, 0.8)),
+        _ts_alpha2(scene, 0.8),
     ]
+    paper = (*_PAPER, *_without_tolerances(scene, ("eps_force_N",)))
     levels += [
         Level(
             f"corrected_{n}_times",
-            (*_PAPER, "numerics.max_iterations=", f"numerics.iterations={n}"),
+            (*paper, "numerics.max_iterations=", f"numerics.iterations={n}"),
         )
         for n in (1, 2, 4, 6, 10, 20)
     ]
     levels += [
         Level(
             f"corrected_to_{eps_d:g}_m",
-            (*_PAPER, f"numerics.eps_d_m={eps_d:g}", f"numerics.eps_v_m_per_s={eps_v:g}"),
+            (*paper, f"numerics.eps_d_m={eps_d:g}", f"numerics.eps_v_m_per_s={eps_v:g}"),
         )
         for eps_d, eps_v in _LOOSENESS
     ]
@@ -177,9 +197,14 @@ def _schemes(scene: Scene) -> list[Level]:
 
 
 def _couplings(scene: Scene) -> list[Level]:
+    own = {"implicit": _TOLERANCES, "iterated": _TOLERANCES[:2], "explicit": _TOLERANCES}
     return [
-        Level(name, (*_ONE_SOLVE, f"numerics.coupling={name}"), quick=name != "iterated")
-        for name in ("implicit", "iterated", "explicit")
+        Level(
+            name,
+            (*_ONE_SOLVE, *_without_tolerances(scene, taken), f"numerics.coupling={name}"),
+            quick=name != "iterated",
+        )
+        for name, taken in own.items()
     ]
 
 
@@ -188,10 +213,11 @@ _ADAPTED = ((1e-3, 1.0), (1e-3, 0.1), (4e-3, 10.0), (4e-3, 1.0), (4e-3, 0.1))
 
 
 def _adaptive(scene: Scene) -> list[Level]:
+    one = _one_solve(scene)
     return [
         Level(
             f"{1e3 * dt:g}_ms_{tolerance:g}_N",
-            (*_ONE_SOLVE, f"numerics.dt_s={dt:g}", f"numerics.adaptive_tolerance_N={tolerance:g}"),
+            (*one, f"numerics.dt_s={dt:g}", f"numerics.adaptive_tolerance_N={tolerance:g}"),
             quick=tolerance == 10.0,
         )
         for dt, tolerance in _ADAPTED

@@ -91,6 +91,13 @@ def _bars_instead(problem: Problem) -> str:
         if arms.kind.stiffness > 0.0 and _is_bar(problem, arms)
     }
     given = ", ".join(f"of {name} {stiffness:g} N/m" for name, stiffness in found.items())
+    radial = [
+        arms.name
+        for arms in problem.line.steady_arms
+        if arms.kind.by_radial_force and _is_bar(problem, arms)
+    ]
+    if radial and not found:
+        return f"{', '.join(radial)} have it as bars, which lateral motion makes of them"
     return (
         f"{given} are not used: with lateral motion they are bars, whose stiffness follows from "
         "their radial force"

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg import lapack
 
+from catenary.solver.base.errors import InputError
 from catenary.solver.statics.form_finding.sparse_sum import Part
 
 # Elements whose matrices are summed at once.
@@ -36,8 +37,8 @@ class BandedFactors:
 
     Raises
     ------
-    RuntimeError
-        If the matrix is singular.
+    InputError
+        If the matrix is singular: a line of free tables whose heights nothing can give.
     """
 
     def __init__(
@@ -70,7 +71,11 @@ class BandedFactors:
         np.add.at(bands, (2 * reach + rows - columns, columns), numbers)
         self._factors, self._pivots, info = lapack.dgbtrf(bands, reach, reach, overwrite_ab=True)
         if info != 0:
-            raise RuntimeError(f"the line at rest has a singular matrix (LAPACK {info})")
+            raise InputError(
+                "the line finds no rest: a height is wanted where nothing can give it, or nothing "
+                f"holds a wire (a singular matrix, LAPACK {info}); look at supports with holds, at "
+                "clamps and at ends"
+            )
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """The solution (n,) for a right-hand side (n,)."""

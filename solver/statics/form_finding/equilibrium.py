@@ -246,7 +246,22 @@ def _given_heights(model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
             chain = mesh.wires[supports.holds]
             nodes.append(chain[np.searchsorted(mesh.x(chain), mesh.x(held_at[-1]) - SAME_CUT)])
             heights.append(_wanted(model, line.wire(supports.holds), nodes[-1]))
-    return np.concatenate(nodes), np.concatenate(heights), np.concatenate(held_at)
+    given = np.concatenate(nodes)
+    _refuse_twice(mesh, given)
+    return given, np.concatenate(heights), np.concatenate(held_at)
+
+
+def _refuse_twice(mesh: LineMesh, given: np.ndarray) -> None:
+    """Refuse heights that two parts are to hold, whose forces nothing would tell apart."""
+    twice = np.flatnonzero(np.bincount(given) > 1)
+    if twice.size:
+        node = int(twice[0])
+        name = next(name for name, nodes in mesh.wires.items() if node in nodes)
+        raise InputError(
+            f"the line finds no rest: two of its parts are to hold the height of {name} at "
+            f"{mesh.points[node, 0]:g} m, such as an end and a support with holds, or a dropper "
+            "and an arm with holds_height; leave one of them out"
+        )
 
 
 def _wanted(model: Model, wire: Wire, nodes: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catenary.cases.scene.convert.line.along import TENSIONER, along_of
-from catenary.cases.scene.convert.line.parts import wire_tables
+from catenary.cases.scene.convert.line.parts import arm_tables, wire_tables
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.tables.line.free import FreeWireTable
@@ -24,6 +24,8 @@ _EFFECT = "axial_motion"
 _GRAVITY = 9.81
 # A place is at a mast if it is nearer than this [m].
 _AT_MAST = 1e-3
+_SIDES = ("start", "end")
+_ARM = "line.steady_arm"
 # Weights fit a tension if they differ by a smaller share.
 _FITS = 1e-6
 
@@ -45,6 +47,7 @@ def check_along(scene: Scene, line: LineData) -> Iterator[Fault]:
         yield from _wires(scene)
         yield from _arms(scene, line)
         yield from _held(scene, line)
+        yield from _held_free(scene, line)
         yield from _elsewhere(scene)
 
 
@@ -62,7 +65,20 @@ def _data_of_effect(scene: Scene) -> dict[str, object]:
         found["line.temperature.difference_K"] = table.temperature.difference_K
     if table.mid_points_m:
         found["line.mid_points_m"] = table.mid_points_m
+    if not scene.origin.recorded:
+        found |= dict.fromkeys(_ends_of_free_wires(table), TENSIONER)
+        # Without any tensioner it is idle in any case, see below.
+        if not found and overlap and overlap.along == TENSIONER:
+            for name in sorted(table.tensioner.model_fields_set):
+                found[f"line.tensioner.{name}"] = getattr(table.tensioner, name)
     return found
+
+
+def _ends_of_free_wires(table: LineTable) -> list[str]:
+    """Keys of the ends of free wires that have tensioners of their own."""
+    wires = enumerate(table.wires or [])
+    ends = ((f"line.wires.{i}.{side}", getattr(wire, side)) for i, wire in wires for side in _SIDES)
+    return [key for key, end in ends if end == TENSIONER]
 
 
 def _idle_tensioners(scene: Scene) -> Iterator[Fault]:
@@ -73,12 +89,13 @@ def _idle_tensioners(scene: Scene) -> Iterator[Fault]:
         return
     ends = [table.ends.start.along, table.ends.end.along]
     ends += [] if table.overlap is None else [table.overlap.along]
-    if TENSIONER not in ends:
+    if TENSIONER not in ends and not _ends_of_free_wires(table):
         key = "line.tensioner"
         yield Fault(
             key,
             f"{key} {scene.origin.of(key)} has {', '.join(sorted(said))}, but no wire ends at a "
-            "tensioner: line.ends.start.along or line.ends.end.along must be tensioner",
+            "tensioner: line.ends.start.along or line.ends.end.along must be tensioner"
+            + (", or start or end of a wire of line.wires" if table.wires else ""),
         )
     elif "stop_stiffness_N_per_m" in said and table.tensioner.travel_m is None:
         key, value = "line.tensioner.stop_stiffness_N_per_m", table.tensioner.stop_stiffness_N_per_m
@@ -100,17 +117,18 @@ def _wires(scene: Scene) -> Iterator[Fault]:
 
 def _arms(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Arms without a length, along which nothing could swing."""
-    if scene.line.steady_arm.length_m > 0:
-        return
     made = make_line(line)
-    if any(made.wire(arms.wire).radial_force(np.array(arms.x)).any() for arms in made.steady_arms):
-        yield refusal(
-            scene.origin,
-            "line.steady_arm.length_m",
-            0.0,
-            f"effects.{_EFFECT} is on, and an arm that carries the radial force of "
-            "line.stagger_m swings about its hinge: it must be greater than 0",
-        )
+    keys = {getattr(table, "name", ""): key for key, table in arm_tables(scene.line).items()}
+    for arms in made.steady_arms:
+        if arms.kind.length == 0 and made.wire(arms.wire).radial_force(np.array(arms.x)).any():
+            yield refusal(
+                scene.origin,
+                f"{keys.get(arms.name, _ARM)}.length_m",
+                0.0,
+                f"effects.{_EFFECT} is on, and an arm that carries the radial force of its wire's "
+                "stagger swings about its hinge: it must be greater than 0",
+            )
+            return
 
 
 def _held(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -132,6 +150,27 @@ def _held(scene: Scene, line: LineData) -> Iterator[Fault]:
                 "nothing to hold them in between: name a mast there in line.mid_points_m, or hold "
                 "one end (fixed)",
             )
+
+
+def _held_free(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Free wires with tensioners of their own at both ends and nothing in between."""
+    along = along_of(scene.line)
+    of_line = {"start": along.start, "end": along.end}
+    for i, wire in enumerate(line.wires or ()):
+        sides = zip(_SIDES, wire.tensioned, wire.clamped_to, strict=True)
+        both = [(of_line[side] if own is None else own) and not on for side, own, on in sides]
+        if not all(both) or wire.tensioned == (None, None):
+            continue
+        for start, end in wire.stretches:
+            if not any(start < x < end for x in along.mid_points):
+                why = (
+                    f"it would have tensioners at both ends from {start:g} to {end:g} m and "
+                    "nothing to hold it in between: name a mast there in line.mid_points_m, or "
+                    "hold one end (fixed)"
+                )
+                key = f"line.wires.{i}.{'start' if wire.tensioned[0] else 'end'}"
+                yield refusal(scene.origin, key, TENSIONER, why)
+                break
 
 
 def _mid_points(scene: Scene, line: LineData) -> Iterator[Fault]:

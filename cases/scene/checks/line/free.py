@@ -69,6 +69,7 @@ def check_free_tables(scene: Scene) -> Iterator[Fault]:
             yield refusal(scene.origin, f"{key}.upper", link.upper, why)
         yield from _numbers(scene, key, link)
     yield from _circles(scene)
+    yield from _lifted(scene)
     yield from _slack(scene)
     yield from _many(scene)
 
@@ -205,6 +206,27 @@ def _circles(scene: Scene) -> Iterator[Fault]:
             in_order(after.items())
         except InputError as circle:
             yield Fault(key, f"{key} {scene.origin.of(key)} has wires {what} each other: {circle}")
+
+
+def _lifted(scene: Scene) -> Iterator[Fault]:
+    """Supports that are to hold a wire which nothing but droppers joins to their own."""
+    wires, links = scene.line.wires or [], scene.line.links or []
+    joined = [(wire.name, end) for wire in wires for end in (wire.start, wire.end) if end]
+    joined += [(link.upper, link.lower) for link in links if isinstance(link, FreeClampsTable)]
+    for i, link in enumerate(links):
+        if not isinstance(link, FreeSupportsTable) or link.holds is None:
+            continue
+        moved, before = {link.wire}, 0
+        while len(moved) > before:
+            before = len(moved)
+            moved |= {name for pair in joined if moved & set(pair) for name in pair}
+            moved -= {TENSIONER, FIXED}
+        if link.holds not in moved:
+            why = (
+                f"no clamp joins it to {link.wire}, which the supports carry, and droppers are cut "
+                f"for its height: it must be one of {', '.join(sorted(moved))}"
+            )
+            yield refusal(scene.origin, f"line.links.{i}.holds", link.holds, why)
 
 
 def _slack(scene: Scene) -> Iterator[Fault]:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from catenary.cases.scene.convert.line.parts import arm_tables
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
-from catenary.cases.scene.tables.line.free import FreeArmsTable
-from catenary.cases.scene.tables.line.hardware import SteadyArmTable
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
@@ -22,7 +21,7 @@ def check_lateral(scene: Scene) -> Iterator[Fault]:
     if scene.switches()[_EFFECT]:
         return
     given: dict[str, object] = {
-        **{f"{key}.inclination_deg": arm.inclination_deg for key, arm in _arms(scene).items()},
+        **{f"{key}.inclination_deg": arm.inclination_deg for key, arm in arm_tables(line).items()},
         "line.messenger_stagger_m": line.messenger_stagger_m,
         "line.curve.radius_m": line.curve and line.curve.radius_m,
     }
@@ -32,10 +31,3 @@ def check_lateral(scene: Scene) -> Iterator[Fault]:
                 f"it acts only with effects.{_EFFECT} = true; write that, or false to leave it out"
             )
             yield refusal(scene.origin, key, value, why)
-
-
-def _arms(scene: Scene) -> dict[str, SteadyArmTable]:
-    """Tables of steady arms by their keys."""
-    links = enumerate(scene.line.links or [])
-    found = {f"line.links.{i}": link for i, link in links if isinstance(link, FreeArmsTable)}
-    return {"line.steady_arm": scene.line.steady_arm, **found}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.tables.line.droppers import DropperTable, HangingTable
-from catenary.cases.scene.tables.line.free import FreeDroppersTable
+from catenary.cases.scene.tables.line.free import FreeArmsTable, FreeDroppersTable
 from catenary.cases.scene.tables.line.hardware import SteadyArmTable
 from catenary.cases.scene.tables.line.line import LineTable
 from catenary.cases.scene.tables.line.wires import WireTable
@@ -28,6 +28,14 @@ def wire_tables(table: LineTable) -> dict[str, WireTable]:
     own = {f"line.{name}": getattr(table, name) for name in LineTable.model_fields}
     own |= {f"line.wires.{i}": wire for i, wire in enumerate(table.wires or [])}
     return {key: wire for key, wire in own.items() if isinstance(wire, WireTable)}
+
+
+def arm_tables(table: LineTable) -> dict[str, SteadyArmTable]:
+    """Tables of all steady arms of a line by their keys."""
+    if table.links is None:
+        return {"line.steady_arm": table.steady_arm}
+    links = enumerate(table.links)
+    return {f"line.links.{i}": link for i, link in links if isinstance(link, FreeArmsTable)}
 
 
 def dropper_kind(table: HangingTable, lower_clamp: float) -> DropperKind:

@@ -1,0 +1,80 @@
+"""Keys of a line that nothing reads: what they describe is not there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from catenary.cases.scene.convert.line.parts import arm_tables
+from catenary.cases.scene.input.faults import Fault
+from catenary.cases.scene.keys.error_sentences import refusal
+from catenary.cases.scene.tables.table import TAKE_AWAY
+from catenary.meshgen.line import Line
+from catenary.meshgen.topologies.all_topologies import make_line
+from catenary.meshgen.topologies.line_data import LineData
+
+if TYPE_CHECKING:
+    from catenary.cases.scene.scene import Scene
+
+
+def check_idle(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Masses of arms and clamps, errors of droppers and further overlaps of which there are none.
+
+    Of an effect that the scene writes as false data may stand there.
+    """
+    if scene.origin.recorded:
+        return
+    yield from _arms(scene)
+    yield from _clamps(scene)
+    yield from _dropper_lengths(scene, make_line(line))
+    yield from _further_overlaps(scene, line)
+
+
+def _arms(scene: Scene) -> Iterator[Fault]:
+    for key, arm in arm_tables(scene.line).items():
+        if arm.mass_kg_per_m and not arm.length_m and scene.effects.get("arm_inertia") is not False:
+            why = f"an arm of length 0 has no mass by it: give {key}.length_m, or clamp_kg alone"
+            yield refusal(scene.origin, f"{key}.mass_kg_per_m", arm.mass_kg_per_m, why + TAKE_AWAY)
+
+
+def _clamps(scene: Scene) -> Iterator[Fault]:
+    """Clamps at the ends of free wires that none has."""
+    wires = scene.line.wires or []
+    names = {wire.name for wire in wires}
+    for i, wire in enumerate(wires):
+        if {wire.start, wire.end} & names:
+            continue
+        for name in ("clamp_kg", "clamp_stiffness_N_per_m"):
+            if name in wire.model_fields_set:
+                why = (
+                    f"{wire.name} has no clamp: neither start nor end names a wire to which it is "
+                    f"clamped{TAKE_AWAY}"
+                )
+                yield refusal(scene.origin, f"line.wires.{i}.{name}", getattr(wire, name), why)
+
+
+def _dropper_lengths(scene: Scene, line: Line) -> Iterator[Fault]:
+    name = "dropper_lengths"
+    given = scene.irregularities.dropper_lengths is not None
+    if given and not line.droppers and scene.effects.get(name) is not False:
+        key = f"irregularities.{name}"
+        yield Fault(
+            key,
+            f"{key} {scene.origin.of(key)} changes nothing: the line has no droppers; leave it "
+            f"out, or write effects.{name} = false",
+        )
+
+
+def _further_overlaps(scene: Scene, line: LineData) -> Iterator[Fault]:
+    table = scene.line.overlap
+    if table is None or line.overlaps is None or table.repeat_every_spans is None:
+        return
+    if len(line.overlaps.first) == len(table.first_span):
+        next_one = table.first_span[-1] + table.repeat_every_spans
+        last = line.n_spans - line.n_transition[1] - table.n_spans
+        why = (
+            f"it adds no overlap: the next one would begin in span {next_one}, and the last in "
+            f"which one may begin is {last}"
+        )
+        key = "line.overlap.repeat_every_spans"
+        yield refusal(scene.origin, key, table.repeat_every_spans, why + TAKE_AWAY)
