@@ -1,10 +1,12 @@
 """What finds a step's forces where the active set cycles: pivoting, and riders that carry in part.
 
 Contacts and links alone are a linear complementarity problem with a P-matrix, which pivoting
-solves. Riders are none: what a dropper does across it is whole while it is taut and nothing while
-it is slack, whatever its tension, so that it jumps where that passes zero. If the jump tightens the
-dropper that slackens, it is neither taut nor slack. The step then ends with its tension at zero and
-riders that carry in part (docs/theory.md, section 16).
+solves. A wheel that slips one way or the other has a row for each way, of which one acts at most:
+sets with both are left out, as with them the matrix is none. Nor is it with riders: what a dropper
+does across it is whole while it is taut and nothing while it is slack, whatever its tension, so
+that it jumps where that passes zero. If the jump tightens the dropper that slackens, it is neither
+taut nor slack. The step then ends with its tension at zero and riders that carry in part
+(docs/theory.md, section 16).
 """
 
 from __future__ import annotations
@@ -21,6 +23,8 @@ _FIRST_GRID = 0.25
 # from shares to shares, what shares and tensions may disagree by.
 _ROUNDING = 1e-12
 _AGREEMENT = 10.0 * _ROUNDING
+# Rows of two ways of one direction differ by this at most, of their largest number.
+_ALIKE = 1e-9
 # Problems that one step may solve on its way to shares: some ten seconds.
 _MOST_LOOKS = 100_000
 
@@ -42,10 +46,10 @@ def pivot(
     NotConverged
         If there is no solution.
     """
-    acts = always.copy()
-    found, rounds, circle = _pivot(matrix, right, always, behind, solution, acts)
+    acts, opposite = always.copy(), _opposites(matrix, right)
+    found, rounds, circle = _pivot(matrix, right, always, behind, opposite, solution, acts)
     if not found and behind.any():
-        found, more = _share(matrix, right, always, behind, solution, acts, circle)
+        found, more = _share(matrix, right, always, behind, opposite, solution, acts, circle)
         rounds += more
     if not found:
         raise NotConverged(
@@ -55,18 +59,37 @@ def pivot(
     return rounds
 
 
+def _opposites(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """The row of the other way of each row, its own where there is none.
+
+    Rows i and j of two ways of one direction add up to those of a unit matrix. Where both act,
+    their values add up to those of the right-hand side, which is negative for ways that exclude
+    each other.
+    """
+    opposite = np.arange(right.size)
+    beside = matrix - np.eye(right.size)
+    size = np.einsum("ij,ij->i", beside, beside)
+    other = (size + 2.0 * beside @ beside.T).argmin(axis=1)
+    apart = np.abs(beside + beside[other]).max(axis=1)
+    both = apart <= _ALIKE * np.abs(beside).max(axis=1)
+    both &= (other[other] == opposite) & (other != opposite) & (right + right[other] < 0.0)
+    opposite[both] = other[both]
+    return opposite
+
+
 def _pivot(
     matrix: np.ndarray,
     right: np.ndarray,
     always: np.ndarray,
     behind: np.ndarray,
+    opposite: np.ndarray,
     solution: np.ndarray,
     acts: np.ndarray,
 ) -> tuple[bool, int, np.ndarray]:
     """Whether a set was right, the rounds to get there from ``acts``, which it overwrites, and, if
     it was not, the rows that go round in a circle of sets."""
     master = np.arange(behind.size) - behind
-    scale = _ROUNDING * (1.0 + np.abs(right).max())
+    scale, alone = _ROUNDING * (1.0 + np.abs(right).max()), opposite == np.arange(behind.size)
     most = 20 * right.size + 100
     turned: list[int] = []
     seen: dict[bytes, int] = {}
@@ -76,7 +99,8 @@ def _pivot(
             return False, rounds, np.unique(turned[since:])
         complementarity_kernels.solve_on(matrix, right, acts, solution)
         residual = matrix @ solution - right
-        wrong = np.where(acts, (solution < -scale) & ~always, residual < -scale)
+        free = residual < -scale  # while the other way acts, that one is wrong then, too
+        wrong = np.where(acts, (solution < -scale) & ~always, free & (alone | ~acts[opposite]))
         wrong &= behind == 0
         if not wrong.any():
             return True, rounds, np.zeros(0, dtype=int)
@@ -92,6 +116,7 @@ def _share(
     right: np.ndarray,
     always: np.ndarray,
     behind: np.ndarray,
+    opposite: np.ndarray,
     solution: np.ndarray,
     acts: np.ndarray,
     circle: np.ndarray,
@@ -120,7 +145,7 @@ def _share(
         partly[np.diag_indices(part.size)] += 1.0 - part
         free = always | (rides & (part > 0.0))
         acts[free], acts[rides & ~free] = True, False
-        found, rounds, _ = _pivot(partly, right * part, free, none, solution, acts)
+        found, rounds, _ = _pivot(partly, right * part, free, none, opposite, solution, acts)
         total, looks = total + rounds, looks + 1
         left = (matrix[masters] @ solution - right[masters] - solution[masters]) / size
         return left if found and looks < _MOST_LOOKS else np.full(masters.size, np.nan)
