@@ -175,7 +175,7 @@ class InnerProblem:
         complementarity_kernels.couple(line.rows, m, coupled, none, none, behind, matrix, right)
         behind = behind[n : n + m]
         right = right[n : n + m] - matrix[n : n + m, :n] @ force
-        matrix = matrix[n : n + m, n : n + m].copy()
+        matrix = matrix[n : n + m, n : n + m]
         always, solution = np.zeros(m, dtype=bool), np.zeros(m)
         rounds = complementarity_kernels.settle(
             matrix, right, always, behind, solution, _MAX_ROUNDS

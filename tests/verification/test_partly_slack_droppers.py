@@ -62,11 +62,12 @@ class Step:
         links = Coupled(
             band, np.ones(size), self.behind == 0, self.behind.astype(np.int64), np.zeros(size)
         )
-        line = LineResponse(0, size)
-        line.count = size
+        # A contact whose wire is not on its strip: loops are those that runs have compiled.
+        line = LineResponse(1, size)
+        line.count, line.present[:] = size, 0.0
         line.rows.number[:], line.rows.reserve[:] = np.arange(size), self.reserve
-        law = LinearInSteps(LinearLaw(1.0, 0.0), 0, pulls=False)
-        found = InnerProblem(law, links).solve(line, Heads(0))
+        law = LinearInSteps(LinearLaw(1.0, 0.0), 1, pulls=False)
+        found = InnerProblem(law, links).solve(line, Heads(1))
         slack = found.compensation if found.compensation.size else np.zeros(size)
         return slack.copy(), found.pivoted
 
