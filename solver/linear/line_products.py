@@ -68,7 +68,9 @@ class LineProducts:
     def prepare(self) -> None:
         """Make those that no step, and no energy, is to wait for."""
         for name in ("stiffness", "mass"):
-            self.by_stations(name)
+            product = self.by_stations(name)
+            if product is not None:
+                product.prepare()
         self._stiffness = None
 
     def destroy(self) -> None:

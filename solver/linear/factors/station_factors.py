@@ -8,6 +8,8 @@ A^-1, so that the factors of alike spans are alike, and a solve reads little mor
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -84,8 +86,13 @@ class StationFactors:
         self.ends = np.array([0, kinds.size, low, high, middle], dtype=np.int64)
         if turning is not None:
             turn(kinds, turning.arrays, kinds.size - 1, middle)
+
+    @cached_property
+    def _solve(self) -> Callable[[np.ndarray, np.ndarray], None]:
         vectors = np.zeros(0), np.zeros(0)
-        self._solve = bound(solve, self.factored, later=vectors)
+        # Runs of stations make no difference here: one machine code serves lines of any length.
+        factored = self.factored._replace(layout=self.layout.changed(by_runs=False))
+        return bound(solve, factored, later=vectors)
 
     @property
     def factored(self) -> Factored:

@@ -9,6 +9,7 @@ memory. Where no two spans are alike, blocks are read one after the other, as me
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -160,8 +161,17 @@ class StationProduct:
     ) -> None:
         self.layout, self.places, self.kinds = layout, places, kinds
         self.blocks, self.first, self.n_kinds = blocks, first, n_kinds
+
+    def prepare(self) -> None:
+        """Compile ``multiply``, which else its first call does: of most products with C, for one,
+        there is none, as steps in two passes make them."""
+        assert self._multiply is not None
+
+    @cached_property
+    def _multiply(self) -> Callable[..., None]:
         later = 0, 0, np.zeros(0), np.zeros(0), np.zeros(0)
-        self._multiply = bound(multiply, layout, places, kinds, blocks, first, later=later)
+        stations = self.layout, self.places, self.kinds, self.blocks, self.first
+        return bound(multiply, *stations, later=later)
 
     def multiply(
         self, factor: np.ndarray, result: np.ndarray, velocity: np.ndarray | None = None
