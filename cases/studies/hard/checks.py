@@ -23,8 +23,6 @@ from catenary.solver.statics.line_at_rest import LineAtRest
 FALLS = 0.6
 # Energy that rises by less [-] is round-off of some thousand steps: of its largest value.
 ROUND_OFF = 1e-9
-# Differences of head heights below this share of their deviation need not fall any further.
-_SAME = 1e-4
 
 
 class Criterion(NamedTuple):
@@ -107,7 +105,7 @@ def _energy(case: HardCase, base: Watched, halved: Watched) -> list[Criterion]:
 
 def _refined(case: HardCase, base: Watched, halved: Watched, quartered: Watched) -> Criterion:
     first, second = _apart(base, halved), _apart(halved, quartered)
-    ratio = second / first if second > _SAME else 0.0
+    ratio = second / first if second > case.same else 0.0
     note = f"differences {first:.1e}, {second:.1e} of the deviation"
     return _below(case, "difference after halving the step twice to once", ratio, FALLS, note)
 
