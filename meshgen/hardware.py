@@ -70,6 +70,10 @@ class Clamps:
     x: tuple[float, ...]
 
 
+# Of a steady arm along itself, far stiffer than what it holds [N/m].
+BAR_STIFFNESS = 1e7
+
+
 @dataclass(frozen=True)
 class SteadyArm:
     """A steady arm hinged at its registration end and clamped to a wire.
@@ -83,6 +87,8 @@ class SteadyArm:
     [N/m]; None without one.
     ``by_radial_force``: whether its vertical stiffness is its radial force over its length, in
     place of ``stiffness``.
+    ``registration_stiffness``: of the registration arm that holds its hinge, along the steady arm
+    [N/m]; None if it does not give.
     """
 
     length: float
@@ -94,6 +100,14 @@ class SteadyArm:
     uplift_stop: float | None = None
     stop_stiffness: float = 1e5
     by_radial_force: bool = False
+    registration_stiffness: float | None = None
+
+    @property
+    def bar_stiffness(self) -> float:
+        """Between its clamp and what does not move, along the arm [N/m]."""
+        if self.registration_stiffness is None:
+            return BAR_STIFFNESS
+        return 1.0 / (1.0 / BAR_STIFFNESS + 1.0 / self.registration_stiffness)
 
 
 @dataclass(frozen=True)

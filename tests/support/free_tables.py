@@ -121,4 +121,5 @@ def _arm(arm: SteadyArm) -> dict[str, Any]:
         "stiffness_N_per_m": arm.stiffness,
         "holds_height": arm.holds_height,
         **({} if arm.inclination is None else {"inclination_deg": math.degrees(arm.inclination)}),
+        "registration_stiffness_N_per_m": arm.registration_stiffness,
     }

@@ -56,6 +56,10 @@ def _lateral(rng: random.Random, words: Words, topology: str) -> None:
     if rng.random() < 0.8:
         words[f"{arm}.length_m"] = rng.uniform(0.5, 1.5)
         words[f"{arm}.inclination_deg"] = rng.uniform(0.0, 25.0)
+        # Drawn apart, so that seeds that tests name go on to make the scenes that they name.
+        apart = random.Random(words[f"{arm}.length_m"])
+        if apart.random() < 0.3:
+            words[f"{arm}.registration_stiffness_N_per_m"] = 10.0 ** apart.uniform(4.0, 7.0)
         # An inclined arm carries what follows from its slope.
         words[f"{arm}.holds_height"] = ""
     # A bar has no stiffness but what its radial force gives it.

@@ -14,11 +14,10 @@ from catenary.solver.model.links.links import Direction, between_nodes, law
 from catenary.solver.model.model import Block
 
 if TYPE_CHECKING:
+    from catenary.meshgen.hardware import SteadyArms
     from catenary.solver.model.builder import ModelBuilder
 
 PLANE = ("v", "theta_z")
-# Of a bar along itself, far stiffer than what it holds [N/m].
-BAR_STIFFNESS = 1e7
 # Parts of unit vectors along the track below this are none: round-off [-].
 _UPRIGHT = 1e-9
 
@@ -36,7 +35,7 @@ def _lateral(builder: ModelBuilder) -> None:
     on_bars = barred[mesh.arm_group] if barred.size else np.zeros(0, dtype=bool)
     for number, arms in enumerate(line.steady_arms):
         if barred[number]:
-            _bars(builder, arms.name, mesh.arm_group == number, arms.kind.length)
+            _bars(builder, arms, mesh.arm_group == number)
     held = np.concatenate([mesh.supports, mesh.steady_arms[~on_bars], builder.held_ends])
     builder.hold(np.setdiff1d(held, mesh.steady_arms[on_bars]), "v")
 
@@ -49,8 +48,9 @@ def _pendulums(builder: ModelBuilder) -> None:
         _add_stiffness(builder, group.name, direction, mine, stiffness)
 
 
-def _bars(builder: ModelBuilder, name: str, mine: np.ndarray, length: float) -> None:
+def _bars(builder: ModelBuilder, arms: SteadyArms, mine: np.ndarray) -> None:
     """Bars from the wire to hinges: stiff along themselves, P/l across."""
+    name, length = arms.name, arms.kind.length
     model, nodes = builder.model, builder.mesh.steady_arms[mine]
     unit, tension = np.tile([1.0, 0.0, 0.0], (nodes.size, 1)), np.zeros(nodes.size)
     if model.form is not None and model.form.lateral is not None:
@@ -62,7 +62,7 @@ def _bars(builder: ModelBuilder, name: str, mine: np.ndarray, length: float) -> 
     names = ("v", "w", "u") if slewed else ("v", "w")
     unit = unit[:, : len(names)]
     unknowns = np.stack([model.dofs(nodes, one) for one in names], axis=1)
-    laws = law(builder.mesh.x(nodes), BAR_STIFFNESS, rest=tension)
+    laws = law(builder.mesh.x(nodes), arms.kind.bar_stiffness, rest=tension)
     builder.add_links(name, Direction(unknowns, -unit), laws, of_shape=True)
     across = np.eye(len(names)) - unit[:, :, None] * unit[:, None, :]
     matrices, kind = (tension / length)[:, None, None] * across, np.arange(nodes.size)

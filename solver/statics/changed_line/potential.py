@@ -16,8 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from catenary.meshgen.hardware import SteadyArm
 from catenary.meshgen.wires import Wire
-from catenary.solver.effects.shipped.lateral_effects import BAR_STIFFNESS
 from catenary.solver.model.axial_elements import curve_rows, shape_of
 from catenary.solver.model.elements import beam
 from catenary.solver.model.model import Model, wire_elements
@@ -192,7 +192,7 @@ class _Arms:
     was : forces on the wire at the known rest, as many [N]
     """
 
-    def __init__(self, model: Model, known: Equilibrium, number: int, length: float) -> None:
+    def __init__(self, model: Model, known: Equilibrium, number: int, kind: SteadyArm) -> None:
         assert known.lateral is not None
         self.mine = model.mesh.arm_group == number
         nodes = model.mesh.steady_arms[self.mine]
@@ -200,8 +200,9 @@ class _Arms:
         self.unknowns = np.stack([model.dofs(nodes, name) for name in names], axis=1)
         tension = known.lateral.arm_tension[self.mine]
         # The arm's own length is that which it has under this tension.
-        self._cut = length - tension / BAR_STIFFNESS
-        self._hinge = length * known.lateral.arm_direction[self.mine]
+        self._stiffness = kind.bar_stiffness
+        self._cut = kind.length - tension / self._stiffness
+        self._hinge = kind.length * known.lateral.arm_direction[self.mine]
         self.was = self.force(np.zeros(model.n_dofs))[:, : len(names)]
 
     def tension(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -209,7 +210,7 @@ class _Arms:
         to_hinge = self._hinge.copy()
         to_hinge[:, : self.unknowns.shape[1]] -= moved[self.unknowns]
         length = np.linalg.norm(to_hinge, axis=1)
-        return BAR_STIFFNESS * (length - self._cut), to_hinge / length[:, None]
+        return self._stiffness * (length - self._cut), to_hinge / length[:, None]
 
     def force(self, moved: np.ndarray) -> np.ndarray:
         """On the wire: lateral, upward, and along the track, (n, 3) [N]."""
@@ -222,7 +223,5 @@ def _arms(model: Model, known: Equilibrium) -> list[_Arms]:
         return []
     kinds = [arms.kind for arms in model.problem.line.steady_arms]
     return [
-        _Arms(model, known, number, kind.length)
-        for number, kind in enumerate(kinds)
-        if kind.length > 0.0
+        _Arms(model, known, number, kind) for number, kind in enumerate(kinds) if kind.length > 0.0
     ]

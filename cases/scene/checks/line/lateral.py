@@ -21,7 +21,11 @@ def check_lateral(scene: Scene) -> Iterator[Fault]:
     if scene.switches()[_EFFECT]:
         return
     given: dict[str, object] = {
-        **{f"{key}.inclination_deg": arm.inclination_deg for key, arm in arm_tables(line).items()},
+        **{
+            f"{key}.{name}": getattr(arm, name)
+            for key, arm in arm_tables(line).items()
+            for name in ("inclination_deg", "registration_stiffness_N_per_m")
+        },
         "line.messenger_stagger_m": line.messenger_stagger_m,
         "line.curve.radius_m": line.curve and line.curve.radius_m,
     }

@@ -130,4 +130,5 @@ def steady_arm(table: SteadyArmTable) -> SteadyArm:
         uplift_stop=table.uplift_stop_m,
         stop_stiffness=table.uplift_stop_stiffness_N_per_m or _STOP_STIFFNESS,
         by_radial_force=table.stiffness_by_radial_force,
+        registration_stiffness=table.registration_stiffness_N_per_m,
     )

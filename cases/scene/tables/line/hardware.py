@@ -40,6 +40,14 @@ class SteadyArmTable(Table):
         "if absent, what the weight that hangs at the arm makes of it",
     )
 
+    registration_stiffness_N_per_m: float | None = Field(
+        None,
+        ge=1e3,
+        le=1e8,
+        description="of the registration arm that holds its hinge, along the steady arm, with "
+        "lateral motion; if absent, it does not give",
+    )
+
     uplift_stop_m: float | None = Field(
         None,
         gt=0,
@@ -68,9 +76,10 @@ class SteadyArmTable(Table):
         return self
 
     @model_validator(mode="after")
-    def _a_bar_to_incline(self) -> SteadyArmTable:
-        if self.inclination_deg is not None and not self.length_m:
-            raise ValueError("needs length_m above 0 for inclination_deg")
+    def _has_a_bar(self) -> SteadyArmTable:
+        for key in ("inclination_deg", "registration_stiffness_N_per_m"):
+            if getattr(self, key) is not None and not self.length_m:
+                raise ValueError(f"needs length_m above 0 for {key}")
         return self
 
     @model_validator(mode="after")
