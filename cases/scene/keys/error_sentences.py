@@ -17,6 +17,7 @@ from catenary.cases.scene.tables.run.petsc import ELSEWHERE
 from catenary.cases.scene.tables.units import unit_of
 
 _LONGEST_KEY = 200  # of one in a sentence
+_LONGEST_TAG = 60
 
 
 def refusal(origin: Origin, key: str, value: object, why: str) -> Fault:
@@ -66,7 +67,8 @@ _WANTED: dict[str, Callable[[dict[str, Any]], str]] = {
     "string_too_long": lambda c: f"must have at most {c['max_length']} characters",
     "value_error": lambda c: str(c["error"]),
     "union_tag_invalid": lambda c: (
-        f"must be of type {_or(c['expected_tags'].replace(chr(39), ''))}, not {c['tag']}"
+        f"must be of type {_or(c['expected_tags'].replace(chr(39), ''))}, "
+        f"not {plain(str(c['tag']), _LONGEST_TAG)}"
     ),
     "union_tag_not_found": lambda c: "must have a type",
 }

@@ -118,6 +118,10 @@ ASSIGNMENTS = {
         f"{SURFACE}.by_place.1.0 is 1330 on the command line (--set); the line runs from 0 to 1320",
     ),
     "no heights": ([f"{HEIGHT}.standard_deviation_mm="], "needs standard_deviation_mm or by_place"),
+    "heights that end before they begin": (
+        [f"{HEIGHT}.from_m=200", f"{HEIGHT}.to_m=100"],
+        f"{HEIGHT}.to_m is 100 m on the command line (--set); it must be greater than the 200 m",
+    ),
     "negative heights": ([f"{HEIGHT}.standard_deviation_mm=-1"], "must be greater than 0 [mm]"),
     "no waves": ([f"{HEIGHT}.shortest_m=200"], "must have waves, but longest_m is 120"),
     "no room": ([f"{HEIGHT}.from_m=1310", f"{HEIGHT}.to_m=1315"], "no wave of shortest_m"),

@@ -56,6 +56,22 @@ ASSIGNMENTS = {
     "damping without its effect": (["contact.damping_N_s_per_m=10"], "effects.contact_damping"),
     "effect without its damping": (["effects.contact_damping=true"], "needs a value"),
     "effect without its ratio": (["effects.residual_dropper_stiffness=true"], "needs a value"),
+    "droppers of next to no stiffness": (
+        ["line.dropper.stiffness_N_per_m=5e-324"],
+        "line.dropper.stiffness_N_per_m is 5e-324 on the command line (--set); it must be at least",
+    ),
+    "a kind of a thousand letters": (
+        ["defects=[{type='" + "x" * 1000 + "'}]"],
+        "hard_spot or kink, not " + "x" * 57 + "...",
+    ),
+    "samples without a time between": (
+        [
+            "pantographs.reference.regulation={measures='contact_force',target=150,delay_s=0.02,"
+            "gains=[{at=0,error=0.5}],sample_s=5e-324}"
+        ],
+        "pantographs.reference.regulation.sample_s is 5e-324 on the command line (--set); it must "
+        "be at least 1e-06 [s]",
+    ),
     "rise of no spans": (
         ["line.transition.rise_m=0.5"],
         "line.transition on the command line (--set) must not have rise_m without transition spans",

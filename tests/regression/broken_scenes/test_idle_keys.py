@@ -64,6 +64,40 @@ IDLE = {
         ["line.wires.4.clamp_stiffness_N_per_m=1e6"],
         "high_messenger has no clamp: neither start nor end names a wire",
     ),
+    "seed of heights that are given": (
+        SOUND,
+        ["irregularities.contact_wire_height={by_place=[[0,0],[100,0.01],[200,0]],seed=4}"],
+        "irregularities.contact_wire_height.seed is 4 on the command line (--set); nothing is "
+        "random without irregularities.contact_wire_height.standard_deviation_mm",
+    ),
+    "cut of errors that are given": (
+        SOUND,
+        ["irregularities.dropper_lengths={by_dropper=[[6,2,5]],cut_off=1.0}"],
+        "irregularities.dropper_lengths.cut_off is 1 on the command line (--set); nothing is",
+    ),
+    "sag between two droppers": (
+        SOUND,
+        ["line.dropper.positions_m=[20,40]", "line.dropper.pre_sag_mid_mm=20"],
+        "line.dropper.pre_sag_mid_mm is 20 mm on the command line (--set); it is that of droppers "
+        "between the first and the last one of a span, of which there is none: spans have 2",
+    ),
+    "ground under a power law": (
+        Path("windy_viaduct"),
+        ["wind.gusts=", "wind.profile=power", "wind.exponent=0.2", "wind.roughness_length_m=0.1"],
+        "wind.roughness_length_m is 0.1 m on the command line (--set); nothing reads it with the "
+        "profile power and no gusts",
+    ),
+    "weights of a wire between clamps": (
+        Path("re330_stitched"),
+        [
+            "effects.axial_motion=true",
+            *(f"line.{wire}.axial_stiffness_N=1e7" for wire in ("contact_wire", "messenger_wire")),
+            "line.stitch_wire.axial_stiffness_N=1e7",
+            "line.ends.end.along=tensioner",
+            "line.tensioner.weights_kg.stitch_wire=118.926265715256",
+        ],
+        "no end of this wire has a tensioner, only those of contact_wire, messenger_wire",
+    ),
     "lengths of droppers that are none": (
         TRAM,
         ["irregularities.dropper_lengths.standard_deviation_mm=5"],

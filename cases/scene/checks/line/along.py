@@ -14,8 +14,11 @@ from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.tables.line.free import FreeWireTable
 from catenary.cases.scene.tables.line.line import LineTable
+from catenary.cases.scene.tables.table import TAKE_AWAY
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.wires import End, Wire
+from catenary.solver.problem.along_track import AlongTrack
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
@@ -184,12 +187,20 @@ def _mid_points(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 def _weights(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Weights of wires that are none, or whose wheel would turn at rest."""
-    tensioner = along_of(scene.line).tensioner
+    along = along_of(scene.line)
+    tensioner = along.tensioner
+    if not tensioner.weights:
+        return
     wires = {wire.name: wire for wire in make_line(line).wires}
+    tensioned = [name for name, wire in wires.items() if _has_tensioner(wire, along, line)]
     for name, mass in tensioner.weights.items():
         key = f"line.tensioner.weights_kg.{name}"
         if name not in wires:
             yield refusal(scene.origin, key, mass, f"the line has {', '.join(wires)}")
+            continue
+        if tensioned and name not in tensioned and not scene.origin.recorded:
+            why = f"no end of this wire has a tensioner, only those of {', '.join(tensioned)}"
+            yield refusal(scene.origin, key, mass, why + TAKE_AWAY)
             continue
         tension = wires[name].tension
         low, high = tensioner.band(name, wires[name], _GRAVITY)
@@ -203,6 +214,16 @@ def _weights(scene: Scene, line: LineData) -> Iterator[Fault]:
                 f"it would hold {holds} by line.tensioner.ratio and efficiency, but "
                 f"the wire has {tension:g} N, which {fits:.6g} kg hold",
             )
+
+
+def _has_tensioner(wire: Wire, along: AlongTrack, line: LineData) -> bool:
+    line_ends = float(line.support_positions[0]), float(line.support_positions[-1])
+    return any(
+        along.tensioned(float(x), line_ends, _AT_MAST) if own is None else own
+        for piece in wire.pieces
+        for x, kind, own in zip((piece.x[0], piece.x[-1]), piece.ends, piece.tensioned, strict=True)
+        if kind is not End.CLAMPED
+    )
 
 
 def _elsewhere(scene: Scene) -> Iterator[Fault]:

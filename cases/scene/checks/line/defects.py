@@ -83,7 +83,10 @@ def _irregularities(scene: Scene, line: Line) -> Iterator[Fault]:
             if value is not None and value > length + _TINY:
                 why = f"the line ends at {length:g} m"
                 yield refusal(scene.origin, f"{key}.{part}", value, why)
-        if end - start < table.shortest_m:
+        if end <= start and table.to_m is not None:
+            why = f"it must be greater than the {start:g} m where they begin"
+            yield refusal(scene.origin, f"{key}.to_m", table.to_m, why)
+        elif end - start < table.shortest_m:
             why = f"no wave of shortest_m = {table.shortest_m:g} m fits from {start:g} to {end:g} m"
             part = "shortest_m" if table.from_m is None else "from_m"
             yield refusal(scene.origin, f"{key}.{part}", getattr(table, part), why)

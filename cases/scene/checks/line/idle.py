@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from catenary.cases.scene.convert.line.parts import arm_tables
+from catenary.cases.scene.convert.line.parts import FEWEST_SAGGING, arm_tables, dropper_tables
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.tables.table import TAKE_AWAY
-from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
+from catenary.postproc.evaluate.wording import counted
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
@@ -26,7 +26,9 @@ def check_idle(scene: Scene, line: LineData) -> Iterator[Fault]:
         return
     yield from _arms(scene)
     yield from _clamps(scene)
-    yield from _dropper_lengths(scene, make_line(line))
+    yield from _dropper_lengths(scene, line)
+    yield from _random(scene)
+    yield from _sagging(scene)
     yield from _further_overlaps(scene, line)
 
 
@@ -53,16 +55,48 @@ def _clamps(scene: Scene) -> Iterator[Fault]:
                 yield refusal(scene.origin, f"line.wires.{i}.{name}", getattr(wire, name), why)
 
 
-def _dropper_lengths(scene: Scene, line: Line) -> Iterator[Fault]:
+def _dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
     name = "dropper_lengths"
     given = scene.irregularities.dropper_lengths is not None
-    if given and not line.droppers and scene.effects.get(name) is not False:
+    if given and scene.effects.get(name) is not False and not make_line(line).droppers:
         key = f"irregularities.{name}"
         yield Fault(
             key,
             f"{key} {scene.origin.of(key)} changes nothing: the line has no droppers; leave it "
             f"out, or write effects.{name} = false",
         )
+
+
+def _sagging(scene: Scene) -> Iterator[Fault]:
+    """A sag at mid-span of droppers between a first and a last one, where there are none."""
+    for key, table in dropper_tables(scene.line).items():
+        if table.count is not None:
+            most = table.count
+        else:
+            each = [len(pattern.positions_m) for pattern in table.patterns or ()]
+            most = max([len(table.positions_m or ()), *each])
+        if table.pre_sag_mid_mm and most < FEWEST_SAGGING and scene.effects.get("pre_sag", True):
+            why = (
+                "it is that of droppers between the first and the last one of a span, of which "
+                f"there is none: spans have {counted(most, 'dropper')}"
+            )
+            at = f"{key}.pre_sag_mid_mm"
+            yield refusal(scene.origin, at, table.pre_sag_mid_mm, why + TAKE_AWAY)
+
+
+# What says how irregularities are drawn at random.
+_DRAWN = ("exponent", "shortest_m", "longest_m", "cut_off", "seed")
+
+
+def _random(scene: Scene) -> Iterator[Fault]:
+    """How random irregularities are drawn, where none are."""
+    for name in scene.irregularities.given:
+        table = getattr(scene.irregularities, name)
+        for part in _DRAWN if not table.standard_deviation_mm else ():
+            if part in table.model_fields_set:
+                key = f"irregularities.{name}.{part}"
+                why = f"nothing is random without irregularities.{name}.standard_deviation_mm"
+                yield refusal(scene.origin, key, getattr(table, part), why + TAKE_AWAY)
 
 
 def _further_overlaps(scene: Scene, line: LineData) -> Iterator[Fault]:

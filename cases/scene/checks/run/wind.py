@@ -11,6 +11,7 @@ from catenary.cases.scene.convert.line.parts import wire_tables
 from catenary.cases.scene.convert.line.wind import wind_of
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
+from catenary.cases.scene.tables.table import TAKE_AWAY
 from catenary.meshgen.topologies.line_data import LineData
 
 if TYPE_CHECKING:
@@ -40,6 +41,11 @@ def check_wind(scene: Scene, line: LineData) -> Iterator[Fault]:
         if after.from_m < before.to_m:
             why = f"it must be {before.to_m:g} at least, where the stretch before it ends"
             yield refusal(scene.origin, f"wind.stretches.{i}.from_m", after.from_m, why)
+    said = "roughness_length_m" in table.model_fields_set and not scene.origin.recorded
+    if said and table.profile == "power" and table.gusts is None:
+        key, value = "wind.roughness_length_m", table.roughness_length_m
+        why = "nothing reads it with the profile power and no gusts"
+        yield refusal(scene.origin, key, value, why + TAKE_AWAY)
     wind = wind_of(table)
     assert wind is not None
     if not math.isfinite(wind.mean) or wind.mean <= 0.0:

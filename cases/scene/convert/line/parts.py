@@ -15,6 +15,8 @@ from catenary.solver.base.errors import InputError
 
 # Span lengths are written in decimal; two that differ by less are the same one.
 _SAME_SPAN = 1e-6
+# Droppers of a span of which some hang lower than the first and the last one.
+FEWEST_SAGGING = 3
 
 
 def hanging_table(table: LineTable) -> DropperTable | None:
@@ -36,6 +38,14 @@ def arm_tables(table: LineTable) -> dict[str, SteadyArmTable]:
         return {"line.steady_arm": table.steady_arm}
     links = enumerate(table.links)
     return {f"line.links.{i}": link for i, link in links if isinstance(link, FreeArmsTable)}
+
+
+def dropper_tables(table: LineTable) -> dict[str, DropperTable]:
+    """Tables of all droppers that give pre-sag by their keys."""
+    if table.dropper is not None:
+        return {"line.dropper": table.dropper}
+    links = enumerate(table.links or [])
+    return {f"line.links.{i}": link for i, link in links if isinstance(link, FreeDroppersTable)}
 
 
 def dropper_kind(table: HangingTable, lower_clamp: float) -> DropperKind:
@@ -84,7 +94,7 @@ def pre_sag_of(kind: DropperTable, span: float, positions: tuple[float, ...]) ->
     for pattern in kind.patterns or []:
         if pattern.pre_sag_mm is not None and abs(pattern.span_m - span) < _SAME_SPAN:
             return tuple(length_from_mm(value) for value in pattern.pre_sag_mm)
-    if not kind.pre_sag_mid_mm or len(positions) < 3:
+    if not kind.pre_sag_mid_mm or len(positions) < FEWEST_SAGGING:
         return (0.0,) * len(positions)
     # Plain numbers: a long line may have as many lengths as spans.
     first, last, sag = positions[0], positions[-1], length_from_mm(kind.pre_sag_mid_mm)

@@ -38,10 +38,10 @@ class HangingTable(Table):
     PLACED_BY: ClassVar[tuple[str, ...]] = ("positions_m", "count", "patterns")
 
     stiffness_N_per_m: float | None = Field(
-        None, gt=0, le=1e9, description="stiffness in tension, the same for every length"
+        None, ge=1, le=1e9, description="stiffness in tension, the same for every length"
     )
     axial_stiffness_N: float | None = Field(
-        None, gt=0, le=1e9, description="EA; the stiffness is EA over the dropper's length"
+        None, ge=1, le=1e9, description="EA; the stiffness is EA over the dropper's length"
     )
     mass_kg_per_m: float = Field(0.0, ge=0, le=100, description="mass per length")
     messenger_clamp_kg: float = Field(

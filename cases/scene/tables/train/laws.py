@@ -136,7 +136,7 @@ class RegulationTable(Table):
     )
     least_N: float = Field(-50.0, ge=-1e3, le=0, description="least force that it adds")
     most_N: float = Field(50.0, ge=0, le=1e3, description="largest force that it adds")
-    sample_s: float = Field(0.01, gt=0, le=10, description="time between two samples")
+    sample_s: float = Field(0.01, ge=1e-6, le=10, description="time between two samples")
     filter_s: float = Field(
         0.0, ge=0, le=100, description="time constant of a filter of first order before samples"
     )
