@@ -249,6 +249,10 @@ class Raising:
 
 def parts_of(part: Callable[[float], float], times: Sequence[float]) -> np.ndarray:
     """The parts of the lift at ``times`` [s], which grow, shape (len(times),)."""
-    if isinstance(part, Raising) and times[0] >= part.raise_time:
+    if not isinstance(part, Raising):
+        return np.array([part(time) for time in times])
+    if times[0] >= part.raise_time:
         return np.ones(len(times))
-    return np.array([part(time) for time in times])
+    # As ``raised``, all at once.
+    at = np.asarray(times)
+    return np.where(at >= part.raise_time, 1.0, 0.5 * (1.0 - np.cos(np.pi * at / part.raise_time)))
