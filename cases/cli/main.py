@@ -45,6 +45,9 @@ def main() -> None:
     # Modules, tables and pictures make many objects and little garbage: a short run ends before the
     # first collection, which takes 0.15 s of it otherwise. A long series of runs has some.
     gc.set_threshold(500_000, 3, 10)
+    # Functions of libraries are looked up when they are first called: of all that PETSc, MPI and
+    # SciPy have a run calls few.
+    sys.setdlopenflags(os.RTLD_LAZY)
     # One thread a process unless the user says otherwise, before a library reads it: matrices are
     # small here, and MPI is what runs in parallel.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
