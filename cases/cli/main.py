@@ -10,20 +10,34 @@ from typing import Any
 
 import typer
 
-# Each of these files adds its verbs to the application, in this order of --help.
-# isort: off
-from catenary.cases.cli import run, plan, line, results  # noqa: F401
-from catenary.cases.cli.studies import sweep, accuracy, hard  # noqa: F401
-from catenary.cases.cli import pantograph  # noqa: F401
-from catenary.cases.cli.studies import stability, waves, scaling  # noqa: F401
-from catenary.cases.cli import lists  # noqa: F401
-
-# isort: on
-from catenary.cases.cli.app import app
+from catenary.cases.cli import app as application
+from catenary.cases.cli import run  # noqa: F401  (adds its verbs)
 from catenary.cases.process import interrupts, matplotlib_folder, memory_limit
 from catenary.cases.terminal import console
 
-__all__ = ["app", "main"]
+# Verbs of ``run``. They take no other file: a user waits for the first step of a run.
+_OF_RUN = frozenset({"run", "restart", "submit"})
+
+
+def all_verbs() -> typer.Typer:
+    """The application with all verbs."""
+    # Each of these files adds its verbs, in this order of --help.
+    # isort: off
+    from catenary.cases.cli import plan, line, results  # noqa: F401
+    from catenary.cases.cli.studies import sweep, accuracy, hard  # noqa: F401
+    from catenary.cases.cli import pantograph  # noqa: F401
+    from catenary.cases.cli.studies import stability, waves, scaling  # noqa: F401
+    from catenary.cases.cli import lists  # noqa: F401
+
+    # isort: on
+    return application.app
+
+
+def __getattr__(name: str) -> Any:
+    """``app``: the application with all verbs, whose files are loaded when it is asked for."""
+    if name == "app":
+        return all_verbs()
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def _complain_of_usage(error: Any) -> None:
@@ -66,6 +80,8 @@ def main() -> None:
         # From here on the end of each rank waits for the others', so that a sentence of rank 0
         # is out before the launcher gets the exit code of another.
         console.world()
+    is_run = bool(_OF_RUN.intersection(sys.argv[1:2]))
+    app = application.app if is_run else all_verbs()
     command: Any = typer.main.get_command(app)
     try:
         code = command(prog_name="catenary", standalone_mode=False)

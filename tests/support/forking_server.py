@@ -52,6 +52,7 @@ def become(words: list[str], folder: str, environment: dict[str, str], files: li
 
 for name in PACKAGES:
     importlib.import_module(name)
+sys.modules["catenary.cases.cli.main"].all_verbs()
 started = {"mpi4py.MPI", "petsc4py.PETSc", "h5py"} & set(sys.modules)
 assert not started, f"what processes are forked from must not have imported {started}"
 for place in importlib.util.find_spec("petsc4py").submodule_search_locations:
