@@ -104,7 +104,7 @@ def forth_and_back(place):
     of_passes, runs = held_at(place)
     multiplied, factored, loads, answer, motion, changes, stretch, ahead, following = of_passes
     call_held(ahead)
-    layout, ends = factored.layout, ends_of(factored)
+    layout, ends = factored.layout, ends_of(factored.ends)
     begin, end, low, high, middle = ends
     product, known, found, moved = pointed((multiplied, factored, answer, motion))
     added, places = (pointed(loads), loads.size > 0), known.places

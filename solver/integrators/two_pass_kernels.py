@@ -176,9 +176,8 @@ def predict(place):
 
 
 @inner
-def ends_of(factored):
+def ends_of(ends):
     """Ends of the stations that are solved for and of the own ones, and the middle."""
-    ends = factored.ends
     return ends[0], ends[1], ends[2], ends[3], ends[4]
 
 
@@ -205,7 +204,7 @@ def forth_and_back(place):
     """
     multiplied, factored, loads, answer, motion, changes, stretch, ahead, following = held_at(place)
     call_held(ahead)
-    layout, ends = factored.layout, ends_of(factored)
+    layout, ends = factored.layout, ends_of(factored.ends)
     begin, end, low, high, middle = ends
     product, known, found, moved = pointed((multiplied, factored, answer, motion))
     added, places = (pointed(loads), loads.size > 0), known.places

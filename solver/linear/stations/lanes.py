@@ -112,18 +112,6 @@ is_damped = _constant(lambda layout: layout.damped, "Whether a product with K is
 
 
 @inlined
-def part_of(typing_context, layout, number):
-    """The layout of a make-up by its ``number``, which is a constant."""
-    if not isinstance(number, types.IntegerLiteral):
-        return None
-
-    def generate(context, builder, signature, arguments):
-        return context.get_dummy_value()
-
-    return LayoutType(layout.layout.parts[number.literal_value])(layout, number), generate
-
-
-@inlined
 def same_part(typing_context, layout, part):
     """The part of ``layout`` for the make-up of ``part``, which is one of another layout."""
 

@@ -7,16 +7,14 @@ has. A line whose stations all have all takes none of this.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
-from numba.extending import overload
+from numba import types
 
-from catenary.solver.linear.stations.lanes import inlined, load, part_of, widened
-from catenary.solver.linear.stations.station_layout import Layout
+from catenary.solver.base.kernels.compiled import inner
+from catenary.solver.linear.stations.lanes import LayoutType, inlined, load, widened
 
 
 class Places(NamedTuple):
@@ -85,44 +83,53 @@ def by_make_up(kernel: Any) -> Any:
     """The function ``kernel`` (layout, places, station, ...) with the layout of the station's
     make-up in place of that of the line, for compiled code.
 
-    Its arguments have no defaults. Where stations are alike nothing is added to it.
+    Its arguments have no defaults. Where stations are alike nothing is added to it. Numba keeps the
+    machine code of each on disk; what it chooses for an ``overload`` each process compiles anew.
     """
-    names = list(inspect.signature(kernel).parameters)
+    known = inner(kernel)  # Numba's type of it does not keep it alive
 
-    def choose(*arguments: Any) -> Any:
-        raise NotImplementedError("called in compiled code only")
+    def typed(typing_context, layout, *others):
+        of_part = types.Dispatcher(known)
+        parts = layout.layout.parts if layout.layout.varies else (layout.layout,)
+        kinds = [(LayoutType(part), *others) for part in parts]
+        found: list[Any] = [of_part.get_call_type(typing_context, kind, {}) for kind in kinds]
 
-    def implementation(layout: Any, *others: Any) -> Any:
-        return _chain(kernel, names, layout.layout, 0) if layout.layout.varies else kernel
+        def generate(context, builder, signature, arguments):
+            calls = [context.get_function(of_part, one) for one in found]
+            if len(calls) == 1:
+                return calls[0](builder, arguments)
+            make_up = _entry(builder, builder.extract_value(arguments[1], 1), arguments[2])
+            return _chosen(builder, calls, make_up, arguments)
 
-    typed = _function(names, f"implementation({', '.join(names)})", implementation=implementation)
-    function = _function(names, "choose()", choose=choose)
-    overload(function, jit_options=OPTIONS)(typed)
-    return function
+        return found[0].return_type(layout, *others), generate
 
-
-OPTIONS: Any = {"forceinline": True, "error_model": "numpy"}
-
-
-def _chain(kernel: Any, names: list[str], layout: Layout, number: int) -> Callable[..., Any]:
-    """A function that chooses among make-ups from ``number`` on."""
-    layout_name, places, station, *others = names
-    words = ", ".join((places, station, *others))
-    known = {"kernel": njit(**OPTIONS)(kernel), "part_of": part_of, "make_up_of": make_up_of}
-    this = f"kernel(part_of({layout_name}, {number}), {words})"
-    if number == len(layout.parts) - 1:
-        return _function(names, this, **known)
-    further = njit(**OPTIONS)(_chain(kernel, names, layout, number + 1))
-    chosen = f"make_up_of({layout_name}, {places}, {station}) == {number}"
-    return _function(
-        names, f"{this} if {chosen} else further({', '.join(names)})", further=further, **known
-    )
+    names = ", ".join(inspect.signature(kernel).parameters)
+    # Numba reads from it how many arguments there are.
+    body = f"lambda typing_context, {names}: typed(typing_context, {names})"
+    definition = eval(body, {"typed": typed})  # noqa: S307
+    definition.__name__, definition.__doc__ = kernel.__name__, kernel.__doc__
+    return inlined(definition)
 
 
-def _function(names: list[str], body: str, **known: Any) -> Any:
-    """The function of these arguments that returns ``body``. Numba keeps count of the arrays in a
-    tuple of arguments at each call, which takes ten times as long as the call."""
-    return eval(f"lambda {', '.join(names)}: {body}", known)  # noqa: S307
+def _chosen(builder: Any, calls: list[Any], number: Any, arguments: Any) -> Any:
+    """LLVM's value of what the call of this number returns."""
+    end, found = builder.append_basic_block("chosen"), []
+    for n, call in enumerate(calls):
+        further = None
+        if n < len(calls) - 1:
+            own, further = builder.append_basic_block(), builder.append_basic_block()
+            is_own = builder.icmp_unsigned("==", number, ir.Constant(number.type, n))
+            builder.cbranch(is_own, own, further)
+            builder.position_at_end(own)
+        found.append((call(builder, arguments), builder.block))
+        builder.branch(end)
+        if further is not None:
+            builder.position_at_end(further)
+    builder.position_at_end(end)
+    value = builder.phi(found[0][0].type)
+    for one, block in found:
+        value.add_incoming(one, block)
+    return value
 
 
 @by_make_up

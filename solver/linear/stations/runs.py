@@ -23,9 +23,10 @@ from catenary.solver.linear.stations.lanes import (
     lanes_widened,
     pitch,
 )
-from catenary.solver.linear.stations.make_ups import OPTIONS, Places, make_up_of, start_of
+from catenary.solver.linear.stations.make_ups import Places, make_up_of, start_of
 from catenary.solver.linear.stations.station_layout import Layout
 
+OPTIONS: Any = {"forceinline": True, "error_model": "numpy"}
 # Stations of a run, at least: fewer take longer to be prepared than to be looked up.
 _LEAST = 6
 
