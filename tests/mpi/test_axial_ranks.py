@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from axial_lines import ALONG, elastic_line
 from mpi4py import MPI
+from rank_histories import on_one
 from small_lines import mesh_of, numerics, problem_of, train
 
 from catenary.solver.problem.along_track import AlongTrack, Tensioner
@@ -70,7 +71,7 @@ def test_ranks_and_a_restart_give_the_same_motion_along_the_track() -> None:
     shared = line_at_rest_on_all(problem, mesh, COMM)
     assert np.array_equal(shared.form.along, rest.form.along)
     assert np.abs(rest.form.leaning(mesh.droppers)).max() > 0.005
-    alone, together = run(MPI.COMM_SELF, rest), run(COMM, shared)
+    alone, together = on_one(lambda comm: run(comm, rest)), run(COMM, shared)
     again = run(COMM, shared, COMM.bcast(together.checkpoint))
     one, all_, later = alone.channels(), together.channels(), again.channels()
     assert np.abs(one[2]).max() > 1e-5

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from contact_wires import STIFFNESS, overlap, problem_on, twins
 from mpi4py import MPI
+from rank_histories import on_one
 from small_lines import EN_PANTOGRAPH, mesh_of, numerics, train
 
 from catenary.mbs.head.strips import Strips
@@ -69,7 +70,7 @@ def test_candidates_of_several_wires_and_strips(name: str, way: str) -> None:
     rest = line_at_rest(problem, mesh_of(line, 2))
     cuts = distribute(rest.model, COMM.size, 0).bounds[1:-1]
     assert (np.diff([0, *cuts, rest.model.n_dofs]) > 0).all()
-    together, alone = run(COMM, rest), run(MPI.COMM_SELF, rest)
+    together, alone = run(COMM, rest), on_one(lambda comm: run(comm, rest))
     force, strip, _, droppers, _ = alone
     assert strip.shape[1] == 4 and (strip > 0.0).any(axis=0).all()
     assert (force == 0.0).any() and (droppers == 0.0).any()
@@ -89,6 +90,6 @@ def test_heads_start_at_the_same_height_on_all_ranks(name: str) -> None:
     problem = problem_on(line, train=train(90.0, 20.0, 24.0, raise_time=0.1))
     assert problem.train.placements[0].nominal_height is None
     rest = line_at_rest(problem, mesh_of(line, 2))
-    together, alone = run(COMM, rest), run(MPI.COMM_SELF, rest)
+    together, alone = run(COMM, rest), on_one(lambda comm: run(comm, rest))
     if COMM.rank == 0:
         assert np.abs(together[0] - alone[0]).max() < 1e-9 * alone[0].max()

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
-from rank_histories import Watching
+from rank_histories import on_one, watched
 
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.solver.base.parallel import on_root
 from catenary.solver.statics.line_at_rest import line_at_rest_on_all
-from catenary.solver.time_loop.march import March
 
 WORLD = MPI.COMM_WORLD
 # See test_same_answers.py.
@@ -46,17 +45,9 @@ def test_defects_on_all_ranks_and_after_a_restart() -> None:
     mesh = on_root(WORLD, lambda: mesh_of(load_scene("en50318_2002", list(SCENE))))
     rest = line_at_rest_on_all(problem, mesh, WORLD)
     assert np.count_nonzero(rest.model.dropper_gap) >= 2
-    found = []
-    for comm in (MPI.COMM_SELF, WORLD):
-        watching = Watching(300)
-        with March(comm, *rest) as march:
-            march.run([watching])
-        found.append(watching)
-    again = Watching()
-    with March(WORLD, *rest) as march:
-        assert found[1].checkpoint is not None
-        march.restore(found[1].checkpoint)
-        march.run([again])
+    found = on_one(lambda comm: watched(comm, rest)), watched(WORLD, rest, kept=300)
+    assert found[1].checkpoint is not None
+    again = watched(WORLD, rest, since=found[1].checkpoint)
     alone, shared = (np.array(watching.rows) for watching in found)
     assert WORLD.rank > 0 or np.ptp(shared[:, 0]) > 50.0
     # Contact forces are rank 0's, energies the line's.

@@ -7,12 +7,12 @@ itself.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 from mpi4py import MPI
+from rank_histories import on_one
 from small_lines import bare_wires
 
 from catenary.cases.run.scene_mesh import mesh_of
@@ -127,7 +127,7 @@ def test_all_ranks_give_the_answer_of_one(
     placement = replace(problem.train.placements[0], lowering=lowering)
     train = replace(problem.train, placements=(placement,), end=problem.train.start + way)
     problem = replace(problem, numerics=numerics, incidents=incidents(at_cut, share), train=train)
-    alone = on_root(WORLD, lambda: run(MPI.COMM_SELF, problem, mesh), takes_long=True)
+    alone = on_one(lambda comm: run(comm, problem, mesh))
     together = run(WORLD, problem, mesh)
     parts = WORLD.gather((together.owned, np.array(together.droppers)), root=0)
     found = {}
@@ -165,8 +165,7 @@ def uninterrupted(case: tuple[Problem, LineMesh, float]) -> Watching:
     """A run on one rank with its checkpoints."""
     problem, mesh, at_cut = case
     problem = replace(problem, incidents=incidents(at_cut))
-    on_one = partial(run, MPI.COMM_SELF, problem, mesh, kept=KEPT)
-    return on_root(WORLD, on_one, takes_long=True)
+    return on_one(lambda comm: run(comm, problem, mesh, kept=KEPT))
 
 
 @pytest.mark.parametrize("at", KEPT)
@@ -204,7 +203,7 @@ def test_a_rank_without_any_station_is_legal(case: tuple[Problem, LineMesh, floa
         train=replace(problem.train, start=5.0, end=50.0),
         incidents=(TensionLoss(0.3, CONTACT_WIRE, 0.8),),
     )
-    alone, together = run(MPI.COMM_SELF, bare, mesh), run(WORLD, bare, mesh)
+    alone, together = on_one(lambda comm: run(comm, bare, mesh)), run(WORLD, bare, mesh)
     apart = lost = 0.0
     if WORLD.rank == 0:
         expected, rows = np.array(alone.rows), np.array(together.rows)

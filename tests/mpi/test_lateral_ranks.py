@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
+from rank_histories import on_one
 from small_lines import EN_PANTOGRAPH, WHOLE, ac_simple_line, mesh_of, problem_of, train
 
 from catenary.mbs.head.strips import Turning
@@ -49,7 +50,7 @@ def run(comm: MPI.Comm) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def test_lateral_motion_is_the_same_on_any_number_of_ranks() -> None:
-    together, alone = run(COMM), run(MPI.COMM_SELF)
+    together, alone = run(COMM), on_one(run)
     assert alone[0].max() > 150.0
     if COMM.rank == 0:
         assert np.abs(together[0] - alone[0]).max() < 1e-9 * alone[0].max()

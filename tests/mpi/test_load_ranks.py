@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from measuring import registered
 from mpi4py import MPI
-from rank_histories import Watching
+from rank_histories import on_one, watched
 
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
@@ -21,7 +21,6 @@ from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.loads import FieldLoad, FunctionLoad, ShapeLoad, along, harmonics
 from catenary.solver.problem.incidents import DropperBreak
 from catenary.solver.statics.line_at_rest import line_at_rest_on_all
-from catenary.solver.time_loop.march import March
 
 WORLD = MPI.COMM_WORLD
 # See test_same_answers.py.
@@ -65,17 +64,9 @@ def test_loads_in_time_on_all_ranks() -> None:
     problem = problem.__class__(**{**problem.__dict__, **changed})
     with registered(Effect("loads", "loads", "loads", "test", False, build=blow)):
         rest = line_at_rest_on_all(problem, mesh, WORLD)
-        found = []
-        for comm in (MPI.COMM_SELF, WORLD):
-            watching = Watching(300)
-            with March(comm, *rest) as march:
-                march.run([watching])
-            found.append(watching)
-        again = Watching()
-        with March(WORLD, *rest) as march:
-            assert found[1].checkpoint is not None
-            march.restore(found[1].checkpoint)
-            march.run([again])
+        found = on_one(lambda comm: watched(comm, rest)), watched(WORLD, rest, kept=300)
+        assert found[1].checkpoint is not None
+        again = watched(WORLD, rest, since=found[1].checkpoint)
     alone, shared = (np.array(watching.rows) for watching in found)
     assert alone.shape == shared.shape
     assert WORLD.rank > 0 or np.ptp(shared[:, 0]) > 50.0

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
-from rank_histories import Watching
+from rank_histories import on_one, watched
 
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 from catenary.solver.base.parallel import on_root
 from catenary.solver.statics.line_at_rest import line_at_rest_on_all
-from catenary.solver.time_loop.march import March
 
 WORLD = MPI.COMM_WORLD
 # See test_same_answers.py.
@@ -41,17 +40,9 @@ def test_wind_on_all_ranks() -> None:
     assert {"wind", "gusts", "pantograph_aerodynamics"} <= problem.effects
     mesh = on_root(WORLD, lambda: mesh_of(scene))
     rest = line_at_rest_on_all(problem, mesh, WORLD)
-    found = []
-    for comm in (MPI.COMM_SELF, WORLD):
-        watching = Watching(300)
-        with March(comm, *rest) as march:
-            march.run([watching])
-        found.append(watching)
-    again = Watching()
-    with March(WORLD, *rest) as march:
-        assert found[1].checkpoint is not None
-        march.restore(found[1].checkpoint)
-        march.run([again])
+    found = on_one(lambda comm: watched(comm, rest)), watched(WORLD, rest, kept=300)
+    assert found[1].checkpoint is not None
+    again = watched(WORLD, rest, since=found[1].checkpoint)
     alone, shared = (np.array(watching.rows) for watching in found)
     assert alone.shape == shared.shape
     # Contact forces are rank 0's, energies the line's.

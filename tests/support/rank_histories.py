@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -11,9 +11,11 @@ from mpi4py import MPI
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.line_at_rest import line_at_rest
+from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.views.observers import Stage, StepView
+
+T = TypeVar("T")
 
 
 class Histories:
@@ -80,6 +82,25 @@ def histories(comm: Any, problem: Problem, mesh: LineMesh) -> dict[str, np.ndarr
     return watched.joined()
 
 
+def on_one(run: Callable[[Any], T]) -> T:
+    """What ``run`` returns of a communicator of rank 0 alone, on all ranks. Collective. The others
+    sleep until it is done: there may be fewer cores than ranks."""
+    return on_root(MPI.COMM_WORLD, lambda: run(MPI.COMM_SELF), takes_long=True)
+
+
+def watched(
+    comm: Any, rest: LineAtRest, kept: int = -1, since: dict[str, Any] | None = None
+) -> Watching:
+    """March on ``comm``, from a checkpoint or from the start. Collective; a step is ``kept`` on all
+    ranks only."""
+    watching = Watching(kept)
+    with March(comm, *rest) as march:
+        if since is not None:
+            march.restore(since)
+        march.run([watching])
+    return watching
+
+
 def relative(values: np.ndarray, reference: np.ndarray) -> float:
     """Largest difference over the largest reference; 0 for histories of nothing."""
     if reference.size == 0:
@@ -88,10 +109,8 @@ def relative(values: np.ndarray, reference: np.ndarray) -> float:
 
 
 def largest_difference(problem: Problem, mesh: LineMesh) -> dict[str, float]:
-    """Largest relative difference of each history between one rank and all, on all ranks. The
-    others sleep while rank 0 is alone: there may be fewer cores than ranks."""
-    on_one = partial(histories, MPI.COMM_SELF, problem, mesh)
-    alone = on_root(MPI.COMM_WORLD, on_one, takes_long=True)
+    """Largest relative difference of each history between one rank and all, on all ranks."""
+    alone = on_one(lambda comm: histories(comm, problem, mesh))
     together = histories(MPI.COMM_WORLD, problem, mesh)
     found = {}
     if together is not None and alone is not None:
