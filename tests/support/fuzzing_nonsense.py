@@ -60,6 +60,8 @@ def _contradiction(rng: random.Random, given: dict[str, str]) -> Way:
     length = float(given["train.end_m"])
     x = rng.uniform(0.01, 0.99)
     flat = ("effects.lateral_motion=", "line.curve=", "line.messenger_stagger_m=")
+    free = given.get("line.topology") == "'free'"
+    diameters = () if free else _DIAMETERS
     ways = (
         # What acts only with lateral motion.
         Way((*flat, f"line.curve.radius_m={500 + 1e4 * x!r}"), "line.curve"),
@@ -94,7 +96,7 @@ def _contradiction(rng: random.Random, given: dict[str, str]) -> Way:
         Way((f"wind={{speed_m_per_s=9,gusts={{turbulence_intensity={x!r},"
              f"friction_velocity_m_per_s={x!r}}}}}",), "wind.gusts"),
         Way(("wind={speed_m_per_s=9,stretches=[{from_m=20,to_m=10}]}",), "wind.stretches.0"),
-        Way(("wind={speed_m_per_s=9,stretches=[{from_m=1e5,to_m=2e5}]}", *_DIAMETERS),
+        Way(("wind={speed_m_per_s=9,stretches=[{from_m=1e5,to_m=2e5}]}", *diameters),
             "wind.stretches.0"),
         # Arms and their stops.
         Way((f"line.steady_arm.uplift_stop_m={-x!r}",), "uplift_stop_m"),
@@ -133,9 +135,15 @@ def _contradiction(rng: random.Random, given: dict[str, str]) -> Way:
         Way((f"defects=[{{type='worn_wire',from_m=1,to_m=2,lost_share={1 + x!r}}}]",), "defects.0"),
         Way(("defects=[{type='rust'}]",), "defects.0"),
         Way((f"line.fittings=[{{kind='splice',at_m={1e6 + length!r},mass_kg=1.0}}]",), "fittings"),
+        # What nothing reads.
+        Way(("numerics.scheme=", "numerics.coupling=", "numerics.iterations=",
+             f"numerics.{rng.choice(['eps_d_m', 'eps_v_m_per_s', 'eps_force_N'])}=1e-3"), "eps_"),
+        Way(("line.steady_arm={mass_kg_per_m=1.0}", "effects.arm_inertia="), "line.steady_arm"),
+        Way(("irregularities.contact_wire_height={by_place=[[0,0],[1,0]],seed=3}",),
+            "contact_wire_height"),
     )  # fmt: skip
     return rng.choice(ways)
 
 
-# So that a wind finds what it needs on a simple line.
+# So that a wind finds what it needs on a line that has this table.
 _DIAMETERS = ("line.contact_wire.diameter_mm=12.0",)
