@@ -121,6 +121,8 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
         except BrokenPipeError:  # the reader of a pipe has gone, as with `| head`
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             code = BROKEN
+        finally:
+            _quiet = False  # of this command only: several may be called in one process
         if code:
             raise typer.Exit(code)
 
