@@ -233,7 +233,12 @@ def raised(time: float, raise_time: float) -> float:
     """Part of the lift that acts at ``time`` [s]: a half cosine from 0 to 1 over ``raise_time``."""
     if time >= raise_time:
         return 1.0
-    return 0.5 * (1.0 - float(np.cos(np.pi * time / raise_time)))
+    return float(_half_cosine(time, raise_time))
+
+
+def _half_cosine(time: Any, raise_time: float) -> Any:
+    """From 0 to 1 over ``raise_time``, at one time or at several [s]."""
+    return 0.5 * (1.0 - np.cos(np.pi * time / raise_time))
 
 
 @dataclass(frozen=True)
@@ -253,6 +258,5 @@ def parts_of(part: Callable[[float], float], times: Sequence[float]) -> np.ndarr
         return np.array([part(time) for time in times])
     if times[0] >= part.raise_time:
         return np.ones(len(times))
-    # As ``raised``, all at once.
     at = np.asarray(times)
-    return np.where(at >= part.raise_time, 1.0, 0.5 * (1.0 - np.cos(np.pi * at / part.raise_time)))
+    return np.where(at >= part.raise_time, 1.0, _half_cosine(at, part.raise_time))
