@@ -13,7 +13,8 @@ from catenary.cases.scene.checks.scene import check
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.input.faults import Fault, SceneError
 from catenary.cases.scene.input.origin import Origin
-from catenary.cases.scene.input.plain_text import refuse_deep, text_faults
+from catenary.cases.scene.input.plain_text import refuse_deep
+from catenary.cases.scene.input.text_faults import text_faults
 from catenary.cases.scene.input.toml_input import Assigned, assign, parse_assignment, read_toml
 from catenary.cases.scene.input.vehicle_files import take_in_files
 from catenary.cases.scene.keys.error_sentences import schema_faults, unknown_key

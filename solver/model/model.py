@@ -8,21 +8,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
 from catenary.solver.model.links.links import Links
+from catenary.solver.model.loads import Load
 from catenary.solver.model.rest.rest_shape import Equilibrium
 from catenary.solver.model.unknowns.registry import Unknowns
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
-
-if TYPE_CHECKING:
-    from catenary.solver.model.loads import Load
-
 
 # Elements of a block that are looked for together: the ends of each are as long as its unknowns.
 _TOGETHER = 16

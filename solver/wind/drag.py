@@ -17,8 +17,9 @@ from collections.abc import Callable
 import numpy as np
 from scipy import sparse
 
+from catenary.solver.model.distributed_loads import along
 from catenary.solver.model.elements import beam
-from catenary.solver.model.loads import FieldLoad, along
+from catenary.solver.model.loads import FieldLoad
 from catenary.solver.model.model import Block, Model, wire_elements
 from catenary.solver.problem.wind import Wind
 from catenary.solver.wind.gust_field import GustField

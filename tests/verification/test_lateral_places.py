@@ -14,7 +14,7 @@ from catenary.mbs.head.strips import Strips, Turning
 from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.contact.contact_wire import ContactWires
-from catenary.solver.model.links.links import at_places
+from catenary.solver.model.links.directions import at_places
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.form_finding.equilibrium import find_form
 from catenary.solver.time_loop.views.observers import Stage, StepView

@@ -31,7 +31,8 @@ from stops import (
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.solver.model.builder import ModelBuilder
-from catenary.solver.model.links.links import BOTH, PULLS, at_nodes, law
+from catenary.solver.model.links.directions import at_nodes
+from catenary.solver.model.links.links import BOTH, PULLS, law
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.schemes.monolithic_system import WholeSystem
 from catenary.solver.statics.form_finding.equilibrium import find_form

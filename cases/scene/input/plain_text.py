@@ -5,27 +5,19 @@ from __future__ import annotations
 import os
 import stat
 import unicodedata
-from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from catenary.cases.scene.input.faults import MOST_TOLD, Fault
 from catenary.solver.base.errors import InputError
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.input.origin import Origin
 
 MOST_BYTES = 10_000_000  # an input file is written by hand or is a table; more is some other file
 DEEPEST = 32  # tables in tables; the schema has no more than eight
 _BOM = b"\xef\xbb\xbf"
-# Where a text may have several lines and tabs.
-_PROSE = ("description", "source", "reason")
 # What steers a terminal, a spreadsheet or the direction of reading: control characters, invisible
 # formats (bidirectional overrides among them), separators of lines, halves of pairs, private use.
 _STEERS = ("Cc", "Cf", "Zl", "Zp", "Cs", "Co")
 # Invisible, but part of how some languages are written.
 _WRITTEN = "\u00ad\u200c\u200d"
-_SHOWN = 60
 
 
 def read_whole(path: Path, name: str) -> bytes:
@@ -86,10 +78,11 @@ def steers(letter: str) -> bool:
 def plain(text: str, most: int | None = None) -> str:
     """``text`` with what cannot be seen written as escapes, cut to ``most`` characters."""
     cut = text if most is None or len(text) <= most else text[: most - 3] + "..."
-    return "".join(letter if letter.isprintable() else _escape(letter) for letter in cut)
+    return "".join(letter if letter.isprintable() else escaped(letter) for letter in cut)
 
 
-def _escape(letter: str) -> str:
+def escaped(letter: str) -> str:
+    """A character as an escape, such as those of TOML."""
     known = {"\n": "\\n", "\t": "\\t", "\r": "\\r"}
     code = ord(letter)
     return known.get(letter) or (f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}")
@@ -108,43 +101,6 @@ def refuse_deep(raw: Any, name: str) -> None:
 def _below(one: Any) -> list[Any]:
     inner = one.values() if isinstance(one, dict) else one if isinstance(one, list) else ()
     return [value for value in inner if isinstance(value, dict | list)]
-
-
-def text_faults(raw: Any, origin: Origin) -> list[Fault]:
-    """A fault for each key and each text with a control character, ``MOST_TOLD`` at most."""
-    found: list[Fault] = []
-    for fault in _texts(raw, "", origin):
-        found.append(fault)
-        if len(found) == MOST_TOLD:
-            break
-    return found
-
-
-def _texts(value: Any, key: str, origin: Origin) -> Iterator[Fault]:
-    if isinstance(value, str):
-        prose = key.rsplit(".", 1)[-1] in _PROSE
-        for letter in value:
-            if steers(letter) and not (prose and letter in "\n\t\r"):
-                yield Fault(
-                    key,
-                    f'{plain(key)} is "{plain(value, _SHOWN)}" {origin.of(key)}; it must not hold '
-                    f"the control character {_escape(letter)}",
-                )
-                return
-    elif isinstance(value, dict):
-        for name, inner in value.items():
-            below = f"{key}.{name}" if key else str(name)
-            if any(steers(letter) for letter in str(name)):
-                yield Fault(
-                    below,
-                    f"{plain(below, 200)} {origin.of(key)} is a key with a control character",
-                )
-            else:
-                yield from _texts(inner, below, origin)
-    elif isinstance(value, list):
-        for number, inner in enumerate(value):
-            if isinstance(inner, str | dict | list):
-                yield from _texts(inner, f"{key}.{number}", origin)
 
 
 def _why(error: Exception) -> str:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from catenary.mbs.roll import roll_of
 from catenary.solver.effects.effect import Effect, Limit, register
 from catenary.solver.effects.shipped import target_heights
-from catenary.solver.model.links.links import between_nodes, law
+from catenary.solver.model.links.directions import between_nodes
+from catenary.solver.model.links.links import law
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
 from catenary.solver.problem.problem import Problem, slowest_wave_speed

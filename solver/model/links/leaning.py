@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catenary.solver.model.links.links import Direction, between_nodes
+from catenary.solver.model.links.directions import between_nodes
+from catenary.solver.model.links.links import Direction
 
 if TYPE_CHECKING:
     from catenary.solver.model.model import Model

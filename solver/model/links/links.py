@@ -8,12 +8,9 @@ one that only pushes no T > 0. With a gap a link stands open at rest: it is then
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from catenary.solver.model.model import Model
 
 # Which forces a link has: tension and compression, or one of both.
 BOTH, PULLS, PUSHES = 0, 1, 2
@@ -62,48 +59,6 @@ class Links:
         weights = self.direction.weights
         stiffness = np.where(self.law["open"], 0.0, self.law["stiffness"])
         return np.asarray(stiffness[:, None, None] * weights[:, :, None] * weights[:, None, :])
-
-
-def at_nodes(model: Model, nodes: np.ndarray, unknown: str = "w") -> Direction:
-    """Stretch that is the displacement of a node each, ``nodes`` (n,): links to the ground."""
-    unknowns = model.dofs(nodes, unknown)[:, None]
-    return Direction(unknowns, np.ones(unknowns.shape))
-
-
-def between_nodes(model: Model, pairs: np.ndarray, unknown: str = "w") -> Direction:
-    """Displacement of the first node less that of the second, ``pairs`` (n, 2)."""
-    unknowns = model.dofs(pairs, unknown)
-    return Direction(unknowns, np.broadcast_to(np.array([1.0, -1.0]), unknowns.shape))
-
-
-def at_places(
-    model: Model, wire: str, x: np.ndarray, plane: tuple[str, str] = ("w", "theta_y")
-) -> Direction:
-    """Deflection of a wire at places ``x`` (n,) [m], which may be between its nodes.
-
-    By the Hermite functions of the element there, in a ``plane`` of deflection and slope.
-    """
-    # Compiled loops are not loaded by a check of a scene, which places no link within an element.
-    from catenary.solver.model.elements.shape_functions import shape_values
-
-    nodes = model.mesh.wires[wire]
-    at = model.mesh.x(nodes)
-    element = np.clip(np.searchsorted(at, x) - 1, 0, at.size - 2)
-    length = np.diff(at)[element]
-    weights = [
-        shape_values(xi, h) for xi, h in zip((x - at[element]) / length, length, strict=True)
-    ]
-    ends = nodes[element[:, None] + [0, 1]]
-    unknowns = np.stack([model.dofs(ends, name) for name in plane], axis=2).reshape(-1, 4)
-    return Direction(unknowns, np.reshape(weights, (-1, 4)))
-
-
-def difference(upper: Direction, lower: Direction) -> Direction:
-    """Stretch of links from ``lower`` to ``upper`` places."""
-    return Direction(
-        np.concatenate([upper.unknowns, lower.unknowns], axis=1),
-        np.concatenate([upper.weights, -lower.weights], axis=1),
-    )
 
 
 def law(

@@ -31,14 +31,8 @@ from catenary.solver.contact_problem import complementarity
 from catenary.solver.effects.effect import Effect
 from catenary.solver.integrators.loads import line_loads
 from catenary.solver.model.builder import ModelBuilder
-from catenary.solver.model.loads import (
-    FieldLoad,
-    FunctionLoad,
-    ShapeLoad,
-    along,
-    harmonics,
-    table,
-)
+from catenary.solver.model.distributed_loads import along
+from catenary.solver.model.loads import FieldLoad, FunctionLoad, ShapeLoad, harmonics, table
 from catenary.solver.problem.contact_laws import KinematicLaw, LinearLaw
 from catenary.solver.problem.problem import Placement, Problem
 from catenary.solver.schemes.one_solve import OneSolve

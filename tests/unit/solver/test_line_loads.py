@@ -12,11 +12,11 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.integrators.loads import line_loads
 from catenary.solver.integrators.loads.line_loads import LineLoads
 from catenary.solver.linear.halo import Subdomain
+from catenary.solver.model.distributed_loads import along
 from catenary.solver.model.loads import (
     FieldLoad,
     FunctionLoad,
     ShapeLoad,
-    along,
     constant,
     harmonics,
     table,
