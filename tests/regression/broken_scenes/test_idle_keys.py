@@ -64,6 +64,23 @@ IDLE = {
         ["line.wires.4.clamp_stiffness_N_per_m=1e6"],
         "high_messenger has no clamp: neither start nor end names a wire",
     ),
+    "stagger of a wire between clamps": (
+        FREE,
+        ["line.wires.1.stagger_m=0.1"],
+        "line.wires.1.stagger_m is [0.1] m on the command line (--set); nothing holds "
+        "auxiliary_wire sideways but the wires to which both of its ends are clamped",
+    ),
+    "lateral place beside a wire between clamps": (
+        FREE,
+        ["line.wires.1.sideways_m=0.1"],
+        "line.wires.1.sideways_m is 0.1 m on the command line (--set); nothing holds "
+        "auxiliary_wire",
+    ),
+    "lateral place beside a wire with one clamp": (
+        FREE,
+        ["line.wires.2.sideways_m=0.1"],
+        "without stagger_m or course_m stitch_wire has the lateral place of the wire to which it",
+    ),
     "seed of heights that are given": (
         SOUND,
         ["irregularities.contact_wire_height={by_place=[[0,0],[100,0.01],[200,0]],seed=4}"],

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 
 def check_idle(scene: Scene, line: LineData) -> Iterator[Fault]:
-    """Masses of arms and clamps, errors of droppers and further overlaps of which there are none.
+    """Masses of arms and clamps, lateral places of clamped wires, errors of droppers and further
+    overlaps of which there are none.
 
     Of an effect that the scene writes as false data may stand there.
     """
@@ -26,6 +27,7 @@ def check_idle(scene: Scene, line: LineData) -> Iterator[Fault]:
         return
     yield from _arms(scene)
     yield from _clamps(scene)
+    yield from _lateral_places(scene)
     yield from _dropper_lengths(scene, line)
     yield from _random(scene)
     yield from _sagging(scene)
@@ -53,6 +55,35 @@ def _clamps(scene: Scene) -> Iterator[Fault]:
                     f"clamped{TAKE_AWAY}"
                 )
                 yield refusal(scene.origin, f"line.wires.{i}.{name}", getattr(wire, name), why)
+
+
+def _lateral_places(scene: Scene) -> Iterator[Fault]:
+    """Lateral places of free wires that lie where the wires do to which they are clamped."""
+    wires = scene.line.wires or []
+    names = {wire.name for wire in wires}
+    links = scene.line.links or []
+    held = {link.wire for link in links if link.type in ("supports", "steady_arms")}
+    for i, wire in enumerate(wires):
+        n_clamped = len([end for end in (wire.start, wire.end) if end in names])
+        if n_clamped == 2 and wire.name not in held:
+            idle = ["stagger_m", "sideways_m"]
+            why = (
+                f"nothing holds {wire.name} sideways but the wires to which both of its ends are "
+                "clamped"
+            )
+        elif (
+            n_clamped and wire.role != "contact" and (wire.stagger_m, wire.course_m) == (None,) * 2
+        ):
+            idle = ["sideways_m"]
+            why = (
+                f"without stagger_m or course_m {wire.name} has the lateral place of the wire to "
+                "which it is clamped"
+            )
+        else:
+            continue
+        for name in set(idle) & wire.model_fields_set:
+            given = getattr(wire, name)
+            yield refusal(scene.origin, f"line.wires.{i}.{name}", given, why + TAKE_AWAY)
 
 
 def _dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
