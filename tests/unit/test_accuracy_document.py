@@ -99,9 +99,9 @@ def test_steps_of_further_lines_are_those_of_the_pages(case: str) -> None:
     assert compared >= 4
 
 
-@pytest.mark.parametrize("case", ["dc_twin", "overlap"])
+@pytest.mark.parametrize("case", ["re330_stitched", "shinkansen_compound", "dc_twin", "overlap"])
 def test_meshes_of_further_lines_are_those_of_the_pages(case: str) -> None:
-    cells = table_after("The mesh decides on both lines", f"`{case}`")
+    cells = table_after("Errors of the mesh alone in the force history", f"`{case}`")
     for n, cell in zip((3, 4, 5, 6, 8, 12, 16), cells[:-1], strict=True):
         # At 0.5 ms the study has the errors of the mesh at 0.2 ms beside the whole ones.
         row = page(case)["grid", f"0.5_ms_{n}_elements"]
