@@ -212,7 +212,7 @@ def packed_blocks(layout: Layout, factors: np.ndarray) -> np.ndarray:
     if layout.sparse:
         return layout.packed_halves(factors[:, 0])
     packed = layout.packed(factors, layout.whole_terms)
-    return packed.reshape(packed.shape[0], 3 * layout.whole_terms.sources.size)
+    return packed.reshape(packed.shape[0], -1)
 
 
 def packed_factors(

@@ -102,10 +102,7 @@ class OperatorPieces:
             layout = with_damping(layout, None if joined is None else joined[0])
         stations, pieces = self._stations.padded(), self.pieces
         sets = 1 if damping is None else 2
-        widths = tuple(
-            sets * (part.own_terms.sources.size + 2 * part.beside_terms.sources.size)
-            for part in layout.parts
-        )
+        widths = tuple(sets * part.row_size for part in layout.parts)
         table = Slots(pieces.n_slots, pieces.size, widths, layout.varies)
         kinds: np.ndarray = np.zeros(self._stations.size, dtype=table.kind)
         product = StationProduct(layout, stations.places(), kinds, table.numbers, 1, 0)

@@ -14,15 +14,17 @@ from numba import types
 from catenary.solver.linear.stations.lanes import (
     FUSED,
     Lanes,
-    Registers,
-    gathered,
     inlined,
     place_of,
-    register_ranges,
+)
+from catenary.solver.linear.stations.registers import (
+    Registers,
+    gathered,
     spread,
     vector_type,
+    zeros,
 )
-from catenary.solver.linear.stations.station_layout import Halves, Terms
+from catenary.solver.linear.stations.station_layout import Halves, Layout, Terms, ranges_of
 
 _NUMBERS = types.CPointer(types.float64)
 
@@ -48,7 +50,8 @@ def sums_from(typing_context, layout, total):
 
     def generate(context, builder, signature, arguments):
         _, total = arguments
-        none = ir.Constant(total.type, [-0.0] * total.type.count)  # adds nothing, not even a sign
+        # What adds nothing, not even a sign.
+        none = Registers(signature.args[1].registers).all_of(-0.0)
         return context.make_tuple(builder, signature.return_type, [total, none])
 
     return types.UniTuple(total, 2)(layout, total), generate
@@ -61,7 +64,7 @@ def total_of(typing_context, layout, sums):
     def generate(context, builder, signature, arguments):
         layout = signature.args[0].layout
         first, second = (builder.extract_value(arguments[1], number) for number in range(2))
-        registers = Registers(layout.n_lanes)
+        registers = Registers(layout.registers)
         result = []
         for one, other in zip(
             registers.apart(builder, first), registers.apart(builder, second), strict=True
@@ -71,7 +74,7 @@ def total_of(typing_context, layout, sums):
             result.append(builder.fadd(one, other))
         return registers.together(builder, result)
 
-    return Lanes(layout.layout.n_lanes)(layout, sums), generate
+    return Lanes(layout.layout.registers)(layout, sums), generate
 
 
 def _product(terms_of: Any, summary: str) -> Any:
@@ -81,9 +84,9 @@ def _product(terms_of: Any, summary: str) -> Any:
         def generate(context, builder, signature, arguments):
             _, sums, numbers, skipped, x = arguments
             data = builder.gep(numbers, [skipped])
-            terms = terms_of(signature.args[0].layout)
+            layout = signature.args[0].layout
             both = [builder.extract_value(sums, number) for number in range(2)]
-            _add_terms(builder, both, data, x, terms)
+            _add_terms(builder, layout, both, data, x, terms_of(layout))
             return context.make_tuple(builder, signature.return_type, both)
 
         return sums(layout, sums, numbers, skipped, x), generate
@@ -115,13 +118,13 @@ def add_symmetric(typing_context, layout, sums, numbers, x):
     def generate(context, builder, signature, arguments):
         _, sums, data, x = arguments
         layout = signature.args[0].layout
-        halves, registers = layout.halves, Registers(layout.n_lanes)
+        halves, registers = layout.halves, Registers(layout.registers)
         both = [builder.extract_value(sums, number) for number in range(2)]
         lanes = np.tile(np.arange(layout.n_lanes), (len(halves.sources), 1))
         direct = Terms(halves.sources, lanes, layout.sums_of(len(lanes)))
-        _add_terms(builder, both, data, x, direct)
+        _add_terms(builder, layout, both, data, x, direct)
         if halves.mirrored.any():
-            other = _mirrored(builder, data, registers.apart(builder, x), halves)
+            other = _mirrored(builder, layout, data, registers.apart(builder, x), halves)
             total = registers.apart(builder, both[0])
             total = [builder.fadd(*pair, flags=FUSED) for pair in zip(total, other, strict=True)]
             both[0] = registers.together(builder, total)
@@ -136,32 +139,40 @@ def _stored(builder: Any, data: Any, at: int, size: int) -> Any:
     return builder.load(builder.bitcast(place, vector_type(size).as_pointer()), align=8)
 
 
-def _add_terms(builder: Any, sums: list[Any], data: Any, x: Any, terms: Terms) -> None:
+def _add_terms(
+    builder: Any, layout: Layout, sums: list[Any], data: Any, x: Any, terms: Terms
+) -> None:
     """Add all terms of a block stored at ``data`` times x to two ``sums``, which are replaced."""
-    n_lanes = terms.sources.shape[1]
-    registers = Registers(n_lanes)
+    registers, ranges = Registers(layout.registers), ranges_of(layout.registers)
+    begins = layout.order_of(terms.sources).begins
     factors = registers.apart(builder, x)
     parts = [registers.apart(builder, one) for one in sums]
     sources = np.where(terms.sources < 0, terms.targets, terms.sources)
     for term, (source, number) in enumerate(zip(sources, terms.sums, strict=True)):
-        for register, (first, size) in enumerate(register_ranges(n_lanes)):
+        for register, (first, size) in enumerate(ranges):
+            if begins[register, term] < 0:
+                continue
             factor = gathered(builder, factors, source[first : first + size])
-            stored = _stored(builder, data, term * n_lanes + first, size)
+            stored = _stored(builder, data, int(begins[register, term]), size)
             product = builder.fmul(stored, factor, flags=FUSED)
             total = parts[number][register]
             parts[number][register] = builder.fadd(total, product, flags=FUSED)
     sums[:] = [registers.together(builder, part) for part in parts]
 
 
-def _mirrored(builder: Any, data: Any, factors: list[Any], halves: Halves) -> list[Any]:
+def _mirrored(
+    builder: Any, layout: Layout, data: Any, factors: list[Any], halves: Halves
+) -> list[Any]:
     """What the half of a symmetric block that is not stored makes of ``factors``, by registers."""
-    n_lanes = halves.sources.shape[1]
-    ranges = register_ranges(n_lanes)
+    ranges = ranges_of(layout.registers)
+    begins = layout.order_of(halves.sources).begins
     total: list[Any] = []
     for term in np.flatnonzero(halves.mirrored):
         products = []
-        for factor, (first, size) in zip(factors, ranges, strict=True):
-            stored = _stored(builder, data, int(term) * n_lanes + first, size)
+        for factor, (_, size), begin in zip(factors, ranges, begins[:, term], strict=True):
+            stored = zeros(size)
+            if begin >= 0:
+                stored = _stored(builder, data, int(begin), size)
             products.append(builder.fmul(stored, factor, flags=FUSED))
         lanes = halves.back[term]
         back = [gathered(builder, products, lanes[first : first + size]) for first, size in ranges]

@@ -22,7 +22,15 @@ from numba.extending import (
     unbox,
 )
 
-from catenary.solver.linear.stations.station_layout import REGISTER, Layout
+from catenary.solver.linear.stations.registers import (
+    Registers,
+    chosen,
+    shuffled,
+    spread,
+    vector_type,
+    zeros,
+)
+from catenary.solver.linear.stations.station_layout import Layout, ranges_of
 
 # Numba's own annotations know nothing of the calls.
 inlined: Any = intrinsic
@@ -42,9 +50,9 @@ class LayoutType(types.Dummy):
 class Lanes(types.Type):
     """Numba's type of the numbers in the lanes of a layout."""
 
-    def __init__(self, n_lanes: int) -> None:
-        self.n_lanes = n_lanes
-        super().__init__(name=f"Lanes({n_lanes})")
+    def __init__(self, registers: tuple[int, ...]) -> None:
+        self.registers = registers
+        super().__init__(name=f"Lanes{registers}")
 
 
 @register_model(LayoutType)
@@ -57,7 +65,7 @@ class _LanesModel(models.PrimitiveModel):
     """Numbers as LLVM's vectors."""
 
     def __init__(self, manager: Any, front_end_type: Lanes) -> None:
-        super().__init__(manager, front_end_type, Registers(front_end_type.n_lanes).type)
+        super().__init__(manager, front_end_type, Registers(front_end_type.registers).type)
 
 
 @typeof_impl.register(Layout)
@@ -87,16 +95,19 @@ def _constant(value_of: Any, summary: str) -> Any:
 
 pitch = _constant(lambda layout: layout.pitch, "Unknowns of a station.")
 whole_size = _constant(
-    lambda layout: layout.whole_terms.sources.size, "Numbers of a packed block of factors."
+    lambda layout: layout.order_of(layout.whole_terms.sources).size,
+    "Numbers of a packed block of factors.",
 )
 half_size = _constant(
-    lambda layout: layout.halves.sources.size, "Numbers of a packed symmetric block of factors."
+    lambda layout: layout.order_of(layout.halves.sources).size,
+    "Numbers of a packed symmetric block of factors.",
 )
 own_size = _constant(
-    lambda layout: layout.own_terms.sources.size, "Numbers of a packed diagonal block of K or C."
+    lambda layout: layout.order_of(layout.own_terms.sources).size,
+    "Numbers of a packed diagonal block of K or C.",
 )
 beside_size = _constant(
-    lambda layout: layout.beside_terms.sources.size,
+    lambda layout: layout.order_of(layout.beside_terms.sources).size,
     "Numbers of a packed block of K or C beside the diagonal.",
 )
 remembers = _constant(
@@ -128,12 +139,14 @@ def narrowed(typing_context, part, x):
     def generate(context, builder, signature, arguments):
         return lanes_narrowed(builder, part.layout, arguments[1])
 
-    return Lanes(part.layout.n_lanes)(part, x), generate
+    return Lanes(part.layout.registers)(part, x), generate
 
 
 def lanes_narrowed(builder: Any, part: Layout, x: Any) -> Any:
     """LLVM's value of what is ``narrowed``."""
-    return x if part.whole is None else _chosen(builder, x, part.lanes_of_whole)
+    if part.whole is None:
+        return x
+    return chosen(builder, part.whole.registers, x, part.registers, part.lanes_of_whole)
 
 
 @inlined
@@ -143,7 +156,7 @@ def widened(typing_context, part, x):
     def generate(context, builder, signature, arguments):
         return lanes_widened(builder, part.layout, arguments[1])
 
-    return Lanes((part.layout.whole or part.layout).n_lanes)(part, x), generate
+    return Lanes((part.layout.whole or part.layout).registers)(part, x), generate
 
 
 def lanes_widened(builder: Any, part: Layout, x: Any) -> Any:
@@ -152,7 +165,7 @@ def lanes_widened(builder: Any, part: Layout, x: Any) -> Any:
         return x
     lanes, own = np.full(part.whole.n_lanes, -1), part.lanes_of_whole
     lanes[own[own >= 0]] = np.flatnonzero(own >= 0)
-    return _chosen(builder, x, lanes)
+    return chosen(builder, part.registers, x, part.whole.registers, lanes)
 
 
 def place_of(context: Any, builder: Any, kind: Any, array: Any) -> Any:
@@ -167,9 +180,9 @@ def zero(typing_context, layout):
     """0 in all lanes."""
 
     def generate(context, builder, signature, arguments):
-        return Registers(signature.return_type.n_lanes).zeros()
+        return Registers(signature.return_type.registers).zeros()
 
-    return Lanes(layout.layout.n_lanes)(layout), generate
+    return Lanes(layout.layout.registers)(layout), generate
 
 
 @inlined
@@ -179,13 +192,13 @@ def load(typing_context, layout, array, at):
     def generate(context, builder, signature, arguments):
         _, array, at = arguments
         data = place_of(context, builder, signature.args[1], array)
-        unknowns = signature.args[0].layout.unknowns
+        layout = signature.args[0].layout
         result = []
-        for first, size in register_ranges(unknowns.size):
-            result.append(_load_some(builder, data, at, unknowns[first : first + size]))
-        return Registers(unknowns.size).together(builder, result)
+        for first, size in ranges_of(layout.registers):
+            result.append(_load_some(builder, data, at, layout.unknowns[first : first + size]))
+        return Registers(layout.registers).together(builder, result)
 
-    return Lanes(layout.layout.n_lanes)(layout, array, at), generate
+    return Lanes(layout.layout.registers)(layout, array, at), generate
 
 
 @inlined
@@ -195,10 +208,10 @@ def store(typing_context, layout, array, at, x):
     def generate(context, builder, signature, arguments):
         _, array, at, x = arguments
         data = place_of(context, builder, signature.args[1], array)
-        unknowns = signature.args[0].layout.unknowns
-        parts = Registers(unknowns.size).apart(builder, x)
-        for part, (first, size) in zip(parts, register_ranges(unknowns.size), strict=True):
-            _store_some(builder, data, at, unknowns[first : first + size], part)
+        layout = signature.args[0].layout
+        parts = Registers(layout.registers).apart(builder, x)
+        for part, (first, size) in zip(parts, ranges_of(layout.registers), strict=True):
+            _store_some(builder, data, at, layout.unknowns[first : first + size], part)
         return context.get_dummy_value()
 
     return types.void(layout, array, at, x), generate
@@ -209,7 +222,7 @@ def add(typing_context, x, y):
     """The sum of two."""
 
     def generate(context, builder, signature, arguments):
-        both = Registers(signature.return_type.n_lanes)
+        both = Registers(signature.return_type.registers)
         return both.each(builder, lambda a, b: builder.fadd(a, b), *arguments)
 
     return x(x, y), generate
@@ -228,74 +241,9 @@ def add_scaled(typing_context, total, factor, x):
             product = builder.fmul(spread(builder, first, [0] * b.type.count), b, flags=FUSED)
             return builder.fadd(a, product, flags=FUSED)
 
-        return Registers(signature.return_type.n_lanes).each(builder, sum_of, total, x)
+        return Registers(signature.return_type.registers).each(builder, sum_of, total, x)
 
     return total(total, factor, x), generate
-
-
-class Registers:
-    """LLVM's vectors of at most eight numbers that arithmetic on lanes is done with.
-
-    Between operations lanes are one vector: a struct of several would be kept in memory. Its size
-    is a power of two, with lanes at the end that are not defined: LLVM takes others apart into
-    single numbers wherever a loop begins anew.
-    """
-
-    def __init__(self, n_lanes: int) -> None:
-        self._ranges = register_ranges(n_lanes)
-        self.type = vector_type(1 << (n_lanes - 1).bit_length())
-
-    def zeros(self) -> Any:
-        """0 in all lanes."""
-        return zeros(self.type.count)
-
-    def together(self, builder: Any, vectors: list[Any]) -> Any:
-        """Lanes from the vectors that hold them."""
-        result = vectors[0]
-        for (first, size), vector in zip(self._ranges[1:], vectors[1:], strict=True):
-            result = _shuffled(
-                builder,
-                _widened(builder, result, max(first, size)),
-                _widened(builder, vector, max(first, size)),
-                list(range(first + size)),
-            )
-        return _widened(builder, result, self.type.count)
-
-    def apart(self, builder: Any, lanes: Any) -> list[Any]:
-        """Vectors that hold the lanes."""
-        if self._ranges == [(0, lanes.type.count)]:
-            return [lanes]
-        return [spread(builder, lanes, list(range(a, a + size))) for a, size in self._ranges]
-
-    def each(self, builder: Any, function: Any, *lanes: Any) -> Any:
-        """A function of vectors for all lanes."""
-        parts = zip(*(self.apart(builder, one) for one in lanes), strict=True)
-        return self.together(builder, [function(*part) for part in parts])
-
-
-def register_ranges(n_lanes: int) -> list[tuple[int, int]]:
-    """First lane and number of lanes of each vector that holds some of them."""
-    firsts = range(0, n_lanes, REGISTER)
-    return [(first, min(REGISTER, n_lanes - first)) for first in firsts]
-
-
-def gathered(builder: Any, vectors: list[Any], lanes: np.ndarray) -> Any:
-    """Numbers by their lanes in ``vectors``."""
-    source = lanes // REGISTER
-    numbers = np.unique(source).tolist()
-    one = vectors[numbers[0]]
-    if len(numbers) == 1:
-        places = lanes - numbers[0] * REGISTER
-        if np.array_equal(places, np.arange(one.type.count)):
-            return one
-        return spread(builder, one, places.tolist())
-    places = lanes % REGISTER
-    for number in numbers[1:]:
-        other = _widened(builder, vectors[number], REGISTER)
-        chosen = np.where(source == number, lanes % REGISTER + REGISTER, places)
-        one = _shuffled(builder, _widened(builder, one, REGISTER), other, chosen.tolist())
-        places = np.arange(lanes.size)
-    return one
 
 
 def _load_some(builder: Any, data: Any, at: Any, unknowns: np.ndarray) -> Any:
@@ -307,13 +255,13 @@ def _load_some(builder: Any, data: Any, at: Any, unknowns: np.ndarray) -> Any:
             return part
         mask = np.full(unknowns.size, size)  # a lane of zeros
         mask[lane : lane + size] = np.arange(size)
-        wide = _shuffled(builder, part, zeros(size), mask.tolist())
+        wide = shuffled(builder, part, zeros(size), mask.tolist())
         if result is None:
             result = wide
         else:
             chosen = np.arange(unknowns.size)
             chosen[lane : lane + size] += unknowns.size
-            result = _shuffled(builder, result, wide, chosen.tolist())
+            result = shuffled(builder, result, wide, chosen.tolist())
     return zeros(unknowns.size) if result is None else result
 
 
@@ -342,41 +290,6 @@ def _runs(unknowns: np.ndarray) -> list[tuple[int, int, int]]:
         result.append((lane, int(unknowns[lane]), size))
         lane += size
     return result
-
-
-def vector_type(size: int) -> ir.VectorType:
-    """LLVM's type of so many numbers."""
-    return ir.VectorType(ir.DoubleType(), size)
-
-
-def zeros(size: int) -> ir.Constant:
-    """As many zeros."""
-    return ir.Constant(vector_type(size), [0.0] * size)
-
-
-def spread(builder: Any, x: Any, lanes: list[int]) -> Any:
-    """Numbers of x by their lanes."""
-    return _shuffled(builder, x, ir.Constant(x.type, ir.Undefined), lanes)
-
-
-def _chosen(builder: Any, x: Any, lanes: np.ndarray) -> Any:
-    """Numbers of x by their lanes, 0 for -1, as ``Registers`` hold them."""
-    chosen = np.where(lanes < 0, x.type.count, lanes)
-    result = _shuffled(builder, x, zeros(x.type.count), chosen.tolist())
-    return _widened(builder, result, Registers(lanes.size).type.count)
-
-
-def _widened(builder: Any, x: Any, size: int) -> Any:
-    """x with lanes that are not defined at its end."""
-    if x.type.count == size:
-        return x
-    # The first lane after those of x is of what is not defined.
-    return spread(builder, x, [min(lane, x.type.count) for lane in range(size)])
-
-
-def _shuffled(builder: Any, x: Any, y: Any, lanes: list[int]) -> Any:
-    mask = ir.Constant(ir.VectorType(ir.IntType(32), len(lanes)), lanes)
-    return builder.shuffle_vector(x, y, mask)
 
 
 def _at(builder: Any, at: Any, step: int) -> Any:

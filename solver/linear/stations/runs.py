@@ -24,6 +24,7 @@ from catenary.solver.linear.stations.lanes import (
     pitch,
 )
 from catenary.solver.linear.stations.make_ups import Places, make_up_of, start_of
+from catenary.solver.linear.stations.registers import Registers
 from catenary.solver.linear.stations.station_layout import Layout
 
 OPTIONS: Any = {"forceinline": True, "error_model": "numpy"}
@@ -67,7 +68,7 @@ def run_number(typing_context, layout, make_up):
     return types.int64(layout, make_up), generate
 
 
-def _converted(convert: Any, size_of: Any, summary: str) -> Any:
+def _converted(convert: Any, registers_of: Any, summary: str) -> Any:
     """A function of lanes that depends on the make-up of a run."""
 
     def converted(typing_context, layout, number, make_up, x):
@@ -78,14 +79,18 @@ def _converted(convert: Any, size_of: Any, summary: str) -> Any:
         def generate(context, builder, signature, arguments):
             _, _, make_up, x = arguments
             parts = signature.args[0].layout.parts
+            of_lanes = Registers(registers)
             found = convert(builder, parts[make_ups[0]], x)
             for own in make_ups[1:]:
                 other = convert(builder, parts[own], x)
-                found = builder.select(_is(builder, make_up, own), other, found)
+                chosen = _is(builder, make_up, own)
+                found = of_lanes.each(
+                    builder, lambda a, b, chosen=chosen: builder.select(chosen, a, b), other, found
+                )
             return found
 
-        size = size_of(layout.layout, layout.layout.parts[make_ups[0]])
-        return Lanes(size)(layout, number, make_up, x), generate
+        registers = registers_of(layout.layout, layout.layout.parts[make_ups[0]])
+        return Lanes(registers)(layout, number, make_up, x), generate
 
     converted.__doc__ = summary
     return inlined(converted)
@@ -93,12 +98,12 @@ def _converted(convert: Any, size_of: Any, summary: str) -> Any:
 
 into_run = _converted(
     lanes_narrowed,
-    lambda layout, part: part.n_lanes,
+    lambda layout, part: part.registers,
     "Lanes of a cross-section as those of the run of a ``number``, which is a constant.",
 )
 out_of_run = _converted(
     lanes_widened,
-    lambda layout, part: layout.n_lanes,
+    lambda layout, part: layout.registers,
     "Lanes of the run of a ``number``, which is a constant, as those of a cross-section.",
 )
 

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 # Lanes that a plane may take: the least of these that holds its unknowns.
-LANES = (2, 4, 8, 12, 16)
+LANES = (2, 4, 6, 8, 10, 12, 16)
 # Unknowns of a plane that kernels take.
 WIDEST = LANES[-1]
-# Lanes of an LLVM vector; more are held in several.
+# Lanes of an LLVM vector, at most; more are held in several, whose sizes are powers of two.
 REGISTER = 8
 # Parameters of a layout.
 _SETTINGS = (
@@ -64,13 +64,28 @@ class Halves(NamedTuple):
     share: np.ndarray
 
 
+class Order(NamedTuple):
+    """In which order a packed block has its numbers.
+
+    Attributes
+    ----------
+    begins : (n_registers, n_terms) int, where those of each register and term begin, -1 if there
+        are none
+    size : how many the block has
+    """
+
+    begins: np.ndarray
+    size: int
+
+
 class Layout:
     """How the unknowns of a station stand in lanes, and which of them matrices join.
 
-    Planes are sets of unknowns that no matrix joins. They stand side by side, so that one
-    instruction works on all of them. A block of a matrix is kept by terms, see ``Terms``. Each
-    joins lanes whose places in their plane differ by one number, in the sense of exclusive or: 0
-    those with themselves, 1 a beam's deflection and slope, 2 the deflections of two wires.
+    Planes are sets of unknowns that no matrix joins. They stand side by side, each in as many lanes
+    as it needs, so that one instruction may work on several. A block of a matrix is kept by terms,
+    see ``Terms``. Each joins lanes whose places in their plane differ by one number, in the sense
+    of exclusive or: 0 those with themselves, 1 a beam's deflection and slope, 2 the deflections of
+    two wires.
 
     Parameters
     ----------
@@ -92,6 +107,7 @@ class Layout:
     ----------
     pitch : unknowns of a cross-section
     n_lanes : lanes that they take, those without an unknown included
+    registers : lanes of each of the vectors that hold these, see ``registers_of``
     turns : whether lanes 0 and 1, 2 and 3 and so on of a second sum are exchanged
     whole, places, number : of one of its ``parts``: what it is a part of, which unknowns of that it
         has, and of which make-up it is
@@ -115,17 +131,21 @@ class Layout:
         by_runs: bool = False,
     ) -> None:
         self.widths = tuple(widths)
-        self._plane = min(lanes for lanes in LANES if lanes >= max(self.widths))
-        every = tuple(range(self._plane if self._plane & (self._plane - 1) == 0 else WIDEST))
+        self._planes = [min(n for n in LANES if n >= width) for width in self.widths]
+        largest = _power(max(self._planes))
+        every = tuple(range(largest))
         self.own = every if own is None else tuple(own)
         self.beside = every if beside is None else tuple(beside)
         self.damped, self.remembers = bool(damped), bool(remembers)
         self.make_ups, self.sparse, self.by_mass = make_ups, bool(sparse), bool(by_mass)
         self.strands, self.by_runs = strands, bool(by_runs)
         self.pitch = sum(self.widths)
-        self.n_lanes = self._plane * len(self.widths)
+        self.n_lanes = sum(self._planes)
         # Columns where there are fewer of these than of differences.
-        self.turns = self._plane <= REGISTER and max(self.widths) > self._plane - 2
+        self.turns = largest <= REGISTER and max(self.widths) > largest - 2
+        self._first = np.repeat(np.cumsum([0, *self._planes[:-1]]), self._planes)
+        self._end = self._first + np.repeat(self._planes, self._planes)
+        self.registers = registers_of(self._planes)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Layout) and self.key == other.key
@@ -150,6 +170,14 @@ class Layout:
     def n_terms(self) -> int:
         """Terms of a row of K or C."""
         return len(self.own) + 2 * len(self.beside)
+
+    @property
+    def row_size(self) -> int:
+        """Numbers of a packed row of K or C."""
+        own, beside = (
+            self.order_of(terms.sources) for terms in (self.own_terms, self.beside_terms)
+        )
+        return own.size + 2 * beside.size
 
     @property
     def n_terms_beside(self) -> int:
@@ -198,7 +226,7 @@ class Layout:
     @cached_property
     def _lane_of(self) -> np.ndarray:
         """Lane of each unknown in its plane, (pitch,)."""
-        return self._lane_of_unknown % self._plane
+        return self._lane_of_unknown - self._first[self._lane_of_unknown]
 
     @cached_property
     def _lane_of_unknown(self) -> np.ndarray:
@@ -217,20 +245,20 @@ class Layout:
     @cached_property
     def unknowns(self) -> np.ndarray:
         """Unknown of each lane, -1 in one that has none, shape (n_lanes,)."""
-        result = np.full((len(self.widths), self._plane), -1)
-        first = 0
-        for row, width in zip(result, self.widths, strict=True):
-            row[:width] = np.arange(first, first + width)
-            first += width
-        return result.ravel()
+        place = np.arange(self.n_lanes) - self._first
+        there = place < np.repeat(self.widths, self._planes)
+        result = np.full(self.n_lanes, -1)
+        result[there] = np.arange(self.pitch)
+        return result
 
     @cached_property
     def whole_terms(self) -> Terms:
         """Of a block that joins all unknowns of each plane."""
         if self.turns:
-            return self._terms(tuple(range(self._plane)))
+            return self._terms(tuple(range(_power(max(self._planes)))))
         lane, columns = np.arange(self.n_lanes), np.arange(max(self.widths))[:, None]
-        sources = lane - lane % self._plane + columns
+        sources = self._first + columns
+        sources = np.where(sources < self._end, sources, -1)
         return Terms(sources, np.broadcast_to(lane, sources.shape), columns.ravel() % 2)
 
     @cached_property
@@ -262,7 +290,7 @@ class Layout:
         mirrored, share = np.zeros(n_terms, dtype=bool), np.ones(sources.shape)
         mirrored[1 : (max(self.widths) + 1) // 2] = True
         for plane, width in enumerate(self.widths):
-            own = plane * self._plane + np.arange(width)
+            own = sum(self._planes[:plane]) + np.arange(width)
             for d in range(width // 2 + 1):
                 sources[d, own], back[d, np.roll(own, -d)] = np.roll(own, -d), own
                 if 2 * d == width and mirrored[d]:
@@ -287,9 +315,8 @@ class Layout:
     def _differing(self, number: np.ndarray) -> np.ndarray:
         """Lanes of the same plane whose place differs by a number, -1 where there is none."""
         lane = np.arange(self.n_lanes)
-        place = lane % self._plane
-        other = place ^ number
-        return np.where(other < self._plane, lane - place + other, -1)
+        other = self._first + ((lane - self._first) ^ number)
+        return np.where(other < self._end, other, -1)
 
     def differences(self, joined: np.ndarray) -> tuple[int, ...]:
         """Numbers of the terms that hold what ``joined`` (b, b) joins, each within a plane."""
@@ -297,22 +324,71 @@ class Layout:
         return tuple(np.unique(self._lane_of[row] ^ self._lane_of[column]).tolist())
 
     def packed(self, blocks: np.ndarray, terms: Terms) -> np.ndarray:
-        """Blocks (..., pitch, pitch) as products read them, shape (..., n_terms n_lanes).
+        """Blocks (..., pitch, pitch) as products read them, shape (..., n); see ``order_of``.
 
         Those of a part are of the whole.
         """
-        return self._packed(blocks, terms.sources, terms.targets)
+        return self._packed(blocks, terms.sources, terms.targets, np.ones(terms.sources.shape))
 
     def packed_halves(self, blocks: np.ndarray) -> np.ndarray:
         """Symmetric blocks (..., pitch, pitch) as products with ``halves`` read them."""
         sources, _, _, share = self.halves
         lanes = np.broadcast_to(np.arange(self.n_lanes), sources.shape)
-        return np.asarray(self._packed(blocks, sources, lanes) * share.ravel())
+        return self._packed(blocks, sources, lanes, share)
 
-    def _packed(self, blocks: np.ndarray, sources: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    def _packed(
+        self, blocks: np.ndarray, sources: np.ndarray, targets: np.ndarray, share: np.ndarray
+    ) -> np.ndarray:
         if self.whole is not None:
             blocks = blocks[..., self.places, :][..., self.places]
         row, column = self.unknowns[targets], self.unknowns[sources]
         there = (row >= 0) & (column >= 0) & (sources >= 0)
-        numbers = np.where(there, blocks[..., row, column], 0.0)
-        return numbers.reshape(*blocks.shape[:-2], sources.size)
+        numbers = np.where(there, blocks[..., row, column], 0.0) * share
+        order = self.order_of(sources)
+        result = np.zeros((*blocks.shape[:-2], order.size))
+        ranges = ranges_of(self.registers)
+        for register, term in np.argwhere(order.begins >= 0).tolist():
+            begin, (first, size) = order.begins[register, term], ranges[register]
+            result[..., begin : begin + size] = numbers[..., term, first : first + size]
+        return result
+
+    def order_of(self, sources: np.ndarray) -> Order:
+        """The order of a block of terms with these ``sources``.
+
+        Numbers of a register stand together, those of the largest ones first, and of a register
+        without sources in a term none: no load then crosses the end of a line of a cache.
+        """
+        begins = np.full((len(self.registers), len(sources)), -1)
+        end, ranges = 0, ranges_of(self.registers)
+        for register in np.argsort(self.registers, kind="stable")[::-1].tolist():
+            first, size = ranges[register]
+            for term in np.flatnonzero((sources[:, first : first + size] >= 0).any(axis=1)):
+                begins[register, term] = end
+                end += size
+        largest = max(self.registers)
+        return Order(begins, -(-end // largest) * largest)
+
+
+def _power(number: int) -> int:
+    """Least power of two that is not less."""
+    return 1 << (number - 1).bit_length()
+
+
+def registers_of(planes: list[int]) -> tuple[int, ...]:
+    """Lanes of each vector that holds some of those of ``planes``.
+
+    Planes of one power of two share vectors, in which they are worked on as one.
+    """
+    if len(set(planes)) == 1 and planes[0] == _power(planes[0]):
+        planes = [sum(planes)]
+    sizes = []
+    for lanes in planes:
+        while lanes:
+            sizes.append(min(REGISTER, 1 << (lanes.bit_length() - 1)))
+            lanes -= sizes[-1]
+    return tuple(sizes)
+
+
+def ranges_of(registers: tuple[int, ...]) -> list[tuple[int, int]]:
+    """First lane and number of lanes of each vector."""
+    return list(zip(np.cumsum([0, *registers[:-1]]).tolist(), registers, strict=True))

@@ -123,8 +123,9 @@ def kinds_by_make_up(
         return kinds, numbers, int(kinds.max(initial=-1)) + 1, np.count_nonzero(packed)
     begins, parts = np.zeros(make_up.size, dtype=np.int64), [np.zeros(0)]
     end = n_kinds = count = 0
-    for number, part in enumerate(layout.parts):
-        stations = np.flatnonzero(make_up == number)
+    # Blocks of large registers begin at lines of a cache if those of small ones stand behind them.
+    for part in sorted(layout.parts, key=lambda part: -max(part.registers)):
+        stations = np.flatnonzero(make_up == part.number)
         packed = pack(part, stations)
         count += np.count_nonzero(packed)
         first, kinds = kinds_of(packed)

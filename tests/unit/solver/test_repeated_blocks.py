@@ -11,13 +11,27 @@ from scipy.sparse.linalg import spsolve
 from catenary.solver.linear.factors import station_factors as module
 from catenary.solver.linear.factors.station_factors import station_factors
 from catenary.solver.linear.stations.sections import neighbours
-from catenary.solver.linear.stations.station_layout import WIDEST, Layout
+from catenary.solver.linear.stations.station_layout import WIDEST, Layout, ranges_of
 from catenary.solver.linear.stations.station_products import layout_of, station_product
 
 RNG = np.random.default_rng(7)
 # Sums of a dozen products of numbers of order one; solves lose a few digits to the condition, 1e2.
 ROUND_OFF = 1e-14
-WIDTHS = [(2,), (3,), (4,), (6,), (8,), (10,), (12,), (16,), (4, 4), (6, 4), (4, 4, 4), (12, 2)]
+WIDTHS = [
+    (2,),
+    (3,),
+    (4,),
+    (6,),
+    (8,),
+    (10,),
+    (12,),
+    (16,),
+    (4, 4),
+    (4, 2),
+    (6, 4),
+    (4, 4, 4),
+    (12, 2),
+]
 LENGTHS = [1, 2, 3, 4, 5, 40, 301]
 
 
@@ -77,21 +91,77 @@ def test_large_factors_of_wires_that_only_stations_join_keep_blocks_by_wires(
     compare_factors(40, 0, 40, widths, wire=wire)
 
 
-@pytest.mark.parametrize("widths", [(1,), (2,), (5,), (8,), (9,), (6, 4), (9, 12), (3, 8, 4)])
+PLANES = [(1,), (2,), (5,), (6,), (8,), (9,), (4, 2), (6, 4), (9, 12), (3, 8, 4)]
+
+
+@pytest.mark.parametrize("widths", PLANES)
 def test_half_of_a_symmetric_block_makes_its_whole_product(widths: tuple[int, ...]) -> None:
-    lanes, planes = Layout(widths, (0,), (0,)), np.repeat(np.arange(len(widths)), widths)
-    block = RNG.standard_normal((planes.size, planes.size)) * (planes[:, None] == planes)
+    lanes, block = Layout(widths, (0,), (0,)), block_of(widths)
     block += block.T
-    halves, x = lanes.halves, np.zeros(lanes.n_lanes)
-    there = lanes.unknowns >= 0
-    factor = RNG.standard_normal(planes.size)
-    x[there] = factor[lanes.unknowns[there]]
-    numbers = lanes.packed_halves(block).reshape(halves.sources.shape)
+    halves, x, expected = lanes.halves, *factor_and_product(lanes, block)
+    numbers = by_terms(lanes, lanes.packed_halves(block), halves.sources)
     result = (numbers * np.where(halves.sources >= 0, x[halves.sources], 0.0)).sum(axis=0)
     for term in np.flatnonzero(halves.mirrored):
         result += (numbers[term] * x)[halves.back[term]]
-    assert np.abs(result[there] - (block @ factor)[lanes.unknowns[there]]).max() < ROUND_OFF * 100
-    assert not result[~there].any()
+    assert np.abs(result - expected).max() < ROUND_OFF * 100
+
+
+@pytest.mark.parametrize("widths", PLANES)
+def test_packed_blocks_make_the_product_and_no_load_crosses_a_line_of_a_cache(
+    widths: tuple[int, ...],
+) -> None:
+    lanes, block = Layout(widths), block_of(widths)
+    terms, x, expected = lanes.whole_terms, *factor_and_product(lanes, block)
+    packed = lanes.packed(block, terms)
+    numbers = by_terms(lanes, packed, terms.sources)
+    result = np.zeros(lanes.n_lanes)
+    for source, target, number in zip(terms.sources, terms.targets, numbers, strict=True):
+        there = source >= 0
+        np.add.at(result, target[there], (number * x[source])[there])
+    assert np.abs(result - expected).max() < ROUND_OFF * 100
+    assert np.count_nonzero(packed) == np.count_nonzero(block)
+    begins, size = lanes.order_of(terms.sources)
+    for register, those in zip(lanes.registers, begins, strict=True):
+        assert not (those[those >= 0] % register).any()
+    assert size % max(lanes.registers) == 0 and size == packed.size
+
+
+def test_planes_take_the_lanes_that_they_need() -> None:
+    for widths, registers in {
+        (6,): (4, 2),
+        (10,): (8, 2),
+        (12,): (8, 4),
+        (6, 4): (4, 2, 4),
+        (4, 2): (4, 2),
+        (4, 4): (8,),
+        (4, 4, 4): (8, 4),
+        (5, 3): (4, 2, 4),
+    }.items():
+        assert Layout(widths).registers == registers
+
+
+def block_of(widths: tuple[int, ...]) -> np.ndarray:
+    """A block that joins all of each plane."""
+    planes = np.repeat(np.arange(len(widths)), widths)
+    return RNG.standard_normal((planes.size, planes.size)) * (planes[:, None] == planes)
+
+
+def factor_and_product(lanes: Layout, block: np.ndarray) -> np.ndarray:
+    """A vector and its product with a block, both in lanes, 0 in those without an unknown."""
+    factor, there = RNG.standard_normal(lanes.pitch), lanes.unknowns >= 0
+    result = np.zeros((2, lanes.n_lanes))
+    result[:, there] = np.array([factor, block @ factor])[:, lanes.unknowns[there]]
+    return result
+
+
+def by_terms(lanes: Layout, packed: np.ndarray, sources: np.ndarray) -> np.ndarray:
+    """Numbers of a packed block by terms and lanes, 0 where none are stored."""
+    result, ranges = np.zeros(sources.shape), ranges_of(lanes.registers)
+    begins = lanes.order_of(sources).begins
+    for register, term in np.argwhere(begins >= 0):
+        (first, size), begin = ranges[register], begins[register, term]
+        result[term, first : first + size] = packed[begin : begin + size]
+    return result
 
 
 def compare_factors(
@@ -158,7 +228,12 @@ def test_planes_are_what_no_matrix_joins() -> None:
 
 
 def test_planes_that_fit_into_the_lanes_of_one_are_put_together() -> None:
-    for widths, together in (((4, 2, 2), (4, 4)), ((6, 2), (8,)), ((4, 2), (4, 2))):
+    for widths, together in (
+        ((4, 2, 2), (4, 4)),
+        ((5, 1), (6,)),
+        ((6, 2), (6, 2)),
+        ((4, 2), (4, 2)),
+    ):
         assert layout(line(10, widths=widths)).widths == together
 
 
