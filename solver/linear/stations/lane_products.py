@@ -20,6 +20,7 @@ from catenary.solver.linear.stations.lanes import (
 from catenary.solver.linear.stations.registers import (
     Registers,
     gathered,
+    shuffled,
     spread,
     vector_type,
     zeros,
@@ -148,16 +149,41 @@ def _add_terms(
     factors = registers.apart(builder, x)
     parts = [registers.apart(builder, one) for one in sums]
     sources = np.where(terms.sources < 0, terms.targets, terms.sources)
-    for term, (source, number) in enumerate(zip(sources, terms.sums, strict=True)):
+    # Registers of two lanes beside larger ones; alone they are quicker one by one.
+    few = 2 if max(layout.registers) > 2 else 0
+    for term, number in enumerate(terms.sums.tolist()):
         for register, (first, size) in enumerate(ranges):
-            if begins[register, term] < 0:
+            begin, lanes = int(begins[register, term]), sources[:, first : first + size]
+            if begin < 0 or (size == few and _is_second(terms, begins[register], term)):
                 continue
-            factor = gathered(builder, factors, source[first : first + size])
-            stored = _stored(builder, data, int(begins[register, term]), size)
-            product = builder.fmul(stored, factor, flags=FUSED)
-            total = parts[number][register]
-            parts[number][register] = builder.fadd(total, product, flags=FUSED)
+            if size == few and _is_second(terms, begins[register], term + 1):
+                factor = gathered(builder, factors, lanes[term : term + 2].ravel())
+                both = parts[0][register], parts[1][register]
+                total = shuffled(builder, *both, list(range(2 * size)))
+                total = _with_product(builder, total, data, begin, factor)
+                for half in range(2):
+                    own = list(range(half * size, (half + 1) * size))
+                    parts[half][register] = spread(builder, total, own)
+                continue
+            factor = gathered(builder, factors, lanes[term])
+            total = _with_product(builder, parts[number][register], data, begin, factor)
+            parts[number][register] = total
     sums[:] = [registers.together(builder, part) for part in parts]
+
+
+def _is_second(terms: Terms, begins: np.ndarray, term: int) -> bool:
+    """Whether a term of a register of two lanes is multiplied with the one before it, as four lanes
+    at once: half as many loads. The two belong to different sums."""
+    if term % 2 == 0 or term >= begins.size or begins[term] < 0:
+        return False
+    follows = begins[term - 1] >= 0 and begins[term] == begins[term - 1] + 2
+    return bool(follows and terms.sums[term - 1] == 0 and terms.sums[term] == 1)
+
+
+def _with_product(builder: Any, total: Any, data: Any, begin: int, factor: Any) -> Any:
+    """A sum and the product of a factor with the numbers of a block from ``begin`` on."""
+    stored = _stored(builder, data, begin, factor.type.count)
+    return builder.fadd(total, builder.fmul(stored, factor, flags=FUSED), flags=FUSED)
 
 
 def _mirrored(
