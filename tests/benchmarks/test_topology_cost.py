@@ -16,7 +16,7 @@ from catenary.solver.statics.line_at_rest import line_at_rest
 
 # Case, what makes the line without it, and how much dearer it may be. A third wire all along makes
 # stations of six unknowns of those of four: a pass reads 2.25 times the numbers of a block, and
-# such stations take 2.9 times as long (``test_station_widths``). So do twin wires: as planes of
+# such stations take 2.5 times as long (``test_station_widths``). So do twin wires: as planes of
 # their sum and difference they would take twice as long. The second contact of a strip adds to it,
 # as wide columns are laid over the state for each. In an overlap only spans beside each other have
 # eight unknowns, and a strip answers to the wires that are there. It is measured on the shipped
@@ -26,8 +26,8 @@ from catenary.solver.statics.line_at_rest import line_at_rest
 STITCHED, COMPOUND = "line.stitch_wire=", "line.auxiliary_wire="
 SIMPLE = "line.topology=simple"
 LINES: dict[str, tuple[str, list[str], float]] = {
-    "stitched": ("re330_stitched", [SIMPLE, STITCHED], 2.2),
-    "compound": ("shinkansen_compound", [SIMPLE, COMPOUND], 3.0),
+    "stitched": ("re330_stitched", [SIMPLE, STITCHED], 2.1),
+    "compound": ("shinkansen_compound", [SIMPLE, COMPOUND], 2.9),
     "twin": ("dc_twin", [SIMPLE, "line.twin="], 2.5),
     "overlap": ("overlap", ["line.overlap="], 1.4),
 }
