@@ -16,7 +16,6 @@ import numpy as np
 from mpi4py import MPI
 
 from catenary.solver.base.kernels import aligned_arrays
-from catenary.solver.base.kernels.pointers import can_hold_calls
 from catenary.solver.base.parallel import total
 from catenary.solver.base.petsc import PETSc
 from catenary.solver.integrators import state_kernels
@@ -135,7 +134,7 @@ class LineIntegrator(ABC):
         motion, steps = ahead
         loads = np.zeros(0) if self.loads is None else self.loads.values
         parts, passes = self.operators.by_stations(not self._proportional, self._shares), None
-        if parts is not None and can_hold_calls():
+        if parts is not None:
             passes = StationPasses(parts, loads, motion, steps)
         # A rank without stations has no passes; it keeps its state like the others.
         can = passes is not None or self.ownership.n_local == 0

@@ -13,7 +13,7 @@ import numpy as np
 
 from catenary.mbs.head.head_records import drive_width
 from catenary.solver.base.kernels.bound import bound
-from catenary.solver.base.kernels.pointers import HeldCall, address_of, can_hold_calls
+from catenary.solver.base.kernels.pointers import HeldCall, address_of
 from catenary.solver.base.petsc_events import event
 from catenary.solver.contact.line_response import affine
 from catenary.solver.contact_problem.complementarity_kernels import SmallProblem
@@ -263,8 +263,6 @@ def compiled_steps(
         return None
     if not hasattr(step_kernels.take, "overloads"):
         return None  # NUMBA_DISABLE_JIT
-    if not can_hold_calls():
-        return None
     if scheme.coupling.law.in_loop() is None or scheme.pantographs.records() is None:
         return None
     if not showing.layout.in_loop:

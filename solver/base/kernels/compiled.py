@@ -6,14 +6,16 @@ formulas and on every rank.
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from typing import Any
 
 import numba
-from numba import njit
+from numba import cfunc, njit, types
 
 from catenary.solver.base.kernels import loop_cache
 
-# Without an entry at a plain address, which only what is `addressed` needs.
+# Without an entry at a plain address.
 _NO_ADDRESS = {"no_cfunc_wrapper": True}
 _NO_ENTRY = {"no_cpython_wrapper": True, **_NO_ADDRESS}
 _settings: Any = numba.config  # Numba makes its attributes while it is imported
@@ -27,9 +29,17 @@ def compiled(function: Any) -> Any:
 def addressed(function: Any) -> Any:
     """A function of a place in memory that compiled loops call, see ``pointers.HeldCall``.
 
-    It has no entry from Python: one for many arguments takes as long to compile as their loop.
+    ``compiled_at`` compiles it. It has no entry from Python: one for many arguments takes as long
+    to compile as their loop.
     """
-    return _compile(function, no_cpython_wrapper=True)
+    return function
+
+
+@functools.cache
+def compiled_at(function: Any, place: Any) -> Any:
+    """What is ``addressed``, compiled for a place of this type: its ``address`` is to be called."""
+    signature = types.void(place)
+    return _kept(lambda keep: cfunc(signature, cache=keep, error_model="numpy")(function))
 
 
 def in_line(function: Any) -> Any:
@@ -56,11 +66,16 @@ def inner(function: Any) -> Any:
 
 
 def _compile(function: Any, **options: Any) -> Any:
+    return _kept(lambda keep: njit(cache=keep, error_model="numpy", **options)(function))
+
+
+def _kept(compiler: Callable[[bool], Any]) -> Any:
+    """What a compiler makes that is told whether to keep its machine code."""
     folder = loop_cache.folder(numba.__version__)
     before = _settings.CACHE_DIR
     try:
         # Numba looks for its folder here, once for each function; other users' loops keep theirs.
         _settings.CACHE_DIR = str(folder or "")
-        return njit(cache=folder is not None, error_model="numpy", **options)(function)
+        return compiler(folder is not None)
     finally:
         _settings.CACHE_DIR = before

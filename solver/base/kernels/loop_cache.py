@@ -27,7 +27,8 @@ _OLD = 30 * 86400.0  # [s] without use, after which the loops of other sources a
 
 # What a file with loops has; a file that only mentions it does no harm.
 _MARK = re.compile(rb"\n@(?:compiled|addressed|in_line|inner|called|intrinsic)")
-_IMPORT = re.compile(rb"(?:from|import) catenary\.([\w.]+)(?: import (\([^)]*\)|.*))?")
+# Begins with a plain word, for which an expression is searched ten times as fast as for a choice.
+_IMPORT = re.compile(rb"catenary\.([\w.]+)(?: import (\([^)]*\)|.*))?")
 _NAME = re.compile(rb"\w+")
 
 
@@ -61,11 +62,11 @@ def sources(package: Path) -> list[Path]:
     # text.
     places = (f"{package}/{part}" for part in ("solver", "mbs"))
     texts = {
-        f"{folder}/{file}": Path(folder, file).read_bytes()
+        path: _read(path)
         for place in places
         for folder, _, files in os.walk(place)
         for file in files
-        if file.endswith(".py")
+        if (path := f"{folder}/{file}").endswith(".py")
     }
     found = [path for path, text in texts.items() if _MARK.search(text)]
     seen = set(found)
@@ -75,6 +76,11 @@ def sources(package: Path) -> list[Path]:
                 seen.add(other)
                 found.append(other)
     return sorted(map(Path, found))
+
+
+def _read(path: str) -> bytes:
+    with open(path, "rb", buffering=0) as file:
+        return file.read()
 
 
 def _imported(text: bytes, package: str) -> Iterator[str]:

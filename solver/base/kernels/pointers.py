@@ -16,7 +16,7 @@ from numba import carray, typeof, types
 from numba.extending import intrinsic
 
 from catenary.solver.base.kernels.bound import bound
-from catenary.solver.base.kernels.compiled import called, compiled
+from catenary.solver.base.kernels.compiled import called, compiled, compiled_at
 
 _inlined: Any = intrinsic
 # Integers that a tuple of arguments takes at most; an array of two dimensions takes nine.
@@ -45,34 +45,15 @@ class HeldCall:
     def __init__(self, kernel: Any, arguments: tuple[Any, ...]) -> None:
         self._arguments = arguments
         kind = typeof(arguments)
-        place = types.CPointer(kind)
-        kernel.compile((place,))
+        function = compiled_at(kernel, types.CPointer(kind))
         self._held = np.zeros(_MOST_HELD, dtype=np.int64)
         if not _hold(_in_numbers(kind, arguments), self._held):
             raise ValueError("too many arguments to be held")
-        self.address = _function_at(kernel, (place,)), int(self._held.ctypes.data)
+        self.address = function.address, int(self._held.ctypes.data)
 
     def caller(self) -> Callable[[], None]:
         """A function that calls it once, from Python."""
         return bound(call_once, self.address)
-
-
-def can_hold_calls() -> bool:
-    """Whether this Numba gives the address of a compiled function.
-
-    ``entry_point``, by which it does, is no documented part of Numba: without it steps are taken
-    one by one.
-    """
-    kind = types.FunctionType(types.none())
-    _own_address.compile((kind,))
-    return hasattr(_own_address.overloads.get((kind,)), "entry_point")
-
-
-def _function_at(kernel: Any, kinds: tuple[Any, ...]) -> int:
-    """Where the machine code of a compiled function is, for arguments of these types."""
-    kind = types.FunctionType(types.none(*kinds))
-    _own_address.compile((kind,))
-    return int(_own_address.overloads[(kind,)].entry_point(kernel))
 
 
 def _in_numbers(kind: Any, value: Any) -> Any:
@@ -224,16 +205,6 @@ def _load_parts(builder: Any, place: Any, kind: Any) -> Any:
     return value
 
 
-@_inlined
-def _address_in(typing_context, function):
-    """The address that a compiled function is called at."""
-
-    def generate(context, builder, signature, arguments):
-        return builder.ptrtoint(builder.extract_value(arguments[0], 0), ir.IntType(64))
-
-    return types.int64(function), generate
-
-
 @compiled
 def _hold(arguments, held):
     return _store(borrowed(arguments), held)
@@ -249,11 +220,6 @@ def call_held(address):
 def call_once(address):
     """``call_held`` from Python."""
     call_held(address)
-
-
-@compiled
-def _own_address(function):
-    return _address_in(function)
 
 
 @called

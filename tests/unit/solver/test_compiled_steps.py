@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,6 @@ from catenary.mbs.vehicle.irregularity import Irregularity
 from catenary.mbs.vehicle.motion_sources import Harmonic, VehicleMotion
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.solver.base.errors import RunBroken
-from catenary.solver.base.kernels import pointers
 from catenary.solver.contact_problem import complementarity
 from catenary.solver.effects.effect import Effect
 from catenary.solver.integrators.loads import line_loads
@@ -274,18 +272,6 @@ def test_a_wish_to_stop_is_seen_between_blocks(mesh: LineMesh) -> None:
     # The step after the wish is the last one.
     assert found.n_steps == asked[-1] and len(rows.rows) == asked[-1] + 1
     assert asked[1] > 2
-
-
-def test_without_addresses_of_functions_steps_are_taken_one_by_one(
-    mesh: LineMesh, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A Numba without ``entry_point``."""
-    nameless = SimpleNamespace(compile=lambda kinds: None, overloads={})
-    monkeypatch.setattr(pointers, "_own_address", nameless)
-    rows = Rows()
-    assert run(problem("one", 50), mesh, rows).outcome == "done"
-    assert len(rows.rows) == 51
-    assert max(rows.blocks, default=1) == 1
 
 
 def test_nobody_needs_to_look(mesh: LineMesh) -> None:
