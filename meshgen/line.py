@@ -27,6 +27,7 @@ class Line(Spans):
     wires : from the contact wires upwards
     droppers, steady_arms, supports, clamps : groups
     curve : of the track, None if it is straight; lateral positions count from the track's middle
+    twins : pairs of like wires side by side: the second one of each, and the first one
     fittings : insulators and the like on wires, which no mesh file has
 
     Raises ValueError if names occur twice, a group names no wire, or droppers hang a wire without
@@ -41,6 +42,7 @@ class Line(Spans):
     clamps: tuple[Clamps, ...] = ()
     fittings: tuple[Fittings, ...] = ()
     curve: Curve | None = None
+    twins: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
         wires = {wire.name for wire in self.wires}
@@ -53,6 +55,7 @@ class Line(Spans):
         asked |= {part.holds for part in self.supports if part.holds}
         asked |= {wire for part in self.droppers for wire in (part.upper, part.lower)}
         asked |= {wire for part in self.clamps for wire in (part.upper, part.lower)}
+        asked |= {wire for pair in self.twins for wire in pair}
         unknown = sorted(asked - wires)
         if unknown:
             raise ValueError(f"topology {self.topology}: there is no wire {unknown[0]}")

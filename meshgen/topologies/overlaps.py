@@ -64,6 +64,7 @@ def with_overlaps(line: Line, overlaps: Overlaps) -> Line:
         (*own.arms(), *others.arms()),
         (*own.supports(), *others.supports()),
         (*own.clamps(), *others.clamps()),
+        twins=(*own.twins(), *others.twins()),
     )
 
 
@@ -111,6 +112,12 @@ class _Sections:
             name = self._name(wire.name)
             found.append(replace(wire, name=name, pieces=pieces, taken=taken, profile=profile))
         return found
+
+    def twins(self) -> list[tuple[str, str]]:
+        """Wires side by side; both are there or none is, as they are cut at the same places."""
+        there = {wire.name for wire in self.wires()}
+        pairs = ((self._name(one), self._name(other)) for one, other in self._line.twins)
+        return [pair for pair in pairs if there.issuperset(pair)]
 
     def _risen(self, profile: Profile) -> Profile:
         """The heights of a wire with those in overlaps."""

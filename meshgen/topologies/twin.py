@@ -54,6 +54,7 @@ def twin_contact_wires(data: LineData) -> Line:
         ),
         _arms(data, inner),
         (Supports(SUPPORTS, data.support_stiffness, MESSENGER_WIRE, inner),),
+        twins=((other.wire.name, one.wire.name),),
     )
 
 
@@ -83,6 +84,7 @@ def twin_simple_catenaries(data: LineData) -> Line:
             Supports(name, data.support_stiffness, wire, inner)
             for name, wire in zip((SUPPORTS, second(SUPPORTS)), names, strict=True)
         ),
+        twins=((other.wire.name, one.wire.name), (names[1], names[0])),
     )
 
 

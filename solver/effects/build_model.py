@@ -22,6 +22,7 @@ def build(
     form: Equilibrium | None = None,
     gap: np.ndarray | None = None,
     before: Model | None = None,
+    apart: bool = False,
 ) -> Model:
     """The model of a problem on a mesh, for given dropper lengths [m]. Not collective.
 
@@ -29,11 +30,18 @@ def build(
     ``gap`` (n_droppers,) what droppers that are slack at rest lack to be taut [m]; none if not
     given. ``form`` is the shape at rest, where it is known: before it is found wires are straight
     and droppers upright. ``before`` is a model of the same problem and mesh, made with the same
-    ``form``, whose numbers and wires are taken over.
+    ``form``, whose numbers and wires are taken over. ``apart`` gives wires that move together
+    unknowns of their own.
+
+    Raises
+    ------
+    InputError
+        If wires that move together have not their nodes, and what hangs there, side by side.
     """
     active = effects.active(problem)
     if before is None:
-        numbering, row_of_node = numbering_of(problem, mesh), np.empty(mesh.n_nodes, dtype=np.int64)
+        numbering = numbering_of(problem, mesh, apart)
+        row_of_node = np.empty(mesh.n_nodes, dtype=np.int64)
         row_of_node[along_the_track(mesh)] = np.arange(mesh.n_nodes)
     else:
         numbering, row_of_node = before.numbering, before.row_of_node
@@ -62,7 +70,30 @@ def build(
     return builder.finish()
 
 
-def numbering_of(problem: Problem, mesh: LineMesh) -> Unknowns:
-    """The unknowns that the effects of a problem need on a mesh. Not collective."""
+def numbering_of(problem: Problem, mesh: LineMesh, apart: bool = False) -> Unknowns:
+    """The unknowns that the effects of a problem need on a mesh; of ``apart`` see ``build``. Not
+    collective."""
     groups = effects.unknown_groups(effects.active(problem), problem.line.wires)
-    return number_unknowns(mesh, groups)
+    return number_unknowns(mesh, groups, together={} if apart else move_together(problem))
+
+
+def move_together(problem: Problem) -> dict[str, str]:
+    """Wires that move with another one, by name: second ones of twins without relative motion."""
+    twins = dict(problem.line.twins)
+    return {} if not twins or effects.simulated(problem).relative_motion else twins
+
+
+def with_wires_apart(model: Model) -> Model:
+    """The model with unknowns of its own for each wire: itself, if no wires move together. Not
+    collective."""
+    if not move_together(model.problem):
+        return model
+    return build(
+        model.problem,
+        model.mesh,
+        model.dropper_lengths,
+        model.broken,
+        model.form,
+        model.dropper_gap,
+        apart=True,
+    )

@@ -52,6 +52,7 @@ class Simulated:
     warmer : temperature less that of the installation [K]
     goes_on : whether the line goes on beyond its start and beyond its end
     lateral : whether wires move sideways
+    relative_motion : whether twin wires move relative to each other; if not, they move as one
     uplift_stops : whether stops end the uplift at steady arms
     irregular_heights : what contact wires are to be higher at rest where they are held
     length_errors : of the droppers, None if all are cut to length
@@ -81,6 +82,7 @@ class Simulated:
     warmer: float = 0.0
     goes_on: tuple[bool, bool] = (False, False)
     lateral: bool = False
+    relative_motion: bool = False
     uplift_stops: bool = False
     irregular_heights: Heights | None = None
     length_errors: LengthErrors | None = None

@@ -11,6 +11,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role
+from catenary.solver.effects.build_model import with_wires_apart
 from catenary.solver.model.links.directions import at_nodes, at_places
 from catenary.solver.model.links.links import Direction
 from catenary.solver.model.matrices import part_of
@@ -73,8 +74,10 @@ def elasticity(model: Model, x_from: float, x_to: float) -> Elasticity:
 
     Droppers taut, arms included. The line outside is condensed to the unknowns that it is joined
     to; then there is a small solve for each place. Of a long line that is as much of it as moves by
-    more than round-off. Not collective.
+    more than round-off. Each wire gives way by itself, also one that moves with another. Not
+    collective.
     """
+    model = with_wires_apart(model)
     chains = model.nodes_of(Role.CONTACT)
     if len(chains) == 1:
         x = model.mesh.x(chains[0])

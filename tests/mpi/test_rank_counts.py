@@ -29,12 +29,13 @@ TOLERANCE = 1e-9
 N_SPANS = 10
 STEPS, DT = 80, 2e-3
 
+APART = "effects.relative_motion=true"
 # By topology: its case, what else it needs, and its tables of wires.
 LINES: dict[str, tuple[str, list[str], tuple[str, ...]]] = {
     "simple": ("ac_simple", [], ("contact_wire", "messenger_wire")),
     "stitched": ("re330_stitched", [], ("contact_wire", "messenger_wire", "stitch_wire")),
     "compound": ("shinkansen_compound", [], ("contact_wire", "messenger_wire", "auxiliary_wire")),
-    "twin": ("dc_twin", [], ("contact_wire", "messenger_wire")),
+    "twin": ("dc_twin", [APART], ("contact_wire", "messenger_wire")),
     "twin_messenger": (
         "ac_simple",
         ["line.topology=twin_messenger", "line.twin.spacing_m=0.1"],

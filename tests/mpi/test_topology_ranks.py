@@ -26,10 +26,13 @@ from catenary.solver.time_loop.views.observers import Stage, StepView
 # As in `test_same_answers`.
 TOLERANCE = 1e-9
 HALF = 10.0  # of the way, about the middle of the line [m]
+APART = "dc_twin, relative motion"
 CASES = {
     "re330_stitched": [],
     "shinkansen_compound": [],
     "dc_twin": [],
+    APART: ["effects.relative_motion=true"],
+    "dc_twin, two messenger wires": ["line.topology=twin_messenger"],
     "tramway": [],
     "overlap": ["line.overlap.first_span=[3,8]", "line.n_spans=12"],
 }
@@ -40,8 +43,10 @@ def problem_and_mesh(case: str) -> tuple[Problem, LineMesh]:
     """A short run about the middle of a short line. Collective."""
 
     def make() -> tuple[Problem, LineMesh]:
-        kind = load_scene(case).train.pantographs[0].name
-        middle = sum(load_scene(case).line.span_m) / len(load_scene(case).line.span_m) * N_SPANS / 2
+        shipped, _, _ = case.partition(",")
+        own = load_scene(shipped)
+        kind = own.train.pantographs[0].name
+        middle = sum(own.line.span_m) / len(own.line.span_m) * N_SPANS / 2
         words = [
             f"line.n_spans={N_SPANS}",
             f"train.pantographs=[{{name='{kind}'}}]",
@@ -53,7 +58,7 @@ def problem_and_mesh(case: str) -> tuple[Problem, LineMesh]:
             "numerics.dt_s=2e-3",
             *CASES[case],
         ]
-        scene = load_scene(case, words)
+        scene = load_scene(shipped, words)
         return problem_of(scene), mesh_of(scene)
 
     return on_root(MPI.COMM_WORLD, make)
@@ -89,7 +94,7 @@ class Passing:
         assert outcome == "done"
 
 
-@pytest.mark.parametrize("case", ["dc_twin", "overlap"])
+@pytest.mark.parametrize("case", ["dc_twin", APART, "overlap"])
 def test_a_run_over_several_contact_wires_goes_on_from_a_state(case: str) -> None:
     """From the middle of the run, on all ranks and on one, with the forces of the whole run."""
     problem, mesh = problem_and_mesh(case)

@@ -22,6 +22,7 @@ from fuzzing import (
     broken_topology,
     sound_scene,
     topology_scene,
+    twin_scene,
     wide_scene,
 )
 from mpi4py import MPI
@@ -143,6 +144,42 @@ def test_a_dropper_that_is_neither_taut_nor_slack_does_not_end_a_run() -> None:
     rest = hard_runs.at_rest(load_scene(made.base, made.assignments), MPI.COMM_SELF)
     run = hard_runs.run(rest, MPI.COMM_SELF)
     assert run.outcome == "done" and run.counters["pivoted_steps"] > 0
+
+
+@pytest.mark.skipif(WORLD.size > 1, reason="processes of their own: test_fuzz_processes")
+@pytest.mark.parametrize("seeds", BLOCKS, ids=str)
+def test_twin_wires_move_as_one_as_they_do_apart(seeds: range) -> None:
+    """In 40 steps: a stiff contact without damping may double round-off with each hop, of which
+    there are twenty at most, and 2^20 1e-16 is 1e-10."""
+    hung = 0
+    for seed in seeds:
+        made = twin_scene(seed, 40)
+        try:
+            hung += check_twins(made.assignments)
+        except (Exception, AssertionError) as error:
+            raise AssertionError(replay(seed, made.assignments)) from error
+    assert hung >= len(seeds) // 2
+
+
+def check_twins(assignments: tuple[str, ...]) -> bool:
+    """Forces and energies with and without relative motion; False as in `check_run`."""
+    found = []
+    for relative in ("true", "false"):
+        scene = load_scene(BASE, [*assignments, f"effects.relative_motion={relative}"])
+        try:
+            rest = hard_runs.at_rest(scene, MPI.COMM_SELF)
+        except InputError as error:
+            assert any(words in str(error) for words in NOT_AT_REST) and "\n" not in str(error)
+            return False
+        found.append(hard_runs.run(rest, MPI.COMM_SELF, with_work=True))
+    apart, one = found
+    assert apart.outcome == one.outcome == "done"
+    for what in ("force", "on_wires", "energy"):
+        expected, values = getattr(apart, what), getattr(one, what)
+        assert np.abs(values - expected).max() <= 1e-8 * max(np.abs(expected).max(), 1e-3)
+    if not one.switches().any():
+        assert one.energy_gain() < 1e-9
+    return True
 
 
 def check_topology(made: RandomScene) -> str:

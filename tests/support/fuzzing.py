@@ -9,7 +9,7 @@ from fuzzing_broken import INCIDENTS, a_way
 from fuzzing_nonsense import nonsense
 from fuzzing_parts import SLACK_DAMPINGS, mechanism, put_more
 from fuzzing_planes import put_planes
-from fuzzing_topologies import put_topology
+from fuzzing_topologies import put_as_one, put_topology
 from fuzzing_words import as_assignments
 
 BASE = "en50318_2002"
@@ -50,7 +50,16 @@ def topology_scene(seed: int, n_steps: int = N_STEPS) -> RandomScene:
     span = words["line.span_m"]
     name = put_topology(rng, words, float(str(span[0] if isinstance(span, list) else span)))
     put_planes(random.Random(f"planes {seed}"), words, name)
+    put_as_one(random.Random(f"as one {seed}"), words)
     return RandomScene(seed, as_assignments(words))
+
+
+def twin_scene(seed: int, n_steps: int = N_STEPS) -> RandomScene:
+    """A sound scene with two wires that hang alike in place of one."""
+    rng = random.Random(f"twins {seed}")
+    topology = rng.choice(("twin", "twin_messenger"))
+    more = f"line.topology={topology}", f"line.twin.spacing_m={rng.uniform(0.02, 0.2)!r}"
+    return RandomScene(seed, (*sound_scene(seed, n_steps).assignments, *more))
 
 
 def sound_scene(

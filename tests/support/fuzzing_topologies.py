@@ -8,6 +8,17 @@ from collections.abc import Callable
 Words = dict[str, object]
 # Shares of the scenes.
 _OVERLAPS, _BRIDLES = 0.4, 0.5
+# What may move twin wires relative to each other: without that motion such scenes are refused.
+_APART = (
+    "effects.lateral_motion",
+    "effects.axial_motion",
+    "effects.head_roll",
+    "incidents",
+    "irregularities",
+    "wind",
+    "pantographs.reference.strips.flexure",
+    "pantographs.reference.strips.rake_deg",
+)
 # Words of a simple line that no line of a single contact wire has.
 _NOT_SINGLE = (
     "line.messenger_wire.",
@@ -34,6 +45,15 @@ def put_topology(rng: random.Random, words: Words, span: float) -> str:
         return name
     _overlap(rng, words)
     return f"{name}+overlap"
+
+
+def put_as_one(rng: random.Random, words: Words) -> None:
+    """Let twin wires move as one, mostly where nothing in ``words`` tells them apart."""
+    if "line.twin" not in words:
+        return
+    alike = "pairs" in str(words["line.twin"]) and not any(k.startswith(_APART) for k in words)
+    if rng.random() < (0.7 if alike else 0.1):
+        words["effects.relative_motion"] = "false"
 
 
 def _simple(rng: random.Random, words: Words, span: float) -> None:

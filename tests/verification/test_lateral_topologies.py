@@ -20,11 +20,12 @@ from catenary.solver.time_loop.views.observers import Stage, StepView
 
 EPS = np.finfo(float).eps
 _TWIN = ["line.topology=twin_messenger", "line.twin={spacing_m=0.1,droppers='pairs'}"]
+APART = "effects.relative_motion=true"
 LINES: dict[str, tuple[str, list[str]]] = {
     "stitched": ("re330_stitched", []),
     "compound": ("shinkansen_compound", []),
-    "twin": ("dc_twin", []),
-    "alternating": ("dc_twin", ["line.twin={spacing_m=0.04,droppers='alternating'}"]),
+    "twin": ("dc_twin", [APART]),
+    "alternating": ("dc_twin", [APART, "line.twin={spacing_m=0.04,droppers='alternating'}"]),
     "twin_messenger": ("ac_simple", _TWIN),
     "single": ("tramway", []),
     "overlap": ("overlap", ["line.overlap.first_span=2", "line.overlap.n_spans=3"]),

@@ -26,7 +26,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.effects import all_effects as effects
-from catenary.solver.effects.build_model import numbering_of
+from catenary.solver.effects.build_model import move_together, numbering_of
 from catenary.solver.integrators.detour import Detour, detour_of
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.watched_links import GAUGES
@@ -92,12 +92,15 @@ def needs_of(
     problem : of the scene
     extent : of its mesh
     n_dofs : unknowns of the line
-    stations : how many have each number of unknowns; by default all have a node of each wire
+    stations : how many have each number of unknowns; by default all have a node of each wire that
+        has unknowns of its own
     detour : why steps take longer than they could
     """
     active = effects.active(problem)
     if not stations:
-        groups = effects.unknown_groups(active, problem.line.wires)
+        together = move_together(problem)
+        own = [wire for wire in problem.line.wires if wire.name not in together]
+        groups = effects.unknown_groups(active, own)
         stations = {sum(len(names) for group in groups for names in group.values()): 1}
     scheme, n_substeps = problem.numerics.scheme, _substeps(problem)
     gusts = problem.wind is not None and problem.wind.gusts is not None

@@ -19,7 +19,7 @@ from catenary.cases.scene.cost_model import estimate_march
 from catenary.cases.scene.scene import Scene
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.effects import all_effects as effects
-from catenary.solver.effects.build_model import numbering_of
+from catenary.solver.effects.build_model import move_together, numbering_of
 from catenary.solver.effects.effect import Effect
 from catenary.solver.problem.problem import Numerics, Problem, n_halvings
 from catenary.solver.window.choice import moving_share, window_sentence
@@ -54,6 +54,7 @@ class Plan:
     case, title : of the scene
     on, off : effects that are simulated, and those that are not
     unknowns : names of the unknowns at each node
+    shared : wires that have the unknowns of others, each with the name of the other one
     n_nodes, n_dofs, n_steps : sizes
     n_droppers, n_arms, n_pantographs : counts
     element_lengths : shortest and longest element of the contact wire [m]
@@ -82,6 +83,7 @@ class Plan:
     on: list[EffectRow]
     off: list[EffectRow]
     unknowns: tuple[str, ...]
+    shared: tuple[tuple[str, str], ...]
     n_nodes: int
     n_dofs: int
     n_steps: int
@@ -162,6 +164,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
         on=on,
         off=off,
         unknowns=numbering.names,
+        shared=tuple(move_together(problem).items()),
         n_nodes=mesh.n_nodes,
         n_dofs=numbering.n_unknowns,
         n_steps=needs.n_steps,
@@ -326,4 +329,7 @@ def _nodes_of_unknowns(plan: Plan) -> str:
     each = len(plan.unknowns)
     if plan.n_dofs == plan.n_nodes * each:
         return f"= {plan.n_nodes} nodes x {each}"
+    if plan.shared:
+        pairs = ", ".join(f"{one} with those of {other}" for one, other in plan.shared)
+        return f"of {plan.n_nodes} nodes, {pairs}"
     return f"of {plan.n_nodes} nodes, up to {each} of each"

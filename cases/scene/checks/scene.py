@@ -32,6 +32,7 @@ from catenary.cases.scene.checks.line.idle import check_idle
 from catenary.cases.scene.checks.line.lateral import check_lateral
 from catenary.cases.scene.checks.line.mesh_size import size_faults
 from catenary.cases.scene.checks.line.topology import check_names, check_parts, check_topology
+from catenary.cases.scene.checks.line.twins import check_twins
 from catenary.cases.scene.checks.run.contact import check_contact
 from catenary.cases.scene.checks.run.incidents import check_incidents
 from catenary.cases.scene.checks.run.iterations import check_iterations
@@ -118,8 +119,9 @@ def faults_of(scene: Scene) -> list[Fault]:
         if found.nothing_by(check_incidents, scene, line):
             found.nothing_by(check_window, scene)
     if not found.faults:
-        # It asks the problem, which is made of a sound scene only.
+        # They ask the problem, which is made of a sound scene only.
         found.nothing_by(check_chosen_act, scene)
+        found.nothing_by(check_twins, scene)
     return found.faults
 
 

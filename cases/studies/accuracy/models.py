@@ -109,17 +109,25 @@ def _fitted(scene: Scene, kind: str, n_masses: int) -> Level:
 
 def planes(scene: Scene) -> list[Level]:
     """Planes in which wires move: sideways, and along the track if they have what that needs."""
+    from catenary.cases.scene.checks.line.twins import RELATIVE_MOTION, needs_relative_motion
     from catenary.cases.scene.convert.problem import problem_of
     from catenary.solver.effects import all_effects
 
-    with_data = all_effects.registry()[_ALONG].applies(problem_of(scene))
+    problem = problem_of(scene)
+    with_data = all_effects.registry()[_ALONG].applies(problem)
+    # Twin wires that move as one do so in the vertical plane only.
+    apart = (f"effects.{RELATIVE_MOTION}=true",) if needs_relative_motion(problem, _ACROSS) else ()
     levels = {"vertical": (False, False), "lateral": (True, False)}
     if with_data:
         levels |= {"axial": (False, True), "three_planes": (True, True)}
     return [
         Level(
             name,
-            (f"effects.{_ACROSS}={str(across).lower()}", f"effects.{_ALONG}={str(along).lower()}"),
+            (
+                f"effects.{_ACROSS}={str(across).lower()}",
+                f"effects.{_ALONG}={str(along).lower()}",
+                *(apart if across or along else ()),
+            ),
             quick=name in ("vertical", "lateral"),
         )
         for name, (across, along) in levels.items()

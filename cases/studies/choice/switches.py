@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from catenary.cases.scene.checks.line.twins import RELATIVE_MOTION, needs_relative_motion
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.effect import Effect
@@ -71,6 +72,8 @@ def choice_of(scene: Scene) -> Choice:
             switches.append(Switch(name, effect.title, True, _keys(name, others, False), ended))
         elif effect.applies(problem):
             others = _with(name, {n: e for n, e in known.items() if not is_on[n]}, _required)
+            if needs_relative_motion(problem, name):
+                others.append(RELATIVE_MOTION)
             keys = _keys(name, others, True)
             switches.append(Switch(name, effect.title, False, keys, tuple(others)))
         else:

@@ -16,6 +16,7 @@ from mpi4py import MPI
 from catenary.cases.studies.waves.seen import NodeMotion
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.base.errors import InputError, RunBroken
+from catenary.solver.effects.build_model import move_together
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Placement, Problem, Train
 from catenary.solver.problem.window import BOUNDED
@@ -82,7 +83,7 @@ def excitation_of(kind: str, asked: Asked, problem: Problem, dt: float) -> Excit
     Raises
     ------
     InputError
-        If something asked for is none of the kind's, or out of range.
+        If something asked for is none of the kind's, or out of range, or if twin wires move as one.
     """
     for name, (option, kinds) in _OPTIONS.items():
         value = getattr(asked, name)
@@ -94,6 +95,11 @@ def excitation_of(kind: str, asked: Asked, problem: Problem, dt: float) -> Excit
             raise InputError(f"{option} is {value:g}, but must be finite")
         if value == 0.0 and name in ("force", "impulse"):
             raise InputError(f"{option} is 0, which excites nothing; it may be above or below")
+    if move_together(problem):
+        raise InputError(
+            f"--excite {kind} acts on one of two contact wires, which move as one without "
+            "effects.relative_motion: switch that on"
+        )
     ends, train = problem.line.support_positions[[0, -1]], problem.train
     if kind == FORCE:
         frequency = asked.frequency or 0.0

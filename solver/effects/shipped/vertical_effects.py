@@ -231,6 +231,18 @@ register(
 )
 register(
     Effect(
+        "relative_motion",
+        "motion of twin wires relative to each other",
+        "unknowns of the second of two wires side by side, which has the first one's without it",
+        "sum and difference of two like wires; docs/theory.md section 1",
+        default=True,
+        applies=lambda p: bool(p.line.twins),
+        law=lambda laws, p: replace(laws, relative_motion=True),
+        data="two wires side by side (line.topology twin or twin_messenger)",
+    )
+)
+register(
+    Effect(
         "structural_damping",
         "structural damping of the line",
         "C = alpha K + beta M, globally or per component",

@@ -39,7 +39,8 @@ class Unknowns:
     Attributes
     ----------
     names : of all unknowns, as effects asked for them
-    numbers : (n_nodes, n_names) number of each, by nodes of the mesh; -1 for what a node has not
+    numbers : (n_nodes, n_names) number of each, by nodes of the mesh; -1 for what a node has not.
+        Nodes of wires that move together have the same
     station : (n_nodes,) of each node
     starts : (n_stations + 1,) number of the first unknown of each station, and how many there are
     planes : places of a cross-section in each group
@@ -69,8 +70,8 @@ class Unknowns:
 
     @cached_property
     def n_unknowns(self) -> int:
-        """How many unknowns all nodes have."""
-        return int(np.count_nonzero(self.numbers >= 0))
+        """How many unknowns all nodes have, those that nodes share counted once."""
+        return self.size - self.missing.size
 
     @property
     def width(self) -> int:
@@ -118,13 +119,14 @@ class Unknowns:
     def as_vector(self, by_node: np.ndarray, missing: float = 0.0) -> np.ndarray:
         """The vector (size,) of what ``by_node`` returns, ``missing`` where a number is no node's.
 
+        Nodes that share a number have the same there.
         ``by_node`` may be (n_nodes, 1), the same for all unknowns of a node.
         """
         result = np.full(self.size, missing)
-        if self.n_unknowns == self.numbers.size:
+        there = self.numbers >= 0
+        if there.all():
             result[self.numbers] = by_node
             return result
-        there = self.numbers >= 0
         result[self.numbers[there]] = np.broadcast_to(by_node, there.shape)[there]
         return result
 
@@ -156,15 +158,29 @@ class Unknowns:
         return first, np.maximum(first, np.searchsorted(self.low, x_high + 1e-9))
 
 
-def number_unknowns(mesh: LineMesh, groups: Iterable[Group], padded: bool = False) -> Unknowns:
+def number_unknowns(
+    mesh: LineMesh,
+    groups: Iterable[Group],
+    padded: bool = False,
+    together: Mapping[str, str] | None = None,
+) -> Unknowns:
     """The registry for a mesh whose wires have the unknowns of ``groups``. Not collective.
 
-    ``padded`` fills all stations up to a whole cross-section.
+    Parameters
+    ----------
+    padded : fills all stations up to a whole cross-section
+    together : wires that move with another one beside them, and share its unknowns, by name
+
+    Raises
+    ------
+    InputError
+        If such a wire has not its nodes, and what hangs there, beside those of the other one.
     """
     groups = list(groups)
     group_names = [_names_of(group) for group in groups]
     names = tuple(name for own in group_names for name in own)
-    stations = stations_of(mesh, max(2, _WIDEST_GROUP // max(map(len, group_names))))
+    most_nodes = max(2, _WIDEST_GROUP // max(map(len, group_names)))
+    stations = stations_of(mesh, most_nodes, together)
     # Whether a slot has an unknown because one of the wires that take it has.
     has_name = np.zeros((stations.present.shape[1], len(names)), dtype=bool)
     numbers = np.full((mesh.n_nodes, len(names)), -1)

@@ -1,16 +1,21 @@
 """Stations of a mesh: nodes in one cross-section of the line, each in a slot of it.
 
+Nodes of a wire that moves with the wire beside it are in the slots of that one's nodes.
+
 A slot is a node's place in a cross-section. Where wires have a node each at all places that they
 pass, a wire keeps its slot all along, and a slot is free again where its wire has ended.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from catenary.meshgen.mesh import LineMesh
+from catenary.solver.base.errors import InputError
 
 # Nodes closer than this along the track belong to one station [m].
 SAME_STATION = 1e-6
@@ -39,11 +44,68 @@ def along_the_track(mesh: LineMesh) -> np.ndarray:
     return order[np.lexsort((_wire_of_node(mesh)[order], _places(mesh)[order]))]
 
 
-def stations_of(mesh: LineMesh, most_nodes: int) -> Stations:
+def stations_of(
+    mesh: LineMesh, most_nodes: int, together: Mapping[str, str] | None = None
+) -> Stations:
     """Stations of a mesh: places, else gaps cut into as many as one wire has nodes, else nodes.
 
-    ``most_nodes`` is how many there may be in a station with more nodes of a wire than one.
+    Parameters
+    ----------
+    most_nodes : how many there may be in a station with more nodes of a wire than one
+    together : wires that move with another one, whose slots their nodes have
+
+    Raises
+    ------
+    InputError
+        If a wire has not its nodes, or what hangs there, beside those of the wire it moves with.
     """
+    if not together:
+        return _stations_of(mesh, most_nodes)
+    # Of a mesh without these wires.
+    kept, number = np.unique(_beside(mesh, together), return_inverse=True)
+    wires = {name: number[own] for name, own in mesh.wires.items() if name not in together}
+    less = replace(mesh, points=mesh.points[kept], wires=wires, droppers=number[mesh.droppers])
+    own = _stations_of(less, most_nodes)
+    return own._replace(of_node=own.of_node[number], slot=own.slot[number])
+
+
+def _beside(mesh: LineMesh, together: Mapping[str, str]) -> np.ndarray:
+    """The node with which each moves, (n_nodes,): itself, or that of another wire beside it."""
+    leads = np.arange(mesh.n_nodes)
+    for name, other in together.items():
+        pieces = [mesh.pieces(wire) for wire in (name, other)]
+        sizes = [[piece.size for piece in own] for own in pieces]
+        own, beside = mesh.wires[name], mesh.wires[other]
+        if sizes[0] != sizes[1] or np.abs(mesh.x(own) - mesh.x(beside)).max() > SAME_STATION:
+            raise InputError(
+                f"without their relative motion {name} and {other} need nodes side by side: the "
+                f"mesh has {own.size} and {beside.size} of them, not all at the same places; "
+                "simulate that motion, or give both wires the same nodes"
+            )
+        leads[own] = beside
+        for part, nodes in _at_nodes(mesh).items():
+            mine, others = (nodes[np.isin(nodes, wire)] for wire in (own, beside))
+            if not np.array_equal(np.sort(leads[mine]), np.sort(others)):
+                raise InputError(
+                    f"without their relative motion {name} and {other} need {part} side by side: "
+                    f"the mesh has {mine.size} and {others.size} of them, not all at the same "
+                    "places; simulate that motion, or give both wires the same"
+                )
+    return leads
+
+
+def _at_nodes(mesh: LineMesh) -> dict[str, np.ndarray]:
+    """Nodes of what hangs and holds wires, (n,) of each."""
+    return {
+        "upper ends of droppers": mesh.droppers[:, 0],
+        "lower ends of droppers": mesh.droppers[:, 1],
+        "steady arms": mesh.steady_arms,
+        "supports": mesh.supports,
+        "ends": mesh.anchors,
+    }
+
+
+def _stations_of(mesh: LineMesh, most_nodes: int) -> Stations:
     places = _places(mesh)
     if all((np.diff(places[nodes]) == 1).all() for nodes in _pieces(mesh)):
         return _by_places(mesh, places)

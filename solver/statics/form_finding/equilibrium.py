@@ -18,7 +18,7 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Wire
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
-from catenary.solver.effects.build_model import build
+from catenary.solver.effects.build_model import build, move_together
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest.lateral_shape import LateralShape
 from catenary.solver.model.rest.rest_shape import Equilibrium as Equilibrium
@@ -67,13 +67,16 @@ def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
 
 
 def _cut(problem: Problem, mesh: LineMesh, pushing: bool = False) -> tuple[Model, Equilibrium]:
-    """The line for which droppers are cut; they may push where ``pushing`` says so."""
+    """The line for which droppers are cut; they may push where ``pushing`` says so.
+
+    Each wire hangs by itself here, also one that moves with another.
+    """
     length = mesh.points[mesh.droppers[:, 0], 2] - mesh.points[mesh.droppers[:, 1], 2]
     hanging: _HangingWires | None = None
     model: Model | None = None
     lateral: LateralShape | None = None
     for _ in range(_MAX_PASSES):
-        model = build(problem, mesh, length, before=model)
+        model = build(problem, mesh, length, before=model, apart=True)
         hanging = hanging or _HangingWires(model)
         form = hanging.at_rest(model, lateral)
         _check(problem.line, mesh, form, pushing)
@@ -95,9 +98,9 @@ def _cut(problem: Problem, mesh: LineMesh, pushing: bool = False) -> tuple[Model
 
 
 def about(model: Model, form: Equilibrium) -> tuple[Model, Equilibrium]:
-    """The model with matrices about its shape at rest, if any effect's are, and that shape. Not
-    collective."""
-    if not effects.needs_form(model.problem):
+    """The model with matrices about its shape at rest, if any effect's are, and that shape; wires
+    that move together share unknowns. Not collective."""
+    if not effects.needs_form(model.problem) and not move_together(model.problem):
         return model, form
     return build(model.problem, model.mesh, model.dropper_lengths, form=form), form
 

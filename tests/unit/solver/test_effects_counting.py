@@ -188,9 +188,10 @@ def test_no_effect_is_found_by_its_name() -> None:
 
 def test_the_table_names_every_shipped_effect() -> None:
     """A new effect must be counted here as well; what depends on the matrices of others stands in
-    `test_absorbing_layers.py`, `test_periodic_ends.py` and `test_axial_counting.py`."""
+    `test_absorbing_layers.py`, `test_periodic_ends.py`, `test_axial_counting.py`; what twin wires
+    have in `test_twin_counting.py`."""
     elsewhere = {"absorbing_layers", "periodic_ends", "axial_motion", "tensioners", "temperature"}
-    elsewhere.add("lateral_motion")
+    elsewhere |= {"lateral_motion", "relative_motion"}
     assert set(effects.registry()) == {"vertical", *elsewhere, *BLOCKS}
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from catenary.cases.scene.checks.line.free_places import free_counts
+from catenary.cases.scene.checks.line.twins import RELATIVE_MOTION
 from catenary.cases.scene.convert.line.free import free_wires
 from catenary.cases.scene.convert.line.line import line_of, span_lengths
 from catenary.cases.scene.convert.line.overlaps import overlaps_of
@@ -81,7 +82,9 @@ def size_of(scene: Scene) -> Size | None:
         often = times[span_of_gap[piece.first if whole else last - 1]]
         nodes[piece.wire] += int(weighted[piece.first : last].sum() + often)
     hanging = np.searchsorted(masts, sample.dropper_x) - 1
-    return _size(scene, int(times[hanging].sum()), nodes, sample.wires)
+    together = () if scene.switches()[RELATIVE_MOTION] else {one for one, _ in sample.twins}
+    own = [wire for wire in sample.wires if wire.name not in together]
+    return _size(scene, int(times[hanging].sum()), nodes, own)
 
 
 def _of_free_line(scene: Scene) -> Size | None:
@@ -96,6 +99,7 @@ def _of_free_line(scene: Scene) -> Size | None:
 
 
 def _size(scene: Scene, n_droppers: int, nodes: dict[str, int], wires: Sequence[Wire]) -> Size:
+    """The size of a line with nodes of wires by name, of which ``wires`` have unknowns."""
     switches = scene.switches()
     chosen = (effect for name, effect in effects.registry().items() if switches[name])
     groups = effects.unknown_groups(chosen, wires)
