@@ -64,6 +64,12 @@ def simulated(problem: Problem) -> Simulated:
     return laws
 
 
+def move_together(problem: Problem) -> dict[str, str]:
+    """Wires that move with another one, by name: second ones of twins without relative motion."""
+    twins = dict(problem.line.twins)
+    return {} if not twins or simulated(problem).relative_motion else twins
+
+
 def unknown_groups(effects: Iterable[Effect], wires: Iterable[NamedWire]) -> list[Group]:
     """Unknowns that a set of effects needs of each wire, in groups: what one is the first to need.
 

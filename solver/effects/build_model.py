@@ -74,19 +74,13 @@ def numbering_of(problem: Problem, mesh: LineMesh, apart: bool = False) -> Unkno
     """The unknowns that the effects of a problem need on a mesh; of ``apart`` see ``build``. Not
     collective."""
     groups = effects.unknown_groups(effects.active(problem), problem.line.wires)
-    return number_unknowns(mesh, groups, together={} if apart else move_together(problem))
-
-
-def move_together(problem: Problem) -> dict[str, str]:
-    """Wires that move with another one, by name: second ones of twins without relative motion."""
-    twins = dict(problem.line.twins)
-    return {} if not twins or effects.simulated(problem).relative_motion else twins
+    return number_unknowns(mesh, groups, together={} if apart else effects.move_together(problem))
 
 
 def with_wires_apart(model: Model) -> Model:
     """The model with unknowns of its own for each wire: itself, if no wires move together. Not
     collective."""
-    if not move_together(model.problem):
+    if not effects.move_together(model.problem):
         return model
     return build(
         model.problem,

@@ -138,9 +138,13 @@ def test_plan_names_all_effects_and_the_size(case: str) -> None:
     for name, effect in effects.registry().items():
         assert (f"\n  {name} " in simulated) != (f"\n  {name} " in left_out)
         assert effect.title in result.stdout
-    on = load_scene(case).switches()
+    scene = load_scene(case)
+    on = scene.switches()
     names = ["w", "theta_y"] + ["u"] * on["axial_motion"] + ["v", "theta_z"] * on["lateral_motion"]
-    assert f"nodes x {len(names)} ({', '.join(names)})" in simulated
+    as_one = scene.line.twin is not None and not on["relative_motion"]
+    of_each = "nodes, contact_wire_2 with those of contact_wire" if as_one else "nodes x"
+    each = "" if as_one else f" {len(names)}"
+    assert f"{of_each}{each} ({', '.join(names)})" in simulated
     assert "real-time factor" in simulated
 
 

@@ -17,7 +17,7 @@ from catenary.cases.studies.choice.switches import choice_of
 from catenary.cases.studies.waves.excited import Asked, excitation_of
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
-from catenary.solver.effects.build_model import move_together, numbering_of
+from catenary.solver.effects.build_model import numbering_of
 
 TWIN = "dc_twin"
 REFUSED = {
@@ -101,7 +101,7 @@ def test_what_would_move_the_wires_apart_is_refused_in_a_sentence(name: str) -> 
 )  # fmt: skip
 def test_what_treats_both_alike_is_taken(words: list[str]) -> None:
     problem = problem_of(load_scene(TWIN, words))
-    assert move_together(problem)
+    assert effects.move_together(problem)
 
 
 def test_a_force_on_one_of_two_wires_is_refused() -> None:

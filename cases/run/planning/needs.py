@@ -26,7 +26,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.effects import all_effects as effects
-from catenary.solver.effects.build_model import move_together, numbering_of
+from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.integrators.detour import Detour, detour_of
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.watched_links import GAUGES
@@ -98,7 +98,7 @@ def needs_of(
     """
     active = effects.active(problem)
     if not stations:
-        together = move_together(problem)
+        together = effects.move_together(problem)
         own = [wire for wire in problem.line.wires if wire.name not in together]
         groups = effects.unknown_groups(active, own)
         stations = {sum(len(names) for group in groups for names in group.values()): 1}

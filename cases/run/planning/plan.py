@@ -19,7 +19,7 @@ from catenary.cases.scene.cost_model import estimate_march
 from catenary.cases.scene.scene import Scene
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.effects import all_effects as effects
-from catenary.solver.effects.build_model import move_together, numbering_of
+from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.effects.effect import Effect
 from catenary.solver.problem.problem import Numerics, Problem, n_halvings
 from catenary.solver.window.choice import moving_share, window_sentence
@@ -164,7 +164,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
         on=on,
         off=off,
         unknowns=numbering.names,
-        shared=tuple(move_together(problem).items()),
+        shared=tuple(effects.move_together(problem).items()),
         n_nodes=mesh.n_nodes,
         n_dofs=numbering.n_unknowns,
         n_steps=needs.n_steps,

@@ -16,7 +16,7 @@ from mpi4py import MPI
 from catenary.cases.studies.waves.seen import NodeMotion
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.base.errors import InputError, RunBroken
-from catenary.solver.effects.build_model import move_together
+from catenary.solver.effects.all_effects import move_together
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Placement, Problem, Train
 from catenary.solver.problem.window import BOUNDED

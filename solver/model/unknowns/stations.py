@@ -78,18 +78,18 @@ def _beside(mesh: LineMesh, together: Mapping[str, str]) -> np.ndarray:
         own, beside = mesh.wires[name], mesh.wires[other]
         if sizes[0] != sizes[1] or np.abs(mesh.x(own) - mesh.x(beside)).max() > SAME_STATION:
             raise InputError(
-                f"without their relative motion {name} and {other} need nodes side by side: the "
+                f"without effects.relative_motion {name} and {other} need nodes side by side: the "
                 f"mesh has {own.size} and {beside.size} of them, not all at the same places; "
-                "simulate that motion, or give both wires the same nodes"
+                "switch that on, or give both wires the same nodes"
             )
         leads[own] = beside
         for part, nodes in _at_nodes(mesh).items():
             mine, others = (nodes[np.isin(nodes, wire)] for wire in (own, beside))
             if not np.array_equal(np.sort(leads[mine]), np.sort(others)):
                 raise InputError(
-                    f"without their relative motion {name} and {other} need {part} side by side: "
+                    f"without effects.relative_motion {name} and {other} need {part} side by side: "
                     f"the mesh has {mine.size} and {others.size} of them, not all at the same "
-                    "places; simulate that motion, or give both wires the same"
+                    "places; switch that on, or give both wires the same"
                 )
     return leads
 

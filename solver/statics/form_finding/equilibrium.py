@@ -18,7 +18,7 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Wire
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
-from catenary.solver.effects.build_model import build, move_together
+from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest.lateral_shape import LateralShape
 from catenary.solver.model.rest.rest_shape import Equilibrium as Equilibrium
@@ -100,7 +100,7 @@ def _cut(problem: Problem, mesh: LineMesh, pushing: bool = False) -> tuple[Model
 def about(model: Model, form: Equilibrium) -> tuple[Model, Equilibrium]:
     """The model with matrices about its shape at rest, if any effect's are, and that shape; wires
     that move together share unknowns. Not collective."""
-    if not effects.needs_form(model.problem) and not move_together(model.problem):
+    if not effects.needs_form(model.problem) and not effects.move_together(model.problem):
         return model, form
     return build(model.problem, model.mesh, model.dropper_lengths, form=form), form
 

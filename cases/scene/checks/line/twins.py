@@ -9,7 +9,6 @@ from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.meshgen.line import Line
 from catenary.solver.effects import all_effects as effects
-from catenary.solver.effects.build_model import move_together
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.problem import Damping, Problem
 
@@ -51,7 +50,7 @@ _ALIKE = frozenset(
 
 def needs_relative_motion(problem: Problem, effect: str) -> bool:
     """Whether a problem has twin wires that move as one, and an effect may move them apart."""
-    return effect not in _ALIKE and bool(move_together(problem))
+    return effect not in _ALIKE and bool(effects.move_together(problem))
 
 
 def check_twins(scene: Scene) -> Iterator[Fault]:
