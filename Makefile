@@ -8,10 +8,8 @@ unexport PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE
 PYTHON := .venv/bin/python
 PYTEST := $(PYTHON) -m pytest
 # Tests that measure no time share the cores, a file at a time (benchmarks cannot), in the order of the
-# folders named: the longest files first, so that quick ones fill the cores up at the end. One worker
-# more than cores: tests that wait for programs which they have started leave theirs.
-CORES := $(shell nproc 2>/dev/null || getconf _NPROCESSORS_ONLN)
-PYTEST_SHARED = $(PYTEST) -p no:benchmark --numprocesses $$(($(CORES) + 1)) --maxprocesses 5 --dist loadfile --no-loadscope-reorder
+# folders named: the longest files first, so that quick ones fill the cores up at the end.
+PYTEST_SHARED = $(PYTEST) -p no:benchmark --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 # An uncaught error on one rank ends all; ranks must not write one cache at a time.
 MPI_PYTEST := $(PYTHON) -m mpi4py -m pytest -p no:cacheprovider
 PARTS := meshgen solver mbs postproc cases
