@@ -20,11 +20,15 @@ from catenary.cases.run import scene_mesh
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.checks.line.mesh_size import size_of
 from catenary.cases.scene.convert.course import resolved
+from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.input.case_files import shipped
 from catenary.cases.scene.input.origin import Origin
 from catenary.cases.scene.load import load_scene, scene_from
 from catenary.cases.studies.sweep.variants import read_named
+from catenary.meshgen.mesh import CONTACT_WIRE
+from catenary.meshgen.topologies.twin import second
 from catenary.solver.base.errors import InputError
+from catenary.solver.effects.all_effects import move_together
 
 SOUND = Path(__file__).parent / "broken_scenes" / "sound.toml"
 NOT_FOR_A_SCENE = "is no PETSc option that a scene may give"
@@ -239,7 +243,10 @@ def test_a_mesh_is_counted_before_it_is_made(case: str) -> None:
         assert (size.nodes, size.droppers) == (mesh.n_nodes, mesh.droppers.shape[0])
         on = scene.switches()
         of_a_node = 2 + 2 * on["lateral_motion"] + on["axial_motion"]  # w, slope; v, slope; u
-        assert size.unknowns == of_a_node * mesh.n_nodes
+        shared = move_together(problem_of(scene))
+        assert set(shared) == ({second(CONTACT_WIRE)} if case == "dc_twin" else set())
+        n_own = mesh.n_nodes - sum(mesh.wires[wire].size for wire in shared)
+        assert size.unknowns == of_a_node * n_own
 
 
 @pytest.mark.parametrize(

@@ -212,7 +212,7 @@ def packed_blocks(layout: Layout, factors: np.ndarray) -> np.ndarray:
     if layout.sparse:
         return layout.packed_halves(factors[:, 0])
     packed = layout.packed(factors, layout.whole_terms)
-    return packed.reshape(packed.shape[0], -1)
+    return packed.reshape(packed.shape[0], 3 * packed.shape[2])  # of no factor, too
 
 
 def packed_factors(
