@@ -5,6 +5,7 @@ The layout of a line is known before its kernels are compiled, and these are com
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -131,7 +132,7 @@ class Layout:
         by_runs: bool = False,
     ) -> None:
         self.widths = tuple(widths)
-        self._planes = [min(n for n in LANES if n >= width) for width in self.widths]
+        self._planes = lanes_of(self.widths)
         largest = _power(max(self._planes))
         every = tuple(range(largest))
         self.own = every if own is None else tuple(own)
@@ -145,7 +146,7 @@ class Layout:
         self.turns = largest <= REGISTER and max(self.widths) > largest - 2
         self._first = np.repeat(np.cumsum([0, *self._planes[:-1]]), self._planes)
         self._end = self._first + np.repeat(self._planes, self._planes)
-        self.registers = registers_of(self._planes)
+        self.registers = registers_of(self.widths)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Layout) and self.key == other.key
@@ -374,11 +375,17 @@ def _power(number: int) -> int:
     return 1 << (number - 1).bit_length()
 
 
-def registers_of(planes: list[int]) -> tuple[int, ...]:
-    """Lanes of each vector that holds some of those of ``planes``.
+def lanes_of(widths: Sequence[int]) -> list[int]:
+    """Lanes of each plane of so many unknowns."""
+    return [min(lanes for lanes in LANES if lanes >= width) for width in widths]
+
+
+def registers_of(widths: Sequence[int]) -> tuple[int, ...]:
+    """Lanes of each vector that holds some of those of planes of these ``widths``.
 
     Planes of one power of two share vectors, in which they are worked on as one.
     """
+    planes = lanes_of(widths)
     if len(set(planes)) == 1 and planes[0] == _power(planes[0]):
         planes = [sum(planes)]
     sizes = []

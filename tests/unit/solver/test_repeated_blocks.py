@@ -227,12 +227,15 @@ def test_planes_are_what_no_matrix_joins() -> None:
     assert layout_of(*[np.ones((3, 2, WIDEST + 1, WIDEST + 1))] * 2) is None
 
 
-def test_planes_that_fit_into_the_lanes_of_one_are_put_together() -> None:
+def test_planes_are_put_together_where_one_vector_then_holds_them() -> None:
     for widths, together in (
         ((4, 2, 2), (4, 4)),
         ((5, 1), (6,)),
-        ((6, 2), (6, 2)),
+        ((6, 2), (8,)),
+        ((2, 6), (8,)),
         ((4, 2), (4, 2)),
+        ((6, 4), (6, 4)),
+        ((8, 2), (8, 2)),
     ):
         assert layout(line(10, widths=widths)).widths == together
 
