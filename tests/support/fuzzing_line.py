@@ -39,7 +39,8 @@ def droppers(rng: random.Random, words: Words, span: float) -> None:
     words["line.dropper.spacing_m"] = span / (count + rng.uniform(0.5, 1.5))
     sag = rng.uniform(-5.0, 30.0)
     if count > 2:  # of two there is none in between
-        words["line.dropper.pre_sag_mid_mm"] = sag
+        # Thousandths of a millimetre are taken for metres.
+        words["line.dropper.pre_sag_mid_mm"] = sag if abs(sag) > 1.0 else 0.0
     words["line.dropper.stiffness_N_per_m"] = ""
     words["line.dropper.axial_stiffness_N"] = 10 ** rng.uniform(4.0, 6.3)
 

@@ -142,8 +142,9 @@ def air(rng: random.Random, words: Words) -> None:
         words[f"{table}.uplift_by_speed"] = [[50.0, rng.uniform(0, 9)], [300.0, rng.uniform(9, 90)]]
     words[f"{table}.head_share"] = rng.uniform(0.0, 1.0)
     if rng.random() < 0.5:
-        start, factor = float(str(words["train.start_m"])), rng.uniform(0.8, 2.0)
+        start, end = (float(str(words[f"train.{name}_m"])) for name in ("start", "end"))
+        first, factor = start + rng.uniform(0.0, 1.0) * (end - start), rng.uniform(0.8, 2.0)
         words["line.tunnels"] = (
-            f"[{{from_m={start + 1.0!r},to_m={start + 500.0!r},force_factor={factor!r},"
+            f"[{{from_m={first!r},to_m={start + 500.0!r},force_factor={factor!r},"
             f"portal_m={rng.choice([0.0, 20.0])!r}}}]"
         )
