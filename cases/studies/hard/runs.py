@@ -72,15 +72,19 @@ class Watched:
     counters: dict[str, int] = field(default_factory=dict)
     kept: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
-    def energy_gain(self) -> float:
+    def energy_gain(self, besides: Collection[int] = ()) -> float:
         """The most that energy less work rises above its least value before, of the largest energy.
 
         Damping only lowers it; any rise is spurious. After incidents the energy, which counts from
-        the first rest, may be negative.
+        the first rest, may be negative. What the steps from ``besides`` change is left out.
         """
         balance = self.energy - self.work
         if self.terms.size:
             balance = balance + self.terms
+        if besides:
+            changes = np.diff(balance)
+            changes[[step for step in besides if step < changes.size]] = 0.0
+            balance = np.concatenate([[0.0], np.cumsum(changes)])
         rise = (balance - np.minimum.accumulate(balance)).max()
         return float(rise / self.energy_scale())
 
