@@ -65,10 +65,12 @@ def rows_of(numbers: np.ndarray, n: int) -> Rows:
 
 
 class Bounds(NamedTuple):
-    """Within which forces whatever switches has a row: contact forces up to ``force`` (n,) [N], and
-    compensations elsewhere that take up to ``loss`` (1,) [N] off a reserve."""
+    """Within which forces whatever switches has a row: contacts that all push up to ``push`` (n,)
+    and pull up to ``pull`` (n,) [N], 0 of those that only push, and compensations elsewhere that
+    take up to ``loss`` (1,) [N] off a reserve."""
 
-    force: np.ndarray
+    push: np.ndarray
+    pull: np.ndarray
     loss: np.ndarray
 
 
@@ -139,7 +141,7 @@ class LineResponse:
         self.rows = rows_of(self.sent_rows, n)
         self.present = np.ones(n)
         self.share = Share(flags.view(FLAGS), self.present, self.line, self.rows)
-        self.bounds = bounds or Bounds(np.full(n, np.inf), np.full(1, np.inf))
+        self.bounds = bounds or Bounds(*(np.full(size, np.inf) for size in (n, n, 1)))
 
     @property
     def count(self) -> int:

@@ -75,7 +75,7 @@ def watch(motion, followed, bounds, touches, answers, gains, rows):
     """
     numbers, links, reserve, moving, riders, riding = followed
     by_force = answers.by_force
-    laws, limits, margin = links.law, bounds.force, bounds.loss[0]
+    laws, margin = links.law, bounds.loss[0]
     count, n = 0, touches.size
     low, high = touches[0].x, touches[0].x
     for i in range(1, n):
@@ -99,12 +99,12 @@ def watch(motion, followed, bounds, touches, answers, gains, rows):
             continue
         per_acceleration = law.stiffness * gains.position + law.damping * gains.velocity
         if not candidate:
+            left = reserve[d]
             for i in range(n):
                 if touches[i].present != 0.0 and abs(law.place - touches[i].x) <= gains.reach:
                     change = per_acceleration * spread(d, links, by_force[i])
-                    if reserve[d] + change * limits[i] < margin:
-                        candidate = True
-                        break
+                    left += min(change * bounds.push[i], -change * bounds.pull[i])
+            candidate = left < margin
         if not candidate:
             continue
         if count < rows.number.size:

@@ -312,7 +312,7 @@ def leaves_out(force, compensation, rows, bounds, coupled):
     if n == 0:
         return False
     for i in range(force.size):
-        if force[i] > bounds.force[i]:
+        if force[i] > bounds.push[i] or -force[i] > bounds.pull[i]:
             return True
     largest = 0.0
     for k in range(compensation.size):

@@ -51,7 +51,9 @@ class OneSolve:
         n = self.pantographs.n_contacts
         switches = self.interaction.link_coupling is not None
         self._bounds = Bounds(
-            np.full(n, _FIRST_BOUND), np.full(1, _FIRST_MARGIN if switches else _NO_MARGIN)
+            np.full(n, _FIRST_BOUND),
+            np.full(n, _FIRST_BOUND if self.coupling.law.pulls else 0.0),
+            np.full(1, _FIRST_MARGIN if switches else _NO_MARGIN),
         )
         self._exchange = Exchange(self.comm, n, self.coupling.extrapolates, self._bounds)
         self._respond = self.interaction.responder(self._exchange.share)

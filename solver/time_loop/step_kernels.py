@@ -155,8 +155,9 @@ def find_forces(time, problem, law, switched, n, counts):
 def widen(bounds):
     """Double the bounds of what may switch."""
     bounds.loss[0] *= 2.0
-    for i in range(bounds.force.size):
-        bounds.force[i] *= 2.0
+    for i in range(bounds.push.size):
+        bounds.push[i] *= 2.0
+        bounds.pull[i] *= 2.0
 
 
 @inner

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 
+import numpy as np
 import pytest
 from measuring import check
 
@@ -94,6 +95,12 @@ def test_the_run_in_that_is_asked_for_leaves_the_limit() -> None:
     needed = run_in_for(damped, 50.0)
     assert 0.0 < needed < 200.0
     check("damped", start_share(damped, 50.0, needed), 0.2, within=1e-9)
+
+
+def test_a_run_in_without_damping_is_found_whatever_is_rounded() -> None:
+    for span in np.linspace(40.0, 70.0, 301):
+        needed = run_in_for(STRING._replace(span=float(span)), 50.0)
+        check("undamped [m]", needed, 4.0 * span, within=1e-9)
 
 
 def test_a_line_for_waves_has_both_wires_and_what_hangs_on_them() -> None:

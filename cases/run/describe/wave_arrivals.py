@@ -154,8 +154,13 @@ def run_in_for(line: WaveLine, speed: float, share: float = SHORT_RUN_IN) -> flo
     """Run-in after which the start leaves ``share`` of the standard deviation [m]."""
     from scipy import optimize  # not loaded for runs that are long enough
 
+    def more(run_in: float) -> float:
+        return start_share(line, speed, run_in) - share
+
     longest = START_SHARE * line.span / share
-    return float(optimize.brentq(lambda d: start_share(line, speed, d) - share, 0.0, longest))
+    if more(longest) >= 0.0:  # nothing damps, or nothing that round-off leaves
+        return longest
+    return float(optimize.brentq(more, 0.0, longest))
 
 
 def end_for(line: WaveLine, course: Course) -> float:
