@@ -152,8 +152,7 @@ def test_a_dropper_that_is_neither_taut_nor_slack_does_not_end_a_run() -> None:
 @pytest.mark.skipif(WORLD.size > 1, reason="processes of their own: test_fuzz_processes")
 @pytest.mark.parametrize("seeds", BLOCKS, ids=str)
 def test_twin_wires_move_as_one_as_they_do_apart(seeds: range) -> None:
-    """In 40 steps: a stiff contact without damping may double round-off with each hop, of which
-    there are twenty at most, and 2^20 1e-16 is 1e-10."""
+    """In 40 steps, which leave few hops for round-off to grow by; see `check_twins`."""
     hung = 0
     for seed in seeds:
         made = twin_scene(seed, 40)
@@ -165,21 +164,29 @@ def test_twin_wires_move_as_one_as_they_do_apart(seeds: range) -> None:
 
 
 def check_twins(assignments: tuple[str, ...]) -> bool:
-    """Forces and energies with and without relative motion; False as in `check_run`."""
+    """Forces and energies with and without relative motion agree as well as the scene lets them,
+    see `nudged`; False as in `check_run`."""
+    apart_, together = (
+        (*assignments, f"effects.relative_motion={relative}") for relative in ("true", "false")
+    )
     found = []
-    for relative in ("true", "false"):
-        scene = load_scene(BASE, [*assignments, f"effects.relative_motion={relative}"])
+    for given in (apart_, together):
         try:
-            rest = hard_runs.at_rest(scene, MPI.COMM_SELF)
+            rest = hard_runs.at_rest(load_scene(BASE, given), MPI.COMM_SELF)
         except InputError as error:
             assert any(words in str(error) for words in NOT_AT_REST) and "\n" not in str(error)
             return False
         found.append(hard_runs.run(rest, MPI.COMM_SELF, with_work=True))
     apart, one = found
     assert apart.outcome == one.outcome == "done"
+    beside: Watched | None = None
     for what in ("force", "on_wires", "energy"):
         expected, values = getattr(apart, what), getattr(one, what)
-        assert np.abs(values - expected).max() <= 1e-8 * max(np.abs(expected).max(), 1e-3)
+        off = np.abs(values - expected).max()
+        usual = 1e-8 * max(np.abs(expected).max(), 1e-3)
+        if off > usual:
+            beside = beside or hard_runs.run(nudged(apart_), MPI.COMM_SELF, with_work=True)
+            assert off <= usual + 100 * np.abs(getattr(beside, what) - expected).max()
     if not one.switches().any():
         assert one.energy_gain() < 1e-9
     return True
@@ -291,21 +298,26 @@ def check_run(assignments: tuple[str, ...]) -> bool:
         # of 200 products of forces with differences of displacements have lost six digits.
         assert gain < 1e-9
     if WORLD.size > 1:
-        check_ranks(scene, assignments, rest, run)
+        check_ranks(assignments, rest, run)
     return True
 
 
-def check_ranks(scene: Scene, assignments: tuple[str, ...], rest: Any, run: Any) -> None:
-    """Ranks agree as well as the scene lets them: a head that hops on a stiff contact without
-    damping is chaotic, and doubles round-off with each hop. How much is measured by a static force
-    that differs in the 12th digit. Fails on all ranks or on none."""
-    together = hard_runs.run(rest, WORLD)
-    force = scene.pantographs["reference"].static_force_N
+def nudged(assignments: tuple[str, ...]) -> hard_runs.AtRest:
+    """The scene at rest with a static force that differs in the 12th digit.
+
+    A head that hops on a stiff contact without damping is chaotic, and multiplies round-off with
+    each hop: what this difference makes says by how much.
+    """
+    force = load_scene(BASE, assignments).pantographs["reference"].static_force_N
     assert force is not None
-    moved = load_scene(
-        BASE, [*assignments, f"pantographs.reference.static_force_N={force * (1 + 1e-12)!r}"]
-    )
-    beside = hard_runs.at_rest(moved, WORLD)
+    words = [*assignments, f"pantographs.reference.static_force_N={force * (1 + 1e-12)!r}"]
+    return hard_runs.at_rest(load_scene(BASE, words), WORLD)
+
+
+def check_ranks(assignments: tuple[str, ...], rest: Any, run: Any) -> None:
+    """Ranks agree as well as the scene lets them, see `nudged`. Fails on all ranks or on none."""
+    together = hard_runs.run(rest, WORLD)
+    beside = nudged(assignments)
     other = on_root(WORLD, lambda: hard_runs.run(beside, MPI.COMM_SELF, with_work=True))
     apart = WORLD.bcast(float(np.abs(together.force - run.force).max()))
     sensitive = float(np.abs(other.force - run.force).max())
