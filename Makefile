@@ -96,7 +96,7 @@ bench: setup ## what steps cost: against their floor, by phase, spans and ranks
 fuzz: setup ## random small problems; scenes: 4000 that run, 4000 refused, 50 sweeps, 25 killed, 25 on 2 to 4 ranks; SEED=...
 	@echo "seeds from $(SEED); FUZZ_SEED=<seed> FUZZ_CASES=1 $(PYTEST) tests/regression/test_fuzz.py replays one"
 	$(PYTEST) -q --hypothesis-profile=others --hypothesis-seed=$(SEED) $$(grep -rl 'import given' tests)
-	FUZZ_SEED=$(SEED) FUZZ_CASES=2000 $(PYTEST) -q tests/regression/test_fuzz.py
+	FUZZ_SEED=$(SEED) FUZZ_CASES=2000 $(PYTEST) -q tests/regression/test_fuzz.py tests/regression/test_fuzz_equations.py
 	FUZZ_SEED=$(SEED) FUZZ_FLIPS=120 $(PYTEST) -q tests/regression/test_fuzz_damage.py
 	FUZZ_SEED=$(SEED) FUZZ_DAMAGE=2000 $(PYTEST) -q tests/unit/postproc/test_postproc_damage.py
 	FUZZ_SEED=$(SEED) FUZZ_SWEEPS=50 $(PYTEST) -q tests/regression/test_fuzz_sweeps.py

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from equations import residual_of
 from fuzzing import (
     BASE,
     N_STEPS,
@@ -162,25 +161,6 @@ def test_twin_wires_move_as_one_as_they_do_apart(seeds: range) -> None:
         except (Exception, AssertionError) as error:
             raise AssertionError(replay(seed, made.assignments)) from error
     assert hung >= len(seeds) // 2
-
-
-@pytest.mark.skipif(WORLD.size > 1, reason="processes of their own: test_fuzz_processes")
-@pytest.mark.parametrize("seeds", BLOCKS, ids=str)
-def test_random_scenes_keep_the_equations_of_motion(seeds: range) -> None:
-    """With one contact wire, and with twin wires by turns as one and with relative motion."""
-    for seed in seeds:
-        made = twin_scene(seed, 60) if seed % 2 else sound_scene(seed)
-        words = [*made.assignments, "line.dropper.slack_damping=released"]
-        if seed % 2:
-            words.append(f"effects.relative_motion={'true' if seed % 4 == 3 else 'false'}")
-        try:
-            rest = hard_runs.at_rest(load_scene(BASE, words), MPI.COMM_SELF)
-        except InputError as error:
-            assert any(words in str(error) for words in NOT_AT_REST)
-            continue
-        # Sums of up to a dozen terms, each known to round-off of the largest; droppers of some
-        # 1e6 N/m see that of displacements.
-        assert residual_of(rest) < 1e-10, replay(seed, made.assignments)
 
 
 def check_twins(assignments: tuple[str, ...]) -> bool:

@@ -381,10 +381,8 @@ def lanes_of(widths: Sequence[int]) -> list[int]:
 
 
 def registers_of(widths: Sequence[int]) -> tuple[int, ...]:
-    """Lanes of each vector that holds some of those of planes of these ``widths``.
-
-    Planes of one power of two share vectors, in which they are worked on as one.
-    """
+    """Lanes of each vector that holds some of those of planes of these ``widths``; those of one
+    power of two share vectors, in which they are worked on as one."""
     planes = lanes_of(widths)
     if len(set(planes)) == 1 and planes[0] == _power(planes[0]):
         planes = [sum(planes)]
