@@ -38,4 +38,6 @@ def test_random_scenes_keep_the_equations_of_motion(seeds: range) -> None:
             continue
         # Sums of up to a dozen terms, each known to round-off of the largest; droppers of some
         # 1e6 N/m see that of displacements.
-        assert residual_of(rest) < 1e-10, f"FUZZ_SEED={seed} FUZZ_CASES=1 replays it: {' '.join(words)}"
+        assert residual_of(rest) < 1e-10, (
+            f"FUZZ_SEED={seed} FUZZ_CASES=1 replays it: {' '.join(words)}"
+        )
