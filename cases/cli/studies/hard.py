@@ -34,7 +34,7 @@ _PLAIN = ("runs to its end", "everything is finite", "the fixed-point correction
 @app.command(
     "hard",
     help="Run the collection of hard cases and print which limits they keep: energy, bounds, "
-    "refinement, schemes, and ranks under mpirun. Some two minutes; exits with 3 if a limit is "
+    "refinement, schemes, and ranks under mpirun. Some five minutes; exits with 3 if a limit is "
     "not kept.",
     epilog="Example: catenary hard -o results/hard",
 )
