@@ -37,15 +37,18 @@ def check(
             console.complain(line)
         return console.BAD_INPUT
     # What a refusal does not need is imported once the scene is sound.
+    from catenary.cases.run.at_rest.installed import registration_of
     from catenary.cases.run.describe.arrivals import arrival_facts
     from catenary.cases.run.describe.pantographs import kind_lines
     from catenary.cases.run.scene_mesh import mesh_of
     from catenary.cases.scene.convert.problem import problem_of
-    from catenary.solver.statics.form_finding.equilibrium import find_form
+    from catenary.solver.statics.line_at_rest import stable_form
+    from catenary.solver.statics.stability_of_rest import refuse_lost_wire
 
     problem = problem_of(scene)
     mesh = mesh_of(scene)
-    find_form(problem, mesh)
+    model, form = stable_form(problem, mesh)
+    refuse_lost_wire(model, form)
     console.say(
         f"{scene.case.name} is sound: {counted(problem.line.n_spans, 'span')}, "
         f"{problem.line.support_positions[-1]:g} m, {counted(mesh.droppers.shape[0], 'dropper')}, "
@@ -57,7 +60,8 @@ def check(
     console.say(f"ends: {'; '.join(waves['ends'])}")
     for fact in waves["pantographs"]:
         console.say(fact["says"])
-    for text in waves["warnings"]:
+    arms = registration_of(mesh, form)
+    for text in [*waves["warnings"], *([] if arms is None else arms.warnings())]:
         console.warn(text)
     return console.DONE
 

@@ -41,6 +41,7 @@ from catenary.postproc.channels.header import Header
 from catenary.postproc.files.own_files import remove_stale
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
+from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watched
 from catenary.postproc.record.snapshots.blocks import RecordedLine
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.base.errors import CatenaryError, RunBroken
@@ -48,6 +49,7 @@ from catenary.solver.base.freed_memory import give_back_long_line
 from catenary.solver.base.parallel import on_root
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all
+from catenary.solver.statics.stability_of_rest import refuse_lost_wire
 from catenary.solver.time_loop.march import March, Outcome
 from catenary.solver.time_loop.views.observers import Observer
 
@@ -206,6 +208,8 @@ def _marched(
             at_rest = _at_rest(scene, problem, comm, phases, phase, judge)
             if excited is not None:
                 excited.excite(at_rest)
+            else:
+                on_root(comm, lambda: refuse_lost_wire(at_rest.model, at_rest.form))
             header: Header | None = None
             if comm.rank == 0:
                 header = header_of(scene, problem, at_rest, order.petsc_options, excited)
@@ -218,7 +222,7 @@ def _marched(
                     march.restore(order.state)
                 if order.extends:
                     on_root(comm, lambda: _let_go_on(order, header, march.n_steps), takes_long=True)
-            observers, recorder = _observers(
+            observers, recorder, watch = _observers(
                 order, problem, at_rest, header, phases.progress, march.n_steps
             )
             header = None  # the recorder has it until it has written it
@@ -226,7 +230,7 @@ def _marched(
         with StopRequest() as stop:
             with phases("march"):
                 outcome = march.run(observers, stop)
-            recorder.close(performance(outcome, phases, comm.size))
+            recorder.close({**performance(outcome, phases, comm.size), "watched": watch.facts()})
     if not recorder.begun:
         raise RunBroken(outcome.outcome)
     return outcome, at_rest.model.n_unknowns
@@ -269,8 +273,8 @@ def _observers(
     header: Header | None,
     progress: Progress,
     n_steps: int,
-) -> tuple[list[Observer], Recorder]:
-    """All that watches the march, the recorder last. Not collective.
+) -> tuple[list[Observer], Recorder, RunWatch]:
+    """All that watches the march, the recorder last, and the one that judges it. Not collective.
 
     The state to continue from, which the recorder writes, stands for all before it. ``n_steps`` are
     those of the whole run, ``header`` is needed on rank 0.
@@ -321,7 +325,8 @@ def _observers(
         first.append(StripWatch(half_lengths))
     if excited is not None:
         first += excited.watching(at_rest)
-    return [*first, progress, recorder], recorder
+    watch = RunWatch(comm, watched(at_rest, excited is None), watch_cadence(dt))
+    return [*first, progress, watch, recorder], recorder, watch
 
 
 def _reported(order: _Order, outcome: Outcome) -> RunOutcome:

@@ -68,12 +68,9 @@ def summary_text(summary: Mapping[str, Any], folder: Path) -> str:
             f"  {words[row['passed']]:10}  {row['criterion']}: {_number(value, digits)}, limit "
             f"{_number(limit, digits)} {row.get('unit', '')}".rstrip()
         )
-    # Older runs have neither indicators nor arrivals.
-    warnings = list(summary.get("complaints", []))
-    for part in ("indicators", "arrivals"):
-        warnings += summary.get(part, {}).get("warnings", [])
-    lines += ["", *(f"  WARNING     {text}" for text in warnings)]
-    lines += [""] * bool(warnings) + [f"Results: {folder}"]
+    told = [*summary.get("complaints", []), *summary.get("remarks", [])]
+    lines += ["", *(f"  REMARK      {text}" for text in told)]
+    lines += [""] * bool(told) + [f"Results: {folder}"]
     return "\n".join(lines)
 
 
@@ -181,10 +178,7 @@ def _registration_text(data: Mapping[str, np.ndarray]) -> list[str]:
             continue
         shown[tuple(figures)] = place
         lines.append("".join(f"{figure:>12}" for figure in (place, *figures)))
-    if table.pushed.any():
-        places = counted(int(table.pushed.sum()), "steady arm")
-        lines.append(f"  {places} pushed by the wire: an arm that only pulls would fall away")
-    return [*lines, ""]
+    return [*lines, *(f"  {text}" for text in table.warnings()), ""]
 
 
 def _wire_text(wire: Wire, lengths: np.ndarray | None) -> str:

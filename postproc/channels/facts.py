@@ -270,6 +270,17 @@ FACTS: dict[str, Fact] = {
             default=0.0,
         ),
     ),
+    "added_dropper_damping": Fact(
+        "s",
+        "the part of that alpha which is numerical damping of droppers stiff for the step",
+        lambda source: max(
+            (
+                simulated(source.problem).added_alpha.get(group.name, 0.0)
+                for group in source.problem.line.droppers
+            ),
+            default=0.0,
+        ),
+    ),
     "slack_stiffness_share": Fact(
         "-",
         "share of its stiffness that a pushed dropper keeps, 1 where droppers do not slacken",

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from catenary.postproc.evaluate import statistics as stats
+from catenary.postproc.evaluate.error_indicators import indicate
+from catenary.postproc.evaluate.remarks import all_remarks
 from catenary.postproc.evaluate.wording import counted, fixed
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
@@ -84,7 +86,12 @@ def _statistics(a: Results, b: Results) -> list[str]:
         _row("  max dropper force [N]", of_a.droppers.maximum, of_b.droppers.maximum),
         _row("  min dropper force [N]", of_a.droppers.minimum, of_b.droppers.minimum),
     ]
-    return lines + of_a.complaints + of_b.complaints + a.damage + b.damage
+    said = [
+        f"{letter}: {text}"
+        for letter, run in (("A", a), ("B", b))
+        for text in all_remarks(run, indicate(run))
+    ]
+    return lines + of_a.complaints + of_b.complaints + a.damage + b.damage + said
 
 
 def _row(label: str, first: float, second: float) -> str:

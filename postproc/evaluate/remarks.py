@@ -7,10 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.postproc.evaluate.error_indicators import Indicators
 from catenary.postproc.evaluate.lateral_places import lateral_ranges, sentence
 from catenary.postproc.evaluate.statistics import slackens_at_all
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.read.results import Results
+from catenary.solver.effects.shipped.stiff_link_effects import STIFF
 
 # Share of a gust's load that linear drag may leave out.
 _LEFT_OUT = 0.15
@@ -18,9 +20,6 @@ _LEFT_OUT = 0.15
 _FELT_HZ = 40.0
 # Phase of the contact's own motion in a step beyond which its hops are not resolved [rad].
 _RESOLVED = 0.5
-# Stiffness of droppers times the step squared [N s2/m] from which their switches feed the line: see
-# docs/hard_cases.md.
-_STIFF_DROPPER = 10.0
 _SIDES = ("start", "end")
 
 
@@ -38,6 +37,21 @@ class _Contact(NamedTuple):
     @property
     def frequency(self) -> float:
         return self.omega / (2.0 * math.pi)
+
+
+def all_remarks(results: Results, indicators: Indicators) -> list[str]:
+    """Sentences about everything that decides the results of a run numerically. Not collective.
+
+    Summary, terminal, report, comparisons and studies all tell these.
+
+    Parameters
+    ----------
+    indicators : estimated errors of the run
+    """
+    watched: list[str] = results.attributes.get("watched", {}).get("remarks", [])
+    arms = results.registration()
+    pushed = [] if arms is None else arms.warnings()
+    return [*indicators.warnings, *watched, *pushed, *remarks(results)]
 
 
 def remarks(results: Results) -> list[str]:
@@ -131,16 +145,25 @@ def _about_incidents(results: Results) -> list[str]:
 
 
 def _about_droppers(results: Results) -> list[str]:
+    """That droppers are stiff for the step, and what is done about it."""
     stiffness, dt = results.fact("stiffest_dropper"), results.dt
     # Not of NaN either.
-    if not stiffness * dt**2 > _STIFF_DROPPER or results.fact("dropper_stiffness_damping") >= dt:
+    if not stiffness * dt**2 > STIFF:
         return []
-    longest = math.sqrt(_STIFF_DROPPER / stiffness)
+    said = f"Droppers of {stiffness:.3g} N/m are stiff for a step of {1e3 * dt:g} ms"
+    longest = f"a numerics.dt_s of {1e3 * math.sqrt(STIFF / stiffness):.2g} ms at most"
+    added = results.fact("added_dropper_damping")
+    if added > 0.0:
+        return [
+            f"{said}: numerical damping of alpha = {1e3 * added:.3g} ms in them "
+            "(effects.stiff_link_damping) keeps their switches from making energy, and softens the "
+            f"forces of a few steps. Take {longest} to do without."
+        ]
+    if results.fact("dropper_stiffness_damping") >= 0.5 * dt:
+        return []
     return [
-        f"Droppers of {stiffness:.3g} N/m are stiff for a step of {1e3 * dt:g} ms: when they "
-        "slacken and tighten they give the line energy that it did not have. Take a "
-        f"numerics.dt_s of {1e3 * longest:.2g} ms at most, or damp droppers by as much as a step: "
-        f"line.damping.per_component.droppers with alpha_s = {dt:g}, beta_per_s = 0."
+        f"{said}: when they slacken and tighten they give the line energy that it did not have. "
+        f"Take {longest}, or leave effects.stiff_link_damping on."
     ]
 
 

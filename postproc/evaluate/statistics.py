@@ -40,6 +40,7 @@ class PantographStatistics:
     histogram_edges : (n + 1,) edges of the bins of the 20 Hz force [N]
     histogram_percent : (n,) share of time in each bin [%]
     complaint : why there are no statistics, a sentence
+    unjudged : why no criterion is judged by statistics that there are, a sentence
     """
 
     name: str
@@ -57,6 +58,7 @@ class PantographStatistics:
     histogram_edges: np.ndarray = field(default_factory=lambda: np.zeros(1))
     histogram_percent: np.ndarray = field(default_factory=lambda: np.zeros(0))
     complaint: str = ""
+    unjudged: str = ""
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,8 @@ class RunStatistics:
     @property
     def complaints(self) -> list[str]:
         """Sentences that say which statistics could not be formed, and why."""
-        return [p.complaint for p in self.pantographs if p.complaint]
+        said = (p.complaint or p.unjudged for p in self.pantographs)
+        return [sentence for sentence in said if sentence]
 
 
 def evaluate(results: Results) -> RunStatistics:
@@ -245,13 +248,31 @@ def _pantograph(name: str, number: int, results: Results) -> PantographStatistic
             f"({1e3 * period:g} ms).",
         )
     try:
+        force = results.column("contact_force", number)
         return PantographStatistics(
             name=name,
-            **_of_force(results.column("contact_force", number), within, results.dt),
+            **_of_force(force, within, results.dt),
             contact_height_range=_range(results.column("wire_height", number), within, results.dt),
+            unjudged=_unjudged(_noun(name), force[within], results),
         )
     except InputError as error:
         return PantographStatistics(name, complaint=f"No statistics of the {_noun(name)}: {error}.")
+
+
+def _unjudged(noun: str, force: np.ndarray, results: Results) -> str:
+    """Why statistics of a force (n,) of the evaluation stretch judge nothing, "" if they do."""
+    if not force.any():
+        return f"Nothing is judged of the {noun}: its contact force is zero all the way."
+    start, end = results.evaluation
+    masts = results.line("support_x")
+    spans = np.diff(masts)[(masts[1:] > start) & (masts[:-1] < end)]
+    # Lengths of spans come from sums, which round.
+    if end - start < spans.min(initial=np.inf) * (1.0 - 1e-9):
+        return (
+            f"Nothing is judged of the {noun}: the evaluation stretch of {end - start:.4g} m is "
+            f"shorter than a span ({spans.min(initial=np.inf):.4g} m)."
+        )
+    return ""
 
 
 def _noun(name: str) -> str:

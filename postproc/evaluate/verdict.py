@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from catenary.postproc.evaluate.statistics import PantographStatistics, RunStatistics
 from catenary.postproc.standards.en50367 import (
@@ -153,10 +153,11 @@ def _of_pantograph(
         ),
         ("arcing NQ", p.arcing_percent, table.arcing_percent, "%", "<=", "arcing"),
     ]
-    return [
+    criteria = [
         _criterion(what + suffix, value, limit, unit, relation, table.clause[line])
         for what, value, limit, unit, relation, line in rows
     ]
+    return [replace(c, passed=None) for c in criteria] if p.unjudged else criteria
 
 
 def _criterion(

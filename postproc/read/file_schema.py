@@ -182,6 +182,15 @@ def _pantographs(value: Any) -> bool:
     )
 
 
+def _watched(value: Any) -> bool:
+    if not isinstance(value, dict):
+        return False
+    remarks = value.get("remarks", [])
+    numbers = {name: number for name, number in value.items() if name != "remarks"}
+    texts = isinstance(remarks, list) and all(isinstance(text, str) for text in remarks)
+    return texts and _table_of_numbers(numbers)
+
+
 ATTRIBUTES: dict[str, Attribute] = {
     "case": _text(),
     "title": _text(""),
@@ -220,6 +229,7 @@ ATTRIBUTES: dict[str, Attribute] = {
     "window": _text(""),
     "phase_wall_s": Attribute("a table of numbers", _table_of_numbers, True, {}),
     "inner_iterations": Attribute("a table of numbers", _table_of_numbers, True, {}),
+    "watched": Attribute("numbers of the march's watch, with sentences", _watched, True, {}),
 }
 
 # Letters: A arms, D droppers, G wire ends, N nodes, M masts, W contact wires, C their nodes, E

@@ -52,6 +52,19 @@ class Registration(NamedTuple):
         """Which arms their wires push, (n,) bool."""
         return self.tension < 0.0
 
+    def warnings(self) -> list[str]:
+        """A sentence if wires push steady arms, none if not."""
+        n = int(np.count_nonzero(self.pushed))
+        if not n:
+            return []
+        most = int(np.argmin(self.tension))
+        return [
+            f"At rest wires push {n} of {self.tension.size} steady arms, the one at "
+            f"{self.x[most]:.4g} m the most, with {-self.tension[most]:.0f} N. A steady arm has to "
+            "be pulled: one that is pushed softens its wire, and folds over when the wire is "
+            "lifted far enough for droppers near it to slacken."
+        ]
+
     @property
     def _towards_hinge(self) -> np.ndarray:
         return np.where(self.pushed, -1.0, 1.0)[:, None] * self.force

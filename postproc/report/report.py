@@ -19,7 +19,7 @@ from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate import verdict as acceptance
 from catenary.postproc.evaluate.comparing import decimals_that_tell
 from catenary.postproc.evaluate.error_indicators import Indicators, indicate
-from catenary.postproc.evaluate.remarks import remarks
+from catenary.postproc.evaluate.remarks import all_remarks
 from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.evaluate.verdict import Criterion
 from catenary.postproc.evaluate.wording import counted, fixed
@@ -243,7 +243,7 @@ def _html(
         lateral=_lateral_places(results),
         reference_span=results.reference_span + 1,
         elasticity=1e3 * results.static("elasticity"),
-        remarks=[*results.damage, *indicators.warnings, *remarks(results)],
+        remarks=[*results.damage, *all_remarks(results, indicators)],
         facts=_facts(results) + _mesh_facts(indicators),
         phases=about.get("phase_wall_s", {}),
         config=json.dumps(about["config"], indent=2, ensure_ascii=False),

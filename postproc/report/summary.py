@@ -14,6 +14,7 @@ import numpy as np
 from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate.error_indicators import Indicators, as_table, indicate
 from catenary.postproc.evaluate.lateral_places import as_table as as_lateral_table
+from catenary.postproc.evaluate.remarks import all_remarks
 from catenary.postproc.evaluate.statistics import PantographStatistics, RunStatistics
 from catenary.postproc.evaluate.verdict import Criterion, verdict
 from catenary.postproc.files.disk import plain
@@ -32,6 +33,7 @@ def summarise(
     ``indicators`` are those of the run, None to find them here.
     """
     attributes = results.attributes
+    indicators = indicate(results) if indicators is None else indicators
     start, end = results.evaluation
     summary = {
         "case": attributes["case"],
@@ -76,8 +78,10 @@ def summarise(
         "static": _static(results),
         "acceptance": [_criterion(c) for c in criteria],
         "passed": verdict(criteria) if results.complete else None,
-        "indicators": as_table(indicate(results) if indicators is None else indicators),
+        "indicators": as_table(indicators),
         "complaints": statistics.complaints + results.damage,
+        "remarks": all_remarks(results, indicators),
+        "watched": {k: v for k, v in attributes.get("watched", {}).items() if k != "remarks"},
         "effects_on": [name for name, _, _ in attributes["effects_on"]],
         "effects_off": [name for name, _, _ in attributes["effects_off"]],
         "effects": _effects(attributes),

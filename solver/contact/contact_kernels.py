@@ -103,6 +103,28 @@ class Gains(NamedTuple):
     reach: float
 
 
+class ContactWork(NamedTuple):
+    """Work of contact forces on the line, summed step by step.
+
+    With load vectors b of unit forces at the contacts, velocities v and weights p, q a step adds
+
+        h (p f_n b_n + q f_n+1 b_n+1) . (v_n + v_n+1) / 2,
+
+    the work of the discrete motion by average acceleration. ``total`` (1,) [J], of what this rank
+    owns of the wires; ``force`` (n,) [N] after the step before; ``local`` and ``value`` (n, 4) of
+    the contacts then; ``before`` (n,) their b_n . v_n, and ``ahead`` (n,) b_n+1 . v_n [m/s];
+    ``weights`` (3,) p, q and the step h [s].
+    """
+
+    total: np.ndarray
+    force: np.ndarray
+    local: np.ndarray
+    value: np.ndarray
+    before: np.ndarray
+    ahead: np.ndarray
+    weights: np.ndarray
+
+
 @inner
 def find_surface(place, surface, touch):
     """Height and slope of the running surface at a place, cubic between samples, zero beyond."""
@@ -366,3 +388,40 @@ def compensate(numbers, compensation, start, at, width, data, motion, gains):
         d, f = numbers[k], compensation[k]
         if f != 0.0:
             add_answer(-f, data[at[d] : at[d] + width[d]], start[d], motion, gains)
+
+
+@inner
+def velocity_of(local, value, motion):
+    """This rank's share of the velocity of a place on a wire [m/s]."""
+    total = 0.0
+    if motion[0].size:
+        for k in range(4):
+            total += value[k] * velocity_at(local[k], motion)
+    return total
+
+
+@in_line
+def begin_work(touches, motion, work):
+    """Keep the velocities at the coming step's contacts; ``motion`` is that before the step."""
+    for i in range(touches.size):
+        touch = touches[i]
+        work.ahead[i] = velocity_of(touch.local, touch.value, motion)
+
+
+@in_line
+def add_work(force, touches, motion, work):
+    """Add the work that contact forces have done in the step which has ended; see ``ContactWork``.
+
+    The wire's own velocity counts, without the convective part: the train pays for that part.
+    """
+    added = 0.0
+    for i in range(force.size):
+        touch = touches[i]
+        behind = velocity_of(work.local[i], work.value[i], motion)
+        now = velocity_of(touch.local, touch.value, motion)
+        added += work.weights[0] * work.force[i] * (work.before[i] + behind)
+        added += work.weights[1] * force[i] * (work.ahead[i] + now)
+        work.force[i], work.before[i] = force[i], now
+        for k in range(4):
+            work.local[i, k], work.value[i, k] = touch.local[k], touch.value[k]
+    work.total[0] += 0.5 * work.weights[2] * added

@@ -10,7 +10,7 @@ import numpy as np
 
 from catenary.solver.base.kernels.bound import bound
 from catenary.solver.contact import contact_kernels
-from catenary.solver.contact.contact_kernels import Answers, Gains
+from catenary.solver.contact.contact_kernels import Answers, ContactWork, Gains
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
 from catenary.solver.contact.crossing_kernels import no_sideways
 from catenary.solver.contact.followed_links import FollowedLinks, LinkCoupling
@@ -33,7 +33,8 @@ class ForcesOnLine:
     link_coupling : LinkCoupling, None if no link switches
     reach : how far from a force the line moves within a step [m]
     placing : arguments of ``contact_kernels.place``
-    superposing, compensating : of ``superpose`` and ``compensate`` after the forces
+    superposing, compensating, working : of ``superpose``, ``compensate`` and ``add_work`` after the
+        forces; ``working`` are those of ``begin_work``, too
     crossing : of ``wires_across.find_across``
 
     Parameters
@@ -44,6 +45,7 @@ class ForcesOnLine:
     train_speed : V of the convective part of the gap rate [m/s]
     uses_rate : whether the contact law needs the gap rate
     table : the links of the line that are followed
+    work : of the contact forces; sums go on from those that it holds
     across : (3, n) what ``find_across`` fills in, without columns if wires do not move sideways
     """
 
@@ -60,6 +62,7 @@ class ForcesOnLine:
         uses_rate: bool,
         table: LinkTable,
         across: np.ndarray,
+        work: ContactWork,
     ) -> None:
         self.line = line
         self.wires = wires
@@ -89,6 +92,9 @@ class ForcesOnLine:
         self.superposing = self._answers, self._touches, *motion
         self._superpose = bound(contact_kernels.superpose, self._force, *self.superposing)
         self.compensating = (*columns[:4], *motion)
+        self.working = self._touches, line.motion.read, work
+        self._begin_work = bound(contact_kernels.begin_work, *self.working)
+        self._add_work = bound(contact_kernels.add_work, self._force, *self.working)
         self._speed = float(train_speed)
         self._across: WiresAcross | None = None
         self.crossing: tuple[Any, ...]
@@ -100,12 +106,14 @@ class ForcesOnLine:
 
     def place(self) -> None:
         """Look where the contacts are now, and work out the line's answer to a unit force at
-        each."""
+        each. The line is still as it was before the step."""
         self._place()
+        self._begin_work()
 
     def locate(self) -> None:
         """Look where the contacts are now, for heights and loads only."""
         contact_kernels.locate(self._contact_place, self.wires.shapes, self._touches)
+        self._begin_work()
 
     def present(self) -> np.ndarray:
         """Whether the wire of each contact is on its strip, (n,) bool, where they were located."""
@@ -166,6 +174,12 @@ class ForcesOnLine:
         self._superpose()
         if links.size:
             contact_kernels.compensate(links, compensation, *self.compensating)
+        self._add_work()
+
+    def add_work(self, contact_force: np.ndarray) -> None:
+        """Add the work of contact forces (n,) [N] in a step whose end the line's state is."""
+        self._force[:] = contact_force
+        self._add_work()
 
     def loads(
         self, contact_force: np.ndarray, compensation: np.ndarray

@@ -13,6 +13,7 @@ from catenary.solver.effects.shipped import (  # noqa: F401  (registers)
     end_effects,
     lateral_effects,
     pantograph_effects,
+    stiff_link_effects,
     vertical_effects,
 )
 from catenary.solver.model.unknowns.registry import Group

@@ -156,7 +156,8 @@ class ModelBuilder:
         model = self.model
         assert model.droppers is not None
         unknowns, weights = (part[which] for part in model.droppers.direction)
-        lacking = (1.0 - model.simulated.kept_ratio) * model.dropper_damping[which]
+        kept = (model.dropper_damping - model.released_damping)[which]
+        lacking = (1.0 - model.simulated.kept_ratio) * kept
         damping = lacking[:, None, None] * weights[:, :, None] * weights[:, None, :]
         kind = np.arange(unknowns.shape[0])
         self.add_block(Block(component, unknowns, kind, None, None, damping))

@@ -189,8 +189,11 @@ class Model:
 
     @property
     def released_damping(self) -> np.ndarray:
-        damping = self.dropper_damping
-        return np.zeros_like(damping) if self.problem.slack_dampers_act else damping
+        if not self.problem.slack_dampers_act:
+            return self.dropper_damping
+        # Numerical damping goes with the spring, whatever the law of the droppers' own dampers.
+        added = [self.simulated.added_alpha.get(g.name, 0.0) for g in self.problem.line.droppers]
+        return np.array([*added, 0.0])[self.mesh.dropper_group] * self.dropper_stiffness
 
     def damping_of(self, component: str) -> tuple[float, float]:
         """Damping factors (alpha [s], beta [1/s]) of a component."""

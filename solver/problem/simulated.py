@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -34,6 +34,7 @@ class Simulated:
     target_heights : functions whose sum is the height at rest of wires with a profile above
         ``Profile.base`` [m]
     damping : of the line's components
+    added_alpha : by component the part of its alpha that is numerical damping [s]
     slackening : whether droppers slacken
     kept_ratio : share of its stiffness that a pushed dropper keeps; 1 if droppers do not slacken
     contact_loss : whether heads leave the wire; without it the contact force may pull
@@ -64,6 +65,7 @@ class Simulated:
     gravity: float = 0.0
     target_heights: tuple[TargetHeight, ...] = ()
     damping: Damping = Damping(0.0, 0.0)
+    added_alpha: Mapping[str, float] = field(default_factory=dict)
     slackening: bool = False
     kept_ratio: float = 1.0
     contact_loss: bool = False

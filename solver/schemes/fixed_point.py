@@ -60,6 +60,8 @@ class FixedPoint:
         line = self.interaction.line
         if self.comm.size > 1:
             stop = self.comm.allreduce(int(stop)) > 0
+        self.pantographs.move_to(time)
+        self.interaction.locate()
         line.predict()
         # Of this scheme's lines they are the arrays themselves.
         moved, sped = line.displacement, line.velocity
@@ -67,8 +69,6 @@ class FixedPoint:
         self._predicted[1] = sped
         line.load_at(time)
         line.internal_forces()
-        self.pantographs.move_to(time)
-        self.interaction.locate()
         self._nowhere = ~self.interaction.present()
         if self.pantographs.lateral:
             find_crossings(self.interaction, self.pantographs, time)
@@ -97,6 +97,7 @@ class FixedPoint:
         self.counters.steps += 1
         self.counters.solves = self.counters.rounds
         self._force = force
+        self.interaction.add_work(force)
         # All ranks hold the same forces, so that all remember the same impacts.
         self.law.accept(time, depth, rate, force)
         heads_below = self.pantographs

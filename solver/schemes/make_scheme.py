@@ -97,6 +97,7 @@ class SchemeFactory:
             uses_rate,
             switching_links(model, own.form.dropper_force),
             pantographs.across,
+            pantographs.work,
         )
         if problem.window.moves:
             self._open_window(problem, model, line, interaction, pantographs)

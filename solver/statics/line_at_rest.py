@@ -16,6 +16,7 @@ from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.elasticity import Elasticity, elasticity, middle_span
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form
+from catenary.solver.statics.stability_of_rest import refuse_unstable
 
 
 class LineAtRest(NamedTuple):
@@ -40,15 +41,28 @@ class LineAtRest(NamedTuple):
         return self.model.mesh
 
 
+def stable_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
+    """``find_form``, of a rest that is stable. Not collective.
+
+    Raises
+    ------
+    InputError
+        As ``find_form``, and if the rest is unstable.
+    """
+    model, form = find_form(problem, mesh)
+    refuse_unstable(model)
+    return model, form
+
+
 def line_at_rest(problem: Problem, mesh: LineMesh) -> LineAtRest:
     """The line of a problem at rest, found by this process. Not collective.
 
     Raises
     ------
     InputError
-        If there is no equilibrium with all droppers taut.
+        If there is no equilibrium with all droppers taut, or if it is unstable.
     """
-    model, form = find_form(problem, mesh)
+    model, form = stable_form(problem, mesh)
     give_back()
     return LineAtRest(model.problem, model, form, elasticity(model, *middle_span(problem.line)))
 

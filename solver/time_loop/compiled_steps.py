@@ -239,6 +239,7 @@ class CompiledSteps:
             law=self._law,
             superposing=interaction.superposing,
             compensating=interaction.compensating,
+            working=interaction.working,
             crossing=interaction.crossing,
             lateral_place=pantographs.lateral_place,
             switched=np.zeros(problem.unknowns.right.size, dtype=np.int64),

@@ -69,6 +69,7 @@ class Steps(NamedTuple):
     placing, responding : arguments of ``place`` and ``respond``
     problem : SmallProblem of a step's forces
     superposing, compensating : of ``superpose`` and ``compensate`` after the forces
+    working : of ``add_work`` after the forces
     crossing : arguments of ``wires_across.find_across``
     lateral_place : (n,) where wires that move sideways are on the strips [m]
     shown : of the line, see ``state_kernels.show``
@@ -97,6 +98,7 @@ class Steps(NamedTuple):
     law: ReportedForces
     superposing: tuple[Any, ...]
     compensating: tuple[Any, ...]
+    working: tuple[Any, ...]
     crossing: tuple[Any, ...]
     lateral_place: np.ndarray
     switched: np.ndarray
@@ -195,6 +197,7 @@ def take(
     law,
     superposing,
     compensating,
+    working,
     crossing,
     lateral_place,
     switched,
@@ -231,6 +234,7 @@ def take(
     records, heads = borrowed(records), borrowed(heads)
     problem, law, switched = borrowed(problem), borrowed(law), borrowed(switched)
     superposing, compensating = borrowed(superposing), borrowed(compensating)
+    working = borrowed(working)
     crossing, lateral_place = borrowed(crossing), borrowed(lateral_place)
     ends, of_step, outputs = borrowed(ends), borrowed(of_step), borrowed(outputs)
     shown, taps = borrowed(shown), borrowed(taps)
@@ -244,6 +248,7 @@ def take(
         time = times[i]
         move_contacts(*moving, speed * time)
         contact_kernels.place(*placing)
+        contact_kernels.begin_work(*working)
         if loading[0] != 0:
             clock[0] = time
             call_held(loading)
@@ -271,6 +276,7 @@ def take(
         if m:
             slack = solution[n : n + m]
             contact_kernels.compensate(switched[:m], slack, *compensating)
+        contact_kernels.add_work(force, *working)
         for h in range(records.size):
             head_records.move(records[h], force)
         output_kernels.write_outputs(force, law.reported, pressed, depth, ends, of_step)

@@ -362,6 +362,70 @@ FAULTS = (
         "regression/test_documents.py",
         "test_what_is_shown_is_what_happens",
     ),
+    # ---- runs that ran away -------------------------------------------------------------------
+    Fault(
+        "windy_viaduct in a storm of 65 m/s: the wire stands beside the strips at rest",
+        "done, exit code 0, standard deviation 409 N",
+        "refused with the stretch, exit code 2",
+        "regression/test_storm.py",
+        "test_a_wire_that_the_wind_holds_beside_the_strips_is_refused",
+    ),
+    Fault(
+        "the same at 80 m/s, whose steady arms are pushed with 4 kN and fold over",
+        "done, exit code 0: an uplift of 1.5e10 mm, an energy of -1.2e19 J",
+        "ends with exit code 1, time and place; pushed arms are named",
+        "regression/test_storm.py",
+        "test_arms_that_are_pushed_are_told_and_a_march_that_they_end_ends",
+    ),
+    Fault(
+        "a rest with arms that are pushed so far that it is unstable",
+        "was marched from",
+        "refused with arm, force and place",
+        "verification/test_stability_of_rest.py",
+        "test_a_rest_is_refused_where_its_stiffness_has_a_negative_eigenvalue",
+    ),
+    Fault(
+        "en50318_2002 without damping, droppers of 1e6 N/m at 3 ms",
+        "done with 724 kJ in the line and a standard deviation of 190 N",
+        "numerical damping of stiff droppers: no energy is made",
+        "verification/test_run_watch.py",
+        "test_stiff_droppers_make_no_energy_with_numerical_damping",
+    ),
+    Fault(
+        "the same with effects.stiff_link_damping=false",
+        "done",
+        "told, then ended with exit code 1 once the scheme has made more than the contacts",
+        "verification/test_run_watch.py",
+        "test_energy_from_nothing_is_told_and_ends_a_march",
+    ),
+    Fault(
+        "a contact force that is zero all the way",
+        "passed mean contact force: 0.00",
+        "not judged, with a sentence",
+        "unit/postproc/test_postproc_standards.py",
+        "test_nothing_of_a_pantograph_passes_by_statistics_that_judge_nothing",
+    ),
+    Fault(
+        "a pantograph that loses the wire for good",
+        "done without a word",
+        "told after a span, and at the end",
+        "verification/test_run_watch.py",
+        "test_a_contact_that_is_lost_for_good_is_told",
+    ),
+    Fault(
+        "what decides a result numerically (1e8 N/m contact, 1e9 N/m droppers)",
+        "stood in report.html alone",
+        "remarks in summary.json, terminal, sweep.csv, compare",
+        "regression/test_told_remarks.py",
+        "test_remarks_are_told_wherever_results_are",
+    ),
+    Fault(
+        "random scenes at the bounds of the schema",
+        "ran away without a word",
+        "end, tell, or are alike with a quarter of the step",
+        "regression/test_fuzz_stability.py",
+        "test_nothing_runs_away_without_a_word",
+    ),
 )
 
 

@@ -7,6 +7,8 @@ import numpy as np
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import End
+from catenary.postproc.read.registration import Registration
+from catenary.solver.model.rest.rest_shape import Equilibrium
 
 
 def installed(line: Line, mesh: LineMesh, height: np.ndarray) -> dict[str, np.ndarray]:
@@ -37,3 +39,11 @@ def installed(line: Line, mesh: LineMesh, height: np.ndarray) -> dict[str, np.nd
             lengths = [np.hypot(np.diff(mesh.x(own)), np.diff(height[own])).sum() for own in pieces]
             found[f"static/lengths/{wire.name}"] = np.array(lengths)
     return found
+
+
+def registration_of(mesh: LineMesh, form: Equilibrium) -> Registration | None:
+    """Steady arms at rest, None if wires do not move sideways, so that nothing pushes an arm."""
+    if form.lateral is None:
+        return None
+    x, nodes = mesh.x(mesh.steady_arms), mesh.steady_arms
+    return Registration(x, form.lateral.y[nodes], form.lateral.arm_force, form.lateral.arm_tension)

@@ -33,7 +33,7 @@ def rows(ended: Sequence[Ended]) -> list[dict[str, Any]]:
 
     Columns: ``variant``, the varied keys with values of their own types, ``outcome``,
     ``pantograph``, ``STATISTICS``, ``passed`` (the standard's verdict, None if not judged),
-    ``failed`` (the criteria that failed), ``wall_s``.
+    ``failed`` (the criteria that failed), ``remarks`` (what decides the results), ``wall_s``.
     """
     keys = varied_keys(ended)
     table = []
@@ -44,6 +44,7 @@ def rows(ended: Sequence[Ended]) -> list[dict[str, Any]]:
         tail: dict[str, Any] = {
             "passed": one.summary.get("passed"),
             "failed": failed_criteria(one.summary),
+            "remarks": one.summary.get("remarks", []),
             "wall_s": one.wall,
         }
         for pantograph in one.summary.get("pantographs", [{}]):
@@ -121,7 +122,16 @@ def as_text(ended: Sequence[Ended]) -> str:
             f"{_short(row['loss_percent'], 3):>10}{_short(row['max_uplift_mm']):>13}"
             f"{_short(row['n_slackened'], 0):>11}  {_verdict(row)}"
         )
-    return "\n".join(lines)
+    return "\n".join([*lines, *_remarks(ended)])
+
+
+def _remarks(ended: Sequence[Ended]) -> list[str]:
+    """Remarks on the variants, each once with those that it is of."""
+    of: dict[str, list[str]] = {}
+    for one in ended:
+        for text in one.summary.get("remarks", []):
+            of.setdefault(text, []).append(one.variant.name)
+    return [f"REMARK      {', '.join(names)}: {text}" for text, names in of.items()]
 
 
 def _verdict(row: Mapping[str, Any]) -> str:

@@ -20,6 +20,7 @@ from catenary.mbs.roll import roll_of
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.base.kernels.bound import bound
 from catenary.solver.base.parallel import on_root
+from catenary.solver.contact.contact_kernels import ContactWork
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
 from catenary.solver.contact.train import output_kernels
 from catenary.solver.contact.train.air_around import airflow
@@ -28,7 +29,7 @@ from catenary.solver.contact.train.output_kernels import Ends
 from catenary.solver.contact.train.place_kernels import move_contacts
 from catenary.solver.contact.train.raked_strips import leads_of
 from catenary.solver.problem.contact_laws import KinematicLaw
-from catenary.solver.problem.problem import Placement, Problem
+from catenary.solver.problem.problem import Numerics, Placement, Problem
 from catenary.solver.problem.simulated import Simulated
 from catenary.solver.statics.elasticity import Elasticity
 
@@ -71,6 +72,7 @@ class Pantographs:
         ``move_contacts``
     reach : how far contacts are behind and ahead of their pantographs at most [m], all ranks
     ends : Ends, contacts of each strip and strips of each pantograph
+    work : of the contact forces on this rank's part of the line
 
     Raises
     ------
@@ -131,6 +133,7 @@ class Pantographs:
         self.wire_height[:] = wires.rest_height(self._start)
         self.head_height[:] = self.wire_height - train.start_below
         self._heads = Heads(self.n_contacts)
+        self.work = _no_work(self.n_contacts, problem.numerics)
         self.across = np.zeros((3, self.n_contacts if simulated.lateral else 0))
         self.lateral_displacement = self.across[2]
         self.lateral_place = np.zeros(self.lateral_displacement.size)
@@ -373,3 +376,12 @@ def nominal_height_rule(
         return float(np.sum(np.diff(x) * (lifted[1:] + lifted[:-1]) / 2.0) / (x[-1] - x[0]))
 
     return height
+
+
+def _no_work(n_contacts: int, numerics: Numerics) -> ContactWork:
+    """Work of contact forces before the first step."""
+    gamma = numerics.gamma if numerics.integrator == "newmark" else 0.5
+    weights = np.array([1.0 - gamma, gamma, numerics.dt])
+    local, values = np.zeros((n_contacts, 4), dtype=np.int64), np.zeros((n_contacts, 4))
+    force, before, ahead = np.zeros((3, n_contacts))
+    return ContactWork(np.zeros(1), force, local, values, before, ahead, weights)

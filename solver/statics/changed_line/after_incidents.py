@@ -58,6 +58,7 @@ from catenary.solver.problem.incidents import DropperBreak, LineIncident
 from catenary.solver.statics.changed_line.potential import Potential
 from catenary.solver.statics.changed_line.rest_nearby import RestNearby
 from catenary.solver.statics.rest_loads import dead_loads
+from catenary.solver.statics.stability_of_rest import refuse_unstable
 
 
 @dataclass(frozen=True)
@@ -124,6 +125,7 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
     energy -= float((rest[carried] ** 2 / (2.0 * stiffness[carried])).sum())
     if effects.needs_form(problem):
         model, form, load = _about_rest(first, model, form)
+        _break_unstable(model)
     load[model.constrained] = 0.0
     unbalanced = np.flatnonzero(load)
     if unbalanced.size:
@@ -160,6 +162,13 @@ def _about_rest(
     there = ChangedLine(model, now, load, 0.0)
     push = _compensation(there, moved, np.zeros(moved.size), model.simulated.kept_ratio)
     return model, now, load - push
+
+
+def _break_unstable(model: Model) -> None:
+    try:
+        refuse_unstable(model)
+    except InputError as error:
+        raise RunBroken(f"after an incident {error}") from None
 
 
 def dropper_at(model: Model, x: float) -> int:

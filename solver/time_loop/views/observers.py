@@ -103,6 +103,8 @@ class StepView:
         names; not collective
     energies : () -> the values of ``channels.ENERGIES`` but the time, kinetic and elastic energy of
         the line relative to equilibrium first [J]; collective
+    contact_work : () -> work of the contact forces on this rank's part of the line since the march
+        was made [J]; not collective
     state : () -> arrays by name on rank 0 with which to continue, None elsewhere, each of which is
         made when it is read, before the next step; collective
     """
@@ -118,6 +120,7 @@ class StepView:
     line_state: Callable[[], Mapping[str, np.ndarray]]
     energies: Callable[[], tuple[float, ...]]
     state: Callable[[], Mapping[str, Any] | None]
+    contact_work: Callable[[], float] = lambda: 0.0
 
     def checkpoint(self) -> dict[str, Any] | None:
         """The same, to be kept. Collective."""

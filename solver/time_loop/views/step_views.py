@@ -119,6 +119,7 @@ class Showing:
             pantograph_places=self._pantograph_places,
             line_state=self._line_state,
             energies=self._energies,
+            contact_work=self._contact_work,
             state=self._state,
         )
 
@@ -283,6 +284,10 @@ class Showing:
         if not self._energies_follow_motion:
             self._shown[:] = self._view.row[: self._shown.size]
         return energies_of(Energies(*self._line_energies(), self._sources))
+
+    def _contact_work(self) -> float:
+        self._refuse_kept_motion()
+        return float(self._pantographs.work.total[0])
 
     def _line_energies(self) -> tuple[float, float]:
         """Kinetic and elastic energy relative to the first rest, slack droppers as they are [J].

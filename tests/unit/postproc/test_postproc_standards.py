@@ -140,3 +140,13 @@ def test_what_has_no_value_is_not_judged() -> None:
 def test_unknown_system_or_edition_is_an_input_error(system: str, edition: str) -> None:
     with pytest.raises(InputError, match="choose one of"):
         judge(run(GOOD), SPEED, WAVE, system, edition)
+
+
+def test_nothing_of_a_pantograph_passes_by_statistics_that_judge_nothing() -> None:
+    """A force that is zero all the way is below every limit; the line is judged all the same."""
+    silent = replace(GOOD, mean=0.0, std=0.0, maximum=0.0, unjudged="zero all the way")
+    criteria = judge(run(silent), SPEED, WAVE, "ac", "2006")
+    own = [c for c in criteria if c.clause not in ("", None) and "uplift" not in c.criterion]
+    assert [c.passed for c in own if "speed" not in c.criterion] == [None] * (len(own) - 1)
+    assert verdict(criteria) is None
+    assert run(silent).complaints == ["zero all the way"]

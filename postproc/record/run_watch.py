@@ -1,0 +1,298 @@
+"""Watches a march: its energy, how far it leaves linear theory, and contacts that are lost.
+
+*Energy.* Average acceleration keeps the energy of a linear line exactly and damping only takes, so
+that the energy of the line may grow by the work of the contact forces and no more:
+
+    E(t) - E(0) <= W(t).
+
+Whatever lies above is made by the time integration, in steps in which one-sided links switch. It is
+a lower bound, since damping has taken a part. Lines under gusts or other loads in time are not
+judged by it: these do work as well. Nor are lines with incidents, whose energy jumps.
+
+*Motion.* The line is linear about its rest. The force of a wire across the track of its rest is
+T sin(phi) in place of T phi: at 0.1 rad wrong by 0.2 %, at 1 rad by 16 %, and the tension, taken as
+constant, by 0.5 and 46 %. A steady arm turns by its lift over its length: at 30 degrees its force
+is off by some 15 %, and its end cannot be lifted by more than its length.
+
+*Contact.* A pantograph that is raised and does not touch the wire for as long as the train takes
+for a span is told.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from catenary.solver.base.errors import RunBroken
+from catenary.solver.model.loads import MemoryLoad
+from catenary.solver.statics.line_at_rest import LineAtRest
+from catenary.solver.time_loop.views.observers import Stage, StepView
+
+logger = logging.getLogger("catenary.watch")
+
+# Energy made by the scheme is told above this share of the work of the contacts.
+TOLD_SHARE = 0.05
+# Rotation of a wire from rest [rad], and lift of a steady arm over its length [-]: what is told and
+# what ends a march.
+TOLD_ROTATION, MOST_ROTATION = 0.1, 1.0
+TOLD_ARM, MOST_ARM = 0.5, 1.0
+_ROTATIONS = ("theta_y", "theta_z")
+# Time between two looks at energy and motion [s]: what runs away grows tenfold in it at most.
+_LOOKS = 0.25
+
+
+def watch_cadence(dt: float) -> int:
+    """Steps of ``dt`` [s] between two looks at energy and motion."""
+    return max(1, round(_LOOKS / dt))
+
+
+@dataclass(frozen=True)
+class Watched:
+    """The data of a run that its watch needs.
+
+    Attributes
+    ----------
+    static_energy : energy of the line at rest under the pantographs' static forces [J]; energies
+        below a share of it are not judged
+    counts_energy : whether the line's energy can grow by the work of contacts alone, and that work
+        is summed
+    arm_length : (n_arms,) lengths of steady arms [m], infinite where arms have none
+    raised : (n_pantographs,) time from which on each is raised [s], infinite if it is lowered
+    span : how far a train may run without contact before it is told [m]
+    speed : of the train [m/s]
+    """
+
+    static_energy: float
+    counts_energy: bool
+    arm_length: np.ndarray
+    raised: np.ndarray
+    span: float
+    speed: float
+
+
+def watched(at_rest: LineAtRest, has_train: bool = True) -> Watched:
+    """What the watch of a run on a line at rest needs; without a train contacts are none. Not
+    collective."""
+    problem, model = at_rest.problem, at_rest.model
+    numerics, train = problem.numerics, problem.train
+    lengths = np.array([*(arms.kind.length for arms in problem.line.steady_arms), 0.0])
+    lengths[lengths == 0.0] = np.inf
+    static = sum(place.static_force**2 for place in train.placements)
+    outer = any(not isinstance(load, MemoryLoad) for load in model.loads)
+    steady = not outer and not model.simulated.incidents
+    summed = numerics.scheme != "ts_alpha2" and numerics.adaptive_tolerance is None
+    return Watched(
+        static_energy=0.5 * static * float(np.max(at_rest.lift.lift, initial=0.0)),
+        counts_energy=steady and summed,
+        arm_length=lengths[model.mesh.arm_group],
+        raised=np.array(
+            [
+                train.raise_time if has_train and place.lowering is None else np.inf
+                for place in train.placements
+            ]
+        ),
+        span=float(np.diff(problem.line.support_positions).max()),
+        speed=train.speed,
+    )
+
+
+class RunWatch:
+    """Observer that judges a march while it goes on. Collective.
+
+    Each fault is told once, when it is seen; ``facts`` has them at the end.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+    run : data of the run
+    every : steps between two looks at energy and motion
+
+    Attributes
+    ----------
+    remarks : sentences on what was wrong, on rank 0
+    """
+
+    def __init__(self, comm: Any, run: Watched, every: int) -> None:
+        self._comm, self._run, self._every = comm, run, every
+        self.remarks: list[str] = []
+        self._told: set[str] = set()
+        self._columns: dict[str, slice] = {}
+        self._start: tuple[float, float] | None = None
+        self._energy = self._most_energy = self._work = self._most_work = self._made = 0.0
+        self._rotation = self._turned = 0.0
+
+    def start(self, stage: Stage) -> None:
+        """Begin to watch a march."""
+        self._dt, self._n_steps = stage.dt, stage.n_steps
+        self._x = stage.node_points[stage.owned_nodes, 0]
+        self._rotations = [name for name in _ROTATIONS if name in stage.unknowns]
+        self._arm_length = self._run.arm_length[stage.owned_arms]
+        self._arm_x = stage.arm_x[stage.owned_arms]
+        self._lost_since = np.full(stage.n_pantographs, np.nan)
+        self._lost_at = np.zeros(stage.n_pantographs)
+
+    def next_state(self, step: int) -> int:
+        """The step of the next look; rows of others will do."""
+        return step - step % self._every + self._every if self._columns else step + 1
+
+    def observe(self, view: StepView) -> None:
+        """Look at a step.
+
+        Raises
+        ------
+        RunBroken
+            On all ranks, where the march has left what its model bears.
+        """
+        self._columns = view.columns
+        self._check_contact(np.array([view.time]), view.row[None])
+        if view.step % self._every == 0 or view.step == self._n_steps or self._start is None:
+            self._look(view)
+
+    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
+        """Look at steps of which only rows are left."""
+        self._check_contact(times, rows)
+
+    def finish(self, outcome: str) -> None:
+        """Tell of contacts that are lost to the end."""
+        for p in np.flatnonzero(np.isfinite(self._lost_since)):
+            if f"lost {p}" in self._told:
+                self._say(
+                    f"lost for good {p}",
+                    f"Pantograph {p + 1} touches no wire from {self._lost_since[p]:.4g} s, "
+                    f"{self._lost_at[p]:.4g} m on to the end of the run.",
+                )
+
+    def facts(self) -> dict[str, Any]:
+        """Numbers and sentences for the result file."""
+        if self._start is None:
+            return {}
+        facts: dict[str, Any] = {
+            "remarks": self.remarks,
+            "largest_rotation_rad": self._rotation,
+            "largest_arm_turn": self._turned,
+            "line_energy_J": self._energy,
+            "most_line_energy_J": self._most_energy,
+        }
+        if self._run.counts_energy:
+            facts |= {"contact_work_J": self._work, "energy_made_J": self._made}
+        return facts
+
+    def _look(self, view: StepView) -> None:
+        energy = float(sum(view.energies()[:2]))
+        work = float(self._comm.allreduce(view.contact_work()))
+        if self._start is None:
+            self._start = energy, work
+        self._energy, self._work = energy - self._start[0], work - self._start[1]
+        self._most_energy = max(self._most_energy, self._energy)
+        self._check_motion(view)
+        if self._run.counts_energy:
+            self._check_energy(view)
+
+    def _check_energy(self, view: StepView) -> None:
+        self._most_work = max(self._most_work, abs(self._work))
+        given = self._most_work + self._run.static_energy
+        made = self._energy - self._work
+        self._made = max(self._made, made)
+        if not made <= TOLD_SHARE * given:
+            self._say(
+                "energy",
+                f"The time integration makes energy: at {self._where(view)} the line has "
+                f"{self._energy:.3g} J, {made:.3g} J more than the contact forces have given it "
+                f"({self._work:.3g} J). Take a smaller numerics.dt_s, damping of the droppers, or "
+                'numerics.integrator = "generalized_alpha" with a spectral_radius below 1.',
+            )
+        if not made <= given:
+            raise RunBroken(
+                f"at {self._where(view)} the time integration has made more energy ({made:.3g} J) "
+                f"than the contact forces have given the line ({self._work:.3g} J): results are of "
+                "no use from here on; take a smaller numerics.dt_s, or damp the droppers"
+            )
+
+    def _check_motion(self, view: StepView) -> None:
+        rotation, x = self._largest(
+            np.max([np.abs(view.node_motion(name, False)) for name in self._rotations], axis=0),
+            self._x,
+        )
+        self._rotation = max(self._rotation, rotation)
+        self._judge(
+            view,
+            "rotation",
+            (rotation, TOLD_ROTATION, MOST_ROTATION),
+            f"a wire has turned by {rotation:.3g} rad from rest at {x:.4g} m",
+            "the linear model of a wire",
+        )
+        turned, x = self._largest(np.abs(view.arm_uplift) / self._arm_length, self._arm_x)
+        self._turned = max(self._turned, turned)
+        self._judge(
+            view,
+            "arm",
+            (turned, TOLD_ARM, MOST_ARM),
+            f"the steady arm at {x:.4g} m is lifted by {turned:.3g} of its length",
+            "the linear model of an arm",
+        )
+
+    def _judge(
+        self,
+        view: StepView,
+        key: str,
+        value: tuple[float, float, float],
+        what: str,
+        model: str,
+    ) -> None:
+        found, told, most = value
+        if not found <= told:
+            self._say(key, f"At {self._where(view)} {what}; {model} holds up to {told:g}.")
+        if not found <= most:
+            raise RunBroken(
+                f"at {self._where(view)} {what}, and {model} ends at {most:g}: look for steady "
+                "arms that are pushed at rest, too long a numerics.dt_s, or loads beyond any line's"
+            )
+
+    def _largest(self, values: np.ndarray, x: np.ndarray) -> tuple[float, float]:
+        """The largest of the values on all ranks, and its place [m]. Collective."""
+        here = (0.0, 0.0)
+        if values.size:
+            at = int(np.argmax(values))
+            here = float(values[at]), float(x[at])
+        if self._comm.size == 1:
+            return here
+        return max(self._comm.allgather(here))
+
+    def _check_contact(self, times: np.ndarray, rows: np.ndarray) -> None:
+        forces = rows[:, self._columns["contact_force"]]
+        if not forces.shape[1]:
+            return  # on another rank
+        places = rows[:, self._columns["contact_position"]]
+        for p, raised in enumerate(self._run.raised):
+            touching = np.flatnonzero((forces[:, p] != 0.0) | (times < raised))
+            first = 0
+            if touching.size:
+                self._lost_since[p] = np.nan
+                first = int(touching[-1]) + 1
+                if first == times.size:
+                    continue
+            if np.isnan(self._lost_since[p]):
+                self._lost_since[p], self._lost_at[p] = times[first], places[first, p]
+            if places[-1, p] - self._lost_at[p] > self._run.span:
+                self._say(
+                    f"lost {p}",
+                    f"Pantograph {p + 1} has not touched a wire for more than a span, from "
+                    f"{self._lost_since[p]:.4g} s, {self._lost_at[p]:.4g} m on.",
+                )
+
+    def _where(self, view: StepView) -> str:
+        position = self._comm.bcast(
+            float(view.contact_position[0]) if view.contact_position.size else 0.0
+        )
+        return f"{view.time:.4g} s, train at {position:.4g} m,"
+
+    def _say(self, key: str, sentence: str) -> None:
+        """Tell a sentence once."""
+        if key not in self._told:
+            self._told.add(key)
+            self.remarks.append(sentence)
+            if self._comm.rank == 0:
+                logger.warning(sentence)

@@ -1,0 +1,81 @@
+"""Numerical damping of one-sided links that are stiff for the time step.
+
+Average acceleration reflects the force of a spring with omega dt >> 1 from step to step (its
+amplification factor goes to -1) and does the work (T_n + T_n+1) / 2 times the stretch of a step. A
+link that slackens from a stretch a to a gap b thereby returns k a (a + b) / 2, though only
+k a^2 / 2 was stored, and a stiff link switches in every other step: the line gains energy. A damper
+alpha k in the link with alpha = dt / 2 makes the amplification factor zero and the work of a
+slackening link at most what it stored (docs/theory.md, section 6).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from catenary.solver.effects.effect import Effect, register
+from catenary.solver.effects.shipped import hardware_effects  # noqa: F401  (built before)
+from catenary.solver.problem.problem import Damping, Problem
+from catenary.solver.problem.simulated import Simulated
+from catenary.solver.problem.watched_links import UPLIFT_STOPS
+
+NAME = "stiff_link_damping"
+# A link is stiff from k dt^2 = 4 kappa m on, with some 0.25 kg of wire that move with its ends
+# within a step: kappa = 0.2. Undamped lines gained energy at 0.25, over 4 km (docs/hard_cases.md).
+STIFF = 0.22  # k dt^2 [N s2/m]
+# Length of droppers whose stiffness is given by EA and which are not cut yet, a short one [m].
+_SHORT = 0.3
+
+
+def _one_sided(problem: Problem) -> Iterator[tuple[str, float]]:
+    """Components whose links act one way, and the largest stiffness of each [N/m]."""
+    line = problem.line
+    if "dropper_slackening" in problem.effects:
+        for group in line.droppers:
+            kind = group.kind
+            if kind.stiffness is not None:
+                yield group.name, kind.stiffness
+            elif kind.axial_stiffness is not None:
+                yield group.name, kind.axial_stiffness / _SHORT
+    if "uplift_stops" in problem.effects:
+        kinds = [arms.kind for arms in line.steady_arms if arms.kind.uplift_stop is not None]
+        if kinds:
+            yield UPLIFT_STOPS, max(kind.stop_stiffness for kind in kinds)
+
+
+def _given(problem: Problem) -> Damping:
+    return problem.damping if "structural_damping" in problem.effects else Damping(0.0, 0.0)
+
+
+def _added(problem: Problem) -> dict[str, float]:
+    """By component the alpha [s] that its links lack to have dt / 2."""
+    given, dt = _given(problem), problem.numerics.dt
+    found = {}
+    for name, stiffness in _one_sided(problem):
+        alpha, _ = given.per_component.get(name, (given.alpha, given.beta))
+        if stiffness * dt**2 > STIFF and alpha < 0.5 * dt:
+            found[name] = 0.5 * dt - alpha
+    return found
+
+
+def _damped(laws: Simulated, problem: Problem) -> Simulated:
+    own, added = laws.damping, _added(problem)
+    pairs = dict(own.per_component)
+    for name, more in added.items():
+        alpha, beta = pairs.get(name, (own.alpha, own.beta))
+        pairs[name] = alpha + more, beta
+    return replace(laws, damping=replace(own, per_component=pairs), added_alpha=added)
+
+
+register(
+    Effect(
+        NAME,
+        "numerical damping of droppers and stops that are stiff for the time step",
+        "a damper alpha k in each link that acts one way, with alpha = dt / 2",
+        "amplification factor of average acceleration for omega dt >> 1; docs/theory.md section 6",
+        default=True,
+        applies=lambda p: bool(_added(p)),
+        law=_damped,
+        data="droppers that slacken, or stops, with k dt^2 above 0.22 N s2/m and less damping",
+    )
+)

@@ -1,0 +1,92 @@
+"""A hunt for runs that run away without a word: random scenes at the bounds of the schema.
+
+Each is run with its step and with a quarter of it. Where the line gets many times the energy, or
+turns many times as far, in the longer steps, the run must have been ended or have told what decides
+its results. FUZZ_SEED and FUZZ_CASES choose the seeds; a failure names its own.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from fuzzing_stability import extreme_scene
+from mpi4py import MPI
+
+from catenary.cases.run.runner import run_case
+from catenary.cases.scene.load import load_scene
+from catenary.solver.base.errors import InputError, RunBroken
+
+pytestmark = pytest.mark.study
+
+FIRST = int(os.environ.get("FUZZ_SEED", "1"))
+CASES = int(os.environ.get("FUZZ_CASES", "40"))
+BLOCK = 20
+BLOCKS = [
+    range(first, min(first + BLOCK, FIRST + CASES)) for first in range(FIRST, FIRST + CASES, BLOCK)
+]
+# Steps of four times the length differ by some ten per cent where they resolve what happens, and by
+# a factor where contacts hop by chance; a march that runs away gains decades.
+WILDLY = 10.0
+# Energies and rotations below these are no motion to speak of [J], [rad].
+LITTLE_ENERGY, LITTLE_ROTATION = 10.0, 0.02
+
+
+class Seen(NamedTuple):
+    """How a run ended, its remarks, and the largest energy [J] and rotation [rad] of the line."""
+
+    outcome: str
+    remarks: list[str]
+    energy: float
+    rotation: float
+
+
+def seen(scene: Any, folder: Path) -> Seen:
+    ended = run_case(scene, folder, MPI.COMM_SELF, force=True, only_summary=True)
+    watched = ended.summary.get("watched", {})
+    return Seen(
+        ended.outcome,
+        ended.summary.get("remarks", []),
+        watched.get("most_line_energy_J", 0.0),
+        watched.get("largest_rotation_rad", 0.0),
+    )
+
+
+def judged(seed: int, folder: Path) -> str:
+    """How a scene ended; AssertionError if it ran away without a word."""
+    made = extreme_scene(seed)
+    dt = float(dict(word.split("=", 1) for word in made.assignments)["numerics.dt_s"])
+    few = ("output.field_every_s=0", "output.energy_every_s=0")
+    try:
+        whole = load_scene(made.base, [*made.assignments, *few])
+        fine = load_scene(made.base, [*made.assignments, *few, f"numerics.dt_s={dt / 4!r}"])
+        one = seen(whole, folder / "whole")
+    except (InputError, RunBroken) as error:
+        assert "\n" not in str(error)
+        return "refused"
+    if one.outcome != "done":
+        return "ended"
+    if one.remarks:
+        return "told"
+    four = seen(fine, folder / "fine")
+    if four.outcome != "done":
+        return "ended with a quarter of the step"
+    assert one.energy <= WILDLY * max(four.energy, LITTLE_ENERGY), (one, four)
+    assert one.rotation <= WILDLY * max(four.rotation, LITTLE_ROTATION), (one, four)
+    return "alike"
+
+
+@pytest.mark.parametrize("seeds", BLOCKS, ids=str)
+def test_nothing_runs_away_without_a_word(seeds: range, tmp_path: Path) -> None:
+    ends: dict[str, int] = {}
+    for seed in seeds:
+        try:
+            how = judged(seed, tmp_path)
+        except (Exception, AssertionError) as error:
+            replay = f"FUZZ_SEED={seed} FUZZ_CASES=1 replays it"
+            raise AssertionError(replay) from error
+        ends[how] = ends.get(how, 0) + 1
+    print(ends)
+    assert sum(ends.values()) > ends.get("refused", 0)
