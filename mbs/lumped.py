@@ -32,6 +32,10 @@ from catenary.mbs.lumped_data import LumpedData, chain_matrix
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.base.kernels.bound import bound
 
+# Half of the time over which the speed of a base that rises is found [s]: a half cosine of 0.1 s is
+# off by (pi 1e-5 / 0.1)^2 / 6, round-off by 1e-11.
+_MOMENT = 1e-5
+
 
 class LumpedPantograph(SteppedHead):
     """A lumped-mass pantograph advanced by Newmark's method, implicit in its contact force.
@@ -39,7 +43,9 @@ class LumpedPantograph(SteppedHead):
     Coordinates are the masses' heights with the springs relaxed when all are equal, and angles of
     a head that turns; see `strips`. Weights are balanced by the lifting mechanism, whose net lift
     on the last mass is ``static_force`` at the nominal head height, raised smoothly from zero over
-    ``raise_time``.
+    ``raise_time``. Of a chain that its base spring holds at a height the base rises in the same
+    way, from where the chain stands with its springs relaxed: pressed against a base that stands
+    already, its masses would start with the force of that spring, and few chains damp what follows.
 
     Parameters
     ----------
@@ -89,6 +95,8 @@ class LumpedPantograph(SteppedHead):
         compression = sum(pressing / k for k in data.stiffnesses[:-1])
         compression += data.strips.compression(pressing)
         self._base_height = nominal_height + compression
+        # A base that rises with the lift starts from where the chain was placed.
+        self._tied, self._started_at = data.tied, self._base_height
         carried = np.zeros(n)
         carried[self._carrier] = 1.0
         self._chain = Chain(self._masses, self._stiffness, self._damping, self._push, carried)
@@ -129,6 +137,12 @@ class LumpedPantograph(SteppedHead):
         """Net lift on the last mass at ``time`` [N]: a half cosine up to the static force."""
         return self._lift_full * self._part(time)
 
+    def place(self, head_height: float, velocity: float = 0.0) -> None:
+        """Put the pantograph without contact to where its head is at this height [m]; see
+        `SteppedHead`. A base that rises starts there."""
+        self._started_at = head_height
+        super().place(head_height, velocity)
+
     def follow(self, part: Callable[[float], float]) -> None:
         """Let the part ``part(time)`` of the lift act."""
         self._part = part
@@ -156,6 +170,11 @@ class LumpedPantograph(SteppedHead):
             drives[:, FORCE] = self._lift_full * parts_of(self._part, times) + constant
         else:
             drives[:, FORCE] = [self._drive(time) for time in times]
+        if self._tied and self._base is None:
+            place, velocity = self._rise(np.asarray(times))
+            drives[:, FORCE] += self._base_stiffness * place + self._base_damping * velocity
+            if self._laws.laws:
+                drives[:, BASE], drives[:, BASE_VELOCITY] = place, velocity
         drives[:, HEAD_FORCE] = 0.0
         if self._air is not None:
             forces = self._air.at(times)
@@ -194,19 +213,33 @@ class LumpedPantograph(SteppedHead):
             rest.append(rest[-1] + static_force / stiffness)
         return in_place(data.laws, numbers, self._n, rest)
 
+    def _rise(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How far and how fast a base that rises with the lift is above where it stands under all
+        of it, at times (t,) [m], [m/s]."""
+        way = self._started_at - self._base_height
+        before, now, after = (
+            parts_of(self._part, np.maximum(times + shift, 0.0).tolist())
+            for shift in (-_MOMENT, 0.0, _MOMENT)
+        )
+        return way * (1.0 - now), way * (before - after) / (2.0 * _MOMENT)
+
     def _base_motion(self, time: float) -> tuple[float, float]:
-        """How far and how fast the vehicle has lifted the base [m], [m/s]."""
-        if self._base is None:
-            return 0.0, 0.0
-        moved = self._base.vertical(time)
-        return float(moved.place), float(moved.velocity)
+        """How far and how fast vehicle and raising have lifted the base [m], [m/s]."""
+        place = velocity = 0.0
+        if self._base is not None:
+            moved = self._base.vertical(time)
+            place, velocity = float(moved.place), float(moved.velocity)
+        if self._tied:
+            (rise,), (rate,) = self._rise(np.array([time]))
+            place, velocity = place + float(rise), velocity + float(rate)
+        return place, velocity
 
     def _drive(self, time: float) -> float:
         """Force on the last mass that its own motion has no part in, but the air's [N]."""
         force = self.lift(time) + self._base_stiffness * self._base_height
-        if self._base is not None:
-            base = self._base.vertical(time)
-            force += self._base_stiffness * base.place + self._base_damping * base.velocity
+        if self._tied or self._base is not None:
+            place, velocity = self._base_motion(time)
+            force += self._base_stiffness * place + self._base_damping * velocity
         return force
 
     def _acceleration(self, time: float) -> np.ndarray:

@@ -10,6 +10,10 @@ from catenary.mbs.air.uplift import Uplift
 from catenary.mbs.head.laws import Law
 from catenary.mbs.head.strips import ONE_STRIP, HeadParts, Strips, Turning, head_parts
 
+# Force of the base spring over the static force that compresses the springs above it, with the head
+# held and the base where it stands when raised: above this the base rises with the lift [-].
+_TIED = 0.1
+
 
 @dataclass(frozen=True)
 class LumpedData:
@@ -42,6 +46,22 @@ class LumpedData:
     def strip_offsets(self) -> tuple[float, ...]:
         """Places of the strips ahead of the pantograph's own place [m]."""
         return self.strips.offsets
+
+    @property
+    def compliance(self) -> float:
+        """Of the springs between head and last mass, the strips' included [m/N]."""
+        return sum(1.0 / k for k in self.stiffnesses[:-1]) + self.strips.compression(1.0)
+
+    @property
+    def tied(self) -> bool:
+        """Whether its base spring holds it at a height: it is then raised with its base."""
+        return self.stiffnesses[-1] * self.compliance > _TIED
+
+    @property
+    def height_stiffness(self) -> float:
+        """By how much its force falls as its head rises [N/m]."""
+        base = self.stiffnesses[-1]
+        return base / (1.0 + base * self.compliance)
 
     def chain(self, values: tuple[float, ...]) -> np.ndarray:
         """Matrix of springs (or dampers) between neighbours, the last to ground, shape (n, n)."""

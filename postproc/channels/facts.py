@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from catenary.meshgen.slowest_wave import slowest_wave
 from catenary.meshgen.wires import Role, Wire
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.problem.contact_laws import ContactLaw, HertzLaw, LinearLaw
@@ -213,9 +214,9 @@ FACTS: dict[str, Fact] = {
     ),
     "wave_speed": Fact(
         "m/s",
-        "speed of transverse waves on the contact wire as a string, at the start; of several the "
-        "smallest",
-        lambda source: min(wire.wave_speed for wire in _contacts(source)),
+        "speed of the contact wire's slowest wave at the start, that of a string unless supports "
+        "and bending stiffness carry it; of several the smallest",
+        lambda source: slowest_wave(source.problem.line),
         low=_POSITIVE,
         high=1e6,
         earlier="wave_speed_m_per_s",

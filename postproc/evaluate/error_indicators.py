@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import linalg, optimize, signal
 
+from catenary.meshgen.slowest_wave import bends
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.facts import FACTS, WIRE
 from catenary.postproc.evaluate import filters
@@ -205,6 +206,37 @@ def required_frequency(felt: float, speed: float, alpha: float) -> float:
     return float(omega * abs(slowness(omega)) / (2.0 * np.pi))
 
 
+def required_by_bending(
+    felt: float, speed: float, tension: float, bending_stiffness: float, mass_per_length: float
+) -> float:
+    """Frequency of the wave that runs ahead of the train on a wire whose bending carries it [Hz].
+
+    A pantograph that moves with v and feels w_0 excites w = w_0 + v k, ahead of itself with
+    w^2 = (F k^2 + EI k^4) / m: there is such a wave at every speed. Damping, which lets what dies
+    out be longer, is left out.
+
+    Parameters
+    ----------
+    felt : highest frequency that is felt at the pantograph [Hz]
+    speed : of the train [m/s]
+    tension, bending_stiffness, mass_per_length : of the wire [N], [N m2], [kg/m]
+    """
+    own = 2.0 * np.pi * felt
+    roots = np.roots(
+        [
+            bending_stiffness / mass_per_length,
+            0.0,
+            tension / mass_per_length - speed**2,
+            -2.0 * own * speed,
+            -(own**2),
+        ]
+    )
+    ahead = roots.real[(np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0.0)]
+    if not ahead.size:  # a damaged file without bending
+        return float("inf")
+    return float((own + speed * ahead.max()) / (2.0 * np.pi))
+
+
 def resolved_frequency(
     length: float, tension: float, bending_stiffness: float, mass_per_length: float
 ) -> float:
@@ -277,16 +309,21 @@ def _contact_wire(results: Results, of_wire: Mapping[str, float]) -> _ContactWir
     alpha, tension = of_wire["contact_wire_stiffness_damping"], of_wire["contact_wire_tension"]
     mass = of_wire["contact_wire_mass"]
     weights = fact("mass_weight"), fact("force_weight")
+    stiffness = of_wire["contact_wire_bending_stiffness"]
+    if bends(fact("wave_speed"), tension, mass):
+        required = required_by_bending(filters.CUT_OFF, fact("speed"), tension, stiffness, mass)
+    else:
+        required = required_frequency(
+            filters.CUT_OFF, fact("speed") / np.sqrt(tension / mass), alpha
+        )
     return _ContactWire(
         Method(
             alpha,
             of_wire["contact_wire_mass_damping"],
             Integration(fact("newmark_beta"), fact("newmark_gamma"), *weights),
         ),
-        resolved_frequency(
-            of_wire["longest_element"], tension, of_wire["contact_wire_bending_stiffness"], mass
-        ),
-        required_frequency(filters.CUT_OFF, fact("speed") / np.sqrt(tension / mass), alpha),
+        resolved_frequency(of_wire["longest_element"], tension, stiffness, mass),
+        required,
     )
 
 

@@ -41,7 +41,12 @@ class Criterion:
 
 
 def judge(
-    statistics: RunStatistics, speed: float, wave_speed: float, system: str, edition: str
+    statistics: RunStatistics,
+    speed: float,
+    wave_speed: float,
+    system: str,
+    edition: str,
+    by_bending: bool = False,
 ) -> list[Criterion]:
     """Every line of an edition's table, judged: those of each pantograph, then those of the line.
 
@@ -49,9 +54,10 @@ def judge(
     ----------
     statistics : of the run
     speed : of the train [m/s]
-    wave_speed : of transverse waves on the contact wire [m/s]
+    wave_speed : of the slowest wave of the contact wire [m/s]
     system : key of ``SYSTEMS``
     edition : key of ``EDITIONS``
+    by_bending : whether that wave is one of a conductor rail, for which EN 50119 states no rule
 
     Raises
     ------
@@ -95,7 +101,7 @@ def judge(
             KMH * table.speed_ratio * wave_speed,
             "km/h",
             "<=",
-            table.clause["speed"],
+            table.clause["speed_by_bending" if by_bending else "speed"],
         )
     )
     return judged

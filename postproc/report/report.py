@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from catenary.meshgen.slowest_wave import bends
 from catenary.postproc.channels.line_record import says
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate import verdict as acceptance
@@ -130,13 +131,16 @@ def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
 
 def judge(results: Results, statistics: RunStatistics) -> list[Criterion]:
     """The criteria of the edition and system that the result file names. Not collective."""
-    about = results.attributes
+    about, slowest = results.attributes, results.fact("wave_speed")
+    tensions = results.facts_of_wires("contact_wire_tension")
+    masses = results.facts_of_wires("contact_wire_mass")
     return acceptance.judge(
         statistics,
         results.fact("speed"),
-        results.fact("wave_speed"),
+        slowest,
         about["system"],
         about["edition"],
+        all(bends(slowest, tensions[wire], masses[wire]) for wire in tensions),
     )
 
 

@@ -49,7 +49,7 @@ class Edition:
     arm_uplift : uplift of the contact wire at a steady arm, at most [m]
     height_range : vertical amplitude of the contact point, at most [m]
     arcing_percent : losses of contact of 5 ms and longer, at most [%]
-    speed_ratio : train speed over wave speed of the contact wire, at most
+    speed_ratio : train speed over the slowest wave of the contact wire, at most
     clause : line of this table -> where it stands
     """
 
@@ -77,6 +77,10 @@ _MAX_FORCE_2012 = {
     "dc_3kv": (ForceStep(200.0, 300.0), ForceStep(_ALWAYS, 400.0)),
     "dc_1500v": (ForceStep(200.0, 300.0), ForceStep(_ALWAYS, 400.0)),
 }
+_SPEED = "EN 50119: V <= 0.7 C"
+_BY_BENDING = (
+    "as EN 50119: V <= 0.7 C, C of the slowest bending wave; stated for tensioned wires (assumed)"
+)
 _CLAUSE_2006 = {
     "mean": "EN 50367:2006",
     "std": "EN 50367:2006",
@@ -84,7 +88,8 @@ _CLAUSE_2006 = {
     "uplift": "EN 50367:2006",
     "height": "EN 50367:2006",
     "arcing": "EN 50367:2006; losses shorter than 5 ms not counted (assumed)",
-    "speed": "EN 50119: V <= 0.7 C",
+    "speed": _SPEED,
+    "speed_by_bending": _BY_BENDING,
 }
 
 
@@ -109,7 +114,8 @@ def _newer(year: str) -> Edition:
             "uplift": kept,
             "height": kept,
             "arcing": f"{own}; losses shorter than 5 ms not counted (assumed)",
-            "speed": "EN 50119: V <= 0.7 C",
+            "speed": _SPEED,
+            "speed_by_bending": _BY_BENDING,
         },
     )
 

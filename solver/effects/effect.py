@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 class Limit(Enum):
     """A limit of all scenes without an effect that lifts it."""
 
-    WAVE_SPEED = "the train is slower than the waves of the contact wire"
+    WAVE_SPEED = "the train is slower than the slowest wave of the contact wire"
     ONE_PANTOGRAPH = "the train has one pantograph"
 
 

@@ -38,6 +38,10 @@ class LinearLaw:
         """Whether the force depends on the rate."""
         return self.damping > 0
 
+    def depth(self, force: float) -> float:
+        """Depth under a force at rest [N], [m]."""
+        return force / self.stiffness if self.stiffness > 0.0 else 0.0
+
     def without_damping(self) -> LinearLaw:
         """The spring alone."""
         return replace(self, damping=0.0)
@@ -62,6 +66,10 @@ class HertzLaw:
         """Whether the force depends on the rate."""
         return self.hysteresis > 0
 
+    def depth(self, force: float) -> float:
+        """Depth under a force at rest [N], [m]."""
+        return float((force / self.stiffness) ** (1.0 / self.exponent))
+
     def without_damping(self) -> HertzLaw:
         """The spring alone."""
         return replace(self, hysteresis=0.0)
@@ -75,6 +83,10 @@ class KinematicLaw:
     def dissipates(self) -> bool:
         """Never."""
         return False
+
+    def depth(self, force: float) -> float:
+        """Depth under a force at rest [N], [m]."""
+        return 0.0
 
     def without_damping(self) -> KinematicLaw:
         """The same."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from catenary.mbs.air.airflow import Tunnel
 from catenary.mbs.vehicle.motion_sources import VehicleMotion
 from catenary.meshgen.line import Line
+from catenary.meshgen.slowest_wave import slowest_wave
 from catenary.meshgen.wires import Role
 from catenary.solver.problem.along_track import AlongTrack
 from catenary.solver.problem.contact_laws import ContactLaw
@@ -160,15 +161,15 @@ def n_halvings(dt: float, smallest: float | None) -> int:
 
 
 def slowest_wave_speed(problem: Problem) -> float:
-    """Least wave speed of the contact wires in a run, wrong and lost tensions included [m/s].
+    """Slowest wave of the contact wires in a run, wrong and lost tensions included [m/s].
 
     ``problem`` is as a scene has it: its wires are those for which droppers are cut.
     """
     losses = [loss for loss in problem.incidents if isinstance(loss, TensionLoss)]
     wrong = [defect for defect in problem.defects if isinstance(defect, WrongTension)]
-    return min(
-        min((loss.share for loss in losses if loss.wire == wire.name), default=1.0) ** 0.5
-        * min((defect.factor for defect in wrong if defect.wire == wire.name), default=1.0) ** 0.5
-        * wire.wave_speed
+    shares = {
+        wire.name: min((loss.share for loss in losses if loss.wire == wire.name), default=1.0)
+        * min((defect.factor for defect in wrong if defect.wire == wire.name), default=1.0)
         for wire in problem.line.wires_of(Role.CONTACT)
-    )
+    }
+    return slowest_wave(problem.line, shares)

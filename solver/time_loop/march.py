@@ -118,7 +118,7 @@ class March:
         self.ownership = distribute(model, comm.size, comm.rank)
         self._wire = ContactWires(model, form, self.ownership)
         air_speed = problem.train.speed if model.simulated.meets_air else None
-        height = nominal_height_rule(self._wire, elasticity, air_speed)
+        height = nominal_height_rule(self._wire, elasticity, air_speed, problem.contact)
         self._nominal_height, effects = height, model.simulated
         self._pantographs = Pantographs(comm, problem, effects, self._wire, height)
         self._moving = MovingColumns()

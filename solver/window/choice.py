@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from catenary.meshgen.slowest_wave import slowest_wave, slowest_wave_of
 from catenary.meshgen.wires import Role
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.window import BOUNDED, EXACT, ROUND_OFF, WindowChoice
@@ -80,7 +81,7 @@ def moving_share(problem: Problem) -> float:
     last = train.start - max(placement.behind for placement in train.placements)
     time = np.linspace(0.0, (train.end - train.start) / train.speed, _SAMPLES)
     if window.by_motion > 0.0:
-        speed = max(wire.wave_speed for wire in problem.line.wires)
+        speed = max(slowest_wave_of(problem.line, wire) for wire in problem.line.wires)
         low, high = last - speed * time, train.start + speed * time
     else:
         span = (end - begin) / (masts.size - 1)
@@ -106,14 +107,12 @@ def _fading(problem: Problem) -> float:
     """Damping at the ends of a window times the square of their length [m2/s]."""
     masts = problem.line.support_positions
     span = float(masts[-1] - masts[0]) / (len(masts) - 1)
-    speed = min(wire.wave_speed for wire in problem.line.wires_of(Role.CONTACT))
-    return _FADING * speed * span
+    return _FADING * slowest_wave(problem.line) * span
 
 
 def _worth(problem: Problem) -> float:
     """For how many spans of the line that was measured one of this line stands."""
-    wires = problem.line.wires_of(Role.CONTACT)
-    ratio = min(problem.train.speed / min(wire.wave_speed for wire in wires), 0.95)
+    ratio = min(problem.train.speed / slowest_wave(problem.line), 0.95)
     way = (1.0 - _SPEED_RATIO**2) / (1.0 - ratio**2)
     return way * math.sqrt(_fading_rate(problem) / _RATE)
 

@@ -25,7 +25,7 @@ from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.load import load_scene
 
 # One string, 1000 m, waves of 100 m/s.
-STRING = WaveLine(0.0, 1000.0, 50.0, 100.0, 100.0, 0.0, 0.0)
+STRING = WaveLine(0.0, 1000.0, 50.0, 100.0, 100.0, 0.0, 0.0, 2.0 * math.pi)
 ALONE = Course(100.0, 900.0, 50.0, (300.0, 500.0), 100.0, 100.0)
 
 

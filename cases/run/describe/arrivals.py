@@ -20,6 +20,8 @@ from catenary.cases.run.describe.wave_arrivals import (
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.line import Line
+from catenary.meshgen.slowest_wave import bends, slowest_wave_of, wave_of_two_spans
+from catenary.meshgen.wires import Wire
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.problem.ends import EndCondition
 from catenary.solver.problem.problem import Problem
@@ -76,7 +78,8 @@ def arrival_warnings(scene: Scene) -> list[str]:
 
 
 def wave_line(problem: Problem) -> WaveLine:
-    """The line as a string for long waves; hardware counts with its mean mass per length."""
+    """The line for long waves, a string unless its contact wire is a conductor rail; hardware
+    counts with its mean mass per length."""
     line = problem.line
     masts = line.support_positions
     total = float(masts[-1] - masts[0])
@@ -86,15 +89,31 @@ def wave_line(problem: Problem) -> WaveLine:
     damping = simulated(problem).damping
     usual = (damping.alpha, damping.beta)
     pairs = [damping.per_component.get(wire.name, usual) for wire in line.wires]
+    span = _span(line)
+    bending = {wire.name: _bending(line, wire) for wire in line.wires}
+    tension = sum(share * wire.tension for wire, share in shares)
+    stiffness = sum(share * bending[wire.name] for wire, share in shares)
+    long = wave_of_two_spans(tension, stiffness, mass, span)
+    alone = [
+        wave_of_two_spans(wire.tension, bending[wire.name], wire.mass_per_length, span)
+        for wire in line.wires
+    ]
     return WaveLine(
         start=float(masts[0]),
         end=float(masts[-1]),
-        span=_span(line),
-        speed=math.sqrt(sum(share * wire.tension for wire, share in shares) / mass),
-        fastest=max(wire.wave_speed for wire in line.wires),
+        span=span,
+        speed=long.energy,
+        fastest=max(wave.energy for wave in alone),
         alpha=min(pair[0] for pair in pairs),
         beta=min(pair[1] for pair in pairs),
+        edge=math.pi * long.phase / span,
     )
+
+
+def _bending(line: Line, wire: Wire) -> float:
+    """Bending stiffness of a wire as far as its waves are not those of a string [N m2]."""
+    slowest = slowest_wave_of(line, wire)
+    return wire.bending_stiffness if bends(slowest, wire.tension, wire.mass_per_length) else 0.0
 
 
 def _traced(problem: Problem) -> Traced:

@@ -30,7 +30,16 @@ def description_of(data: PantographData, static_force: float) -> str:
     masses = ", ".join(f"{mass:g}" for mass in data.masses)
     noun = "mass" if len(data.masses) == 1 else "masses"
     text = f"lumped: {len(data.masses)} {noun} of {masses} kg; {static_force:.1f} N"
-    return text + _strips_of(data.strips)
+    return text + _strips_of(data.strips) + _tied_of(data)
+
+
+def _tied_of(data: LumpedData) -> str:
+    """By how much the force of a chain depends on the height of the line, if it is tied to its
+    base."""
+    if not data.tied:
+        return ""
+    change = 1e-3 * data.height_stiffness
+    return f"; tied to its base: its force falls by {change:.3g} N with each mm that its head rises"
 
 
 def _strips_of(strips: Strips) -> str:

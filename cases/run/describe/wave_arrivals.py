@@ -1,6 +1,7 @@
 """When waves that the start of a run sends out come back from the ends of the line.
 
-Wires that droppers join carry long waves together, with c = sqrt(sum of tensions / sum of masses).
+Wires that droppers join carry long waves together, with c = sqrt(sum of tensions / sum of masses);
+a conductor rail carries them by bending.
 The start of the run sends such waves ahead of the train and behind it; the ends of the line, which
 are fixed, reflect them. docs/guide.md, "How long a line", compares what follows with marches.
 """
@@ -20,7 +21,7 @@ SHORT_RUN_IN = 0.2
 
 
 class WaveLine(NamedTuple):
-    """A line as a string for long waves.
+    """A line for long waves.
 
     Attributes
     ----------
@@ -29,6 +30,7 @@ class WaveLine(NamedTuple):
     speed : of waves on both wires together [m/s]
     fastest : of waves on the faster one alone [m/s]
     alpha, beta : proportional damping of the less damped wire [s], [1/s]
+    edge : lower edge of the first pass band [rad/s]
     """
 
     start: float
@@ -38,15 +40,16 @@ class WaveLine(NamedTuple):
     fastest: float
     alpha: float
     beta: float
+    edge: float
 
     @property
     def decay(self) -> float:
         """Least rate at which amplitudes fall [1/s].
 
-        (beta + alpha w^2) / 2 at the lower edge of the first pass band, w = pi c / span: supports
-        hold the messenger wire, and longer waves do not travel.
+        (beta + alpha w^2) / 2 at the lower edge of the first pass band, where a wave is as long as
+        two spans: supports hold the wires, and longer waves do not travel.
         """
-        return 0.5 * (self.beta + self.alpha * (math.pi * self.speed / self.span) ** 2)
+        return 0.5 * (self.beta + self.alpha * self.edge**2)
 
 
 class Course(NamedTuple):

@@ -17,6 +17,7 @@ from catenary.cases.run.recording import extent_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.cost_model import estimate_march
 from catenary.cases.scene.scene import Scene
+from catenary.meshgen.slowest_wave import slowest_wave
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import numbering_of
@@ -173,7 +174,7 @@ def make_plan(scene: Scene, mesh: LineMesh | None = None) -> Plan:
         n_pantographs=len(train.placements),
         element_lengths=(float(length.min()), float(length.max())),
         speed=train.speed,
-        wave_speed=min(wire.wave_speed for wire in contact),
+        wave_speed=slowest_wave(problem.line),
         static_forces=tuple(place.static_force for place in train.placements),
         kinds=tuple((name, told[0]) for name, told in kind_lines(scene, problem).items()),
         start=train.start,

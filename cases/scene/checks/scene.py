@@ -54,6 +54,8 @@ from catenary.cases.scene.convert.line.line import line_data_of
 from catenary.cases.scene.input.faults import Fault, SceneError
 from catenary.cases.scene.keys.error_sentences import refusal, unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys
+from catenary.meshgen.slowest_wave import bends, slowest_wave
+from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects.effect import Limit
@@ -207,18 +209,23 @@ def _separations(scene: Scene) -> Iterator[Fault]:
 
 
 def _speed(scene: Scene, line: LineData) -> Iterator[Fault]:
-    wave = 3.6 * line.contact_wire.wave_speed
     speed = scene.train.speed_km_h
-    if speed >= wave and scene.holds(Limit.WAVE_SPEED):
-        yield _refusal(
-            scene,
-            "train.speed_km_h",
-            speed,
-            f"it must be below the wave speed of the contact wire ({wave:.1f} km/h, which "
-            f"tension_N = {line.contact_wire.tension:g} and mass_kg_per_m = "
-            f"{line.contact_wire.mass_per_length:g} give it) unless effects.supercritical_speed = "
-            "true",
-        )
+    if not scene.holds(Limit.WAVE_SPEED):
+        return
+    wave = slowest_wave(make_line(line))
+    if speed < 3.6 * wave:
+        return
+    wire = line.contact_wire
+    of = f"tension_N = {wire.tension:g} and mass_kg_per_m = {wire.mass_per_length:g}"
+    if bends(wave, wire.tension, wire.mass_per_length):
+        of = f"bending_stiffness_N_m2 = {wire.bending_stiffness:g}, {of} between its supports"
+    yield _refusal(
+        scene,
+        "train.speed_km_h",
+        speed,
+        f"it must be below the wave speed of the contact wire ({3.6 * wave:.1f} km/h, which "
+        f"{of} give it) unless effects.supercritical_speed = true",
+    )
 
 
 def _running(scene: Scene, line: LineData) -> Iterator[Fault]:

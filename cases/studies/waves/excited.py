@@ -15,6 +15,7 @@ from mpi4py import MPI
 
 from catenary.cases.studies.waves.seen import NodeMotion
 from catenary.mbs.lumped_data import LumpedData
+from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.effects.all_effects import move_together
 from catenary.solver.problem.contact_laws import LinearLaw
@@ -142,8 +143,8 @@ def without_train(problem: Problem, excitation: Excitation) -> Problem:
     if isinstance(excitation, MovingForce):
         course = Train(train.speed, train.start, train.end, 0.0, (place,))
     else:
-        speed = max(wire.wave_speed for wire in problem.line.wires)
-        slowest = min(wire.wave_speed for wire in problem.line.wires)
+        speeds = [slowest_wave_of(problem.line, wire) for wire in problem.line.wires]
+        speed, slowest = max(speeds), min(speeds)
         duration = excitation.duration + np.abs(ends - excitation.at).max() / slowest
         # One that creeps: its place is nobody's business, its course is the run's duration.
         creep = 1e-3 * speed

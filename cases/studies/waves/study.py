@@ -222,9 +222,10 @@ def energy_rows(energy: EnergySeen, seen: WavesSeen) -> list[Row]:
 
 def as_rows(theory: WaveTheory) -> list[Row]:
     """Figures with unit and meaning; those that the line does not have are left out."""
+    slowest = "slowest wave" if theory.by_bending else "sqrt(T/m)"
     rows = [
         ("train_speed", theory.speed, "m/s", "speed of the train"),
-        ("wave_speed", theory.wave_speed, "m/s", "sqrt(T/m) of the contact wire"),
+        ("wave_speed", theory.wave_speed, "m/s", f"{slowest} of the contact wire"),
         ("doppler_factor", theory.doppler, "-", "(c - v) / (c + v)"),
         ("dropper_reflection", theory.reflection, "-", "Z_m / (Z_c + Z_m), stiff dropper"),
         ("amplification", theory.amplification, "-", "reflection / Doppler factor"),

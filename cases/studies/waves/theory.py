@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from catenary.meshgen.slowest_wave import bends, slowest_wave_of
 from catenary.meshgen.wires import Role
 from catenary.solver.base.errors import InputError
 from catenary.solver.problem.problem import Problem
@@ -26,14 +27,15 @@ class WaveTheory:
     Attributes
     ----------
     speed : of the train [m/s]
-    wave_speed : of the contact wire as a string, sqrt(T / m) [m/s]
-    wires : name and speed of waves of all wires as strings [m/s]
+    wave_speed : slowest wave of the contact wire, sqrt(T / m) of a string [m/s]
+    wires : name and slowest wave of all wires, sqrt(T / m) of strings [m/s]
     doppler : (c - v) / (c + v) [-]: an echo from ahead comes back with its frequency over this
     reflection : share of a wave on the contact wire that a stiff dropper sends back,
         Z_m / (Z_c + Z_m) with impedances sqrt(T m); NaN for lines of more than two wires [-]
     amplification : reflection / doppler, by which an echo grows with each return [-]
     bloch : waves of the line as a periodic one, None if its spans are not alike
     why_not : why there are none, empty otherwise
+    by_bending : whether the contact wire's waves are not those of a string
     """
 
     speed: float
@@ -44,10 +46,15 @@ class WaveTheory:
     amplification: float
     bloch: BlochWaves | None
     why_not: str
+    by_bending: bool = False
+
+    @property
+    def _as(self) -> str:
+        return "on its supports" if self.by_bending else "as a string"
 
     def speeds(self) -> list[tuple[float, str]]:
         """Speeds of waves [m/s] and what they are of: the wires, the periodic line up to 20 Hz."""
-        found = [(speed, f"{name.replace('_', ' ')} as a string") for name, speed in self.wires]
+        found = [(speed, f"{name.replace('_', ' ')} {self._as}") for name, speed in self.wires]
         if self.bloch is not None:
             speed, at = self.bloch.fastest(HIGHEST)
             found.append((speed, f"fastest energy of the line ({at:.1f} Hz)"))
@@ -77,7 +84,7 @@ def wave_theory(problem: Problem, rest: LineAtRest) -> WaveTheory:
     """Figures of a problem and its line at rest. Not collective."""
     contact = problem.line.wires_of(Role.CONTACT)[0]
     carriers = [wire for wire in problem.line.wires if wire.role is not Role.CONTACT]
-    c, v = contact.wave_speed, problem.train.speed
+    c, v = slowest_wave_of(problem.line, contact), problem.train.speed
     reflection = np.nan
     if len(carriers) == 1:
         z_m, z_c = (np.sqrt(wire.tension * wire.mass_per_length) for wire in (carriers[0], contact))
@@ -88,5 +95,6 @@ def wave_theory(problem: Problem, rest: LineAtRest) -> WaveTheory:
         waves = bloch_waves(period_of(rest.model, *middle_span(problem.line)), HIGHEST)
     except InputError as error:
         why_not = str(error)
-    wires = tuple((wire.name, wire.wave_speed) for wire in problem.line.wires)
-    return WaveTheory(v, c, wires, doppler, reflection, reflection / doppler, waves, why_not)
+    wires = tuple((wire.name, slowest_wave_of(problem.line, wire)) for wire in problem.line.wires)
+    bent = bends(c, contact.tension, contact.mass_per_length)
+    return WaveTheory(v, c, wires, doppler, reflection, reflection / doppler, waves, why_not, bent)

@@ -16,6 +16,7 @@ from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.head.wire_crossing import CrossingPath, FollowedPath, LateralPath, SeveralPaths
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph
+from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.roll import roll_of
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.base.kernels.bound import bound
@@ -28,7 +29,7 @@ from catenary.solver.contact.train.head_states import Heads
 from catenary.solver.contact.train.output_kernels import Ends
 from catenary.solver.contact.train.place_kernels import move_contacts
 from catenary.solver.contact.train.raked_strips import leads_of
-from catenary.solver.problem.contact_laws import KinematicLaw
+from catenary.solver.problem.contact_laws import ContactLaw, KinematicLaw
 from catenary.solver.problem.problem import Numerics, Placement, Problem
 from catenary.solver.problem.simulated import Simulated
 from catenary.solver.statics.elasticity import Elasticity
@@ -354,13 +355,18 @@ def _lateral_path(
 
 
 def nominal_height_rule(
-    wires: ContactWires, elasticity: Elasticity, air_speed: float | None = None
+    wires: ContactWires,
+    elasticity: Elasticity,
+    air_speed: float | None = None,
+    contact: ContactLaw | None = None,
 ) -> Callable[[Placement], float]:
     """Head height at which the static force is defined.
 
     That of the placement, or else the mean height of a head that lifts the contact wires in the
     stretch of ``elasticity`` with the static force and that of still air at ``air_speed`` [m/s], so
-    that the base spring neither adds to the mean force nor takes from it.
+    that the base spring neither adds to the mean force nor takes from it. The head of a chain that
+    is tied to its base stands above the wires by the depth of its ``contact`` law; others change
+    their force by less than a hundredth over that depth, which is left out.
     """
     x = elasticity.x
     at_rest = np.stack([wires.rest_height_of(wire, x) for wire in range(wires.n_wires)], axis=1)
@@ -372,8 +378,12 @@ def nominal_height_rule(
         if air_speed is not None and placement.data.meets_air:
             force += steady_forces(placement.data, air_speed).whole
         lifted = elasticity.pressed(at_rest, force)
+        above = 0.0
+        if contact is not None and isinstance(placement.data, LumpedData) and placement.data.tied:
+            above = contact.depth(force / (len(placement.data.strip_offsets) * wires.n_wires))
         # By trapezoids; scipy.integrate, which has the rule, loads solvers for 0.03 s.
-        return float(np.sum(np.diff(x) * (lifted[1:] + lifted[:-1]) / 2.0) / (x[-1] - x[0]))
+        mean = float(np.sum(np.diff(x) * (lifted[1:] + lifted[:-1]) / 2.0) / (x[-1] - x[0]))
+        return mean + above
 
     return height
 

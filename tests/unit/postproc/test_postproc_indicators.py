@@ -16,6 +16,7 @@ from catenary.postproc.evaluate.error_indicators import (
     as_table,
     indicate,
     memory,
+    required_by_bending,
     required_frequency,
     resolved_frequency,
     step_error,
@@ -136,6 +137,19 @@ def test_waves_ahead_of_the_train_are_shortened_by_its_motion() -> None:
     """Doppler: 20 Hz / (1 - v / c)."""
     check("required [Hz]", required_frequency(20.0, 0.6, 0.0), 50.0, within=1e-6)
     assert required_frequency(20.0, 1.0, 0.0) == np.inf
+
+
+def test_waves_ahead_on_a_rail_are_shortened_by_its_bending() -> None:
+    """A train at rest excites waves of the frequency that it feels; without tension k is the root
+    of sqrt(EI / m) k^2 - v k - w_0 = 0 and the frequency w_0 + v k."""
+    rail = {"tension": 1e-6, "bending_stiffness": 2.7e5, "mass_per_length": 7.1}
+    check("required [Hz]", required_by_bending(20.0, 0.0, **rail), 20.0, within=1e-9)
+    stiff, speed, own = np.sqrt(2.7e5 / 7.1), 120.0 / 3.6, 2.0 * np.pi * 20.0
+    k = (speed + np.sqrt(speed**2 + 4.0 * stiff * own)) / (2.0 * stiff)
+    expected = (own + speed * k) / (2.0 * np.pi)
+    check("required [Hz]", required_by_bending(20.0, speed, **rail), expected, within=1e-9)
+    # A string as slow as that has none at all.
+    assert required_by_bending(20.0, speed, 100.0, 0.0, 7.1) == np.inf
 
 
 def test_waves_on_a_damped_line_need_no_more_than_their_length() -> None:

@@ -150,3 +150,11 @@ def test_nothing_of_a_pantograph_passes_by_statistics_that_judge_nothing() -> No
     assert [c.passed for c in own if "speed" not in c.criterion] == [None] * (len(own) - 1)
     assert verdict(criteria) is None
     assert run(silent).complaints == ["zero all the way"]
+
+
+def test_the_rule_on_speed_says_where_it_is_taken_over() -> None:
+    """EN 50119 states it for tensioned wires; a conductor rail is judged by its slowest wave."""
+    criteria = judge(run(GOOD), SPEED, WAVE, "ac", "2020", by_bending=True)
+    (speed,) = [c for c in criteria if c.criterion.startswith("train speed")]
+    assert speed.passed is True and "bending" in speed.clause and "assumed" in speed.clause
+    assert "bending" not in judged(run(GOOD))[speed.criterion].clause

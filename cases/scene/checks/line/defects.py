@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -19,6 +18,7 @@ from catenary.cases.scene.tables.line.imperfections.defects import (
 )
 from catenary.cases.scene.tables.run.incidents import DropperBreakTable
 from catenary.meshgen.line import Line
+from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.wires import Role, Wire
 from catenary.postproc.evaluate.wording import counted
@@ -54,7 +54,7 @@ def check_defects(scene: Scene, data: LineData) -> Iterator[Fault]:
         elif isinstance(table, WrongTensionTable):
             what = "tension", table.wire
             yield from _twice(scene, seen, (f"{key}.wire", table.wire), what)
-            yield from _tension(scene, wire, f"{key}.factor", table.factor)
+            yield from _tension(scene, line, wire, f"{key}.factor", table.factor)
         else:
             yield from _place(scene, wire, f"{key}.at_m", table.at_m)
             if isinstance(table, KinkTable) and wire.role is not Role.CONTACT:
@@ -161,7 +161,7 @@ def _worn_twice(scene: Scene, i: int, table: WornWireTable) -> Iterator[Fault]:
             yield refusal(scene.origin, f"defects.{i}.from_m", table.from_m, why)
 
 
-def _tension(scene: Scene, wire: Wire, key: str, factor: float) -> Iterator[Fault]:
+def _tension(scene: Scene, line: Line, wire: Wire, key: str, factor: float) -> Iterator[Fault]:
     most = wire.most_taken
     if factor * wire.tension <= most:
         why = (
@@ -169,9 +169,9 @@ def _tension(scene: Scene, wire: Wire, key: str, factor: float) -> Iterator[Faul
             f"must be greater than {most / wire.tension:.3g}"
         )
         yield refusal(scene.origin, key, factor, why)
-    wave = 3.6 * math.sqrt(factor) * wire.wave_speed
     if wire.role is not Role.CONTACT or not scene.holds(Limit.WAVE_SPEED):
         return
+    wave = 3.6 * slowest_wave_of(line, wire, factor)
     if scene.switches()["wrong_tension"] and scene.train.speed_km_h >= wave:
         why = (
             f"the wave speed of {wire.name} would be {wave:.1f} km/h, not above train.speed_km_h = "

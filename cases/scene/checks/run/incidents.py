@@ -16,9 +16,11 @@ from catenary.cases.scene.tables.run.incidents import (
     LoweringTable,
     TensionLossTable,
 )
+from catenary.meshgen.line import Line
+from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.meshgen.wires import Role
+from catenary.meshgen.wires import Role, Wire
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.effects.effect import Limit
 
@@ -114,7 +116,8 @@ def _dropper(scene: Scene, i: int, table: DropperBreakTable, line: LineData) -> 
 
 def _tension(scene: Scene, i: int, table: TensionLossTable, line: LineData) -> Iterator[Fault]:
     yield from _hangs(scene, i, table)
-    wire = make_line(line).wire(table.wire)
+    whole = make_line(line)
+    wire = whole.wire(table.wire)
     most = wire.most_taken
     if table.share * wire.tension <= most:
         why = (
@@ -125,18 +128,30 @@ def _tension(scene: Scene, i: int, table: TensionLossTable, line: LineData) -> I
         return
     if wire.role is not Role.CONTACT or not scene.holds(Limit.WAVE_SPEED):
         return
-    wave = 3.6 * wire.wave_speed
-    if scene.train.speed_km_h >= math.sqrt(table.share) * wave:
-        least = (scene.train.speed_km_h / wave) ** 2
+    speed = scene.train.speed_km_h / 3.6
+    wave = slowest_wave_of(whole, wire, table.share)
+    if speed >= wave:
+        least = _least_share(whole, wire, speed)
         yield _refusal(
             scene,
             i,
             "share",
             table.share,
-            f"the wave speed of the contact wire would fall to {math.sqrt(table.share) * wave:.1f} "
+            f"the wave speed of the contact wire would fall to {3.6 * wave:.1f} "
             f"km/h: it must be greater than {least:.3g} at train.speed_km_h = "
             f"{scene.train.speed_km_h:g} unless effects.supercritical_speed = true",
         )
+
+
+def _least_share(line: Line, wire: Wire, speed: float) -> float:
+    """Share of its tension at which the slowest wave of a wire is as fast as a train [m/s], which
+    it is not faster than with all of it; 1 at most."""
+    from scipy import optimize  # for lines with a fault only
+
+    def faster(share: float) -> float:
+        return slowest_wave_of(line, wire, share) - speed
+
+    return 1.0 if faster(1.0) <= 0.0 else float(optimize.brentq(faster, 0.0, 1.0))
 
 
 def _lowering(scene: Scene, i: int, table: LoweringTable, line: LineData) -> Iterator[Fault]:
