@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -82,6 +82,42 @@ class LineMesh:
     def pieces(self, wire: str) -> list[np.ndarray]:
         """Nodes of the pieces of a wire, in order of x."""
         return np.split(self.wires[wire], self.breaks.get(wire, _NONE))
+
+
+def reduced(mesh: LineMesh, places: np.ndarray, within: float) -> LineMesh:
+    """The mesh with nodes of all wires only where something hangs or ends, and at ``places``.
+
+    Parameters
+    ----------
+    places : (n,) further places that keep their nodes [m]
+    within : distance below which places are one [m]
+
+    Returns
+    -------
+    LineMesh
+        Droppers and hardware in the same order, with other numbers of nodes.
+    """
+    ends = [piece[[0, -1]] for wire in mesh.wires for piece in mesh.pieces(wire)]
+    joints = (mesh.droppers, mesh.clamps, mesh.steady_arms, mesh.supports, mesh.anchors)
+    used = np.concatenate([*ends, *(part.ravel() for part in joints)])
+    x, wanted = mesh.points[:, 0], np.sort(np.concatenate([mesh.x(used), places]))
+    next_one = np.searchsorted(wanted, x - within)
+    kept = np.append(wanted, np.inf)[next_one] <= x + within
+    number = np.cumsum(kept) - 1
+    return replace(
+        mesh,
+        points=mesh.points[kept],
+        wires={name: number[nodes[kept[nodes]]] for name, nodes in mesh.wires.items()},
+        droppers=number[mesh.droppers],
+        steady_arms=number[mesh.steady_arms],
+        supports=number[mesh.supports],
+        anchors=number[mesh.anchors],
+        clamps=number[mesh.clamps],
+        breaks={
+            name: np.cumsum(kept[mesh.wires[name]])[begins - 1]
+            for name, begins in mesh.breaks.items()
+        },
+    )
 
 
 def elements_of(nodes: np.ndarray, breaks: np.ndarray = _NONE) -> np.ndarray:

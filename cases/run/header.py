@@ -16,6 +16,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
 from catenary.solver.problem.problem import Problem
+from catenary.solver.statics.form_finding.equilibrium import lengths_to_cut
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.window.choice import window_sentence
 
@@ -40,7 +41,7 @@ def header_of(
     excited : what sets the line into motion in place of the scene's train
     """
     on, off = effect_rows(scene, problem)
-    line = problem.line
+    line, lengths = problem.line, lengths_to_cut(problem, at_rest.mesh)
     if excited is not None:
         by_what = excited.attributes()
     else:
@@ -66,7 +67,7 @@ def header_of(
         },
         datasets={
             **line_datasets(line, at_rest.mesh, problem.evaluation),
-            **static_datasets(line, at_rest.mesh, at_rest.form, at_rest.lift),
+            **static_datasets(line, at_rest.mesh, at_rest.form, at_rest.lift, lengths),
         },
         facts=facts_of(problem, at_rest.mesh, at_rest.model.dropper_lengths),
     )

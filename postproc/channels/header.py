@@ -86,13 +86,22 @@ def line_datasets(
 
 
 def static_datasets(
-    line: Line, mesh: LineMesh, equilibrium: Equilibrium, elasticity: Elasticity
+    line: Line,
+    mesh: LineMesh,
+    equilibrium: Equilibrium,
+    elasticity: Elasticity,
+    lengths: np.ndarray,
 ) -> dict[str, np.ndarray]:
     """Datasets of ``/static``: droppers, profiles, registration and elasticity at rest. Not
-    collective."""
+    collective.
+
+    Parameters
+    ----------
+    lengths : (n_droppers,) to which droppers are cut, which no mesh changes [m]
+    """
     contact = np.concatenate([mesh.wires[wire.name] for wire in line.wires_of(Role.CONTACT)])
     return {
-        "static/dropper_length": equilibrium.dropper_length,
+        "static/dropper_length": lengths,
         "static/dropper_force": equilibrium.dropper_force,
         "static/contact_x": mesh.x(contact),
         "static/contact_height": equilibrium.height[contact],

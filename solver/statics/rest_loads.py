@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.solver.model.axial_elements import curve_rows
-from catenary.solver.model.elements import beam
+from catenary.solver.model.elements import beam, exact_beam
 from catenary.solver.model.model import Model, wire_elements
 from catenary.solver.wind.mean_wind import mean_load
 
@@ -49,4 +49,24 @@ def curve_load(model: Model) -> np.ndarray:
         middle = model.mesh.x(model.mesh.elements(wire.name)).mean(axis=1)
         pull = wire.tension_at(middle) * length
         np.add.at(load, dofs, -pull[:, None] * curve_rows(model, wire.name))
+    return load
+
+
+def exact_moments(model: Model) -> np.ndarray:
+    """What exact elements add to ``dead_loads`` and ``curve_load`` of a line in still air,
+    (n_dofs,) [N m]: under a uniform load their ends carry smaller moments."""
+    load, line = np.zeros(model.n_dofs), model.problem.line
+    curve = line.curve if model.simulated.lateral else None
+    for wire in line.wires:
+        dofs, length = model.wire_elements(wire.name)
+        middle = model.mesh.x(model.mesh.elements(wire.name)).mean(axis=1)
+        tension = wire.tension_at(middle)
+        lacks = exact_beam.moment_share(length, wire.bending_stiffness, tension) - 1.0
+        moments = lacks[:, None] * beam.uniform_load(length) * np.array([0.0, 1.0, 0.0, 1.0])
+        weight = model.simulated.gravity * wire.mass_per_length
+        np.add.at(load, dofs, -weight * moments)
+        if curve is not None:
+            pull = curve.sideways_pull_at(middle) * weight + curve.curvature_at(middle) * tension
+            sideways, _ = wire_elements(model, wire.name, _LEVEL)
+            np.add.at(load, sideways, pull[:, None] * moments)
     return load

@@ -9,6 +9,7 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.postproc.channels.header import line_datasets, static_datasets
+from catenary.solver.statics.form_finding.equilibrium import lengths_to_cut
 from catenary.solver.statics.line_at_rest import line_at_rest
 
 
@@ -22,7 +23,7 @@ def static_table(scene: Scene) -> dict[str, np.ndarray]:
     rest = line_at_rest(problem, mesh)
     data = {
         **line_datasets(problem.line, mesh, problem.evaluation),
-        **static_datasets(problem.line, mesh, rest.form, rest.lift),
+        **static_datasets(problem.line, mesh, rest.form, rest.lift, lengths_to_cut(problem, mesh)),
         "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
         "line/arm_x": mesh.x(mesh.steady_arms),
         **installed(problem.line, mesh, rest.form.height),

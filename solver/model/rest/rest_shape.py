@@ -19,7 +19,7 @@ class Equilibrium:
     height : (n_nodes,) of every mesh node [m]
     slope : (n_nodes,) dw/dx of the wires at every mesh node [-]
     dropper_force : (n_droppers,) tension [N]
-    dropper_length : (n_droppers,) unstretched length, by which the dropper is cut [m]
+    dropper_length : (n_droppers,) unstretched length by which the line is balanced on its mesh [m]
     along : (n_nodes,) how far every node has moved along the track since the installation [m];
         empty where that is nothing
     gained_tension : (n_elements,) of wires by name, what their elements carry beside the tension of

@@ -29,7 +29,7 @@ def hang(problem: Problem, cut: Model, form: Equilibrium) -> tuple[Model, Equili
     InputError
         If a dropper would have no length, or there is no rest.
     """
-    mesh, errors = cut.mesh, _errors_of_length(problem, cut)
+    mesh, errors = cut.mesh, errors_of_length(problem, cut)
     length = cut.dropper_lengths + errors
     if (length <= 0.0).any():
         number = int(np.argmin(length))
@@ -45,7 +45,7 @@ def hang(problem: Problem, cut: Model, form: Equilibrium) -> tuple[Model, Equili
     return build(problem, mesh, length, form=rest.form, gap=rest.gap), rest.form
 
 
-def _errors_of_length(problem: Problem, cut: Model) -> np.ndarray:
+def errors_of_length(problem: Problem, cut: Model) -> np.ndarray:
     """Errors of the droppers' lengths, (n_droppers,) [m]."""
     errors, n = simulated(problem).length_errors, cut.dropper_lengths.size
     if errors is None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from catenary.meshgen.geometry import SAME_CUT
 from catenary.meshgen.line import Line
-from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.mesh import LineMesh, reduced
 from catenary.meshgen.wires import Wire
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
@@ -23,7 +23,7 @@ from catenary.solver.model.model import Model
 from catenary.solver.model.rest.lateral_shape import LateralShape
 from catenary.solver.model.rest.rest_shape import Equilibrium as Equilibrium
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.changed_line.as_hung import hang
+from catenary.solver.statics.changed_line.as_hung import errors_of_length, hang
 from catenary.solver.statics.form_finding.banded_factors import BandedFactors
 from catenary.solver.statics.form_finding.lateral_equilibrium import lateral_shape
 from catenary.solver.statics.form_finding.repeated_ends import repeated_ends, settled
@@ -33,10 +33,10 @@ from catenary.solver.statics.form_finding.sparse_sum import (
     columns_of,
     wire_parts,
 )
-from catenary.solver.statics.rest_loads import dead_loads
+from catenary.solver.statics.rest_loads import dead_loads, exact_moments
 
-# Lengths are printed to the millimetre; the iteration contracts by the ratio of dropper weight
-# to tension sag, about 1e-3, so that this costs one more pass and leaves no trace in the forces.
+# Lengths are printed to a tenth of a millimetre; the iteration contracts by the ratio of dropper
+# weight to tension sag, about 1e-3, so that this costs one more pass and leaves no trace in forces.
 _LENGTH_TOLERANCE = 1e-10
 _MAX_PASSES = 30
 # Of what steady arms lift, which follows from the lateral plane, in terms of the largest tension:
@@ -58,19 +58,48 @@ def find_form(problem: Problem, mesh: LineMesh) -> tuple[Model, Equilibrium]:
     """
     befallen = effects.after_cutting(problem)
     if not befallen:
-        return _cut(problem, mesh)
-    cut_for = {effect.name for effect in befallen if effect.cut_for}
+        return about(*_cut(problem, mesh))
     sound = _cut(effects.as_cut(problem), mesh)
-    if cut_for:
-        irregular = effects.as_cut(problem, but=cut_for)
-        sound = _cut(irregular, mesh, pushing=True)
-    return hang(effects.as_hung(problem), *sound)
+    if _cut_for(problem):
+        sound = _cut(_as_installed(problem), mesh, pushing=True)
+    return hang(effects.as_hung(problem), *about(*sound))
 
 
-def _cut(problem: Problem, mesh: LineMesh, pushing: bool = False) -> tuple[Model, Equilibrium]:
-    """The line for which droppers are cut; they may push where ``pushing`` says so.
+def lengths_to_cut(problem: Problem, mesh: LineMesh) -> np.ndarray:
+    """Unstretched lengths to which droppers are cut, (n_droppers,) [m]. Not collective.
+
+    They hold for any mesh: wires bend within sqrt(EI / T), some 0.1 m, of what holds them, which
+    elements of a mesh do not resolve. Here elements go from one dropper, clamp or support to the
+    next and are exact. A line of ``find_form`` has lengths of its own, for it to be balanced on its
+    mesh.
+    """
+    places = problem.line.support_positions
+    joints = reduced(mesh, places, SAME_CUT)
+    cut, form = _cut(_as_installed(problem), joints, pushing=True, exact=True)
+    return form.dropper_length + errors_of_length(problem, cut)
+
+
+def _cut_for(problem: Problem) -> set[str]:
+    """Effects after cutting whose heights droppers are cut for, by name."""
+    return {effect.name for effect in effects.after_cutting(problem) if effect.cut_for}
+
+
+def _as_installed(problem: Problem) -> Problem:
+    """The problem of the line for which droppers are cut, with irregular heights."""
+    return effects.as_cut(problem, but=_cut_for(problem))
+
+
+def _cut(
+    problem: Problem, mesh: LineMesh, pushing: bool = False, exact: bool = False
+) -> tuple[Model, Equilibrium]:
+    """The line for which droppers are cut.
 
     Each wire hangs by itself here, also one that moves with another.
+
+    Parameters
+    ----------
+    pushing : whether droppers may push
+    exact : whether wires bend as tensioned beams do, or by Hermite's functions as in motion
     """
     length = mesh.points[mesh.droppers[:, 0], 2] - mesh.points[mesh.droppers[:, 1], 2]
     hanging: _HangingWires | None = None
@@ -79,19 +108,18 @@ def _cut(problem: Problem, mesh: LineMesh, pushing: bool = False) -> tuple[Model
     close = _FORCE_TOLERANCE * max(wire.tension for wire in problem.line.wires)
     for _ in range(_MAX_PASSES):
         model = build(problem, mesh, length, before=model, apart=True)
-        hanging = hanging or _HangingWires(model)
+        hanging = hanging or _HangingWires(model, exact)
         form = hanging.at_rest(model, lateral)
         _check(problem.line, mesh, form, pushing)
         still_lifted, before = 0.0, lateral
         if model.simulated.lateral:
-            form = _with_lateral(model, form)
+            form = _with_lateral(model, form, exact)
             lateral = form.lateral
             still_lifted = _most_change(before, lateral)
-        geometric = np.linalg.norm(form.dropper_vectors(mesh.droppers), axis=1)
-        change = np.abs(geometric - length).max(initial=0.0)
-        length = geometric
+        change = np.abs(form.dropper_length - length).max(initial=0.0)
+        length = form.dropper_length
         if change < _LENGTH_TOLERANCE and still_lifted < close:
-            return about(model, form)
+            return model, form
     raise InputError(
         f"the lengths of the droppers do not settle: after {_MAX_PASSES} passes they still change "
         f"by {1e3 * change:.2g} mm, and what steady arms lift by {still_lifted:.2g} N, as both "
@@ -107,9 +135,9 @@ def about(model: Model, form: Equilibrium) -> tuple[Model, Equilibrium]:
     return build(model.problem, model.mesh, model.dropper_lengths, form=form), form
 
 
-def _with_lateral(model: Model, form: Equilibrium) -> Equilibrium:
+def _with_lateral(model: Model, form: Equilibrium, exact: bool) -> Equilibrium:
     """The equilibrium with its lateral plane, in which droppers may lean."""
-    shape = lateral_shape(model, form)
+    shape = lateral_shape(model, form, exact)
     form = replace(form, lateral=shape)
     vectors = form.dropper_vectors(model.mesh.droppers)
     length = np.linalg.norm(vectors, axis=1)
@@ -134,10 +162,10 @@ class _HangingWires:
     the line goes on height and slope are given, and those of the mast before.
     """
 
-    def __init__(self, model: Model) -> None:
-        self._w = 2 * model.row_of_node
+    def __init__(self, model: Model, exact: bool = False) -> None:
+        self._w, self._exact = 2 * model.row_of_node, exact
         n = 2 * model.mesh.n_nodes
-        parts, self._spring_load = _springs_and_wires(model, self._w)
+        parts, self._spring_load = _springs_and_wires(model, self._w, exact)
         nodes, heights, held_at = _given_heights(model)
         self._repeated = repeated_ends(model)
         ends = self._w[self._repeated.ends]
@@ -162,6 +190,8 @@ class _HangingWires:
         mesh, every = model.mesh, np.arange(model.mesh.n_nodes)
         load = self._spring_load - self._factor.from_given
         dead = dead_loads(model)
+        if self._exact:
+            dead += exact_moments(model)
         load[self._w] += dead[model.dofs(every)]
         load[self._w + 1] += dead[model.dofs(every, "theta_y")]
         holding = _holding(model)
@@ -203,7 +233,7 @@ def _holding(model: Model) -> np.ndarray:
     return np.array([*holds, False])[model.mesh.arm_group]
 
 
-def _springs_and_wires(model: Model, w: np.ndarray) -> tuple[list[Part], np.ndarray]:
+def _springs_and_wires(model: Model, w: np.ndarray, exact: bool) -> tuple[list[Part], np.ndarray]:
     """Stiffness of wires, supports and clamps, and the load of relaxed supports.
 
     ``w`` is the number of each node's height; that of its slope follows. A support is a spring
@@ -213,7 +243,7 @@ def _springs_and_wires(model: Model, w: np.ndarray) -> tuple[list[Part], np.ndar
     mesh, line = model.mesh, model.problem.line
     n = 2 * mesh.n_nodes
     load = np.zeros(n)
-    parts = wire_parts(model, w)
+    parts = wire_parts(model, w, exact)
     for number, supports in enumerate(line.supports):
         if supports.holds:
             continue
@@ -277,6 +307,10 @@ def _wanted(model: Model, wire: Wire, nodes: np.ndarray) -> np.ndarray:
 def _check(line: Line, mesh: LineMesh, form: Equilibrium, pushing: bool) -> None:
     length = form.height[mesh.droppers[:, 0]] - form.height[mesh.droppers[:, 1]]
     _refuse(line, mesh, length <= 0, lambda i: f"would have a length of {length[i]:.3f} m")
+    cut = form.dropper_length
+    _refuse(
+        line, mesh, cut <= 0, lambda i: f"would be cut to {cut[i]:.3f} m to stretch to its length"
+    )
     weighted = form.dropper_force.any() and not pushing
     slack = (form.dropper_force <= 0) & weighted
     _refuse(
@@ -295,5 +329,5 @@ def _refuse(line: Line, mesh: LineMesh, bad: np.ndarray, what: Callable[[int], s
     more = f", and so would {found.size - 1} more" if found.size > 1 else ""
     raise InputError(
         f"the dropper in {place} {what(int(found[0]))}{more}: change line.dropper.pre_sag_mm, the "
-        "dropper positions, line.encumbrance_m or the tensions"
+        "dropper positions, line.encumbrance_m, the tensions or the droppers' stiffness"
     )

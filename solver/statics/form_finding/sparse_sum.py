@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from catenary.solver.model.elements import beam
+from catenary.solver.model.elements import beam, exact_beam
 from catenary.solver.model.model import Model
 
 
@@ -30,9 +30,14 @@ class Part(NamedTuple):
         return Part(self.dofs[which], self.matrices, self.kind[which])
 
 
-def wire_parts(model: Model, at: np.ndarray) -> list[Part]:
-    """Bending and tension of all wires; ``at`` (n_nodes,) is the number of each node's deflection,
-    that of its slope follows."""
+def wire_parts(model: Model, at: np.ndarray, exact: bool = False) -> list[Part]:
+    """Bending and tension of all wires.
+
+    Parameters
+    ----------
+    at : (n_nodes,) number of each node's deflection; that of its slope follows
+    exact : whether elements bend as tensioned beams do, or by Hermite's functions as in motion
+    """
     mesh, parts = model.mesh, []
     for wire in model.problem.line.wires:
         first, second = mesh.elements(wire.name).T
@@ -40,7 +45,8 @@ def wire_parts(model: Model, at: np.ndarray) -> list[Part]:
         dofs = np.stack([at[first], at[first] + 1, at[second], at[second] + 1], axis=1)
         tension = wire.tension_at(0.5 * (mesh.x(first) + mesh.x(second)))
         lengths, tensions, kind = beam.alike(length, tension)
-        stiffness = beam.stiffness(lengths, wire.bending_stiffness, tensions)
+        elements = exact_beam if exact else beam
+        stiffness = elements.stiffness(lengths, wire.bending_stiffness, tensions)
         parts.append(Part(dofs, stiffness, kind))
     return parts
 

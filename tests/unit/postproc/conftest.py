@@ -140,7 +140,7 @@ def make_header(problem: Problem, mesh: LineMesh, **attributes: Any) -> Header:
     }
     datasets = {
         **line_datasets(line, mesh, EVALUATION),
-        **static_datasets(line, mesh, equilibrium, elasticity),
+        **static_datasets(line, mesh, equilibrium, elasticity, equilibrium.dropper_length),
     }
     return Header({**known, **attributes}, datasets, facts_of(problem, mesh, length))
 

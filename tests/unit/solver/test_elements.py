@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from catenary.solver.model.elements import beam
+from catenary.solver.model.elements import beam, exact_beam
 from catenary.solver.model.elements.shape_functions import shape_slopes, shape_values
 
 EPS = np.finfo(float).eps
@@ -97,3 +97,80 @@ def test_many_lengths_are_many_elements() -> None:
     matrices = beam.stiffness(several, 195.0, 20e3)
     for length, matrix in zip(several, matrices, strict=True):
         assert np.array_equal(matrix, beam.stiffness(np.array([length]), 195.0, 20e3)[0])
+
+
+BENDING, TENSION = 131.7, 16000.0  # sqrt(EI / T) is 0.09 m
+
+
+def pinned_wire(
+    elements: np.ndarray, bending_stiffness: float, load: float, force: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Heights (n + 1,) [m] and slopes (n + 1,) [-] of a wire pinned at both ends.
+
+    ``elements`` (n,) are their lengths [m], ``load`` is downward per length [N/m], ``force``
+    downward at the node in the middle [N].
+    """
+    n, tension = elements.size, np.full(elements.size, TENSION)
+    matrices = exact_beam.stiffness(elements, bending_stiffness, tension)
+    share = exact_beam.moment_share(elements, bending_stiffness, tension)
+    loads = -load * beam.uniform_load(elements)
+    loads[:, 1::2] *= share[:, None]
+    whole, right = np.zeros((2 * n + 2, 2 * n + 2)), np.zeros(2 * n + 2)
+    for i in range(n):
+        own = slice(2 * i, 2 * i + 4)
+        whole[own, own] += matrices[i]
+        right[own] += loads[i]
+    right[n // 2 * 2] -= force
+    free = np.delete(np.arange(2 * n + 2), [0, 2 * n])
+    found = np.zeros(2 * n + 2)
+    found[free] = np.linalg.solve(whole[np.ix_(free, free)], right[free])
+    return found[::2], found[1::2]
+
+
+@pytest.mark.parametrize("elements", [[27.5, 27.5], [1.0, 26.0, 0.5, 0.4, 20.1, 7.0]])
+def test_exact_elements_of_any_length_have_the_heights_of_the_closed_form(
+    elements: list[float],
+) -> None:
+    """A load q and a force P: each sags as a string's does, less what bending holds up in layers of
+    r = sqrt(EI / T)."""
+    ends = np.concatenate([[0.0], np.cumsum(elements)])
+    span, place = ends[-1], ends[len(elements) // 2]
+    q, force, r = 10.6, 196.0, np.sqrt(BENDING / TENSION)
+    height, _ = pinned_wire(np.array(elements), BENDING, q, force)
+    s, half = ends, span / 2
+    layer = 1.0 - np.cosh((s - half) / r) / np.cosh(half / r)
+    sag = q * s * (span - s) / (2 * TENSION) - q * r**2 / TENSION * layer
+    near, far = np.minimum(s, place), span - np.maximum(s, place)
+    bent = np.sinh(near / r) / np.sinh(span / r) * np.sinh(far / r)
+    sag += force / TENSION * (near * far / span - r * bent)
+    # Condition of the chain: bending of the shortest element 12 EI / h^3 against T / l of all.
+    condition = 12 * BENDING / min(elements) ** 3 * span / TENSION + len(elements) ** 2
+    np.testing.assert_allclose(height, -sag, rtol=0, atol=64 * EPS * condition * sag.max())
+
+
+def test_an_exact_element_without_bending_stiffness_is_a_string() -> None:
+    height, _ = pinned_wire(np.array([27.5, 27.5]), 0.0, 10.6, 196.0)
+    sag = 10.6 * 55.0**2 / (8 * TENSION) + 196.0 * 55.0 / (4 * TENSION)
+    # It bends in layers r of 1e-4 of an element, which hold up F r / 2 T + q r^2 / T and no more.
+    r = 1e-4 * 27.5
+    within = 1.01 * (0.5 * 196.0 * r + 10.6 * r**2) / TENSION
+    assert height[1] == pytest.approx(-sag, abs=within)
+
+
+@given(st.floats(1e-4, 0.4), st.floats(0.05, 20.0))
+def test_short_exact_elements_are_those_of_hermite(ratio: float, length: float) -> None:
+    """Both are series in (h / r)^2, of which Hermite's has the first two terms. The third one of
+    k coth k is -k^4 / 45, of k^2 / (k coth k - 1) it is -k^4 / 175, with k = h / 2 r."""
+    one, tension = np.array([length]), np.array([TENSION])
+    bending = TENSION * (length / ratio) ** 2
+    exact = exact_beam.stiffness(one, bending, tension)[0]
+    hermite = beam.stiffness(one, bending, TENSION)[0]
+    # In terms of EI / h, for deflections in terms of h.
+    scale = np.array([length, 1.0, length, 1.0])
+    difference = np.abs(exact - hermite) * scale * scale[:, None] * length / bending
+    k = 0.5 * ratio
+    third = 2 * k**4 * np.array([1 / 175, 1 / 45])
+    # Of the series below k = 0.01, and round-off of what is divided by c - 1 = k^2 / 3.
+    round_off = 12 * (1e-10 + 8 * EPS / max(k, 1e-2) ** 2)
+    assert difference.max() < 4 * third[0] + round_off
+    assert difference[1, 1] < 0.5 * third.sum() + round_off
