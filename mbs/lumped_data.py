@@ -22,7 +22,8 @@ class LumpedData:
     ``masses`` [kg], shape (n,); ``stiffnesses`` [N/m] and ``dampings`` [N s/m], shape (n,): entry
     i joins mass i to mass i + 1, the last entry joins the last mass to the base. The first mass is
     the whole head, ``strips`` included, which may turn about the track as ``roll`` says. The air
-    lifts it by ``uplift``. ``laws`` that are not linear act besides.
+    lifts it by ``uplift``; ``crosswind_factor`` is what a cross wind counts in the air's speed
+    (`air.airflow`). ``laws`` that are not linear act besides.
     """
 
     masses: tuple[float, ...]
@@ -32,6 +33,7 @@ class LumpedData:
     roll: Turning | None = None
     uplift: Uplift | None = None
     laws: tuple[Law, ...] = ()
+    crosswind_factor: float = 0.0
 
     @property
     def meets_air(self) -> bool:

@@ -33,13 +33,15 @@ class Tunnel:
 class Airflow:
     """The air around one pantograph, which is at ``start`` [m] at time 0 and has ``speed`` [m/s].
 
-    ``wind`` is that at a place and a time, None in still air.
+    ``wind`` is that at a place and a time, None in still air; ``crosswind_factor`` says how far the
+    square of its part across the track counts in that of the air's speed.
     """
 
     speed: float
     start: float = 0.0
     tunnels: tuple[Tunnel, ...] = ()
     wind: WindAt | None = None
+    crosswind_factor: float = 0.0
 
     @property
     def steady(self) -> bool:
@@ -49,7 +51,14 @@ class Airflow:
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Speed of the air relative to the pantograph [m/s] and factor of its forces, (n,) each.
 
-        Wind along the track and across it counts alike. In tunnels there is no wind.
+        It is sqrt((V - W_x)^2 + c W_y^2): what lies across the track, such as strips, is lifted by
+        the flow along the track alone, so that c is zero unless it was measured (independence of
+        flows across a slender body and along it, S. F. Hoerner, *Fluid-Dynamic Drag*, 1965). In
+        tunnels there is no wind.
+
+        Parameters
+        ----------
+        times : (n,) [s]
         """
         speed, factor = np.full(times.size, self.speed), np.ones(times.size)
         if self.steady:
@@ -63,5 +72,6 @@ class Airflow:
         if self.wind is not None:
             along, across = self.wind(places, times)
             left = 1.0 - sheltered
-            speed = np.hypot(self.speed - left * along, left * across)
+            counted = np.sqrt(self.crosswind_factor) * left * across
+            speed = np.hypot(self.speed - left * along, counted)
         return speed, factor

@@ -63,7 +63,8 @@ class MultibodyData:
     the train's speed and ``uplift`` lifts head and arm, both not at standstill, where the static
     force is measured; ``strips`` are parts of the head.
     ``all_bodies`` has all bodies in the time loop; with None the mechanism is reduced to tables.
-    ``laws`` that are not linear act on head (0) and arm (1) besides.
+    ``laws`` that are not linear act on head (0) and arm (1) besides. ``crosswind_factor`` is what
+    a cross wind counts in the air's speed (`air.airflow`).
     """
 
     name: str
@@ -79,6 +80,7 @@ class MultibodyData:
     all_bodies: AllBodies | None = None
     uplift: Uplift | None = None
     laws: tuple[Law, ...] = ()
+    crosswind_factor: float = 0.0
 
     @property
     def meets_air(self) -> bool:

@@ -72,7 +72,11 @@ def _description(placement: Placement, problem: Problem) -> str:
     from catenary.mbs.build import steady_forces
 
     lifted = steady_forces(placement.data, problem.train.speed).whole
-    return f"{text}; {lifted:+.1f} N by the air at {3.6 * problem.train.speed:.4g} km/h"
+    text += f"; {lifted:+.1f} N by the air at {3.6 * problem.train.speed:.4g} km/h"
+    if acts.wind is None:
+        return text
+    factor = placement.data.crosswind_factor
+    return f"{text}, where the square of a cross wind counts {factor:g} times (crosswind_factor)"
 
 
 def header_words(scene: Scene, problem: Problem) -> list[dict[str, str]]:

@@ -45,20 +45,30 @@ def check_requirements_of_chosen(scene: Scene) -> Iterator[Fault]:
 def check_chosen_act(scene: Scene) -> Iterator[Fault]:
     """Effects that the scene switches on without anything for them to act on.
 
-    One that lifts a limit is a permission, of which a scene need not make use.
+    One that lifts a limit is a permission, of which a scene need not make use. In a calm, such as
+    one of the variants of a sweep, those of the wind may stay on.
     """
     from catenary.cases.scene.convert.problem import problem_of
 
     if scene.origin.recorded:
         return
     problem = functools.cache(lambda: problem_of(scene))
+    calmed = _calmed(scene)
     for name, on in scene.effects.items():
         effect = effects.registry()[name]
-        needs = on and effect.data and not effect.lifts
+        needs = on and effect.data and not effect.lifts and name not in calmed
         if needs and not effect.applies(problem()):
             lacking = f"it acts only with {effect.data}; give that, or leave the effect out"
             why = effect.instead(problem()) or lacking
             yield refusal(scene.origin, f"effects.{name}", True, why)
+
+
+def _calmed(scene: Scene) -> set[str]:
+    """Effects whose tables are there, but have nothing to do in a calm."""
+    wind = scene.wind
+    if wind is None or wind.speed_m_per_s > 0.0:
+        return set()
+    return {"wind"} if wind.gusts is None else {"wind", "gusts"}
 
 
 def check_requirements_of_defaults(scene: Scene) -> Iterator[Fault]:

@@ -42,6 +42,7 @@ from catenary.cases.scene.checks.run.usual import usual_faults
 from catenary.cases.scene.checks.run.wind import check_wind
 from catenary.cases.scene.checks.run.window import check_window
 from catenary.cases.scene.checks.train.aerodynamics import (
+    check_crosswind,
     check_tunnels,
     check_uplift,
     has_front,
@@ -100,6 +101,7 @@ def faults_of(scene: Scene) -> list[Fault]:
         check_dropper_lengths,
         check_recorded_parts,
         check_tunnels,
+        check_crosswind,
         check_wind,
         _speed,
         check_defects,

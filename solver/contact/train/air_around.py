@@ -15,4 +15,10 @@ def airflow(problem: Problem, simulated: Simulated, placement: Placement) -> Air
     train, wind = problem.train, simulated.wind
     masts = problem.line.support_positions
     blowing = None if wind is None else wind_at(wind, float(masts[0]), float(masts[-1]))
-    return Airflow(train.speed, train.start - placement.behind, problem.tunnels, blowing)
+    return Airflow(
+        train.speed,
+        train.start - placement.behind,
+        problem.tunnels,
+        blowing,
+        placement.data.crosswind_factor,
+    )

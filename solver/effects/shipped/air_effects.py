@@ -59,7 +59,7 @@ register(
         applies=lambda p: p.wind is not None,
         build=_damped,
         law=_steady,
-        data="a table [wind]",
+        data="a table [wind] with a speed above 0",
         after_cutting=True,
     )
 )
@@ -74,7 +74,7 @@ register(
         applies=lambda p: p.wind is not None and p.wind.gusts is not None,
         build=_gusts,
         law=lambda laws, p: replace(laws, wind=p.wind),
-        data="a table [wind.gusts]",
+        data="a table [wind.gusts] in a wind above 0",
         after_cutting=True,
     )
 )

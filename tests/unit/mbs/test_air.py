@@ -45,14 +45,23 @@ def test_forces_go_over_to_those_in_a_tunnel_behind_its_portals() -> None:
 
 
 @pytest.mark.parametrize(
-    ("along", "across", "expected"), [(0.0, 0.0, 70.0), (-10.0, 0.0, 80.0), (0.0, 20.0, 72.801)]
+    ("along", "across", "factor", "expected"),
+    [
+        (0.0, 0.0, 0.0, 70.0),
+        (-10.0, 0.0, 0.0, 80.0),
+        (0.0, 20.0, 0.0, 70.0),
+        (0.0, 20.0, 1.0, np.sqrt(70.0**2 + 20.0**2)),
+        (-10.0, -20.0, 0.5, np.sqrt(80.0**2 + 0.5 * 20.0**2)),
+    ],
 )
-def test_wind_adds_to_the_speed_of_the_train(along: float, across: float, expected: float) -> None:
+def test_wind_adds_to_the_speed_of_the_train_as_far_as_it_counts(
+    along: float, across: float, factor: float, expected: float
+) -> None:
     def wind(places: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return np.full(places.size, along), np.full(places.size, across)
 
-    flow = Airflow(70.0, 0.0, (Tunnel(1000.0, 2000.0, 1.0, 0.0),), wind)
-    check("open line [m/s]", flow.at(np.array([1.0]))[0], expected, within=5e-4)
+    flow = Airflow(70.0, 0.0, (Tunnel(1000.0, 2000.0, 1.0, 0.0),), wind, factor)
+    check("open line [m/s]", flow.at(np.array([1.0]))[0], expected, within=4 * EPS * expected)
     check("in a tunnel [m/s]", flow.at(np.array([20.0]))[0], 70.0, within=1e-12)
 
 

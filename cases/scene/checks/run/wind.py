@@ -23,7 +23,7 @@ def check_wind(scene: Scene, line: LineData) -> Iterator[Fault]:
     table = scene.wind
     if table is None:
         return
-    if scene.switches()["wind"]:
+    if scene.switches()["wind"] and table.speed_m_per_s > 0.0:
         for name, wire in wire_tables(scene.line).items():
             if wire.diameter_mm is None:
                 key = f"{name}.diameter_mm"
@@ -47,8 +47,7 @@ def check_wind(scene: Scene, line: LineData) -> Iterator[Fault]:
         why = "nothing reads it with the profile power and no gusts"
         yield refusal(scene.origin, key, value, why + TAKE_AWAY)
     wind = wind_of(table)
-    assert wind is not None
-    if not math.isfinite(wind.mean) or wind.mean <= 0.0:
+    if wind is not None and (not math.isfinite(wind.mean) or wind.mean <= 0.0):
         yield refusal(
             scene.origin, "wind.height_m", table.height_m, "there is no wind at that height"
         )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from catenary.cases.scene.convert.train.pantograph import pantograph_of, static_force
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.error_sentences import refusal
+from catenary.cases.scene.tables.table import TAKE_AWAY
 from catenary.cases.scene.tables.train.pantograph import PantographTable
 from catenary.cases.scene.tables.units import speed_from_km_h
 from catenary.meshgen.topologies.line_data import LineData
@@ -41,6 +42,18 @@ def check_tunnels(scene: Scene, line: LineData) -> Iterator[Fault]:
             f"line.tunnels {scene.origin.of('line.tunnels')} changes nothing: no pantograph of the "
             "train has aerodynamics or a force of type aerodynamic_force",
         )
+
+
+def check_crosswind(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """A factor of cross winds of a pantograph on which the air has no forces."""
+    for name, table in scene.pantographs.items():
+        if table.crosswind_factor and not _meets_air(scene, name) and not scene.origin.recorded:
+            key = f"pantographs.{name}.crosswind_factor"
+            why = (
+                "the air has no forces on this pantograph: give it aerodynamics or a force of type "
+                f"aerodynamic_force{TAKE_AWAY}"
+            )
+            yield refusal(scene.origin, key, table.crosswind_factor, why)
 
 
 def check_uplift(scene: Scene) -> Iterator[Fault]:

@@ -8,8 +8,8 @@ from catenary.solver.problem.wind import Gusts, Profile, Stretch, Wind, friction
 
 
 def wind_of(table: WindTable | None) -> Wind | None:
-    """The wind of a scene, None if there is none."""
-    if table is None:
+    """The wind of a scene, None if there is none or a calm."""
+    if table is None or table.speed_m_per_s == 0.0:
         return None
     wind = Wind(
         speed=table.speed_m_per_s,

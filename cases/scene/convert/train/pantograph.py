@@ -33,6 +33,7 @@ def pantograph_of(
             multibody_of(name, table, speed_km_h),
             uplift=uplift_of(table.aerodynamics, reversed),
             laws=laws_of(table.laws, 2),
+            crosswind_factor=table.crosswind_factor,
         )
         return turned(data) if reversed else data
     spring, damper = table.stiffnesses_N_per_m[0], table.dampings_N_s_per_m[0]
@@ -47,6 +48,7 @@ def pantograph_of(
         else turning_of(roll.inertia_kg_m2, roll.spring_distance_m, spring, damper),
         uplift_of(table.aerodynamics, reversed),
         laws_of(table.laws, len(table.masses_kg)),
+        table.crosswind_factor,
     )
 
 

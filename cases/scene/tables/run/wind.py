@@ -88,7 +88,9 @@ class GustsTable(Table):
 class WindTable(Table):
     """Wind over the line; acts with effects.wind."""
 
-    speed_m_per_s: float = Field(gt=0, le=80, description="mean speed at reference_height_m")
+    speed_m_per_s: float = Field(
+        ge=0, le=80, description="mean speed at reference_height_m; 0 is a calm, without gusts"
+    )
     direction_deg: float = Field(
         90.0,
         ge=-360,

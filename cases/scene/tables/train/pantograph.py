@@ -54,6 +54,13 @@ class _Pressing(Table):
     aerodynamics: AerodynamicsTable | None = Field(
         None, description="uplift by the air under way, on top of the static force"
     )
+    crosswind_factor: float = Field(
+        0.0,
+        ge=0,
+        le=2,
+        description="what the square of a wind across the track counts in that of the air's speed; "
+        "acts with aerodynamics or an aerodynamic_force",
+    )
     laws: list[LawTable] = Field(
         default_factory=list, max_length=20, description="what is not linear between its masses"
     )
