@@ -89,7 +89,7 @@ class LineIntegrator(ABC):
         self._shares: tuple[float, float] | None = None
         if self._proportional:
             alpha, beta_damping = (
-                model.damping_of(model.blocks[0].component) if model.blocks else (0.0, 0.0)
+                model.damping_of_block(model.blocks[0]) if model.blocks else (0.0, 0.0)
             )
             stiffness_share = self.position_factor + self.velocity_factor * alpha
             self._beta_share = beta_damping / (1.0 + self.velocity_factor * beta_damping)

@@ -17,6 +17,8 @@ from catenary.solver.problem.problem import Problem
 
 # Displacements of a node beside its height, in which its masses move as well.
 _LEVEL = ("u", "v")
+# Unknowns of a wire in the lateral plane.
+_LATERAL = ("v", "theta_z")
 
 
 class ModelBuilder:
@@ -61,7 +63,8 @@ class ModelBuilder:
             stiffness = np.concatenate([stiffness, bending[worn, None, None] * bent + pulled])
             own_load = data.mass_per_length * beam.uniform_load(own) * section[worn, None]
             load = np.concatenate([load, own_load])
-        self.add_block(Block(wire, dofs, kind, mass, stiffness, of_shape=True))
+        lateral = tuple(unknowns) == _LATERAL
+        self.add_block(Block(wire, dofs, kind, mass, stiffness, of_shape=True, lateral=lateral))
         if unknowns[0] == "w":
             self._hang(len(self.model.blocks) - 1, load)
 

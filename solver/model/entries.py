@@ -37,7 +37,7 @@ def iterate_sums(
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """``iterate_entries`` of several ``sums`` of M, K and C, with the values (k, n) of each."""
     for block in model.blocks:
-        alpha, beta = model.damping_of(block.component)
+        alpha, beta = model.damping_of_block(block)
         near = block.near(first, last)
         dofs, kind = block.dofs[near].astype(np.int64), block.kind[near]
         if wanted is not None:

@@ -35,6 +35,7 @@ class Block:
     kind : (n,) int32, of each element, which of the matrices it has
     mass, stiffness : (k, m, m) or None
     damping : (k, m, m) or None, beside what the component's damping makes of the other two
+    lateral : whether it is a wire that moves across the track, which may have its own damping
     of_shape : whether the stiffness is the tangent of forces that the shape at rest decides, such
         as those of wires and droppers; others are springs without a force at rest
     """
@@ -46,6 +47,7 @@ class Block:
     stiffness: np.ndarray | None
     damping: np.ndarray | None = None
     of_shape: bool = False
+    lateral: bool = False
 
     def near(self, first: int, last: int) -> slice | np.ndarray:
         """Elements among which are all with unknowns from ``first`` to before ``last``."""
@@ -94,7 +96,7 @@ class Model:
     row_of_node : (n_nodes,) place of each mesh node in the order along the track
     blocks : element blocks; their sums are M and K
     constrained : (n,) int, unknowns held at zero, and numbers that are no node's
-    dropper_lengths : (n_droppers,) [m]
+    dropper_lengths : (n_droppers,) unstretched [m]
     dropper_stiffness, dropper_damping : (n_droppers,) [N/m], [N s/m], of the taut dropper
     released_damping : (n_droppers,) the part of ``dropper_damping`` that goes slack with the spring
     broken : (n_droppers,) droppers that carry nothing; what they weigh stays on their clamps
@@ -200,12 +202,17 @@ class Model:
         damping = self.simulated.damping
         return damping.per_component.get(component, (damping.alpha, damping.beta))
 
+    def damping_of_block(self, block: Block) -> tuple[float, float]:
+        """Damping factors (alpha [s], beta [1/s]) of a block."""
+        lateral = self.simulated.damping.lateral if block.lateral else None
+        return self.damping_of(block.component) if lateral is None else lateral
+
     @property
     def damping_is_proportional(self) -> bool:
         """Whether C = alpha K + beta M holds for the whole line with one alpha and one beta."""
         if any(block.damping is not None for block in self.blocks):
             return False
-        return len({self.damping_of(block.component) for block in self.blocks}) <= 1
+        return len({self.damping_of_block(block) for block in self.blocks}) <= 1
 
     def tension_of(self, wire: str) -> np.ndarray:
         """Tension of the elements of a wire at rest, (n_elements,) [N]."""

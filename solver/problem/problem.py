@@ -36,12 +36,14 @@ class Damping:
 
     ``alpha`` [s] acts on stiffness, ``beta`` [1/s] on mass. ``per_component`` replaces both for
     the components that it names (wires and groups of droppers, arms and supports, by
-    their names in the line) with a pair (alpha, beta).
+    their names in the line) with a pair (alpha, beta), ``lateral`` for the motion of all wires
+    across the track.
     """
 
     alpha: float
     beta: float
     per_component: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    lateral: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

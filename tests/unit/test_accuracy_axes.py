@@ -171,6 +171,20 @@ def test_wires_move_in_the_planes_that_a_scene_has_data_for(
     assert len(plan.jobs) == len(levels)
 
 
+def test_lateral_motion_is_damped_over_the_band_of_measurements() -> None:
+    plan = make_plan("ac_simple_3d", parse_axes("lateral_damping"))
+    (planned,) = plan.axes
+    assert [*planned.runs] == [f"{beta}_per_s" for beta in (0.003, 0.2, 0.9, 3, 10)]
+    scenes = {job.variant.name: job.scene for job in plan.jobs}
+    for level, run in planned.runs.items():
+        lateral = scenes[run].line.damping.lateral
+        assert lateral is not None and lateral.alpha_s == 0.0
+        assert f"{lateral.beta_per_s:g}_per_s" == level
+    # Of wires that move up and down only there is nothing to damp.
+    with pytest.raises(InputError, match=r"the axes lateral_damping have nothing to vary in \w+$"):
+        make_plan(CASE, parse_axes("lateral_damping"))
+
+
 @pytest.mark.parametrize(
     ("case", "level", "left"),
     [

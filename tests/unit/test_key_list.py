@@ -53,7 +53,10 @@ def test_a_filter_is_a_part_or_a_pattern(wanted: str, keys: list[str]) -> None:
         ("evaluation.edition", "one of 2006, 2012, 2020"),
         ("evaluation.system", "one of ac, dc_3kv, dc_1500v"),
         ("effects.head_roll", "default false; true or false"),
-        ("effects.gusts", "requires effects.wind acts only with a table [wind.gusts] source:"),
+        (
+            "effects.gusts",
+            "requires effects.wind acts only with a table [wind.gusts] in a wind above 0 source:",
+        ),
         ("line.steady_arm.holds_height", "default false; true or false"),
         ("pantographs.*.masses_kg", "list of 1 to 20, each number above 0 to 1000; only of lumped"),
         ("petsc.march_pc_asm_type", "one of basic, restrict, interpolate, none"),

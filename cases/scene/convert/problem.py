@@ -80,6 +80,7 @@ def _window(table: WindowTable, problem: Problem) -> WindowChoice:
 
 
 def _damping(table: LineTable) -> Damping:
+    lateral = table.damping.lateral
     return Damping(
         alpha=table.damping.alpha_s,
         beta=table.damping.beta_per_s,
@@ -87,6 +88,7 @@ def _damping(table: LineTable) -> Damping:
             name: (value.alpha_s, value.beta_per_s)
             for name, value in table.damping.per_component.items()
         },
+        lateral=None if lateral is None else (lateral.alpha_s, lateral.beta_per_s),
     )
 
 

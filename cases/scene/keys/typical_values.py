@@ -68,6 +68,10 @@ TYPICAL: dict[str, str] = {
         "0.0001 (en50318_2002, ac_simple); 0.0275 and 0.00275 (Ambrosio et al., 2012)"
     ),
     "line.damping.beta_per_s": "0.0125 (en50318_2002, ac_simple); 0 (Ambrosio et al., 2012)",
+    "line.damping.lateral.alpha_s": "0 (assumed; none was measured)",
+    "line.damping.lateral.beta_per_s": (
+        "0.003 (wires alone) to 0.9 (a ratio of 0.05 at 1.4 Hz, as measured on vertical motion)"
+    ),
     "pantographs.*.static_force_N": "AC 60 to 90, DC 3 kV 90 to 120, DC 1.5 kV 70 to 140",
     "pantographs.*.masses_kg": "two masses [7.2, 15] (EN 50318); head 5 to 10, frame 10 to 20",
     "pantographs.*.stiffnesses_N_per_m": "[4200, 50] for two masses (EN 50318)",

@@ -242,6 +242,7 @@ _ALL = (
     Axis("dropper", "dropper model", MODEL, models.droppers),
     Axis("pantograph", "pantograph model", MODEL, models.pantographs),
     Axis("planes", "planes in which wires move", MODEL, models.planes),
+    Axis("lateral_damping", "damping of lateral motion", MODEL, models.lateral_dampings),
     Axis("parts", "the line without one of its parts", MODEL, models.parts_of_the_line),
 )  # fmt: skip
 AXES = {axis.name: axis for axis in _ALL}

@@ -134,6 +134,26 @@ def planes(scene: Scene) -> list[Level]:
     ]
 
 
+# Damping of a wire itself, of whole lines as it was measured on their vertical motion (ratios of
+# 0.01 and 0.05 at 1.4 Hz), and so much that no wave comes back from a mast [1/s]; see the README of
+# ac_simple_3d. None was measured on lateral motion.
+_ACROSS_DAMPINGS = (0.003, 0.2, 0.9, 3.0, 10.0)
+
+
+def lateral_dampings(scene: Scene) -> list[Level]:
+    """Dampings of the wires' lateral motion, on their mass alone; none without that motion."""
+    if not scene.switches()[_ACROSS]:
+        return []
+    return [
+        Level(
+            f"{beta:g}_per_s",
+            (f"line.damping.lateral={{alpha_s=0.0, beta_per_s={beta:g}}}",),
+            quick=beta in (0.003, 0.9),
+        )
+        for beta in _ACROSS_DAMPINGS
+    ]
+
+
 def parts_of_the_line(scene: Scene) -> list[Level]:
     """The line without each wire or fitting that it can do without; none of a simple line."""
     levels = []

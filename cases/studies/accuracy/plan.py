@@ -107,7 +107,7 @@ def make_plan(
     if not planned:
         raise InputError(
             f"the axes {', '.join(axis.name for axis in axes)} have nothing to vary in "
-            f"{scene.case.name}, whose mesh is the user's own"
+            f"{scene.case.name}" + (", whose mesh is the user's own" if scene.mesh.file else "")
         )
     asked = [axis.name for axis in axes]
     return Plan(scene.case.name, planned, collected.jobs, repeats, quick, tuple(overrides), asked)

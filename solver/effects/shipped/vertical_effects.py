@@ -252,6 +252,7 @@ register(
             p.damping.alpha > 0
             or p.damping.beta > 0
             or any(any(pair) for pair in p.damping.per_component.values())
+            or any(p.damping.lateral or ())
         ),
         law=lambda laws, p: replace(laws, damping=p.damping),
         data="line.damping with alpha_s or beta_per_s above 0",

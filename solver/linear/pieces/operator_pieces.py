@@ -211,7 +211,7 @@ def joined_by(model: Model, *sums: Coefficients) -> list[np.ndarray] | None:
         if not block.dofs.size:
             continue
         at, where = _kinds_of_elements(station, place, block.dofs, width)
-        alpha, beta = model.damping_of(block.component)
+        alpha, beta = model.damping_of_block(block)
         for joined, (m, k, c) in zip(result, sums, strict=True):
             terms = ((block.mass, m + c * beta), (block.stiffness, k + c * alpha))
             given = [

@@ -28,6 +28,7 @@ def check_lateral(scene: Scene) -> Iterator[Fault]:
         },
         "line.messenger_stagger_m": line.messenger_stagger_m,
         "line.curve.radius_m": line.curve and line.curve.radius_m,
+        "line.damping.lateral": line.damping.lateral,
     }
     for key, value in given.items():
         if value is not None and _EFFECT not in scene.effects:

@@ -31,3 +31,8 @@ class DampingTable(ProportionalDamping):
         description="damping of single components by name, in place of the line's: a wire or a "
         "group, such as contact_wire, messenger_wire, droppers, steady_arms, supports",
     )
+    lateral: ProportionalDamping | None = Field(
+        None,
+        description="damping of the wires' motion across the track, in place of that of the line "
+        "and of components; acts with effects.lateral_motion",
+    )
