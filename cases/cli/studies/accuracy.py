@@ -47,7 +47,7 @@ def accuracy(
             metavar="NAME,...",
             autocompletion=completion.axes,
             help="Out of dt, elements, grid, scheme, coupling, adaptive, contact, dropper, "
-            "pantograph, planes, parts; all if absent.",
+            "pantograph, planes, lateral_damping, parts; all if absent.",
         ),
     ] = None,
     target: Annotated[
