@@ -68,6 +68,11 @@ def _lateral(rng: random.Random, words: Words, topology: str) -> None:
         words["line.messenger_stagger_m"] = rng.uniform(-0.2, 0.2)
     if rng.random() < 0.4:
         _curve(rng, words)
+    apart = random.Random(str(words["line.stagger_m"]))
+    if apart.random() < 0.3:
+        words["line.damping.lateral"] = (
+            f"{{alpha_s={10 ** apart.uniform(-5, -2)!r},beta_per_s={apart.uniform(0.0, 5.0)!r}}}"
+        )
 
 
 def _arm(words: Words) -> str:

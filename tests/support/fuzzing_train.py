@@ -141,6 +141,9 @@ def air(rng: random.Random, words: Words) -> None:
     else:
         words[f"{table}.uplift_by_speed"] = [[50.0, rng.uniform(0, 9)], [300.0, rng.uniform(9, 90)]]
     words[f"{table}.head_share"] = rng.uniform(0.0, 1.0)
+    apart = random.Random(str(words[f"{table}.head_share"]))
+    if apart.random() < 0.5:
+        words["pantographs.reference.crosswind_factor"] = apart.uniform(0.0, 1.0)
     if rng.random() < 0.5:
         start, end = (float(str(words[f"train.{name}_m"])) for name in ("start", "end"))
         first, factor = start + rng.uniform(0.0, 1.0) * (end - start), rng.uniform(0.8, 2.0)

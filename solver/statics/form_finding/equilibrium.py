@@ -307,9 +307,12 @@ def _wanted(model: Model, wire: Wire, nodes: np.ndarray) -> np.ndarray:
 def _check(line: Line, mesh: LineMesh, form: Equilibrium, pushing: bool) -> None:
     length = form.height[mesh.droppers[:, 0]] - form.height[mesh.droppers[:, 1]]
     _refuse(line, mesh, length <= 0, lambda i: f"would have a length of {length[i]:.3f} m")
-    cut = form.dropper_length
+    cut, force = form.dropper_length, form.dropper_force
     _refuse(
-        line, mesh, cut <= 0, lambda i: f"would be cut to {cut[i]:.3f} m to stretch to its length"
+        line,
+        mesh,
+        cut <= 0,
+        lambda i: f"would have a length of {cut[i]:.3f} m before {force[i]:.0f} N stretch it",
     )
     weighted = form.dropper_force.any() and not pushing
     slack = (form.dropper_force <= 0) & weighted
