@@ -453,6 +453,62 @@ FAULTS = (
         "counted; check and pantograph say that the force depends on the height",
         "unit/mbs/test_tied_chains.py",
         "test_a_tied_chain_says_by_how_much_its_force_depends_on_the_height",
+    # ---- wind, lateral damping, lengths of droppers ---------------------------------------------
+    Fault(
+        "windy_viaduct: 0.00097 u^2 of the train's own flow in a wind across the track",
+        "the mean force grew from 141 to 151 N",
+        "pantographs.NAME.crosswind_factor, 0 by default and told; 141 N",
+        "unit/mbs/test_air.py",
+        "test_wind_adds_to_the_speed_of_the_train_as_far_as_it_counts",
+    ),
+    Fault(
+        "what a cross wind does to pantographs, in plan and report",
+        "was not said",
+        "told beside each pantograph in a wind",
+        "unit/test_scene_wind.py",
+        "test_what_a_cross_wind_counts_is_told_beside_the_pantograph",
+    ),
+    Fault(
+        "ac_simple_3d: the damping of lateral motion",
+        "decided on 4 N of sigma without a key or a source",
+        "line.damping.lateral; the band of measurements moves sigma by 1 N",
+        "unit/solver/test_lateral_counting.py",
+        "test_wires_have_a_damping_of_their_own_across_the_track",
+    ),
+    Fault(
+        "catenary accuracy of a line with lateral motion",
+        "no axis showed what its damping decides",
+        "axis lateral_damping",
+        "unit/test_accuracy_axes.py",
+        "test_lateral_motion_is_damped_over_the_band_of_measurements",
+    ),
+    Fault(
+        "dropper lengths of ac_simple with 8 to 64 elements a gap",
+        "1.0163 to 1.0155 m, printed with four decimals",
+        "1.0155 m on every mesh",
+        "verification/test_static_shape.py",
+        "test_droppers_are_cut_to_the_same_lengths_on_every_mesh",
+    ),
+    Fault(
+        "droppers of 0.117 kg/m that 196 N stretch by 2 mm",
+        "weighed by their stretched length",
+        "weigh by the length as cut",
+        "verification/test_static_shape.py",
+        "test_bending_stiffness_rounds_the_kinks_but_keeps_the_weights",
+    ),
+    Fault(
+        "wind.speed_m_per_s=0 as a variant of a sweep",
+        "was refused",
+        "a calm",
+        "unit/test_scene_wind.py",
+        "test_a_calm_has_no_wind_and_no_gusts",
+    ),
+    Fault(
+        "reference/expected.csv of four cases",
+        "made on other meshes than the cases'",
+        "made by a second program on equal inputs",
+        "verification/test_second_program.py",
+        "test_expected_figures_are_those_of_the_second_program",
     ),
 )
 

@@ -1,0 +1,371 @@
+"""A vertical line under one pantograph of lumped masses, computed by a second program.
+
+Written from the equations with NumPy and SciPy: elements by Gauss quadrature, form finding with the
+droppers' forces as multipliers, average acceleration on all unknowns with banded factors, and slack
+droppers and contacts by switching until all signs fit. Of the package it takes inputs only: places
+of nodes, data of wires and hardware, wanted heights.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import linalg, sparse
+from scipy.sparse import linalg as sparse_linalg
+
+from catenary.mbs.lumped_data import LumpedData
+from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.wires import Role
+from catenary.solver.effects.all_effects import simulated
+from catenary.solver.problem.problem import Problem
+
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(6)
+_AT, _SHARE = 0.5 * (1.0 + _POINTS), 0.5 * _WEIGHTS
+_MOST_SWITCHES = 200
+
+
+def cubics(s: np.ndarray, h: np.ndarray) -> np.ndarray:
+    """Hermite's functions at shares ``s`` of elements of length ``h``, (4, ...) [-], [m]."""
+    return np.array(
+        [1 - 3 * s**2 + 2 * s**3, h * s * (1 - s) ** 2, s**2 * (3 - 2 * s), h * s**2 * (s - 1)]
+    )
+
+
+@dataclass
+class History:
+    """What a run gives: place [m], force [N] and wire height [m] at each step, and the largest
+    uplift of each steady arm in the evaluated stretch [m]."""
+
+    place: np.ndarray
+    force: np.ndarray
+    height: np.ndarray
+    uplift: float
+
+
+@dataclass
+class PlainLine:
+    """The line of a problem on a mesh; unknowns are height and slope of nodes in order of x."""
+
+    problem: Problem
+    mesh: LineMesh
+    height: np.ndarray = field(init=False)
+    tension: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        mesh, line = self.mesh, self.problem.line
+        self.size = 2 * mesh.n_nodes
+        self.row = np.empty(mesh.n_nodes, dtype=int)
+        self.row[np.lexsort((np.arange(mesh.n_nodes), mesh.points[:, 0]))] = np.arange(mesh.n_nodes)
+        self.w = 2 * self.row
+        self.mass, self.wires, self.wire_weight = self._wires()
+        upper, lower = self.w[mesh.droppers].T
+        n, each = len(mesh.droppers), np.arange(len(mesh.droppers))
+        self.pull = sparse.csr_matrix(
+            (np.repeat([1.0, -1.0], n), (np.tile(each, 2), np.append(upper, lower))),
+            shape=(n, self.size),
+        )
+        self.spring = np.array([g.kind.stiffness for g in line.droppers])[mesh.dropper_group]
+        self._rest()
+        self._moving()
+
+    def _wires(self) -> tuple[sparse.csc_matrix, sparse.csc_matrix, np.ndarray]:
+        """Mass, stiffness and weight per gravity of all wires."""
+        parts, weight = [], np.zeros(self.size)
+        for wire in self.problem.line.wires:
+            pairs = self.mesh.elements(wire.name)
+            ends = self.mesh.points[pairs, 0]
+            h = (ends[:, 1] - ends[:, 0])[:, None]
+            s = np.broadcast_to(_AT, (len(h), _AT.size))
+            shape = cubics(s, h)
+            slope = np.array(
+                [6 * s * (s - 1) / h, (1 - s) * (1 - 3 * s), 6 * s * (1 - s) / h, s * (3 * s - 2)]
+            )
+            bend = np.array([12 * s - 6, h * (6 * s - 4), 6 - 12 * s, h * (6 * s - 2)]) / h**2
+            tension = wire.tension_at(ends.mean(axis=1))[:, None]
+
+            def over(f: np.ndarray, by: np.ndarray, h: np.ndarray = h) -> np.ndarray:
+                return np.einsum("iep,jep,ep->eij", f, f, by * h * _SHARE)
+
+            dofs = np.stack([self.w[pairs[:, 0]], self.w[pairs[:, 0]] + 1,
+                             self.w[pairs[:, 1]], self.w[pairs[:, 1]] + 1], axis=1)  # fmt: skip
+            one = np.ones_like(s)
+            mass = over(shape, wire.mass_per_length * one)
+            stiffness = over(bend, wire.bending_stiffness * one) + over(slope, tension * one)
+            parts.append((dofs, mass, stiffness))
+            own = wire.mass_per_length * np.einsum("iep,ep->ei", shape, h * _SHARE * one)
+            np.add.at(weight, dofs, own)
+        rows = np.concatenate([np.repeat(d, 4, axis=1).ravel() for d, _, _ in parts])
+        columns = np.concatenate([np.tile(d, (1, 4)).ravel() for d, _, _ in parts])
+        mass, stiffness = (
+            sparse.csc_matrix(
+                (np.concatenate([part[k].ravel() for part in parts]), (rows, columns)),
+                shape=(self.size, self.size),
+            )
+            for k in (1, 2)
+        )
+        return mass, stiffness, weight
+
+    def _diagonal(self, nodes: np.ndarray, values: np.ndarray) -> sparse.csc_matrix:
+        """A matrix with values at the heights of nodes."""
+        at = self.w[nodes]
+        return sparse.csc_matrix((values, (at, at)), shape=(self.size, self.size))
+
+    def _rest(self) -> None:
+        """Heights at rest and tensions of the droppers, whose masses follow from their lengths."""
+        mesh, line = self.mesh, self.problem.line
+        supports = np.array([own.stiffness for own in line.supports])[mesh.support_group]
+        self.standing = self.wires + self._diagonal(mesh.supports, supports)
+        load = np.zeros(self.size)
+        for number, own in enumerate(line.supports):
+            nodes = mesh.supports[mesh.support_group == number]
+            load[self.w[nodes]] += own.stiffness * line.wire(own.wire).points(mesh.x(nodes))[:, 2]
+        for (upper, lower), number in zip(mesh.clamps, line.clamp_group, strict=True):
+            at, k = self.w[[upper, lower]], line.clamps[number].stiffness
+            self.standing = self.standing + sparse.csc_matrix(
+                ([k, -k, -k, k], (at[[0, 0, 1, 1]], at[[0, 1, 0, 1]])), shape=(self.size, self.size)
+            )
+        wanted, held = self._wanted()
+        n, m = len(mesh.droppers), len(held)
+        given = np.append(self.w[mesh.droppers[:, 1]], self.w[held])
+        pick = sparse.csr_matrix((np.ones(n + m), (np.arange(n + m), given)),
+                                 shape=(n + m, self.size))  # fmt: skip
+        acts = sparse.vstack([-self.pull, pick[n:]]).T
+        factor = sparse_linalg.splu(sparse.bmat([[self.standing, -acts], [pick, None]]).tocsc())
+        length = mesh.points[mesh.droppers[:, 0], 2] - mesh.points[mesh.droppers[:, 1], 2]
+        gravity = simulated(self.problem).gravity
+        for _ in range(8):
+            self.hung, self.moved = self._points(length)
+            right = load - gravity * (self.wire_weight + self.hung)
+            found = factor.solve(np.append(right, wanted))
+            self.tension = found[self.size : self.size + n]
+            length = self.pull @ found[: self.size] - self.tension / self.spring
+        self.height = found[: self.size]
+
+    def _wanted(self) -> tuple[np.ndarray, np.ndarray]:
+        """Heights wanted at droppers' lower ends, at ends and at arms that hold them, and the nodes
+        of the latter two."""
+        mesh, line, laws = self.mesh, self.problem.line, simulated(self.problem)
+        at_droppers = np.zeros(len(mesh.droppers))
+        for number, group in enumerate(line.droppers):
+            mine = mesh.dropper_group == number
+            at_droppers[mine] = laws.target_height(
+                line.wire(group.lower), mesh.x(mesh.droppers[mine, 1])
+            )
+        held, heights = [], [at_droppers]
+        for wire in line.wires:
+            held.append(mesh.anchors[np.isin(mesh.anchors, mesh.wires[wire.name])])
+            ends = wire.held_heights if wire.profile is None else laws.target_height(
+                wire, mesh.x(held[-1]))  # fmt: skip
+            heights.append(np.array(ends, dtype=float))
+        for number, arms in enumerate(line.steady_arms):
+            if arms.kind.holds_height:
+                held.append(mesh.steady_arms[mesh.arm_group == number])
+                heights.append(laws.target_height(line.wire(arms.wire), mesh.x(held[-1])))
+        return np.concatenate(heights), np.concatenate(held)
+
+    def _points(self, length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Point masses that hang at each unknown, and those that move with it [kg]."""
+        mesh, line = self.mesh, self.problem.line
+        hung = np.zeros(self.size)
+        for number, group in enumerate(line.droppers):
+            mine = mesh.dropper_group == number
+            half = 0.5 * group.kind.mass_per_length * length[mine]
+            for side, clamp in ((0, group.kind.upper_clamp_mass), (1, group.kind.lower_clamp_mass)):
+                np.add.at(hung, self.w[mesh.droppers[mine, side]], half + clamp)
+        for (upper, lower), number in zip(mesh.clamps, line.clamp_group, strict=True):
+            hung[self.w[[upper, lower]]] += 0.5 * line.clamps[number].mass
+        moved = hung.copy()
+        for number, arms in enumerate(line.steady_arms):
+            at = self.w[mesh.steady_arms[mesh.arm_group == number]]
+            rod = arms.kind.mass_per_length * arms.kind.length
+            np.add.at(hung, at, rod / 2 + arms.kind.clamp_mass)
+            np.add.at(moved, at, rod / 3 + arms.kind.clamp_mass)
+        return hung, moved
+
+    def _moving(self) -> None:
+        """Matrices of the motion, all droppers taut; held unknowns are left out."""
+        mesh, line = self.mesh, self.problem.line
+        arms = np.array([own.kind.stiffness for own in line.steady_arms])[mesh.arm_group]
+        stiffness = self.standing + self._diagonal(mesh.steady_arms, arms)
+        stiffness = stiffness + self.pull.T @ sparse.diags(self.spring) @ self.pull
+        self.free = np.setdiff1d(np.arange(self.size), self.w[mesh.anchors])
+        cut = sparse.csr_matrix(
+            (np.ones(self.free.size), (np.arange(self.free.size), self.free)),
+            shape=(self.free.size, self.size),
+        )
+        self.stiffness = (cut @ stiffness @ cut.T).tocsr()
+        self.inertia = (cut @ (self.mass + sparse.diags(self.moved)) @ cut.T).tocsr()
+        self.pulls = (self.pull @ cut.T).tocsr()
+        self.number = np.full(self.size, -1)
+        self.number[self.free] = np.arange(self.free.size)
+
+    def _banded(self, matrix: sparse.spmatrix) -> tuple[np.ndarray, bool]:
+        """Cholesky factors of a matrix in bands."""
+        lower = sparse.tril(matrix).tocoo()
+        bands = np.zeros((int((lower.row - lower.col).max()) + 1, matrix.shape[0]))
+        bands[lower.row - lower.col, lower.col] = lower.data
+        return linalg.cholesky_banded(bands, lower=True), True
+
+    def at(self, wire: str, x: float) -> tuple[np.ndarray, np.ndarray, float]:
+        """How the height of a wire at a place follows from the free unknowns, as numbers and
+        weights, and its height at rest [m]."""
+        nodes = self.mesh.wires[wire]
+        places = self.mesh.points[nodes, 0]
+        e = min(max(int(np.searchsorted(places, x, side="right")) - 1, 0), len(places) - 2)
+        h = places[e + 1] - places[e]
+        own = np.repeat(self.w[nodes[e : e + 2]], 2) + [0, 1, 0, 1]
+        values = cubics(np.array((x - places[e]) / h), np.array(h))
+        rest = float(values @ self.height[own])
+        keep = self.number[own] >= 0
+        return self.number[own[keep]], values[keep], rest
+
+    def elasticity(self, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
+        """Places of nodes between two masts (n,) [m], and the lift there under a unit force that
+        the contact wires share [m/N]."""
+        factor, wires = self._banded(self.stiffness), self.problem.line.wires_of(Role.CONTACT)
+        x = self.mesh.points[self.mesh.wires[wires[0].name], 0]
+        x, lifts = x[(x > start - 1e-9) & (x < end + 1e-9)], []
+        for place in x:
+            load = np.zeros(self.free.size)
+            for wire in wires:
+                own, values, _ = self.at(wire.name, place)
+                load[own] += values / len(wires)
+            lifts.append(load @ linalg.cho_solve_banded(factor, load))
+        return x, np.array(lifts)
+
+    def nominal_height(self, start: float, end: float) -> float:
+        """Mean height between two masts of a head that presses with its static force [m]."""
+        x, lift = self.elasticity(start, end)
+        wire = self.problem.line.wires_of(Role.CONTACT)[0].name
+        height = np.array([self.at(wire, place)[2] for place in x])
+        height += lift * self.problem.train.placements[0].static_force
+        return float(np.sum(np.diff(x) * (height[1:] + height[:-1]) / 2) / (end - start))
+
+    def run(self, nominal_height: float) -> History:
+        """The train's way to its end, by average acceleration."""
+        problem, dt = self.problem, self.problem.numerics.dt
+        train, alpha = problem.train, problem.damping.alpha
+        damping = alpha * self.stiffness + problem.damping.beta * self.inertia
+        factor = self._banded(self.inertia + dt / 2 * damping + dt**2 / 4 * self.stiffness)
+        wires = [wire.name for wire in problem.line.wires_of(Role.CONTACT)]
+        law = problem.contact.stiffness  # type: ignore[union-attr]
+        head = _Chain(train.placements[0].data, train.placements[0].static_force, dt)  # type: ignore[arg-type]
+        head.begin(np.mean([self.at(wire, train.start)[2] for wire in wires]), nominal_height)
+        d, v, a = np.zeros((3, self.free.size))
+        answers: dict[int, np.ndarray] = {}
+        touching, slack = np.zeros(len(wires), dtype=bool), np.zeros(len(self.spring), dtype=bool)
+        worth = self.spring * (dt**2 / 4 + alpha * dt / 2)
+        arms = self.mesh.steady_arms
+        x = self.mesh.points[arms, 0]
+        arms = arms[(x >= problem.evaluation[0]) & (x <= problem.evaluation[1])]
+        arm_numbers, uplift = self.number[self.w[arms]], 0.0
+        n_steps = int((train.end - train.start) / train.speed / dt + 1e-9)
+        record = np.zeros((n_steps, 3))
+        for step in range(n_steps):
+            time = (step + 1) * dt
+            place = train.start + train.speed * time
+            d, v = d + dt * v + dt**2 / 4 * a, v + dt / 2 * a
+            free = linalg.cho_solve_banded(factor, -(damping @ v) - self.stiffness @ d)
+            contacts = [self.at(wire, place) for wire in wires]
+            moves = []
+            for own, values, _ in contacts:
+                load = np.zeros(self.free.size)
+                load[own] = values
+                moves.append(linalg.cho_solve_banded(factor, load))
+            height = [r + values @ (d + dt**2 / 4 * free)[own] for own, values, r in contacts]
+            z, give = head.predict(time, train.raise_time)
+            tension = self.tension + self.spring * (self.pulls @ d)
+            tension += alpha * self.spring * (self.pulls @ v) + worth * (self.pulls @ free)
+            depth = z - np.array(height)
+            for turn in range(_MOST_SWITCHES):
+                on, loose = np.flatnonzero(touching), np.flatnonzero(slack)
+                for number in loose:
+                    if number not in answers:
+                        pull = self.pulls[number].toarray()[0]
+                        answers[number] = linalg.cho_solve_banded(factor, pull)
+                columns = [moves[k] for k in on] + [answers[k] for k in loose]
+                k = on.size
+                if columns:
+                    at = np.array(columns).T
+                    by_depth = np.array([-(dt**2 / 4) * (values @ at[own])
+                                         for own, values, _ in contacts])  # fmt: skip
+                    by_depth[:, :k] -= give
+                    by_tension = worth[:, None] * (self.pulls @ at)
+                    # f = law depth of contacts that touch, q = tension of droppers that are slack.
+                    small = np.eye(len(columns))
+                    small[:k] -= law * by_depth[on]
+                    small[k:] -= by_tension[loose]
+                    forces = np.linalg.solve(small, np.append(law * depth[on], tension[loose]))
+                    new_depth, new_tension = (
+                        depth + by_depth @ forces,
+                        tension + by_tension @ forces,
+                    )
+                else:
+                    forces, new_depth, new_tension = np.zeros(0), depth, tension
+                wrong = np.append((new_depth > 0) != touching, (new_tension < 0) != slack)
+                if not wrong.any():
+                    break
+                # All at first; should that go round, one at a time.
+                switched = np.flatnonzero(wrong) if turn < 20 else np.flatnonzero(wrong)[:1]
+                touching[switched[switched < touching.size]] ^= True
+                slack[switched[switched >= touching.size] - touching.size] ^= True
+            else:
+                raise RuntimeError(f"signs do not fit at {time} s")
+            a = free + (at @ forces if columns else 0.0)
+            d, v = d + dt**2 / 4 * a, v + dt / 2 * a
+            force = float(forces[:k].sum())
+            head.follow(force)
+            own, values, rest = contacts[0]
+            record[step] = place, force, rest + values @ d[own]
+            uplift = max(uplift, float(d[arm_numbers].max()))
+        return History(*record.T, uplift)
+
+
+class _Chain:
+    """Lumped masses, head first, lifted at the last one; average acceleration."""
+
+    def __init__(self, data: LumpedData, lift: float, dt: float) -> None:
+        n = data.n_masses
+        self.lift, self.dt, self.springs = lift, dt, data.stiffnesses
+        self.mass = np.diag(data.masses)
+        self.stiffness, self.damping = (
+            sum(k * np.outer(r, r) for k, r in zip(values, self._stretches(n), strict=True))
+            for values in (data.stiffnesses, data.dampings)
+        )
+        step = self.mass + dt / 2 * self.damping + dt**2 / 4 * self.stiffness
+        self.inverse = np.linalg.inv(step)
+
+    @staticmethod
+    def _stretches(n: int) -> np.ndarray:
+        """Stretch of each spring by the masses' heights; the last stands on the base."""
+        return np.eye(n) - np.eye(n, k=1)
+
+    def begin(self, height: float, nominal_height: float) -> None:
+        """All masses at a height; the base spring is relaxed when the head is at the nominal one
+        under the static force."""
+        n = len(self.mass)
+        self.base = self.springs[-1] * (
+            nominal_height + sum(self.lift / k for k in self.springs[:-1])
+        )
+        # Before anything lifts it, the base spring alone pushes the last mass.
+        level = np.full(n, height)
+        push = -self.stiffness @ level
+        push[-1] += self.base
+        self.state = np.array([level, np.zeros(n), push / np.diag(self.mass)])
+
+    def predict(self, time: float, raise_time: float) -> tuple[float, float]:
+        """Height of the head at a time without contact [m], and how far a unit force lowers it."""
+        dt = self.dt
+        z, v, a = self.state
+        self.z, self.v = z + dt * v + dt**2 / 4 * a, v + dt / 2 * a
+        part = 0.5 * (1.0 - np.cos(np.pi * min(time / raise_time, 1.0)))
+        load = -self.damping @ self.v - self.stiffness @ self.z
+        load[-1] += part * self.lift + self.base
+        self.free = self.inverse @ load
+        return self.z[0] + dt**2 / 4 * self.free[0], dt**2 / 4 * self.inverse[0, 0]
+
+    def follow(self, force: float) -> None:
+        """End the step under a contact force on the head, downward [N]."""
+        dt, a = self.dt, self.free - force * self.inverse[:, 0]
+        self.state = np.array([self.z + dt**2 / 4 * a, self.v + dt / 2 * a, a])
