@@ -75,6 +75,7 @@ def _filtered(results: Results) -> list[tuple[str, np.ndarray, np.ndarray]]:
     return found
 
 
+@figures.own_style()
 def _forces(folders: Folders) -> StudyFigure:
     trains = list(dict.fromkeys(train for own in folders.values() for train in own))
     figure = figures.new_figure(0.6 + 1.55 * len(trains))
@@ -103,6 +104,7 @@ def _force_panel(axes: Axes, folder: Path, train: str, damping: str, columns: Co
             columns[f"{name} force [N]"] = force
 
 
+@figures.own_style()
 def _overview(runs: Runs) -> StudyFigure:
     """Figure 9: statistics of all pantographs, a panel for each damping."""
     figure = figures.new_figure(6.4)
@@ -138,6 +140,7 @@ def _labelled(trains: Mapping[str, Run | None]) -> dict[str, Force]:
     }
 
 
+@figures.own_style()
 def _histograms(folders: Folders) -> StudyFigure:
     """Figure 10: share of time in bins of the contact force, a panel for each damping."""
     figure = figures.new_figure(6.4)
@@ -190,6 +193,7 @@ def _droppers(shown: Folders) -> StudyFigure:
     )  # fmt: skip
 
 
+@figures.own_style()
 def _passages(
     shown: Folders,
     record: Callable[[Results], tuple[float, np.ndarray]],
@@ -224,6 +228,7 @@ def _passages(
     return StudyFigure(name, caption, figure, columns)
 
 
+@figures.own_style()
 def _by_separation(number: int, damping: str, runs: Runs) -> StudyFigure:
     """Figures 13 and 14: statistics over the separation beside the single pantograph's."""
     figure = figures.new_figure(3.6)

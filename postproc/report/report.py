@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import json
 import logging
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,6 +35,9 @@ from catenary.postproc.standards.en50367 import KMH
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    # Name of the file without its end, caption, and what makes the figure, if there is one.
+    _Drawing = tuple[str, str, Callable[[], Figure | None]]
 
 logger = logging.getLogger("catenary.report")
 
@@ -78,7 +82,8 @@ def write_report(
 ) -> Report:
     """Write summary, report, pictures and dropper table of a run into a folder. Not collective.
 
-    Each file appears whole or not at all.
+    Each file appears whole or not at all. The summary is written before the first picture is
+    drawn, and a picture that cannot be drawn is left out with a remark.
 
     Parameters
     ----------
@@ -99,17 +104,19 @@ def write_report(
             logger.warning("%s", sentence)
         statistics = stats.evaluate(results)
         criteria = judge(results, statistics)
-        pictures = _pictures(results, statistics)
-        content: dict[str, bytes | str] = {f"{p.name}.png": p.data for p in pictures}
-        content["droppers.csv"] = csv_tables.droppers_csv(results)
         found = indicate(results)
+        summary = as_json(summarise(results, statistics, criteria, found))
+        content: dict[str, bytes | str] = {"droppers.csv": csv_tables.droppers_csv(results)}
         registration = results.registration()
         if registration is not None:
             content["registration.csv"] = registration.csv()
-        content["report.html"] = _html(results, statistics, criteria, found, pictures)
-        content["summary.json"] = as_json(summarise(results, statistics, criteria, found))
+        files = write_into(out, {"summary.json": summary, **content})
+        pictures = _pictures(results, statistics)
+        html = _html(results, statistics, criteria, found, pictures)
+        content = {f"{p.name}.png": p.data for p in pictures}
+        files += write_into(out, {**content, "report.html": html})
         verdict = acceptance.verdict(criteria) if results.complete else None
-    return Report(write_into(out, content), criteria, verdict)
+    return Report(files, criteria, verdict)
 
 
 def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
@@ -145,68 +152,60 @@ def judge(results: Results, statistics: RunStatistics) -> list[Criterion]:
 
 
 def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
-    # A summary alone does without Matplotlib.
+    """The pictures of a run, without those that cannot be drawn, which is logged."""
+    try:
+        # A summary alone does without Matplotlib.
+        from catenary.postproc.report.pictures import figures
+    except (OSError, UnicodeDecodeError) as error:
+        logger.warning("no picture was drawn: Matplotlib cannot read a matplotlibrc (%s)", error)
+        return []
+    pictures = []
+    for name, caption, draw in _drawings(results, statistics):
+        data = figures.painted(f"{name}.png", draw)
+        pictures += [_Picture(name, caption, content) for content in data.values()]
+    return pictures
+
+
+def _drawings(results: Results, statistics: RunStatistics) -> Iterator[_Drawing]:
+    """Name, caption and what makes the figure of each picture of a run, in their order."""
     from catenary.postproc.report.pictures import (
         channel_pictures,
-        figures,
         force_pictures,
         lateral_picture,
         line_pictures,
         plan_view,
     )
 
-    drawn: list[tuple[str, str, Figure | None]] = []
     if results.n_rows("time") > 1:
-        drawn.append(
-            (
-                "contact_force",
-                "Contact force along the track.",
-                force_pictures.contact_force(results),
-            )
-        )
+        text = "Contact force along the track."
+        yield "contact_force", text, lambda: force_pictures.contact_force(results)
         if results.several_strips:
-            caption = "Shares of the collector strips in the contact force, below 20 Hz."
-            drawn.append(("strip_forces", caption, force_pictures.strip_forces(results)))
+            text = "Shares of the collector strips in the contact force, below 20 Hz."
+            yield "strip_forces", text, lambda: force_pictures.strip_forces(results)
         if results.has("contact_wire_force"):
-            caption = "Shares of the contact wires in the contact force, below 20 Hz."
-            drawn.append(("wire_forces", caption, force_pictures.wire_forces(results)))
+            text = "Shares of the contact wires in the contact force, below 20 Hz."
+            yield "wire_forces", text, lambda: force_pictures.wire_forces(results)
         if results.has("lateral_place"):
-            caption = "Lateral place of the contact wires on the strips."
-            drawn.append(("lateral_place", caption, lateral_picture.lateral_places(results)))
+            text = "Lateral place of the contact wires on the strips."
+            yield "lateral_place", text, lambda: lateral_picture.lateral_places(results)
         if len(statistics.complaints) < len(statistics.pantographs):
-            drawn += [
-                (
-                    "statistics",
-                    "Contact force in the evaluation stretch.",
-                    force_pictures.force_statistics(results, statistics),
-                ),
-                (
-                    "histogram",
-                    "Distribution of the contact force in the evaluation stretch.",
-                    force_pictures.force_histogram(results, statistics),
-                ),
-            ]
+            text = "Contact force in the evaluation stretch."
+            yield "statistics", text, lambda: force_pictures.force_statistics(results, statistics)
+            text = "Distribution of the contact force in the evaluation stretch."
+            yield "histogram", text, lambda: force_pictures.force_histogram(results, statistics)
         if statistics.supports.x.size:
             limit = standards.EDITIONS[results.attributes["edition"]].arm_uplift
-            drawn.append(
-                (
-                    "uplift",
-                    "Uplift of the contact wire at the steady arms.",
-                    line_pictures.arm_uplift(results, statistics, limit),
-                )
-            )
+            text = "Uplift of the contact wire at the steady arms."
+            yield "uplift", text, lambda: line_pictures.arm_uplift(results, statistics, limit)
         if statistics.droppers.x.size:
-            drawn.append(
-                ("droppers", "Dropper forces.", line_pictures.dropper_force(results, statistics))
-            )
-    drawn += channel_pictures.channel_pictures(results)
-    drawn.append(
-        ("static", "Profile and elasticity of the line.", line_pictures.static_line(results))
-    )
-    caption = "The line at rest from above, and its steady arms."
-    drawn.append(("plan_view", caption, plan_view.plan_view(results)))
-    drawn.append(("energy", "Energies of the line.", line_pictures.energies(results)))
-    return [_Picture(name, text, figures.png(f)) for name, text, f in drawn if f is not None]
+            text = "Dropper forces."
+            yield "droppers", text, lambda: line_pictures.dropper_force(results, statistics)
+    yield from channel_pictures.channel_pictures(results)
+    text = "Profile and elasticity of the line."
+    yield "static", text, lambda: line_pictures.static_line(results)
+    text = "The line at rest from above, and its steady arms."
+    yield "plan_view", text, lambda: plan_view.plan_view(results)
+    yield "energy", "Energies of the line.", lambda: line_pictures.energies(results)
 
 
 def _html(

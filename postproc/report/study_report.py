@@ -9,6 +9,7 @@ import base64
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -104,7 +105,9 @@ def write_study(
     rows : figures of every run, for ``study.json``
     facts : what is said of the study as a whole, such as its run time
     """
-    pictures = {figure.name: figures.png(figure.figure) for figure in study.figures}
+    pictures: dict[str, bytes] = {}
+    for one in study.figures:
+        pictures |= figures.painted(one.name, partial(getattr, one, "figure"))
     content: dict[str, bytes | str] = {f"{name}.png": data for name, data in pictures.items()}
     for figure in study.figures:
         content[f"{figure.name}.csv"] = columns_csv(figure.columns)

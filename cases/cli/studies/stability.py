@@ -47,10 +47,8 @@ def stability_map(
     given = [*(assignments or []), *(extras or [])]
     grid = study.QUICK if quick else study.Grid()
     found = study.make_map(case, given, shortened, console.alone(), grid, console.say)
-    content: dict[str, bytes | str] = {
-        TABLE: as_csv(study.as_rows(found)),
-        PICTURE: figures.png(draw(found)),
-    }
+    content: dict[str, bytes | str] = {TABLE: as_csv(study.as_rows(found))}
+    content |= figures.painted(PICTURE, lambda: draw(found))
     files = write_all(out, content)
     console.say("\n" + study.as_text(found) + "\n" + "\n".join(map(str, files)))
     return console.DONE if all(one.agrees for one in found.limits) else console.NOT_ACCEPTED

@@ -47,7 +47,7 @@ def write(found: Measured, out_dir: Path, target: float) -> list[Path]:
         RECORD: json.dumps(plain(_record(found, target)), indent=1, ensure_ascii=False) + "\n",
     }
     if any(row.done for axis in _precise(found) for row in found.rows_of(axis.name)):
-        content[PICTURE] = figures.png(draw(found))
+        content |= figures.painted(PICTURE, lambda: draw(found))
     orders = {
         planned.axis.name: _order_lines(planned.axis, found.rows_of(planned.axis.name))
         for planned in found.plan.axes
@@ -104,6 +104,7 @@ def advices(found: Measured, target: float) -> list[str]:
     ]
 
 
+@figures.own_style()
 def draw(found: Measured) -> Figure:
     """Error of the force history over the time of the march, with the Pareto front."""
     figure = figures.new_figure(4.8)

@@ -11,16 +11,17 @@ from matplotlib.figure import Figure
 
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.studies.pantograph.study import PantographStudy, fit_error
-from catenary.postproc.files.disk import write_whole
+from catenary.postproc.files.disk import write_all
 from catenary.postproc.report.pictures.figures import (
     COLOURS,
     LIGHT,
     legend_above,
     new_figure,
-    png,
+    own_style,
+    painted,
     tidy,
 )
-from catenary.solver.base.errors import InputError, RunBroken
+from catenary.solver.base.errors import InputError
 
 HEADER = "frequency_hz,receptance_real_m_per_N,receptance_imag_m_per_N"
 FILES = ("receptance.csv", "receptance.png", "lumped.toml")
@@ -36,15 +37,11 @@ def new_files(folder: Path, force: bool) -> None:
 
 def write_study(found: PantographStudy, folder: Path) -> list[Path]:
     """Write all files and return their paths. Raises ``RunBroken`` if the disk refuses."""
-    contents: tuple[bytes | str, ...] = (csv_text(found), png(picture(found)), lumped_toml(found))
-    paths = [folder / name for name in FILES]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for path, content in zip(paths, contents, strict=True):
-            write_whole(path, content)
-    except OSError as error:
-        raise RunBroken(f"{folder} could not be written: {error.strerror}") from error
-    return paths
+    table, drawn, lumped = FILES
+    content: dict[str, bytes | str] = {table: csv_text(found)}
+    content |= painted(drawn, lambda: picture(found))
+    content[lumped] = lumped_toml(found)
+    return write_all(folder, content)
 
 
 def csv_text(found: PantographStudy) -> str:
@@ -56,6 +53,7 @@ def csv_text(found: PantographStudy) -> str:
     return "\n".join([HEADER, *rows]) + "\n"
 
 
+@own_style()
 def picture(found: PantographStudy) -> Figure:
     """Magnitude and phase of the receptance, the pantograph's and the fitted model's."""
     at, fit = found.range.frequencies(), found.fit

@@ -16,6 +16,7 @@ _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _STABLE, _ONLY_IMPLICIT = "#eef3e6", "#fbeee6"
 
 
+@figures.own_style()
 def draw(found: StabilityMap) -> Figure:
     """Largest step over contact stiffness and over head mass, both logarithmic."""
     figure = figures.new_figure(5.6)

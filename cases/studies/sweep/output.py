@@ -164,10 +164,11 @@ def write(out_dir: Path, case: str, ended: Sequence[Ended], plotted: Sequence[st
         RECORD: json.dumps(plain(record), indent=1, ensure_ascii=False) + "\n",
     }
     if sum(one.done for one in ended) > 1:
-        content[PICTURE] = figures.png(draw(table, varied_keys(ended), plotted))
+        content |= figures.painted(PICTURE, lambda: draw(table, varied_keys(ended), plotted))
     return write_all(out_dir, content)
 
 
+@figures.own_style()
 def draw(table: Sequence[dict[str, Any]], keys: Sequence[str], plotted: Sequence[str]) -> Figure:
     """Statistics over the first varied key with numbers, a curve for each value of the others.
 

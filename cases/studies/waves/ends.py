@@ -69,6 +69,7 @@ def curve_rows(found: list[EndReflection]) -> list[dict[str, Any]]:
     ]
 
 
+@figures.own_style()
 def picture(
     found: list[EndReflection], ends: tuple[EndCondition, EndCondition], speed: float
 ) -> Figure:

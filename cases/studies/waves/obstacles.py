@@ -158,6 +158,7 @@ def as_rows(results: list[Result]) -> list[dict[str, Any]]:
     return rows
 
 
+@figures.own_style()
 def picture(results: list[Result]) -> Figure:
     """Sizes of the shares over frequency: theory as lines, what is measured as dots."""
     figure = figures.new_figure(2.0 + 2.4 * ((len(results) + 1) // 2))

@@ -22,6 +22,7 @@ _AROUND = 400.0
 _WIDEST, _MOST = 1.2, 1600
 
 
+@figures.own_style()
 def space_time(
     seen: WavesSeen, theory: WaveTheory, supports: np.ndarray, what: str = "pantographs"
 ) -> Figure:
@@ -49,6 +50,7 @@ def space_time(
     return figure
 
 
+@figures.own_style()
 def train_frame(
     seen: WavesSeen, theory: WaveTheory, behind: float, ahead: float, what: str
 ) -> Figure:
@@ -75,6 +77,7 @@ def train_frame(
     return figure
 
 
+@figures.own_style()
 def wavenumbers(seen: WavesSeen, theory: WaveTheory, what: str = "train") -> Figure:
     """Amplitude of the velocity over wavenumber and frequency, with the waves of theory; ``what``
     names what moves."""
@@ -114,6 +117,7 @@ def wavenumbers(seen: WavesSeen, theory: WaveTheory, what: str = "train") -> Fig
     return figure
 
 
+@figures.own_style()
 def transmission(found: Transmitted) -> Figure:
     """Energy at two stations beyond a blow over frequency; pass bands are shaded."""
     figure = figures.new_figure(4.2)
@@ -134,6 +138,7 @@ def transmission(found: Transmitted) -> Figure:
     return figure
 
 
+@figures.own_style()
 def energy_parts(energy: EnergySeen, seen: WavesSeen, what: str) -> Figure:
     """Energy ahead of and behind what moves, over time, and where it is on the mean.
 

@@ -236,10 +236,11 @@ def write(folder: Path, ended: Sequence[Ended], theory: WaveTheory, span: float)
                 for curve, one in zip(curves, found, strict=True)
             ]
         )  # fmt: skip
-        content[PICTURE] = figures.png(draw(curves, found[0]))
+        content |= figures.painted(PICTURE, lambda: draw(curves, found[0]))
     return write_all(folder, content)
 
 
+@figures.own_style()
 def draw(curves: Sequence[Curve], period: Period) -> Figure:
     """Deviation, mean and loss of contact of the trailing pantograph over separation.
 

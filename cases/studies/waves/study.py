@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from catenary.cases.result_folder.output_folder import refuse_earlier
@@ -140,10 +142,8 @@ def study_obstacles(scene: Scene, folder: Path, force: bool) -> tuple[str, list[
     problem = problem_of(scene)
     rest = line_at_rest(problem, mesh_of(scene))
     results = [obstacles.result_of(one, problem) for one in obstacles.obstacles_of(rest)]
-    content: dict[str, bytes | str] = {
-        OBSTACLES: as_csv(obstacles.as_rows(results)),
-        "obstacles.png": figures.png(obstacles.picture(results)),
-    }
+    content: dict[str, bytes | str] = {OBSTACLES: as_csv(obstacles.as_rows(results))}
+    content |= figures.painted("obstacles.png", lambda: obstacles.picture(results))
     lines = [
         f"{one.name.replace('_', ' ')}: measured within {100.0 * one.error.max():.2g} % of theory"
         for one in results
@@ -188,24 +188,29 @@ def _write(
         *measured_rows(theory, seen), *ends.reflection_rows(reflections, theory.speed)
     ]  # fmt: skip
     content: dict[str, bytes | str] = {
-        "space_time.png": figures.png(pictures.space_time(seen, theory, supports, moving)),
-        "wavenumbers.png": figures.png(pictures.wavenumbers(seen, theory, what)),
-        "energy.png": figures.png(pictures.energy_parts(energy, seen, origin)),
         "energy.csv": as_csv(energy_rows(energy, seen)),
         TABLE: as_csv([*as_rows(theory), *measured]),
         "pass_bands.csv": as_csv(band_rows(theory)),
     }
+    drawings: dict[str, Callable[[], Figure]] = {
+        "space_time.png": lambda: pictures.space_time(seen, theory, supports, moving),
+        "wavenumbers.png": lambda: pictures.wavenumbers(seen, theory, what),
+        "energy.png": lambda: pictures.energy_parts(energy, seen, origin),
+    }
     if reflections:
-        drawn = ends.picture(reflections, rest.problem.ends, theory.speed)
-        content["end_reflection.png"] = figures.png(drawn)
+        drawings["end_reflection.png"] = lambda: ends.picture(
+            reflections, rest.problem.ends, theory.speed
+        )
         content["end_reflection.csv"] = as_csv(ends.curve_rows(reflections))
     spectra = transmitted(theory, seen)
     if spectra is not None:
-        content["transmission.png"] = figures.png(pictures.transmission(spectra))
+        drawings["transmission.png"] = lambda: pictures.transmission(spectra)
     if seen.position.shape[1]:
-        content["train_frame.png"] = figures.png(
-            pictures.train_frame(seen, theory, _BEHIND, _AHEAD, origin)
+        drawings["train_frame.png"] = lambda: pictures.train_frame(
+            seen, theory, _BEHIND, _AHEAD, origin
         )
+    for name, draw in drawings.items():
+        content |= figures.painted(name, draw)
     return Studied(theory, measured, write_all(folder, content))
 
 

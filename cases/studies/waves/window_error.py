@@ -147,12 +147,12 @@ def write(folder: Path, curves: Sequence[Curve]) -> list[Path]:
         for curve in curves
         for one in curve.errors
     ]  # fmt: skip
-    content: dict[str, bytes | str] = {
-        TABLE: as_csv(rows), PICTURE: figures.png(draw(curves))
-    }  # fmt: skip
+    content: dict[str, bytes | str] = {TABLE: as_csv(rows)}
+    content |= figures.painted(PICTURE, lambda: draw(curves))
     return write_all(folder, content)
 
 
+@figures.own_style()
 def draw(curves: Sequence[Curve]) -> Figure:
     """Errors over size; the window that the program chooses is a star, its estimates are dotted."""
     figure = figures.new_figure(4.6)

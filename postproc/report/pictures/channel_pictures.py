@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,7 +11,14 @@ from matplotlib.figure import Figure
 
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures.envelope import thinned, thinned_ranges
-from catenary.postproc.report.pictures.figures import COLOURS, colour, legend_above, stacked, tidy
+from catenary.postproc.report.pictures.figures import (
+    COLOURS,
+    colour,
+    legend_above,
+    own_style,
+    stacked,
+    tidy,
+)
 from catenary.postproc.report.pictures.marks import mark_line, still_marks, travelled
 from catenary.solver.time_loop.views.channels import (
     ARM,
@@ -23,19 +32,18 @@ from catenary.solver.time_loop.views.channels import (
 )
 
 
-def channel_pictures(results: Results) -> list[tuple[str, str, Figure]]:
-    """Name of the file without its end, caption and picture of each such channel."""
-    drawn = []
+def channel_pictures(results: Results) -> list[tuple[str, str, Callable[[], Figure | None]]]:
+    """Name of the file without its end, caption and what draws it, of each such channel."""
+    drawn: list[tuple[str, str, Callable[[], Figure | None]]] = []
     for channel in CHANNELS.values():
         if not channel.own_picture and results.has(channel.name) and results.n_rows("time") > 1:
-            figure = _picture_of(results, channel)
-            if figure is not None:
-                drawn.append((picture_name(channel), f"{_sentence(channel)}.", figure))
+            draw: Callable[[], Figure | None] = partial(_picture_of, results, channel)
+            drawn.append((picture_name(channel), f"{_sentence(channel)}.", draw))
     recorded = results.energies()
     for channel in ENERGIES.values():
         if channel.energy is not None and not channel.own_picture and channel.name in recorded:
-            figure = _of_energy(recorded["time"], recorded[channel.name], channel)
-            drawn.append((picture_name(channel), f"{_sentence(channel)}.", figure))
+            draw = partial(_of_energy, recorded["time"], recorded[channel.name], channel)
+            drawn.append((picture_name(channel), f"{_sentence(channel)}.", draw))
     return drawn
 
 
@@ -58,6 +66,7 @@ def _label(channel: Channel) -> str:
     return f"{channel.name.replace('_', ' ')} [{channel.unit}]"
 
 
+@own_style()
 def _of_train(results: Results, channel: Channel) -> Figure:
     """A panel for each pantograph, a curve for each of its columns."""
     names = results.pantograph_names()
@@ -94,6 +103,7 @@ def _of_train(results: Results, channel: Channel) -> Figure:
     return figure
 
 
+@own_style()
 def _on_line(results: Results, channel: Channel) -> Figure:
     """The range of each column over the run."""
     x = results.line("arm_x" if channel.per == ARM else "dropper_x")
@@ -109,6 +119,7 @@ def _on_line(results: Results, channel: Channel) -> Figure:
     return figure
 
 
+@own_style()
 def _at_ends(results: Results, channel: Channel) -> Figure | None:
     """A panel for each wire with the history at each of its ends, None if all stay zero."""
     low, high = results.extremes(channel.name)
@@ -135,6 +146,7 @@ def _at_ends(results: Results, channel: Channel) -> Figure | None:
     return figure
 
 
+@own_style()
 def _of_energy(time: np.ndarray, values: np.ndarray, channel: Channel) -> Figure:
     figure, (axes,) = stacked(3.0, 1)
     chosen = thinned(values)

@@ -1,15 +1,18 @@
 """Figures of matplotlib in one style: made empty, labelled, and turned into PNG.
 
-Nothing here needs a display or touches files.
+Nothing here needs a display or touches files. A user's ``matplotlibrc`` changes no picture.
 """
 
 from __future__ import annotations
 
+import contextlib
 import io
+import logging
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
+import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -20,6 +23,10 @@ from matplotlib.text import Text
 from matplotlib.ticker import AutoLocator, LogLocator, MaxNLocator, NullFormatter
 from matplotlib.transforms import ScaledTranslation
 from PIL import Image
+
+from catenary.solver.base.errors import CatenaryError
+
+logger = logging.getLogger("catenary.pictures")
 
 COLOURS = ("#1f5fa8", "#d1641b", "#2f8f4e", "#7b4fa3", "#8c6d31", "#444444")
 GREY, LIGHT, SHADE, LIMIT = "#6b6b6b", "#c9c9c9", "#eef3e6", "#b3261e"
@@ -50,6 +57,30 @@ class FewTicks(MaxNLocator):
         slack = 1e-9 * (high - low)
         places = np.asarray(super().tick_values(vmin, vmax))
         return places[(places >= low - slack) & (places <= high + slack)]
+
+
+_in_own_style = False
+
+
+@contextlib.contextmanager
+def own_style() -> Iterator[None]:
+    """Matplotlib's default settings in place of the user's, until the context ends.
+
+    A context manager, and as ``@own_style()`` a decorator of every function that makes a figure:
+    lines and texts take the settings of the moment in which they are made.
+    """
+    global _in_own_style
+    if _in_own_style:
+        yield
+        return
+    # To set a backend would import pyplot, which nothing here needs.
+    usual = {key: value for key, value in matplotlib.rcParamsDefault.items() if key != "backend"}
+    with matplotlib.rc_context(usual):
+        _in_own_style = True
+        try:
+            yield
+        finally:
+            _in_own_style = False
 
 
 def new_figure(height: float) -> Figure:
@@ -144,6 +175,30 @@ def legend_above(axes: Axes, columns: int = 5) -> None:
     )
 
 
+def painted(name: str, draw: Callable[[], Figure | None]) -> dict[str, bytes]:
+    """A picture as ``{name: PNG file}``; empty if there is none to draw or drawing fails.
+
+    A failure is logged and costs this picture alone. Results that are damaged, a `CatenaryError`,
+    are not a failure of drawing and are raised.
+
+    Parameters
+    ----------
+    name : of the file, with its end
+    draw : makes the figure, None if there is nothing to show
+    """
+    try:
+        with own_style():
+            figure = draw()
+            return {} if figure is None else {name: png(figure)}
+    except CatenaryError:
+        raise
+    except Exception as error:
+        said = str(error) or type(error).__name__
+        logger.warning("%s was not drawn (%s); all figures are in the other files", name, said)
+        return {}
+
+
+@own_style()
 def png(figure: Figure) -> bytes:
     """``figure`` as the bytes of a PNG file. A dollar sign in a text is one, and no formula."""
     for text in _texts(figure):

@@ -13,11 +13,19 @@ from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures.envelope import thinned
-from catenary.postproc.report.pictures.figures import GREY, colour, legend_above, stacked, tidy
+from catenary.postproc.report.pictures.figures import (
+    GREY,
+    colour,
+    legend_above,
+    own_style,
+    stacked,
+    tidy,
+)
 from catenary.postproc.report.pictures.marks import mark_line, travelled
 from catenary.solver.base.errors import InputError
 
 
+@own_style()
 def contact_force(results: Results) -> Figure:
     """Contact force of each pantograph along the track: unfiltered light, 20 Hz low-pass bold."""
     names = results.pantograph_names()
@@ -48,6 +56,7 @@ def contact_force(results: Results) -> Figure:
     return figure
 
 
+@own_style()
 def strip_forces(results: Results) -> Figure:
     """Share of each strip in the contact force along the track, 20 Hz low-pass, for pantographs
     with more than one."""
@@ -72,6 +81,7 @@ def strip_forces(results: Results) -> Figure:
     return figure
 
 
+@own_style()
 def wire_forces(results: Results) -> Figure:
     """Share of each contact wire in the contact force along the track, 20 Hz low-pass."""
     names = results.pantograph_names()
@@ -100,6 +110,7 @@ def wire_forces(results: Results) -> Figure:
     return figure
 
 
+@own_style()
 def force_statistics(results: Results, statistics: RunStatistics) -> Figure:
     """Bars of mean, deviation, extremes and mean +- 3 sigma of each pantograph."""
     groups = ("mean", "std", "maximum", "minimum", "stat_max", "stat_min")
@@ -129,6 +140,7 @@ def force_statistics(results: Results, statistics: RunStatistics) -> Figure:
     return figure
 
 
+@own_style()
 def force_histogram(results: Results, statistics: RunStatistics) -> Figure:
     """Share of time that the 20 Hz force of each pantograph spends in each bin."""
     shown = [(i, p) for i, p in enumerate(statistics.pantographs) if not p.complaint]

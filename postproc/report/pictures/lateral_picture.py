@@ -7,10 +7,11 @@ from matplotlib.figure import Figure
 
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures.envelope import thinned
-from catenary.postproc.report.pictures.figures import colour, legend_above, stacked, tidy
+from catenary.postproc.report.pictures.figures import colour, legend_above, own_style, stacked, tidy
 from catenary.postproc.report.pictures.marks import mark_line, travelled
 
 
+@own_style()
 def lateral_places(results: Results) -> Figure:
     """Lateral place of each contact wire on each strip along the track, and where strips end."""
     names = results.pantograph_names()

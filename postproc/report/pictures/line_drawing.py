@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
-from catenary.postproc.report.pictures.figures import COLOURS, GREY, LIGHT
+from catenary.postproc.report.pictures.figures import COLOURS, GREY, LIGHT, own_style
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 
 _COLOUR = {
@@ -42,6 +42,7 @@ class Mark(NamedTuple):
     says: str
 
 
+@own_style()
 def draw_line(
     line: Line,
     mesh: LineMesh,

@@ -16,6 +16,7 @@ from catenary.postproc.report.pictures.figures import (
     LIMIT,
     colour,
     legend_above,
+    own_style,
     stacked,
     tidy,
 )
@@ -25,6 +26,7 @@ from catenary.postproc.report.pictures.marks import mark_line, mark_static, stil
 _MOST_ARMS = 60
 
 
+@own_style()
 def arm_uplift(results: Results, statistics: RunStatistics, limit: float | None) -> Figure:
     """Uplift at the evaluated arms as the train passes, and the largest uplift of every arm.
 
@@ -92,6 +94,7 @@ def _passing_train(axes: Axes, results: Results, statistics: RunStatistics) -> N
     legend_above(axes)
 
 
+@own_style()
 def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
     """Forces of the worst dropper and of a mid-span one, and the range of every dropper."""
     droppers = statistics.droppers
@@ -134,6 +137,7 @@ def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
     return figure
 
 
+@own_style()
 def static_line(results: Results) -> Figure:
     """Contact-wire profile of the reference span and its neighbours; elasticity along a span.
 
@@ -192,6 +196,7 @@ def static_line(results: Results) -> Figure:
     return figure
 
 
+@own_style()
 def energies(results: Results) -> Figure | None:
     """Energies of the line over time; None if the run did not record them."""
     recorded = results.energies()

@@ -10,6 +10,7 @@ from catenary.postproc.report.pictures.figures import (
     GREY,
     colour,
     legend_above,
+    own_style,
     stacked,
     tidy,
 )
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+@own_style()
 def plan_view(results: Results) -> Figure | None:
     """Where contact wires are laterally, and radial forces of arms; None where no wire moves so."""
     registration = results.registration()

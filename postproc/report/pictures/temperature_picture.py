@@ -8,13 +8,21 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from catenary.postproc.report.pictures.figures import COLOURS, GREY, LIMIT, new_figure, tidy
+from catenary.postproc.report.pictures.figures import (
+    COLOURS,
+    GREY,
+    LIMIT,
+    new_figure,
+    own_style,
+    tidy,
+)
 from catenary.solver.statics.tension_along import LineAtTemperature
 
 # Change of tension that is allowed [%].
 _ALLOWED = 10.0
 
 
+@own_style()
 def draw_temperatures(rests: Sequence[LineAtTemperature], path: Path) -> None:
     """Write the picture as PNG or SVG, by the file's suffix. Not collective."""
     found = [rest for rest in rests if not rest.why_not]

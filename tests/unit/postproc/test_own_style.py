@@ -1,0 +1,106 @@
+"""Pictures in the program's own style, whatever a user's matplotlibrc says; a picture costs nothing
+but itself."""
+
+from __future__ import annotations
+
+import ast
+import json
+import shutil
+from pathlib import Path
+
+import matplotlib
+import pytest
+from matplotlib.figure import Figure
+from program import catenary_started
+
+from catenary.postproc.report import report
+from catenary.postproc.report.pictures import figures, force_pictures
+
+ROOT = Path(__file__).parents[3]
+# A style without a visible curve, and letters from LaTeX, which need not be installed.
+FOREIGN = {
+    "text.usetex": True,
+    "axes.facecolor": "black",
+    "axes.edgecolor": "black",
+    "lines.linestyle": "None",
+    "font.size": 22.0,
+}
+
+
+def test_every_function_that_makes_a_figure_does_so_in_the_own_style() -> None:
+    makers = []
+    for path in [*(ROOT / "postproc").rglob("*.py"), *(ROOT / "cases").rglob("*.py")]:
+        for function in ast.parse(path.read_text(encoding="utf-8")).body:
+            if not isinstance(function, ast.FunctionDef):
+                continue
+            called = {ast.unparse(one.func) for one in ast.walk(function) if type(one) is ast.Call}
+            if any(name.split(".")[-1] in ("stacked", "new_figure", "Figure") for name in called):
+                makers.append(path)
+                styled = {ast.unparse(one) for one in function.decorator_list}
+                assert (
+                    styled & {"own_style()", "figures.own_style()"} or path.name == "figures.py"
+                ), f"{path}: {function.name} draws in the user's style"
+    assert len(makers) > 20
+
+
+def test_a_users_settings_change_no_picture_and_stay_the_users(
+    run_folder: Path, tmp_path: Path
+) -> None:
+    plain, styled = tmp_path / "plain", tmp_path / "styled"
+    plain.mkdir()
+    styled.mkdir()
+    report.write_report(run_folder, plain)
+    with matplotlib.rc_context(FOREIGN):
+        report.write_report(run_folder, styled)
+        assert matplotlib.rcParams["text.usetex"] is True
+    pictures = sorted(plain.glob("*.png"))
+    assert len(pictures) >= 7
+    for path in pictures:
+        assert (styled / path.name).read_bytes() == path.read_bytes(), path.name
+
+
+def test_a_picture_that_cannot_be_drawn_costs_itself_alone(
+    run_folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    def refuse(*words: object) -> Figure:
+        raise RuntimeError("no such font")
+
+    monkeypatch.setattr(force_pictures, "contact_force", refuse)
+    report.write_report(run_folder, tmp_path)
+    assert caplog.messages == [
+        "contact_force.png was not drawn (no such font); all figures are in the other files"
+    ]
+    assert not (tmp_path / "contact_force.png").exists()
+    assert (tmp_path / "histogram.png").exists() and (tmp_path / "report.html").exists()
+    assert json.loads((tmp_path / "summary.json").read_text())["outcome"] == "done"
+
+
+def test_the_summary_is_there_before_the_first_picture(
+    run_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Killed(BaseException):
+        """As a signal ends the process."""
+
+    def end(*words: object) -> dict[str, bytes]:
+        raise Killed
+
+    monkeypatch.setattr(figures, "painted", end)
+    with pytest.raises(Killed):
+        report.write_report(run_folder, tmp_path)
+    assert json.loads((tmp_path / "summary.json").read_text())["outcome"] == "done"
+
+
+@pytest.mark.process
+def test_a_matplotlibrc_that_is_no_text_ends_no_report(run_folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(run_folder, tmp_path / "run")
+    (tmp_path / "run" / "summary.json").unlink(missing_ok=True)
+    (tmp_path / "matplotlibrc").write_bytes(b"axes.facecolor: \xff\xfe\n")
+    with catenary_started("report", "run", cwd=tmp_path) as program:
+        done = program.end()
+    assert done.code == 0, done.stderr
+    assert any("no picture was drawn: Matplotlib cannot read" in one for one in done.sentences)
+    assert (tmp_path / "run" / "summary.json").exists()
+    assert (tmp_path / "run" / "report.html").exists()
