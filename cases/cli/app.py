@@ -139,7 +139,7 @@ def begin(
     Collective. ``read`` also gives the command line's options for PETSc, ``scene_of`` the scene
     whose ``[petsc]`` table stands before them.
     """
-    from catenary.cases.process.petsc_options import as_arguments, start_petsc
+    from catenary.cases.process.petsc_options import as_arguments, idle_options, start_petsc
     from catenary.solver.base.parallel import (
         abort_on_unforeseen_error,
         launched_by_mpirun,
@@ -153,6 +153,13 @@ def begin(
     abort_on_unforeseen_error(comm)
     set_up_logging(comm, verbose, console.is_quiet())
     what, options = read_before or on_root(comm, read, takes_long=True)
-    arguments = as_arguments(scene_of(what).petsc.given(), options)
+    table = scene_of(what).petsc.given()
+    arguments = as_arguments(table, options)
     start_petsc(arguments)
+
+    def warn() -> None:
+        for sentence in idle_options(table) if comm.rank == 0 else ():
+            console.warn(sentence)
+
+    console.at_end(warn)
     return comm, what, arguments

@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+import ctypes
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from catenary.cases.scene.input.origin import shown
+from catenary.cases.scene.keys.keys import nearest
 from catenary.solver.base.errors import InputError
+
+
+# Options that PETSc looks up when the process ends, after `idle_options` was called.
+_LOOKED_UP_LAST = frozenset(
+    {"citations", "get_total_flops", "malloc_view_threshold", "options_left", "options_view"}
+)
+# Options outside of a scene's table that a misspelt one may stand for.
+_OTHER_OPTIONS = (
+    "march_ts_max_steps", "march_ts_max_time", "march_ts_monitor", "march_ts_monitor_solution",
+    "march_ts_view", "march_ts_adapt_clip", "march_ts_adapt_monitor", "march_ksp_view",
+    "march_ksp_monitor", "march_ksp_converged_reason", "log_view", "log_view_memory", "log_trace",
+    "options_left", "options_view", "malloc_debug", "malloc_dump", "malloc_view", "memory_view",
+)  # fmt: skip
 
 
 def split_extras(extras: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -64,3 +79,30 @@ def start_petsc(arguments: Sequence[str]) -> None:
 
     if running and arguments:
         PETSc.Options().insertString(shlex.join(arguments))
+
+
+def idle_options(of_scene: Collection[str]) -> list[str]:
+    """A sentence for each option that PETSc holds and never looked up, such as a misspelt one.
+
+    Not collective. petsc4py does not expose PetscOptionsUsed, which is public in ``petscoptions.h``
+    and is called through ctypes.
+
+    Parameters
+    ----------
+    of_scene : names of the scene's ``[petsc]`` table, which has correct names alone; no sentence
+        is made of them
+    """
+    from catenary.cases.scene.tables.run.petsc import PetscTable
+    from catenary.solver.base.petsc import PETSc
+
+    library = ctypes.CDLL(PETSc.__file__)
+    known = [*PetscTable.model_fields, *_OTHER_OPTIONS]
+    sentences = []
+    for name in sorted(PETSc.Options().getAll().keys() - _LOOKED_UP_LAST - set(of_scene)):
+        used = ctypes.c_int(0)  # a PetscBool: an int, or one byte in newer versions
+        library.PetscOptionsUsed(None, name.encode(), ctypes.byref(used))
+        if not used.value:
+            near = None if name in known else nearest(name, known)
+            hint = f"; did you mean -{near}?" if near else ""
+            sentences.append(f"the option -{name} had no effect: PETSc never looked it up{hint}")
+    return sentences

@@ -23,6 +23,16 @@ _RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK")
 # The option that ``guarded`` adds to every verb, and whether the present one has it.
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
 _quiet = False
+# What the verb that runs tells when it has come to its end.
+_last_words: list[Callable[[], None]] = []
+
+
+def at_end(tell: Callable[[], None]) -> None:
+    """Let ``tell`` be called when the present verb has come to its end without an error.
+
+    Not collective.
+    """
+    _last_words.append(tell)
 
 
 def speaks() -> bool:
@@ -109,6 +119,8 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
             if quiet and kwargs.get("verbose"):
                 raise InputError("--quiet and --verbose exclude each other; give one of them")
             code = command(*args, **kwargs)
+            for tell in _last_words:
+                tell()
         except CatenaryError as error:
             complain(str(error))
             code = error.exit_code
@@ -122,7 +134,9 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             code = BROKEN
         finally:
-            _quiet = False  # of this command only: several may be called in one process
+            # Of this command only: several may be called in one process.
+            _quiet = False
+            _last_words.clear()
         if code:
             raise typer.Exit(code)
 

@@ -20,12 +20,14 @@ OF_BLOCKS = {"Steps"}
 STAGES = ["mesh", "equilibrium", "distribute", "march", "report"]
 # An end that comes early, and its exit code: what needs some steps only need not wait for 2016.
 EARLY, INTERRUPTED = ["-march_ts_max_steps", "400"], 1
+NO_EFFECT = "had no effect"
 
 
 def run(out: Path, *options: str) -> str:
     """What a run with options prints."""
     done = catenary(*short_run(out), "--", *options, cwd=out.parent)
     assert done.code == 0, done.stderr
+    assert NO_EFFECT not in done.stderr
     assert_sound(out / "run.h5")
     return done.stdout
 
@@ -121,6 +123,23 @@ def test_the_scene_may_hold_options_and_the_command_line_wins(tmp_path: Path) ->
     other = catenary(*words, "--force", "--", *options, *EARLY, cwd=tmp_path)
     assert other.code == INTERRUPTED, other.stderr
     assert "type: lu" in other.stdout and "type: ilu" not in other.stdout
+
+
+def test_misspelt_options_are_told_with_the_nearest_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PETSC_OPTIONS", "-march_pc_typ lu -my_own 3 -march_ts_max_steps 20")
+    # The last one is looked up when the process ends.
+    options = ["-march_ksp_typ", "gmres", "-march_ksp_type", "cg", "-options_left"]
+    done = catenary(*short_run(tmp_path / "out"), "--", *options, cwd=tmp_path)
+    assert done.code == INTERRUPTED, done.stderr
+    told = [line for line in done.stderr.splitlines() if NO_EFFECT in line]
+    why = "had no effect: PETSc never looked it up"
+    assert told == [
+        f"WARNING the option -march_ksp_typ {why}; did you mean -march_ksp_type?",
+        f"WARNING the option -march_pc_typ {why}; did you mean -march_pc_type?",
+        f"WARNING the option -my_own {why}",
+    ]
 
 
 @pytest.mark.parametrize(
