@@ -139,6 +139,7 @@ def begin(
     Collective. ``read`` also gives the command line's options for PETSc, ``scene_of`` the scene
     whose ``[petsc]`` table stands before them.
     """
+    from catenary.cases.process.batch_tasks import lone_task
     from catenary.cases.process.petsc_options import as_arguments, idle_options, start_petsc
     from catenary.solver.base.parallel import (
         abort_on_unforeseen_error,
@@ -150,6 +151,8 @@ def begin(
     # A process of its own is refused before MPI has started.
     read_before = None if launched_by_mpirun() else read()
     comm = console.world()
+    if lone := lone_task(comm.size):
+        console.warn(lone)
     abort_on_unforeseen_error(comm)
     set_up_logging(comm, verbose, console.is_quiet())
     what, options = read_before or on_root(comm, read, takes_long=True)

@@ -12,7 +12,6 @@ from catenary.cases.scene.input.origin import shown
 from catenary.cases.scene.keys.keys import nearest
 from catenary.solver.base.errors import InputError
 
-
 # Options that PETSc looks up when the process ends, after `idle_options` was called.
 _LOOKED_UP_LAST = frozenset(
     {"citations", "get_total_flops", "malloc_view_threshold", "options_left", "options_view"}

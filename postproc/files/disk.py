@@ -14,12 +14,14 @@ from typing import Any
 import h5py
 import numpy as np
 
-from catenary.postproc.files.disk_errors import reason, remedy
+from catenary.postproc.files.disk_errors import code_of, reason, remedy
 from catenary.postproc.files.hdf5.checked import FORMAT_BOUNDS
 from catenary.postproc.files.own_files import part_of
 from catenary.postproc.files.trimming import trimmed
 from catenary.solver.base.errors import RunBroken
 
+# What a file system without locks says to flock.
+_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 # Room for HDF5's own tables and for the last words of a run that has filled the disk [bytes].
 MARGIN = 128 * 1024
 
@@ -132,13 +134,35 @@ def abandon(file: h5py.File) -> None:
         file.close()
 
 
+def open_to_write(path: Path, mode: str, **how: Any) -> h5py.File:
+    """An HDF5 file opened for writing, with HDF5's lock where the file system has locks.
+
+    HDF5 refuses a file that it cannot lock. The result folder has a lock of its own that needs
+    none of the file system, so that this one may be missing.
+
+    Parameters
+    ----------
+    path, mode, how : as of ``h5py.File``
+
+    Raises
+    ------
+    OSError
+    """
+    try:
+        return h5py.File(path, mode, **how)
+    except OSError as error:
+        if code_of(error) not in _NO_LOCKS:
+            raise
+    return h5py.File(path, mode, locking=False, **how)
+
+
 @contextlib.contextmanager
 def opened(path: Path, mode: str) -> Iterator[h5py.File]:
     """An HDF5 file for writing, cut to what it holds at the end. A context manager.
 
     It is abandoned if something fails.
     """
-    file = h5py.File(path, mode, libver=FORMAT_BOUNDS)
+    file = open_to_write(path, mode, libver=FORMAT_BOUNDS)
     try:
         yield file
         file.flush()

@@ -22,6 +22,7 @@ _REMEDIES = {
     errno.EEXIST: f"a file or a link that leads nowhere has this name, {_OTHER_FOLDER}",
     errno.EAGAIN: "another program has the file open and locked, close it there",
     errno.EIO: f"the disk fails, {_OTHER_FOLDER}",
+    errno.ENOLCK: f"set HDF5_USE_FILE_LOCKING=FALSE in the environment or {_OTHER_FOLDER}",
     errno.ESTALE: f"the connection to the disk was lost, {_OTHER_FOLDER}",
 }
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import h5py
 
 from catenary.postproc.channels.header import Header
-from catenary.postproc.files.disk import as_attribute
+from catenary.postproc.files.disk import as_attribute, open_to_write
 from catenary.postproc.files.disk_errors import reason
 from catenary.postproc.files.hdf5.array_writes import put_array
 from catenary.postproc.files.hdf5.checked import (
@@ -52,7 +52,7 @@ def let_go_on(path: Path, header: Header, n_steps: int) -> None:
     made_as = part_of(path, os.getpid())
     try:
         shutil.copyfile(path, made_as)
-        with h5py.File(made_as, "r+", libver=FORMAT_BOUNDS) as file:
+        with open_to_write(made_as, "r+", libver=FORMAT_BOUNDS) as file:
             _change(file, header, n_steps)
         os.replace(made_as, path)
     except (OSError, RuntimeError) as error:

@@ -21,7 +21,14 @@ import numpy as np
 from catenary.postproc.channels.facts import FACTS
 from catenary.postproc.channels.header import Header
 from catenary.postproc.channels.line_record import GZIP, GZIP_LEVEL, LineRecord
-from catenary.postproc.files.disk import MARGIN, abandon, as_attribute, check_in_place, reserve
+from catenary.postproc.files.disk import (
+    MARGIN,
+    abandon,
+    as_attribute,
+    check_in_place,
+    open_to_write,
+    reserve,
+)
 from catenary.postproc.files.hdf5.array_writes import append_rows, grow, put_array
 from catenary.postproc.files.hdf5.checked import (
     FORMAT_BOUNDS,
@@ -125,7 +132,8 @@ class ResultFile:
         self._room = room_of(table, shapes, rows, record) + MARGIN
         self._start_time = stage.start_time
         self._n_states = 0
-        self._file = h5py.File(self._made_as, "r+" if resume else "w", libver=FORMAT_BOUNDS)
+        mode = "r+" if resume else "w"
+        self._file = open_to_write(self._made_as, mode, libver=FORMAT_BOUNDS)
         try:
             if resume:
                 _cut(self._file, stage.start_time - 0.5 * stage.dt)

@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import h5py
 import numpy as np
 
+from catenary.postproc.files.disk import open_to_write
 from catenary.postproc.film.film_data import FilmData
 from catenary.postproc.film.pantograph_shape import MovingPantographs
 from catenary.postproc.film.snapshots import Snapshots
@@ -62,7 +62,7 @@ def write(
     n_points = sum(int(shape.cells.max()) + 1 for shape in pantographs.shapes)
     has_train = data.excitation is None
     n_corners = len(boxes(data.position[0], pantographs.roof))
-    with h5py.File(folder / NUMBERS, "w") as file:
+    with open_to_write(folder / NUMBERS, "w") as file:
         file["track/points"], file["track/cells"] = rails, lines_of_rails
         file["pantographs/cells"] = cells
         file["pantographs/number"], file["pantographs/kind"] = number, kind

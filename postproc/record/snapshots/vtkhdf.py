@@ -14,7 +14,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from catenary.postproc.files.disk import appears_whole
+from catenary.postproc.files.disk import appears_whole, open_to_write
 from catenary.postproc.files.hdf5.array_writes import (
     group_in_order,
     put_array,
@@ -44,7 +44,7 @@ def write_vtkhdf(numbers: Path) -> Path:
         times = whole_array(source, "times")
         times = times[np.isfinite(times)]
         # Readers go through links in the order in which they were made.
-        with h5py.File(part, "w", track_order=True) as file:
+        with open_to_write(part, "w", track_order=True) as file:
             root = group_in_order(file, "VTKHDF")
             _name_type(root, "PartitionedDataSetCollection")
             assembly = group_in_order(root, "Assembly")
