@@ -150,7 +150,7 @@ def static_text(table: Mapping[str, Any], line: Line, half_head: float | None = 
         for name, at, y in zip(wires, chains_x, np.split(data["contact_y"], ends), strict=True):
             own = y[(at >= first) & (at <= last)]
             wire = "Contact wire" if len(wires) == 1 else name
-            text = f"{wire} at rest: {own.min():.4f} to {own.max():.4f} m to the left"
+            text = f"{wire} at rest: {fixed(own.min(), 4)} to {fixed(own.max(), 4)} m to the left"
             if half_head is not None:
                 within = "within" if np.abs(own).max() <= half_head else "BEYOND"
                 text += f", {within} the {half_head:g} m of the shortest strip to either side"

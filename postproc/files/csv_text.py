@@ -30,6 +30,11 @@ def plain_cell(value: Any) -> Any:
     return f"'{text}" if begins_formula(value) else text
 
 
+def number_text(value: float) -> str:
+    """``value`` with all of its digits, from which the same number is read; zero has no sign."""
+    return repr(float(value) + 0.0).removesuffix(".0")
+
+
 def csv_text(heads: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
     """A table as CSV text, lines ended by ``\\n``."""
     stream = io.StringIO()

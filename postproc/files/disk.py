@@ -27,7 +27,8 @@ MARGIN = 128 * 1024
 
 
 def plain(value: Any) -> Any:
-    """``value`` in types of JSON: NumPy types converted, NaN and infinity as None."""
+    """``value`` in types of JSON: NumPy types converted, NaN and infinity as None, zero without a
+    sign."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (set, frozenset)):
@@ -38,8 +39,8 @@ def plain(value: Any) -> Any:
         return plain(value.tolist())
     if isinstance(value, np.generic):
         return plain(value.item())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
+    if isinstance(value, float):
+        return value + 0.0 if math.isfinite(value) else None
     if value is None or isinstance(value, (str, bool, int, float)):
         return value
     return str(value)

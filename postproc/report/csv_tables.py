@@ -7,6 +7,7 @@ from typing import NamedTuple, TextIO
 
 import numpy as np
 
+from catenary.postproc.evaluate.wording import fixed
 from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.read.results import Results
 from catenary.solver.time_loop.views import channels
@@ -66,10 +67,10 @@ def droppers_csv(results: Results) -> str:
         (
             row.span,
             row.number,
-            f"{row.position:.4f}",
-            f"{row.x:.4f}",
-            f"{row.length:.4f}",
-            f"{row.force:.2f}",
+            fixed(row.position, 4),
+            fixed(row.x, 4),
+            fixed(row.length, 4),
+            fixed(row.force, 2),
         )
         for row in dropper_table(results)
     )
@@ -114,7 +115,8 @@ def write_pantographs_csv(results: Results, stream: TextIO) -> None:
         blocks += _by_pantograph([results.rows(c.name, part) for c in by_wire], len(prefixes))
         rows = [results.rows(channel.name, part) for channel in by_contact]
         blocks += [values[:, columns] for _, columns, _ in contacts for values in rows]
-        np.savetxt(stream, np.hstack(blocks), fmt="%.9g", delimiter=",")
+        # To add zero takes the sign from a negative one.
+        np.savetxt(stream, np.hstack(blocks) + 0.0, fmt="%.9g", delimiter=",")
 
 
 def _by_pantograph(tables: list[np.ndarray], n: int) -> list[np.ndarray]:

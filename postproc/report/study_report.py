@@ -17,7 +17,7 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from catenary.postproc.files.csv_text import csv_text
+from catenary.postproc.files.csv_text import csv_text, number_text
 from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.report.pictures import figures
 
@@ -134,7 +134,7 @@ def columns_csv(columns: Mapping[str, Sequence[Any] | np.ndarray]) -> str:
 
 
 def _cell(value: Any) -> Any:
-    return f"{value:.6g}" if isinstance(value, float | np.floating) else value
+    return number_text(float(value)) if isinstance(value, float | np.floating) else value
 
 
 def verdict_text(study: Study) -> str:

@@ -245,6 +245,34 @@ def test_bad_input_is_one_sentence_and_writes_nothing(
     assert not out.exists()
 
 
+def test_a_variant_that_is_refused_breaks_alone(tmp_path: Path) -> None:
+    vary = "line.dropper.pre_sag_mid_mm=20,0.04,30"
+    words = ["sweep", CASE, "-o", str(tmp_path / "out"), "--vary", vary, "--set", *TINY]
+    done = invoke(*words)
+    assert done.exit_code == 1, done.output
+    why = "is it 0.04 m? write 40, or case.accept_unusual = true if it is meant"
+    assert why in done.stderr.splitlines()[0]
+    assert "1 of 3 variants broke: pre_sag_mid_mm_0.04" in done.stderr.splitlines()[-1]
+    with (tmp_path / "out" / "sweep.csv").open(encoding="utf-8") as file:
+        table = list(csv.DictReader(file))
+    assert [row["outcome"] == "done" for row in table] == [True, False, True]
+    assert why in table[1]["outcome"] and table[1]["std_N"] == ""
+    meant = invoke(*words, "case.accept_unusual=true", "--force")
+    assert meant.exit_code == 0, meant.output
+
+
+def test_the_table_has_all_digits(swept: tuple[Path, str]) -> None:
+    folder, _ = swept
+    with (folder / "sweep.csv").open(encoding="utf-8") as file:
+        table = list(csv.DictReader(file))
+    for row in table:
+        path = folder / row["variant"] / "summary.json"
+        (found,) = json.loads(path.read_text(encoding="utf-8"))["pantographs"]
+        for name in ("mean_N", "std_N"):
+            assert float(row[name]) == found[name]
+            assert len(row[name]) > 12
+
+
 def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_run(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("mine")
     with pytest.raises(InputError, match="cannot be made or written to"):

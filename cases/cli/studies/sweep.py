@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from catenary.cases.studies.sweep.jobs import Ended, Job
+    from catenary.cases.studies.sweep.variants import Variant
 
 _SHOWN_BROKEN = 3
 
@@ -78,10 +79,10 @@ def sweep(
 ) -> int:
     """Collective."""
     from catenary.cases.process.petsc_options import split_extras
-    from catenary.cases.studies.sweep.jobs import check_statistics, make_jobs
+    from catenary.cases.studies.sweep.jobs import check_statistics, in_order, jobs_and_refused
     from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product, read_named
 
-    def read() -> tuple[list[Job], list[str]]:
+    def read() -> tuple[tuple[list[Job], list[Ended], list[Variant]], list[str]]:
         more, options = split_extras(extras or [])
         if not vary and named is None:
             raise InputError("there is nothing to vary: give --vary key=v1,v2,... or --variants")
@@ -92,11 +93,13 @@ def sweep(
         check_keys(product([], table), f"in {named}")
         variants = product(varied, table)
         overrides = [*(assignments or []), *more]
-        jobs = make_jobs(case, variants, overrides, shortened, full_report=reports)
-        _refuse_other_sweep(out, jobs, force)
-        return jobs, options
+        made = jobs_and_refused(case, variants, overrides, shortened, full_report=reports)
+        _refuse_other_sweep(out, variants, force)
+        return (*made, variants), options
 
-    comm, jobs, arguments = begin(read, verbose, lambda made: made[0].scene)
+    comm, (jobs, refused, variants), arguments = begin(read, verbose, lambda made: made[0][0].scene)
+    for one in refused:
+        console.warn(f"variant {one.variant.name} is not run: {one.outcome}")
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.sweep import output as sweep_output
     from catenary.cases.studies.sweep.jobs import RunOptions
@@ -107,6 +110,7 @@ def sweep(
     show = _names(plotted) or sweep_output.PLOTTED
     with held(out, comm, f"catenary sweep {case}"):
         ended = run_jobs(jobs, out, comm, RunOptions(force, arguments, console.say))
+        ended = in_order(variants, ended, refused)
         files = on_root(comm, lambda: sweep_output.write(out, name, ended, show), takes_long=True)
     console.say("\n" + sweep_output.as_text(ended))
     console.say("\n" + "\n".join(str(path) for path in files))
@@ -168,7 +172,7 @@ def _names(text: str | None) -> list[str]:
     return [] if text is None else [name.strip() for name in text.split(",")]
 
 
-def _refuse_other_sweep(out: Path, jobs: Sequence[Any], force: bool) -> None:
+def _refuse_other_sweep(out: Path, variants: Sequence[Variant], force: bool) -> None:
     """Refuse to replace the table of a sweep that had variants which this one has not."""
     refuse_impossible(out)
     path = out / "sweep.json"
@@ -178,7 +182,7 @@ def _refuse_other_sweep(out: Path, jobs: Sequence[Any], force: bool) -> None:
         there = {one["name"] for one in json.loads(path.read_text(encoding="utf-8"))["variants"]}
     except (OSError, ValueError, KeyError, TypeError):
         there = set()
-    other = sorted(there - {job.variant.name for job in jobs})
+    other = sorted(there - {variant.name for variant in variants})
     if other:
         raise InputError(
             f"{path} is the table of a sweep with other variants ({other[0]}); name another folder "

@@ -52,7 +52,7 @@ from catenary.cases.scene.checks.train.pantograph import check_mechanisms, check
 from catenary.cases.scene.checks.train.vehicle import check_vehicle
 from catenary.cases.scene.convert.course import end_of, strips_ahead
 from catenary.cases.scene.convert.line.line import line_data_of
-from catenary.cases.scene.input.faults import Fault, SceneError
+from catenary.cases.scene.input.faults import Fault, SceneError, UnfitScene
 from catenary.cases.scene.keys.error_sentences import refusal, unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.meshgen.slowest_wave import bends, slowest_wave
@@ -71,10 +71,10 @@ _TINY = 1e-6
 
 
 def check(scene: Scene) -> None:
-    """Raise ``SceneError`` with all in which a scene contradicts itself."""
+    """Raise ``UnfitScene`` with all in which a scene contradicts itself."""
     faults = faults_of(scene)
     if faults:
-        raise SceneError(faults)
+        raise UnfitScene(faults)
 
 
 def faults_of(scene: Scene) -> list[Fault]:

@@ -44,3 +44,7 @@ class SceneError(InputError):
         """One sentence for each fault, and one that counts those left out."""
         told = [fault.sentence for fault in self.faults]
         return told + ([f"there are {self.more} more faults"] if self.more else [])
+
+
+class UnfitScene(SceneError):
+    """A scene whose values are allowed one by one, and do not fit together or are implausible."""

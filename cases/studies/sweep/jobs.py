@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from catenary.cases.scene.input.faults import UnfitScene
 from catenary.cases.scene.input.origin import shown
 from catenary.cases.scene.input.toml_input import Assigned
 from catenary.cases.scene.keys.keys import nearest
@@ -127,6 +128,50 @@ def _refuse_petsc(variant: Variant) -> None:
             )
 
 
+def jobs_and_refused(
+    case: str,
+    variants: Sequence[Variant],
+    overrides: Sequence[str] = (),
+    shortened: bool = False,
+    *,
+    full_report: bool = False,
+) -> tuple[list[Job], list[Ended]]:
+    """The jobs of the variants that can be run, and how the others ended. Not collective.
+
+    A variant breaks alone if its values do not fit together or are implausible. Arguments as of
+    ``make_jobs``.
+
+    Raises
+    ------
+    InputError
+        As ``make_jobs``, if no variant can be run, or if a value of one is out of bounds.
+    """
+    jobs: list[Job] = []
+    refused: list[Ended] = []
+    several = len(variants) > 1
+    for variant in variants:
+        try:
+            scene = _scene(case, variant, overrides, shortened, several)
+            jobs.append(Job(variant, scene, full_report))
+        except UnfitScene as error:
+            refused.append(Ended(variant, str(error)))
+    if refused and not jobs:
+        first = refused[0]
+        raise InputError(
+            f"variant {first.variant.name}: {first.outcome}" if several else first.outcome
+        )
+    return jobs, refused
+
+
+def in_order(
+    variants: Sequence[Variant], ended: Sequence[Ended], refused: Sequence[Ended]
+) -> list[Ended]:
+    """What ended and what was refused, in the order of the variants; an interruption comes last."""
+    by_name = {one.variant.name: one for one in (*refused, *ended)}
+    merged = [by_name[variant.name] for variant in variants if variant.name in by_name]
+    return merged[: merged.index(ended[-1]) + 1] if interrupted(ended) else merged
+
+
 def make_jobs(
     case: str,
     variants: Sequence[Variant],
@@ -144,14 +189,22 @@ def make_jobs(
     InputError
         If a scene is wrong, with the variant's name if there are several.
     """
-    jobs = []
-    for variant in variants:
-        _refuse_petsc(variant)
-        try:
-            scene = load_scene(case, overrides, shortened, _assigned(variant))
-        except InputError as error:
-            if len(variants) == 1:
-                raise
-            raise InputError(f"variant {variant.name}: {error}") from error
-        jobs.append(Job(variant, scene, full_report))
+    jobs, refused = jobs_and_refused(case, variants, overrides, shortened, full_report=full_report)
+    if refused:
+        raise InputError(f"variant {refused[0].variant.name}: {refused[0].outcome}")
     return jobs
+
+
+def _scene(
+    case: str, variant: Variant, overrides: Sequence[str], shortened: bool, several: bool
+) -> Scene:
+    """The scene of a variant; InputError names it if it is one of ``several``."""
+    _refuse_petsc(variant)
+    try:
+        return load_scene(case, overrides, shortened, _assigned(variant))
+    except UnfitScene:
+        raise
+    except InputError as error:
+        if not several:
+            raise
+        raise InputError(f"variant {variant.name}: {error}") from error

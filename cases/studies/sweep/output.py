@@ -19,7 +19,7 @@ from catenary.cases.studies.sweep.axis_words import (
 from catenary.cases.studies.sweep.jobs import LINE_COLUMNS, PANTOGRAPH_COLUMNS, Ended
 from catenary.cases.studies.sweep.variants import NAMES
 from catenary.postproc.evaluate.wording import fixed
-from catenary.postproc.files.csv_text import csv_text
+from catenary.postproc.files.csv_text import csv_text, number_text
 from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.report.pictures import figures
 
@@ -100,7 +100,7 @@ def _cell(value: Any) -> Any:
         return "; ".join(value)
     if isinstance(value, list | dict):
         return json.dumps(value)
-    return f"{value:.6g}" if isinstance(value, float) else value
+    return number_text(value) if isinstance(value, float) else value
 
 
 def as_text(ended: Sequence[Ended]) -> str:

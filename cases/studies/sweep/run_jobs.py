@@ -23,6 +23,7 @@ from catenary.cases.run.runner import RESULT, run_case
 from catenary.cases.scene.convert.course import resolved
 from catenary.cases.studies.sweep.done_before import read_record, read_summary, record_text
 from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, Job, RunOptions
+from catenary.postproc.evaluate.wording import fixed
 from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.files.own_files import VARIANT_FILE as RECORD
 from catenary.postproc.files.result_file import DONE, INTERRUPTED
@@ -195,5 +196,5 @@ def _figures(ended: Ended) -> str:
         if one["std_N"] is None:
             parts.append("no statistics")
         else:
-            parts.append(f"{one['name']} {one['mean_N']:.1f} +- {one['std_N']:.1f} N")
+            parts.append(f"{one['name']} {fixed(one['mean_N'], 1)} +- {fixed(one['std_N'], 1)} N")
     return ", ".join(parts)

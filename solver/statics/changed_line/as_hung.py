@@ -63,7 +63,7 @@ def _refuse_slack_wires(model: Model, form: Equilibrium) -> None:
         left = wire.tension_at(middle) + gained
         if left.min() <= 0.0:
             raise InputError(
-                f"{name} would be slack{where(model)} (tension {left.min():.0f} N at "
+                f"{name} would be slack{where(model)} (tension {left.min() + 0.0:.3g} N at "
                 f"{middle[left.argmin()]:.1f} m): give its end a tensioner (line.ends, "
                 "line.tensioner), or change line.temperature.difference_K"
             )

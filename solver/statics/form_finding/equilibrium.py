@@ -306,7 +306,7 @@ def _wanted(model: Model, wire: Wire, nodes: np.ndarray) -> np.ndarray:
 
 def _check(line: Line, mesh: LineMesh, form: Equilibrium, pushing: bool) -> None:
     length = form.height[mesh.droppers[:, 0]] - form.height[mesh.droppers[:, 1]]
-    _refuse(line, mesh, length <= 0, lambda i: f"would have a length of {length[i]:.3f} m")
+    _refuse(line, mesh, length <= 0, lambda i: f"would have a length of {length[i] + 0.0:.3g} m")
     cut, force = form.dropper_length, form.dropper_force
     _refuse(
         line,
@@ -317,7 +317,11 @@ def _check(line: Line, mesh: LineMesh, form: Equilibrium, pushing: bool) -> None
     weighted = form.dropper_force.any() and not pushing
     slack = (form.dropper_force <= 0) & weighted
     _refuse(
-        line, mesh, slack, lambda i: f"would be slack at rest (force {form.dropper_force[i]:.1f} N)"
+        line,
+        mesh,
+        slack,
+        # Digits as they matter, so that a small force is not rounded to a zero with a sign.
+        lambda i: f"would be slack at rest (force {form.dropper_force[i] + 0.0:.3g} N)",
     )
 
 

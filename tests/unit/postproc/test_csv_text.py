@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catenary.postproc.files.csv_text import csv_text, plain_cell
+from catenary.postproc.files.csv_text import csv_text, number_text, plain_cell
 
 ROOT = Path(__file__).parents[3]
 
@@ -20,6 +20,16 @@ ROOT = Path(__file__).parents[3]
 )
 def test_a_formula_gets_an_apostrophe(text: str) -> None:
     assert plain_cell(text) == f"'{text}"
+
+
+@given(st.floats())
+def test_a_number_is_read_as_it_was(value: float) -> None:
+    read = float(number_text(value))
+    assert read == value or read != read and value != value
+
+
+def test_zero_has_no_sign() -> None:
+    assert [number_text(value) for value in (-0.0, 0.0, 250.0, 0.1)] == ["0", "0", "250", "0.1"]
 
 
 @pytest.mark.parametrize(

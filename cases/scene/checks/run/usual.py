@@ -11,9 +11,16 @@ from catenary.cases.scene.keys.usual_ranges import USUAL, unit_guess
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.tables.units import unit_of
 
+_MEANT = ", or case.accept_unusual = true if it is meant"
+
 
 def usual_faults(scene: Scene) -> Iterator[Fault]:
-    """A fault for every number that was probably written in another unit."""
+    """A fault for every number that was probably written in another unit.
+
+    None in a scene that says with ``case.accept_unusual`` that its numbers are meant.
+    """
+    if scene.case.accept_unusual:
+        return
     plain = scene.model_dump(exclude_none=True)
     for pattern in USUAL:
         yield from _faults(plain, pattern.split("."), "", scene.origin)
@@ -34,5 +41,5 @@ def _faults(value: Any, parts: list[str], key: str, origin: Origin) -> Iterator[
         guess = unit_guess(key, number)
         if guess:
             unit = unit_of(key)
-            yield Fault(key, f"{key} is {number:.12g} {unit} {origin.of(key)}; {guess}")
+            yield Fault(key, f"{key} is {number:.12g} {unit} {origin.of(key)}; {guess}{_MEANT}")
             return
