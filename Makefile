@@ -15,6 +15,7 @@ MPI_PYTEST := $(PYTHON) -m mpi4py -m pytest -p no:cacheprovider
 PARTS := meshgen solver mbs postproc cases
 RESULT := results/ambrosio2012
 SEED ?= 1
+VTK ?= 9.3.1 9.4.2 9.5.2 9.6.1
 LONG_RUNS := $(wildcard tests/benchmarks/test_multibody_*.py) tests/benchmarks/test_killed_runs.py \
     tests/benchmarks/test_long_line.py tests/benchmarks/test_exact_window.py
 
@@ -34,7 +35,7 @@ endif
 # The targets share .venv and two cores: one after the other, also under make -j.
 .NOTPARALLEL:
 .PHONY: help setup setup-newest compile update-versions run check test test-studies test-unit \
-    test-verification test-regression test-mpi test-ranks bench long-runs fuzz test-paraview lint types format clean
+    test-verification test-regression test-mpi test-ranks bench long-runs fuzz test-paraview test-vtk lint types format clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -111,6 +112,15 @@ test-paraview: setup ## open runs in the ParaView of this machine (Debian: parav
 	@command -v pvpython >/dev/null && command -v xvfb-run >/dev/null || \
 	    { echo "test-paraview needs pvpython and xvfb-run: apt-get install python3-paraview xvfb"; exit 1; }
 	$(PYTEST) -q tests/paraview
+
+test-vtk: setup ## fields.vtkhdf by time in other versions of VTK, from the package index: VTK="9.3.1 9.4.2 9.5.2 9.6.1"
+	.venv/bin/catenary run en50318_2002 --short --quiet --force -o build/film
+	.venv/bin/catenary run en50318_2002 --short --quiet --force -o build/film_of_window --set 'output.field_window_m=[100,100]'
+	set -e; for version in $(VTK); do \
+	    test -x build/vtk-$$version/bin/python || $(PYTHON) -m venv build/vtk-$$version; \
+	    build/vtk-$$version/bin/pip install --quiet vtk==$$version h5py; \
+	    for film in film film_of_window; do build/vtk-$$version/bin/python tests/paraview/vtk_by_time.py build/$$film; done; \
+	done
 
 lint: setup ## ruff (lint and format) and mypy
 	$(PYTHON) -m ruff check .
