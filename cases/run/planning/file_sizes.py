@@ -49,7 +49,7 @@ _INCOMPRESSIBLE = (1.0, 1.0)
 # Report and pictures of any run, and what a dropper and an arm add to its tables [B].
 _REPORT, _REPORT_PER_DROPPER, _REPORT_PER_ARM = 1.2e6, 300.0, 90.0
 # Tables of the snapshots' blocks, and room that is claimed beside them [B].
-_FIELD_TABLES = 200e3
+_FIELD_TABLES = 90e3
 # Lines of a block in the XDMF file at each snapshot, and of each of its fields [B].
 _XDMF_BLOCK, _XDMF_FIELD = 600, 250
 
@@ -61,7 +61,7 @@ class FileSizes:
     Attributes
     ----------
     result : ``run.h5``
-    film : ``fields.h5`` and ``fields.xdmf``
+    film : ``fields.h5``, ``fields.xdmf`` and ``fields.vtkhdf``
     report : ``report.html``, its pictures and tables
     """
 
@@ -109,7 +109,7 @@ def estimate_files(
 
 
 def _film_bytes(problem: Problem, recording: Recording, n_snapshots: int) -> float:
-    """Size of ``fields.h5`` and ``fields.xdmf``, were all parts of the line in them [B]."""
+    """Size of ``fields.h5``, ``fields.xdmf`` and ``fields.vtkhdf``, were all parts of the line in them [B]."""
     fields, line = recording.fields, problem.line
     share = shown_share(fields, problem, recording.n_steps)
     extent = Extent(recording.arm_x, recording.dropper_x, recording.n_nodes, recording.n_cells)
