@@ -35,7 +35,7 @@ endif
 # The targets share .venv and two cores: one after the other, also under make -j.
 .NOTPARALLEL:
 .PHONY: help setup setup-newest compile update-versions run check test test-studies test-unit \
-    test-verification test-regression test-mpi test-ranks bench long-runs fuzz test-paraview test-vtk lint types format clean
+    test-verification test-regression test-mpi test-ranks bench long-runs fuzz test-paraview test-readers lint types format clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -113,13 +113,15 @@ test-paraview: setup ## open runs in the ParaView of this machine (Debian: parav
 	    { echo "test-paraview needs pvpython and xvfb-run: apt-get install python3-paraview xvfb"; exit 1; }
 	$(PYTEST) -q tests/paraview
 
-test-vtk: setup ## fields.vtkhdf by time in other versions of VTK, from the package index: VTK="9.3.1 9.4.2 9.5.2 9.6.1"
+test-readers: setup ## what other programs read of a run: versions of VTK and xarray, from the package index; VTK="9.3.1 9.4.2"
 	.venv/bin/catenary run en50318_2002 --short --quiet --force -o build/film
-	.venv/bin/catenary run en50318_2002 --short --quiet --force -o build/film_of_window --set 'output.field_window_m=[100,100]'
-	set -e; for version in $(VTK); do \
-	    test -x build/vtk-$$version/bin/python || $(PYTHON) -m venv build/vtk-$$version; \
-	    build/vtk-$$version/bin/pip install --quiet vtk==$$version h5py; \
-	    for film in film film_of_window; do build/vtk-$$version/bin/python tests/paraview/vtk_by_time.py build/$$film; done; \
+	.venv/bin/catenary run en50318_2002 --short --quiet --force -o build/film_of_window \
+	    --set 'output.field_window_m=[100,100]' output.line_channels_every_s=0.01
+	set -e; for reader in $(VTK:%=vtk==%) xarray; do \
+	    place=build/reader-$$reader; test -x $$place/bin/python || $(PYTHON) -m venv $$place; \
+	    case $$reader in xarray) also="h5netcdf netCDF4"; script=xarray_shows;; *) also=; script=vtk_by_time;; esac; \
+	    $$place/bin/pip install --quiet $$reader h5py $$also; \
+	    for film in film film_of_window; do $$place/bin/python tests/readers/$$script.py build/$$film; done; \
 	done
 
 lint: setup ## ruff (lint and format) and mypy

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 import h5py
 import numpy as np
 
+from catenary.postproc.files.dimensions import describe_extremes
 from catenary.postproc.files.hdf5.array_writes import put_array
 from catenary.postproc.files.hdf5.checked import seal_arrays, sum_is_kept
 
@@ -30,7 +31,10 @@ def store_extremes(file: h5py.File, n_rows: int, extremes: Mapping[str, np.ndarr
     place = group.require_group(_SLOTS[int(np.argmin(counts))])
     arrays = {**extremes, ROWS: np.array(n_rows, dtype=np.int64)}
     for name, values in arrays.items():
+        is_new = name not in place
         put_array(place, name, values)
+        if is_new and name != ROWS:
+            describe_extremes(place[name], name)
     seal_arrays(place, arrays)
 
 

@@ -21,6 +21,7 @@ import numpy as np
 from catenary.postproc.channels.facts import FACTS
 from catenary.postproc.channels.header import Header
 from catenary.postproc.channels.line_record import GZIP, GZIP_LEVEL, LineRecord
+from catenary.postproc.files import dimensions
 from catenary.postproc.files.disk import (
     MARGIN,
     abandon,
@@ -143,6 +144,8 @@ class ResultFile:
                     create_checked(self._file, f"line_columns/{name}", columns_of)
                 for name, (channel, columns) in table.items():
                     _create_growing(self._file, name, channel, columns, shapes[name], record)
+                of_columns = {channels.CHANNELS[name].per: x for name, x in self._x.items()}
+                dimensions.describe(self._file, of_columns)
             # Kept open: closing a dataset writes what is left of it, and h5py ignores errors there.
             self._growing = {name: self._file[name] for name in table}
             set_attribute(self._file, "outcome", RUNNING)
@@ -249,6 +252,9 @@ class ResultFile:
             for name in set(place) - set(state):  # of the line as it was before an incident
                 del place[name]
             put_sealed_arrays(place, state)
+            for array in place.values():
+                if array.ndim:
+                    dimensions.hide(array)
             self._settle()
             set_attribute(group, "latest", slot)
         self._n_states += 1
@@ -283,6 +289,7 @@ def _write_head(
 ) -> None:
     fixed = {
         "format": FORMAT,
+        "Conventions": dimensions.CONVENTIONS,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "n_steps_planned": stage.n_steps,
         "n_strips": list(stage.n_strips),

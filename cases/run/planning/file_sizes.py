@@ -109,7 +109,7 @@ def estimate_files(
 
 
 def _film_bytes(problem: Problem, recording: Recording, n_snapshots: int) -> float:
-    """Size of ``fields.h5``, ``fields.xdmf`` and ``fields.vtkhdf``, were all parts of the line in them [B]."""
+    """Size of ``fields.h5``, ``.xdmf`` and ``.vtkhdf``, were all parts of the line in them [B]."""
     fields, line = recording.fields, problem.line
     share = shown_share(fields, problem, recording.n_steps)
     extent = Extent(recording.arm_x, recording.dropper_x, recording.n_nodes, recording.n_cells)

@@ -1,4 +1,4 @@
-"""Whether this Python's VTK shows the film of a run by time: `make test-vtk` runs it with several.
+"""Whether this Python's VTK shows the film of a run by time; `make test-readers` runs it.
 
 python vtk_by_time.py FOLDER        # needs vtk, numpy, h5py; nothing of this project
 """
