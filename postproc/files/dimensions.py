@@ -108,9 +108,9 @@ def describe(file: h5py.File, places: dict[str, np.ndarray]) -> None:
     time = file["time"]
     h5ds.set_scale(time.id, b"time")
     _describe(time, channels.TIME.unit, channels.TIME.meaning)
-    for name, table in ((ARM, "line/arm_x"), (DROPPER, "line/dropper_x"), (WIRE_END, "line/end_x")):
-        if table in file:
-            _add_places(file, name, file[table][...])
+    for name, own in ((ARM, "line/arm_x"), (DROPPER, "line/dropper_x"), (WIRE_END, "line/end_x")):
+        if own in file:
+            _add_places(file, name, file[own][...])
     for per, x in places.items():
         if _OF_COLUMNS[per] not in file:
             _add_places(file, _OF_COLUMNS[per], x)
