@@ -19,6 +19,7 @@ from catenary.solver.effects.shipped.axial_effects import moves_along
 from catenary.solver.model.gauges import gauge_places
 from catenary.solver.problem.problem import Problem
 from catenary.solver.time_loop.views import channels
+from catenary.solver.window.choice import Reach, reach_of_motion
 
 if TYPE_CHECKING:
     from catenary.cases.scene.tables.run.output import OutputTable
@@ -99,9 +100,13 @@ class Recording:
             told["film"] = f"a snapshot of the line every {self.field_every * dt:.3g} s{chosen}"
             if self.fields.fields != USUAL_FIELDS:
                 told["film"] += f" with {', '.join(self.fields.fields)}"
-            if self.fields.window is not None:
+            if self.fields.wave_speed:
+                told["film"] += f" as far as waves of {self.fields.wave_speed:.3g} m/s have come"
+            elif self.fields.window is not None:
                 behind, ahead = self.fields.window
                 told["film"] += f" from {behind:g} m behind to {ahead:g} m ahead of the train"
+            if self.fields.rests_beyond:
+                told["film"] += "; the line beyond is at rest"
         return told
 
     def thinned(self, dt: float) -> list[str]:
@@ -116,6 +121,7 @@ def recording_of(
     extent: Extent,
     n_steps: int,
     usual_s: float = FIELD_EVERY,
+    with_train: bool = True,
 ) -> Recording:
     """What a run of a problem records. Not collective.
 
@@ -124,8 +130,10 @@ def recording_of(
     output : the scene's table
     n_steps : steps after step 0
     usual_s : from one snapshot to the next where neither the table nor their size decides [s]
+    with_train : whether the train alone sets the line into motion, and a window follows it
     """
-    fields = _field_record(output, problem)
+    reach = reach_of_motion(problem) if with_train else None
+    fields = _field_record(output, problem, reach)
     field_every, by_size = _field_every(output, problem, fields, extent, n_steps, usual_s)
     train = train_of(problem)
     end_x = np.array([end.x for end in gauge_places(problem, train.moves_along)])
@@ -137,7 +145,7 @@ def recording_of(
     names = channels.line_channels(train)
     n_columns = sum(places[channels.CHANNELS[name].per] for name in names)
     return Recording(
-        _line_record(output, problem, n_columns, n_steps).of(train),
+        _line_record(output, problem, n_columns, n_steps, reach).of(train),
         fields,
         field_every,
         cadence(output.energy_every_s, problem.numerics.dt),
@@ -166,7 +174,9 @@ def cadence(every: float, dt: float) -> int | None:
     return max(1, round(every / dt)) if every > 0 else None
 
 
-def _line_record(output: OutputTable, problem: Problem, n_columns: int, n_steps: int) -> LineRecord:
+def _line_record(
+    output: OutputTable, problem: Problem, n_columns: int, n_steps: int, reach: Reach | None
+) -> LineRecord:
     dt, given = problem.numerics.dt, output.chooses_line_channels
     if not given and 8.0 * n_columns * (n_steps + 1) > WHOLE_UP_TO:
         return LineRecord(
@@ -179,6 +189,8 @@ def _line_record(output: OutputTable, problem: Problem, n_columns: int, n_steps:
     if output.line_channels_every_m is not None:
         every_s = output.line_channels_every_m / problem.train.speed
     window, spans = output.line_channels_window_m, output.line_channels_spans
+    if not given and reach is not None and not reach.wave_speed:
+        window = [reach.behind, reach.ahead]
     masts = problem.line.support_positions
     names = output.line_channels
     return LineRecord(
@@ -211,10 +223,13 @@ def _field_every(
     return max(usual, needed), needed > usual
 
 
-def _field_record(output: OutputTable, problem: Problem) -> FieldRecord:
-    """Which part of the fields is recorded."""
+def _field_record(output: OutputTable, problem: Problem, reach: Reach | None) -> FieldRecord:
+    """Which part of the fields is recorded: what moves, unless the scene says how far."""
     masts, train = problem.line.support_positions, problem.train
     spans, window = output.field_spans, output.field_window_m
+    follows = spans is None and window is None and reach is not None
+    if follows and reach is not None:
+        window = [reach.behind, reach.ahead]
     behind = [placement.behind for placement in train.placements]
     return FieldRecord(
         fields=USUAL_FIELDS if output.fields is None else tuple(output.fields),
@@ -222,6 +237,8 @@ def _field_record(output: OutputTable, problem: Problem) -> FieldRecord:
         stretch=None if spans is None else (float(masts[spans[0] - 1]), float(masts[spans[1]])),
         window=None if window is None else (window[0], window[1]),
         course=Course(train.start - max(behind), train.start - min(behind), train.speed),
+        wave_speed=reach.wave_speed if follows and reach is not None else 0.0,
+        rests_beyond=follows,
     )
 
 

@@ -283,7 +283,8 @@ def _observers(
     begun_for = comm.bcast(_begun_for(order) if comm.rank == 0 else None) or n_steps
     excited = order.excited
     usual = FIELD_EVERY if excited is None else excited.snapshot_every
-    recording = recording_of(output, problem, extent_of(at_rest.mesh), begun_for, usual)
+    extent, with_train = extent_of(at_rest.mesh), excited is None
+    recording = recording_of(output, problem, extent, begun_for, usual, with_train)
     for sentence in recording.thinned(dt):
         logger.info(sentence)
     flush_every = output.flush_every_steps or flush_cadence(

@@ -13,7 +13,12 @@ import numpy as np
 from catenary.postproc.files.hdf5.checked import text_of
 from catenary.postproc.read.guard import survives
 from catenary.postproc.record.snapshots.blocks import ARMS, OTHER_PARTS
-from catenary.postproc.record.snapshots.fields_file import FORMAT, PLACES, SIZES
+from catenary.postproc.record.snapshots.fields_file import (
+    FORMAT,
+    PLACES,
+    RESTS_BEYOND,
+    SIZES,
+)
 from catenary.solver.base.errors import InputError
 
 FIELDS_FILE = "fields.h5"
@@ -26,7 +31,10 @@ _UP = 2
 
 @dataclass(frozen=True)
 class _Wire:
-    """What snapshots show of a wire: nodes and places of its points, rows of each snapshot."""
+    """What snapshots show of a wire: nodes and places of its points, rows of each snapshot.
+
+    ``rests`` is whether points that a snapshot does not show are at rest.
+    """
 
     nodes: np.ndarray
     x: np.ndarray
@@ -35,6 +43,7 @@ class _Wire:
     start: np.ndarray
     values: h5py.Dataset
     vectors: h5py.Dataset | None
+    rests: bool
 
     def rows(self, number: int, first: int, count: int) -> slice:
         """Rows of its tables with ``count`` points from number ``first`` on in a snapshot."""
@@ -50,7 +59,7 @@ class Snapshots:
     times : (n,) times of the snapshots that are there, ascending [s]
     parts : names of the wires and other parts of the line that are shown
     field : name of the field that lifts points, as ParaView's calculator has it
-    whole : whether each snapshot shows all nodes
+    whole : whether the motion of all nodes is known in each snapshot
     has_vectors : whether motions along the track and sideways are there, zero as they may be
 
     Parameters
@@ -111,7 +120,8 @@ class Snapshots:
                     f"{path} has neither uplift nor displacement; run the scene again with one of "
                     "them in output.fields"
                 )
-            self._wires = [_wire(group) for group in wires]
+            rests = bool(file.attrs.get(RESTS_BEYOND, 0))
+            self._wires = [_wire(group, rests) for group in wires]
             scalar = all("uplift" in wire for wire in wires)
             self.field = "uplift" if scalar else "displacement_Z"
             self.has_vectors = all(wire.vectors is not None for wire in self._wires)
@@ -120,7 +130,7 @@ class Snapshots:
                 raise ValueError(f"{PLACES} has another size")
         except (KeyError, OSError, TypeError, ValueError) as error:
             raise InputError(f"{path} is damaged: {error}") from error
-        shown = sum(wire.count for wire in self._wires)
+        shown = sum(wire.x.size if wire.rests else wire.count for wire in self._wires)
         self.whole = bool(np.all(shown == self._n_nodes))
 
     def __enter__(self) -> Snapshots:
@@ -137,9 +147,11 @@ class Snapshots:
         return group["points"][0::2], group["nodes"][1::2]
 
     def shown(self, number: int) -> tuple[float, float]:
-        """From and to of the wires in a snapshot, as far as each reaches [m]."""
+        """From and to of the wires whose motion a snapshot tells, as far as each reaches [m]."""
         ends = [
-            wire.x[[int(wire.first[number]), int(wire.first[number] + wire.count[number]) - 1]]
+            wire.x[[0, -1]]
+            if wire.rests
+            else wire.x[[int(wire.first[number]), int(wire.first[number] + wire.count[number]) - 1]]
             for wire in self._wires
         ]
         low, high = np.array(ends).reshape(-1, 2).T
@@ -180,20 +192,20 @@ class Snapshots:
         )
 
     def uplift(self, number: int) -> np.ndarray:
-        """Uplift of the nodes in a snapshot, NaN where it shows none, (n_nodes,) [m].
+        """Uplift of the nodes in a snapshot, NaN where it is not known, (n_nodes,) [m].
 
         Raises
         ------
         InputError
             If it is not of this line, or not finite.
         """
-        uplift = np.full(self._n_nodes, np.nan)
+        uplift = self._before(())
         for nodes, values in self._shown(number, vectors=False):
             uplift[nodes] = values if values.ndim == 1 else values[:, _UP]
         return uplift
 
     def displacement(self, number: int) -> np.ndarray:
-        """Displacement of the nodes in a snapshot, NaN where it shows none, (n_nodes, 3) [m].
+        """Displacement of the nodes in a snapshot, NaN where it is not known, (n_nodes, 3) [m].
 
         Where the snapshots have the uplift alone, nothing moves along the track and sideways.
 
@@ -202,7 +214,7 @@ class Snapshots:
         InputError
             If it is not of this line, or not finite.
         """
-        moved = np.full((self._n_nodes, 3), np.nan)
+        moved = self._before((3,))
         for nodes, values in self._shown(number, vectors=self.has_vectors):
             if values.ndim == 1:
                 moved[nodes, :_UP], moved[nodes, _UP] = 0.0, values
@@ -225,6 +237,19 @@ class Snapshots:
             return np.nan
         wire = self._wire(name)
         return _between(wire, number, x, wire.values, _UP)
+
+    def _before(self, shape: tuple[int, ...]) -> np.ndarray:
+        """Motion of the nodes that a snapshot does not show: zero at rest, NaN if not known.
+
+        Parameters
+        ----------
+        shape : of the motion of one node
+        """
+        motion = np.full((self._n_nodes, *shape), np.nan)
+        for wire in self._wires if self._of_this_line else ():
+            if wire.rests:
+                motion[wire.nodes] = 0.0
+        return motion
 
     def _wire(self, name: str) -> _Wire:
         return self._wires[[part for part in self.parts if part not in OTHER_PARTS].index(name)]
@@ -255,6 +280,8 @@ def _between(wire: _Wire, number: int, x: float, table: h5py.Dataset, axis: int)
     """Value of a table in a snapshot between the two points of a wire next to a place."""
     first = int(wire.first[number])
     last = first + int(wire.count[number]) - 2
+    if wire.rests and not wire.x[first] <= x <= wire.x[last + 1]:
+        return 0.0
     at = int(np.clip(wire.x.searchsorted(x) - 1, first, max(first, last)))
     values = np.asarray(table[wire.rows(number, at, 2)], dtype=float)
     if values.ndim > 1:
@@ -262,11 +289,11 @@ def _between(wire: _Wire, number: int, x: float, table: h5py.Dataset, axis: int)
     return float(np.interp(x, wire.x[at : at + 2], values))
 
 
-def _wire(group: h5py.Group) -> _Wire:
+def _wire(group: h5py.Group, rests: bool) -> _Wire:
     first, count = group["first"][...], group["count"][...]
     start = np.cumsum(count) - count
     values = group["uplift" if "uplift" in group else "displacement"]
     if values.shape[0] != int(count.sum()):
         raise ValueError(f"{values.name} is too short")
     nodes, x = group["nodes"][...], group["points"][:, 0]
-    return _Wire(nodes, x, first, count, start, values, group.get("displacement"))
+    return _Wire(nodes, x, first, count, start, values, group.get("displacement"), rests)

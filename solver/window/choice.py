@@ -7,6 +7,7 @@ is negligible follows from how waves fade on the way, and for how long they are 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,6 +31,25 @@ _FEWEST, _WANTED = 4, 22.0
 # speeds times spans: the change of group velocity with wavenumber, some 0.08 of that, is a scale of
 # 2 of it (see ``window_kernels.fade``). Without that damping more spans are taken.
 _SLOW, _FADING, _WANTED_WITHOUT = 0.1, 2.0, 30.0
+# Spans beyond the front of the fastest transverse wave within which motion is found. Bending makes
+# short waves faster, damping ends them: in exact windows on en50318_2002 and ambrosio2012 (200
+# spans, 17 to 20 s) displacements above 1e-6 of the largest reached 30 m further than that front.
+_BEYOND_FRONT = 2.0
+
+
+class Reach(NamedTuple):
+    """How far a line with a window moves at most.
+
+    Attributes
+    ----------
+    behind, ahead : of the last and of the first pantograph [m]
+    wave_speed : of the waves that also leave the places where these started [m/s]; 0 if a number of
+        spans bounds the motion
+    """
+
+    behind: float
+    ahead: float
+    wave_speed: float = 0.0
 
 
 def window_sentence(problem: Problem) -> str:
@@ -89,6 +109,25 @@ def moving_share(problem: Problem) -> float:
         high = train.start + train.speed * time + window.spans_ahead * span
     alive = np.clip(np.minimum(high, end) - np.maximum(low, begin), 0.0, None)
     return float(alive.mean() / (end - begin))
+
+
+def reach_of_motion(problem: Problem) -> Reach | None:
+    """How far the line moves around the train, None if all of it may. Not collective.
+
+    All of it may without a window, under gusts, with incidents, whose loads stay where they are,
+    and where motion bounds the window and waves of the wires' stretch leave the train behind.
+    """
+    window, wind = problem.window, problem.wind
+    gusts = wind is not None and wind.gusts is not None and "gusts" in problem.effects
+    if not window.moves or problem.incidents or gusts:
+        return None
+    span = float(np.diff(problem.line.support_positions).max())
+    if window.by_motion == 0.0:
+        return Reach(window.spans_behind * span, window.spans_ahead * span)
+    if "axial_motion" in problem.effects:
+        return None
+    margin = _BEYOND_FRONT * span
+    return Reach(margin, margin, max(wire.wave_speed for wire in problem.line.wires))
 
 
 def estimated_error(problem: Problem, ahead: float, behind: float) -> float:

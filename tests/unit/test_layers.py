@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import functools
 import graphlib
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
@@ -287,22 +286,6 @@ def test_no_files_import_each_other_in_a_circle_even_for_types() -> None:
     }
     assert sum(map(len, arrows.values())) > len(FILES)
     graphlib.TopologicalSorter(arrows).prepare()  # names a circle that it finds
-
-
-MOST_FILES, MOST_LINES = 13, 400
-
-
-def test_a_folder_has_about_a_dozen_files() -> None:
-    counts = Counter(path.parent for path in FILES if path.stem != "__init__")
-    assert {str(path): n for path, n in counts.items() if n > MOST_FILES} == {}
-
-
-def test_a_file_is_read_in_one_sitting() -> None:
-    tests = (ROOT / "tests").rglob("*.py")
-    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in FILES}
-    lengths |= {path: len(path.read_text(encoding="utf-8").splitlines()) for path in tests}
-    long = {str(path.relative_to(ROOT)): n for path, n in lengths.items() if n > MOST_LINES}
-    assert long == {}
 
 
 def table_below(title: str) -> list[tuple[str, str]]:

@@ -38,6 +38,8 @@ class FieldRecord:
     stretch : from and to along the track [m], None for the whole line
     window : how far behind the last and ahead of the first pantograph [m], None for everything
     course : of the train, for the window
+    wave_speed : at which the window also grows from where the pantographs started [m/s]
+    rests_beyond : whether the line is at rest outside of the window
     """
 
     fields: tuple[str, ...] = USUAL_FIELDS
@@ -45,6 +47,8 @@ class FieldRecord:
     stretch: tuple[float, float] | None = None
     window: tuple[float, float] | None = None
     course: Course = Course(0.0, 0.0, 0.0)
+    wave_speed: float = 0.0
+    rests_beyond: bool = False
 
     @property
     def kinds(self) -> tuple[FieldKind, ...]:
@@ -86,9 +90,10 @@ class FieldRecord:
         """From and to of the window at times [s], shapes as those [m]."""
         if self.window is None:
             return np.full(times.shape, -np.inf), np.full(times.shape, np.inf)
-        travelled = self.course.speed * times
-        behind, ahead = self.window
-        return self.course.last + travelled - behind, self.course.first + travelled + ahead
+        (behind, ahead), speed = self.window, self.course.speed
+        back = -self.wave_speed if self.wave_speed else speed
+        forth = max(speed, self.wave_speed)
+        return self.course.last + back * times - behind, self.course.first + forth * times + ahead
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,8 @@ logger = logging.getLogger("catenary.fields")
 FORMAT = "catenary-fields-2"
 # Where the bases, masses and bodies of the pantographs are, and how many numbers each has of it.
 PLACES, SIZES = "pantograph_places", "pantograph_sizes"
+# Its attribute that is 1 where wires are at rest at all points that a snapshot does not show.
+RESTS_BEYOND = "rests_beyond"
 # Rows of a table that are copied at once.
 _ROWS_OF_COPY = 1 << 16
 # Tables of a block beside its fields.
@@ -232,6 +234,7 @@ class FieldsFile:
     def _write_tables(self, file: h5py.File) -> None:
         set_attribute(file, "format", FORMAT)
         set_attribute(file, "n_nodes", self._size.n_nodes)
+        set_attribute(file, RESTS_BEYOND, int(self._record.rests_beyond))
         set_attribute(file, "parts", json.dumps([slots.name for slots in self._layout]))
         put_array(file, "times", np.full(len(self._planned), np.nan))
         # Room in the file now, and no zeros written into it.

@@ -50,14 +50,15 @@ class OutputTable(Table):
         None,
         min_length=2,
         max_length=2,
-        description="first and last span that snapshots show, counted from 1; all if absent",
+        description="first and last span that snapshots show, counted from 1; if absent all, or "
+        "with a window.mode other than off what moves",
     )
     field_window_m: list[Annotated[float, Field(ge=0, le=1e6)]] | None = Field(
         None,
         min_length=2,
         max_length=2,
         description="how far behind the last and ahead of the first pantograph snapshots show the "
-        "line; the whole line if absent",
+        "line; if absent the whole line, or with a window.mode other than off what moves",
     )
     energy_every_s: float = Field(
         0.05, ge=0, le=1e4, description="cadence of the line's energy; 0 writes none"
@@ -80,8 +81,8 @@ class OutputTable(Table):
         ge=0,
         le=1e4,
         description="cadence of the line's channels; 0 records every step. Of this key and the "
-        "next four none: every step up to 500 MB, beyond it every 5 ms from 300 m behind to 200 m "
-        "ahead of the train",
+        "next four none: every step up to 500 MB, with window.mode = bounded of the spans that move; "
+        "beyond it every 5 ms from 300 m behind to 200 m ahead of the train",
     )
     line_channels_every_m: float | None = Field(
         None, ge=0, le=1e4, description="the same as a distance that the train travels"
