@@ -21,6 +21,38 @@ STAMP=.venv/catenary-setup
 
 say() { printf '%s\n' "$*" >&2; }
 
+# begin WORDS: say what is done from now on, and every 15 s how long it has taken so far.
+begin() {
+    finish
+    step=$1 step_begin=$SECONDS
+    say "setup: $step ..."
+    (
+        # Of its own output: what outlives this script would keep a pipe of it open.
+        while sleep 15 >/dev/null 2>&1; do
+            say "setup:   $step, $((SECONDS - step_begin)) s so far"
+        done
+    ) &
+    ticker=$!
+}
+
+# finish: end what was begun, and say how long it took.
+finish() {
+    [ -n "$ticker" ] || return 0
+    kill "$ticker" 2>/dev/null || true
+    wait "$ticker" 2>/dev/null || true
+    ticker=
+    say "setup:   $((SECONDS - step_begin)) s"
+}
+
+# Files to remove, and the ticker to end, however this script ends.
+work=
+ticker=
+clean_up() {
+    [ -z "$ticker" ] || kill "$ticker" 2>/dev/null || true
+    [ -z "$work" ] || rm -rf "$work"
+}
+trap clean_up EXIT
+
 fail() {
     say "setup: $*"
     exit 1
@@ -108,7 +140,7 @@ quietly() {
 install_packages() {
     local name
     local -a names=()
-    say "setup: installing $# system packages"
+    begin "installing $# system packages with apt-get, some 30 s"
     quietly as_root apt-get update || fail "apt-get update failed"
     for name in "$@"; do
         name=$(name_in_archive "$name")
@@ -116,6 +148,7 @@ install_packages() {
     done
     quietly as_root apt-get install -y --no-install-recommends -o DPkg::Lock::Timeout=120 \
         "${names[@]}" || fail "apt-get could not install: ${names[*]}"
+    finish
 }
 
 # Folder that holds the petsc4py of the newest installed PETSc: Debian keeps it out of sys.path.
@@ -177,8 +210,10 @@ make_environment() {
     if [ ! -f "$STAMP" ] || [ "$(head -n 1 "$STAMP")" != "$PWD" ] ||
         ! .venv/bin/python -m pip --version >/dev/null 2>&1 ||
         ! grep -q '^include-system-site-packages = false' .venv/pyvenv.cfg; then
+        begin "making the virtual environment .venv"
         rm -rf .venv
         "${python[@]}" -m venv .venv
+        finish
     fi
     rm -f "$STAMP"
     "${python[@]}" .setup/system_packages.py .venv ${extra_path:+"$extra_path"}
@@ -191,10 +226,8 @@ pip_install() {
 }
 
 install_python_packages() {
-    local work tested
+    local tested
     work=$(mktemp -d)
-    # shellcheck disable=SC2064  # the folder of now, not of later
-    trap "rm -rf '$work'" EXIT
     .venv/bin/python -I .setup/requirements.py pyproject.toml >"$work/requirements.txt"
     # petsc4py and h5py are compiled against the system's numpy: nothing may bring another one.
     .venv/bin/python -I - >"$work/system.txt" <<'CODE'
@@ -206,7 +239,7 @@ CODE
     local -a wanted=(--requirement "$work/requirements.txt" --constraint "$work/system.txt")
     tested=.setup/tested/$(.venv/bin/python -I -c \
         'import sys; print("python{}.{}.txt".format(*sys.version_info))')
-    say "setup: installing Python packages into .venv"
+    begin "downloading and installing Python packages into .venv (1.2 GB), some 60 s"
     if [ "$newest" ]; then
         pip_install --upgrade --upgrade-strategy eager "${wanted[@]}"
     elif [ -f "$tested" ]; then
@@ -218,6 +251,7 @@ CODE
         pip_install "${wanted[@]}"
     fi
     pip_install --no-deps --no-build-isolation --editable .
+    begin "compiling the packages to bytecode"
     # Bytecode on all cores at once: pip makes it on one, which took a third of its time. Packages
     # may bring files that are no Python of this version.
     .venv/bin/python -I -m compileall -q -j 0 \
@@ -237,8 +271,12 @@ esac
 if [ ! "$newest" ] && is_current; then
     exit 0
 fi
+say "setup: preparing .venv, which takes one to two minutes the first time"
 choose_python
 make_environment
 install_python_packages
+begin "checking that all packages load"
 .venv/bin/python -I .setup/check.py >&2
+finish
 fingerprint >"$STAMP"
+say "setup: ready after $SECONDS s"

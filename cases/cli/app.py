@@ -72,7 +72,7 @@ MoreAssignments = Annotated[
 Shortened = Annotated[
     bool, typer.Option("--short", help="Apply the case's [test] table, which shortens it.")
 ]
-Force = Annotated[bool, typer.Option("--force", help="Replace what is there.")]
+Force = Annotated[bool, typer.Option("--force", help="Overwrite existing results.")]
 
 
 def load(
@@ -103,7 +103,7 @@ MoreAndPetscOptions = Annotated[
 Strict = Annotated[
     bool, typer.Option("--strict", help="Exit with 3 if an acceptance criterion fails.")
 ]
-Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more.")]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print the time of each phase.")]
 
 
 def _version(wanted: bool) -> None:

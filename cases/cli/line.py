@@ -36,7 +36,7 @@ def check(
         for line in error.lines():
             console.complain(line)
         return console.BAD_INPUT
-    # What a refusal does not need is imported once the scene is sound.
+    # What a refusal does not need is imported once the scene is valid.
     from catenary.cases.run.at_rest.installed import registration_of
     from catenary.cases.run.describe.arrivals import arrival_facts
     from catenary.cases.run.describe.pantographs import kind_lines
@@ -50,7 +50,7 @@ def check(
     model, form = stable_form(problem, mesh)
     refuse_lost_wire(model, form)
     console.say(
-        f"{scene.case.name} is sound: {counted(problem.line.n_spans, 'span')}, "
+        f"{scene.case.name} is valid: {counted(problem.line.n_spans, 'span')}, "
         f"{problem.line.support_positions[-1]:g} m, {counted(mesh.droppers.shape[0], 'dropper')}, "
         f"{mesh.n_nodes} nodes"
     )

@@ -176,7 +176,8 @@ def _end(result: RunOutcome, folder: Path, strict: bool) -> int:
 
     if result.outcome != "done":
         return console.BROKEN
-    console.say(terminal_text.summary_text(result.summary, folder))
+    text = terminal_text.summary_text(result.summary, folder, result.phase_wall, console.waited())
+    console.say(text)
     return console.NOT_ACCEPTED if strict and result.accepted is False else console.DONE
 
 
@@ -195,7 +196,9 @@ def submit(
     assignments: Assignments = None,
     shortened: Shortened = False,
     ranks: Annotated[int, typer.Option("--ranks", min=1, max=10**6, help="MPI ranks.")] = 1,
-    nodes: Annotated[int, typer.Option("--nodes", min=1, max=10**5, help="Computers.")] = 1,
+    nodes: Annotated[
+        int, typer.Option("--nodes", min=1, max=10**5, help="Number of cluster nodes.")
+    ] = 1,
     minutes: Annotated[
         int | None,
         typer.Option(

@@ -1,4 +1,4 @@
-"""Runs that take one rank, whatever number there is: those with a window."""
+"""Runs with a window, in which only one rank computes."""
 
 from __future__ import annotations
 

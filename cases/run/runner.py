@@ -66,12 +66,14 @@ class RunOutcome:
     """How a run ended.
 
     ``outcome`` is "done", "interrupted" or the sentence of what broke; ``accepted`` the verdict
-    of the standard, None if not judged; ``summary`` the content of ``summary.json``.
+    of the standard, None if not judged; ``summary`` the content of ``summary.json``;
+    ``phase_wall`` the wall time of all phases, that of the report included [s].
     """
 
     outcome: str
     accepted: bool | None
     summary: dict[str, Any] = field(default_factory=dict)
+    phase_wall: dict[str, float] = field(default_factory=dict)
 
 
 def run_case(
@@ -185,9 +187,11 @@ def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
     outcome, n_unknowns = _marched(order, judge, phases)
     # The line is not needed any more: of a long one it is a gigabyte.
     give_back_long_line(n_unknowns)
+    phases.tell_compiled()
     order.tell(outcome.outcome)
     with phases("report"):
         result = _reported(order, outcome)
+    result.phase_wall = dict(phases.wall)
     logger.debug("phases [s]: %s", {name: round(wall, 3) for name, wall in phases.wall.items()})
     return result
 
@@ -215,8 +219,8 @@ def _marched(
                 header = header_of(scene, problem, at_rest, order.petsc_options, excited)
             if order.resume:
                 on_root(comm, lambda: _refuse_other_run(order, header, problem))
-            phase.next("the line was distributed")
-            with phases("distribute"):
+            phase.next("the solver was prepared")
+            with phases("prepare solver"):
                 march = stack.enter_context(March(comm, *at_rest))
                 if order.state is not None:
                     march.restore(order.state)

@@ -1,6 +1,6 @@
 """The scene: everything a run is made of, as it is written in ``case.toml``.
 
-``load_scene`` is the one way in. A loaded scene is sound: types, bounds, geometry and effects
+``load_scene`` is the one way in. A loaded scene is valid: types, bounds, geometry and effects
 have been checked, so that what follows meets no surprise.
 """
 

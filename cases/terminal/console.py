@@ -7,6 +7,7 @@ import inspect
 import logging
 import os
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
@@ -33,6 +34,21 @@ def at_end(tell: Callable[[], None]) -> None:
     Not collective.
     """
     _last_words.append(tell)
+
+
+# When this module was loaded, where the system does not say when the process started.
+_LOADED = time.perf_counter()
+
+
+def waited() -> float:
+    """Wall time since this process started [s]. Not collective."""
+    try:
+        # The name of the program, which may hold spaces, stands in brackets.
+        fields = Path("/proc/self/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+        ticks = os.sysconf("SC_CLK_TCK")
+        return time.clock_gettime(time.CLOCK_BOOTTIME) - int(fields[19]) / ticks
+    except (AttributeError, IndexError, OSError, ValueError):
+        return time.perf_counter() - _LOADED
 
 
 def speaks() -> bool:

@@ -22,13 +22,20 @@ def case_table(cases: Sequence[CaseEntry]) -> str:
     return "\n".join(f"{entry.name:{width}}  {entry.title}" for entry in cases)
 
 
-def summary_text(summary: Mapping[str, Any], folder: Path) -> str:
+def summary_text(
+    summary: Mapping[str, Any],
+    folder: Path,
+    phase_wall: Mapping[str, float] | None = None,
+    waited: float | None = None,
+) -> str:
     """The most important figures of a finished run.
 
     Parameters
     ----------
     summary : content of ``summary.json``
     folder : where the results are
+    phase_wall : wall time of the phases, that of the report included, None if not known [s]
+    waited : wall time since the command was given, None if not known [s]
     """
     start, end = summary["evaluation_m"]
     lines = [
@@ -54,7 +61,9 @@ def summary_text(summary: Mapping[str, Any], folder: Path) -> str:
         f"{counted(droppers['n_slackened'], 'dropper')} slackened",
         f"  {counted(summary['n_steps'], 'step')}, {counted(summary['n_dofs'], 'unknown')}, "
         f"{counted(summary['n_ranks'], 'rank')}, "
-        f"real-time factor {_number(summary['real_time_factor'], 2)}",
+        f"real-time factor {_number(summary['real_time_factor'], 2)}, with all records "
+        f"{_number(summary.get('real_time_factor_with_records'), 2)}",
+        *_waited(phase_wall or {}, waited),
         *([f"  {summary['detour']}"] if summary.get("detour") else []),
         *([f"  {summary['window']}"] if summary.get("window") else []),
         *_sizes_of_steps(summary.get("inner_iterations", {})),
@@ -72,6 +81,14 @@ def summary_text(summary: Mapping[str, Any], folder: Path) -> str:
     lines += ["", *(f"  REMARK      {text}" for text in told)]
     lines += [""] * bool(told) + [f"Results: {folder}"]
     return "\n".join(lines)
+
+
+def _waited(phase_wall: Mapping[str, float], waited: float | None) -> list[str]:
+    """What a user waited for: the whole command, and the phases of the run in it."""
+    if waited is None:
+        return []
+    parts = ", ".join(f"{name} {wall:.1f}" for name, wall in phase_wall.items())
+    return [f"  {waited:.1f} s from the command to this summary: {parts}"]
 
 
 def _sizes_of_steps(counted: Mapping[str, Any]) -> list[str]:

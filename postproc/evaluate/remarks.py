@@ -206,18 +206,18 @@ def _about_contact(results: Results) -> list[str]:
 
 def _about_head(head: _Contact) -> list[str]:
     said = (
-        f"A head of {head.mass:.3g} kg on a contact of {head.stiffness:.3g} N/m swings at "
-        f"{head.frequency:.3g} Hz"
+        f"A head of {head.mass:.3g} kg on a contact of {head.stiffness:.3g} N/m has a resonance "
+        f"at {head.frequency:.3g} Hz"
     )
     result = []
     if head.frequency < _FELT_HZ:
         result.append(
-            f"{said}, which the forces below 20 Hz feel: contact.stiffness_N_per_m is part of the "
+            f"{said}, inside the 20 Hz band: contact.stiffness_N_per_m is part of the "
             "result. Figures of other contact stiffnesses cannot be compared with these."
         )
     if head.omega * head.dt > _RESOLVED:
         result.append(
-            f"{said}, of which a step of {1e3 * head.dt:g} ms does not resolve the hops: forces "
+            f"{said}: a step of {1e3 * head.dt:g} ms does not resolve its hops. Forces "
             "below 20 Hz hold, but the loss of contact counts steps, not losses. Take a smaller "
             "numerics.dt_s, or a contact that damps."
         )

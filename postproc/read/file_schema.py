@@ -207,6 +207,7 @@ ATTRIBUTES: dict[str, Attribute] = {
     "marched_s": _not_negative(None),
     "march_wall_s": _not_negative(None),
     "march_cpu_s": _not_negative(None),
+    "records_wall_s": _not_negative(None),
     "config": Attribute("a scene as JSON", lambda v: isinstance(v, dict), is_json=True),
     "versions": Attribute("a table", lambda v: isinstance(v, dict), True, {}),
     "effects_on": Attribute("a list of names with titles and reasons", _effects, True),

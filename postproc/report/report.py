@@ -57,6 +57,10 @@ _STATISTICS_ROWS = (
 )
 
 
+# Counters of summary.json that say how the contact problem was solved, not what came of it.
+_OF_THE_SOLVER = ("steps", "rounds", "repeated_steps", "pivoted_steps")
+
+
 @dataclass(frozen=True)
 class Report:
     """What was written and found: the files, the criteria, and ``verdict`` (None: not judged)."""
@@ -352,12 +356,14 @@ def _facts(results: Results) -> list[tuple[str, str]]:
     ]
     if "march_wall_s" in about:
         facts.append(("wall time of the march", f"{about['march_wall_s']:.2f} s"))
-    factor = real_time_factor(results)
-    if factor is not None:
-        facts.append(("real-time factor (simulated / wall)", f"{factor:.2f}"))
+    for name, with_records in (("steps", False), ("steps and all records", True)):
+        factor = real_time_factor(results, with_records)
+        if factor is not None:
+            facts.append((f"real-time factor (simulated / wall), {name}", f"{factor:.2f}"))
     facts += [
         (name.replace("_", " "), f"{value}")
         for name, value in about.get("inner_iterations", {}).items()
+        if name not in _OF_THE_SOLVER
     ]
     facts.append(("started", str(about["created"])))
     return facts

@@ -47,7 +47,9 @@ def summarise(
         "simulated_s": results.simulated,
         "march_wall_s": attributes.get("march_wall_s"),
         "march_cpu_s": attributes.get("march_cpu_s"),
+        "records_wall_s": attributes.get("records_wall_s"),
         "real_time_factor": real_time_factor(results),
+        "real_time_factor_with_records": real_time_factor(results, with_records=True),
         "phase_wall_s": attributes.get("phase_wall_s", {}),
         "inner_iterations": attributes.get("inner_iterations", {}),
         "detour": attributes.get("detour") or None,
@@ -95,12 +97,17 @@ def as_json(summary: dict[str, Any]) -> str:
     return json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def real_time_factor(results: Results) -> float | None:
+def real_time_factor(results: Results, with_records: bool = False) -> float | None:
     """Simulated time over the wall time of the march: above 1 the run is faster than the train.
 
-    Of a resumed run this is the speed of its last part.
+    Of a resumed run this is the speed of its last part. ``with_records`` adds to the time of the
+    steps that of the records that are written when these have been taken.
     """
-    wall, marched = (results.attributes.get(name) for name in ("march_wall_s", "marched_s"))
+    about = results.attributes
+    marched, wall = about.get("marched_s"), about.get("march_wall_s")
+    if with_records:
+        after = about.get("records_wall_s")
+        wall = None if wall is None or after is None else wall + after
     return marched / wall if wall and marched is not None else None
 
 

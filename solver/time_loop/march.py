@@ -64,7 +64,8 @@ class Outcome:
     ``counters`` of the scheme; ``traffic`` is how many messages and bytes a rank sent a step since
     the line changed last, the one that sent most: to its neighbours, and each sum and broadcast as
     one; None on one rank, or if not counted; ``detour`` says why steps of the line took longer than
-    they could, empty if they did not.
+    they could, empty if they did not; ``finishing`` [s] is the time after the loop in which
+    observers wrote what they still held.
     """
 
     outcome: str
@@ -75,6 +76,7 @@ class Outcome:
     counters: dict[str, int] = field(default_factory=dict)
     traffic: tuple[float, float] | None = None
     detour: str = ""
+    finishing: float = 0.0
 
 
 class March:
@@ -315,7 +317,9 @@ class March:
         elif self._stepper.stopped or self._stepper.step_number < self.n_steps:
             # The latter if an option of PETSc ends early, for instance -march_ts_max_steps.
             outcome = "interrupted"
+        begin = clock.perf_counter()
         outcome = audience.finish(outcome)
+        finishing = clock.perf_counter() - begin
         n_steps = self._stepper.step_number - first
         return Outcome(
             outcome,
@@ -326,6 +330,7 @@ class March:
             self._scheme.counters.as_dict(),
             self._traffic(max(1, self._stepper.step_number - since)),
             "" if self.detour is None else str(self.detour),
+            finishing,
         )
 
     def destroy(self) -> None:

@@ -581,6 +581,34 @@ FAULTS = (
         "test_zero_has_no_sign",
     # ---- what a user sees and waits for -------------------------------------------------------
     Fault(
+        "make setup in a fresh clone",
+        "up to 90 s without a word",
+        "each step, how long it takes and took",
+        "unit/test_environment.py",
+        "test_setup_says_what_it_does_and_for_how_long",
+    ),
+    Fault(
+        "the first run, which compiles its loops",
+        "the phases distribute and march, without a reason for their 35 to 155 s",
+        "loops compiled so far, for how long, and why",
+        "unit/postproc/test_postproc_progress.py",
+        "test_a_log_tells_of_loops_that_are_compiled",
+    ),
+    Fault(
+        "a run's real-time factor",
+        "that of the steps, without what is recorded after them",
+        "both, and the time of the whole command by phases",
+        "unit/postproc/test_comparing.py",
+        "test_a_summary_shows_by_how_little_a_limit_is_missed",
+    ),
+    Fault(
+        "a file of 401 lines, a folder of 14 files",
+        "failed the tests, whatever was in them",
+        "no bound on either",
+        "unit/test_layers.py",
+        "test_files_import_only_rooms_below_their_own",
+    ),
+    Fault(
         "window.mode = bounded on 1000 spans",
         "snapshots of all spans, 980 of them at rest: 508 MB, 2.5 times the march of 40 spans",
         "the spans that move: 46 MB, 1.2 times",

@@ -43,7 +43,7 @@ def wide_scene(seed: int, n_steps: int = N_STEPS) -> RandomScene:
 def topology_scene(seed: int, n_steps: int = N_STEPS) -> RandomScene:
     """A scene of any topology, with and without an overlap, and more of the schema in it.
 
-    It is sound, or two of its parts do not fit to each other.
+    It is valid, or two of its parts do not fit to each other.
     """
     rng = random.Random(f"topology {seed}")
     words = _words(seed, n_steps, rng)
@@ -65,7 +65,7 @@ def twin_scene(seed: int, n_steps: int = N_STEPS) -> RandomScene:
 def sound_scene(
     seed: int, n_steps: int = N_STEPS, wide: random.Random | None = None
 ) -> RandomScene:
-    """A scene that is sound by what the documents say, of any seed.
+    """A scene that is valid by what the documents say, of any seed.
 
     It runs for ``n_steps``; with ``wide`` it has parts of `fuzzing_parts`.
     """

@@ -11,7 +11,7 @@ Words = dict[str, object]
 def put_defects(
     rng: random.Random, words: Words, droppers: list[int], length: float, smooth: bool
 ) -> None:
-    """Some of each, in a scene that is sound and stays so; incidents stand in it already.
+    """Some of each, in a scene that is valid and stays so; incidents stand in it already.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """What random lines have besides the usual: wires, spans, droppers, arms, damping, wind.
 
-Each function puts its keys into the words of a scene that is sound and leaves it sound.
+Each function puts its keys into the words of a scene that is valid and leaves it valid.
 """
 
 from __future__ import annotations

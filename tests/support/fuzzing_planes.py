@@ -1,7 +1,7 @@
 """Random lines of all topologies in three dimensions: what lets their wires move in all planes,
 what holds them there, how they end, and the wind over them.
 
-Each function puts its keys into the words of a scene that is sound, and mostly leaves it sound:
+Each function puts its keys into the words of a scene that is valid, and mostly leaves it valid:
 parts that do not go together are refused in a sentence.
 """
 

@@ -43,7 +43,7 @@ def test_a_page_has_words_for_names_and_no_empty_column() -> None:
     again = "`catenary accuracy a_case --axes elements --quick --repeats 2 --set 'a=[1, 2]'`"
     assert again in lines[2]
     table = [line for line in lines if line.startswith("|")]
-    assert table[0] == "| elements | " + " | ".join([*QUANTITIES, "rounds", "s/s"]) + " |"
+    assert table[0] == "| elements | " + " | ".join([*QUANTITIES, "solves", "s/s"]) + " |"
     assert {line.count("|") for line in table} == {table[0].count("|")}
     assert [line.split("|")[1].strip() for line in table[2:]] == [
         "1 element",

@@ -30,6 +30,7 @@ SUMMARY = {
     "n_dofs": 20,
     "n_ranks": 1,
     "real_time_factor": None,
+    "real_time_factor_with_records": None,
     "evaluation_m": [360.0, 600.0],
     "pantographs": [
         {
@@ -77,7 +78,9 @@ def runner(monkeypatch: pytest.MonkeyPatch) -> types.SimpleNamespace:
 
 
 def outcome(said: str, accepted: bool | None) -> types.SimpleNamespace:
-    return types.SimpleNamespace(outcome=said, accepted=accepted, summary=SUMMARY)
+    return types.SimpleNamespace(
+        outcome=said, accepted=accepted, summary=SUMMARY, phase_wall={"march": 0.24, "report": 0.76}
+    )
 
 
 @pytest.mark.parametrize("verb", VERBS)
@@ -160,7 +163,7 @@ def test_check_writes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.chdir(tmp_path)
     result = invoke("check", "ac_simple", "--set", "line.n_spans=24")
     assert result.exit_code == 0, result.output
-    assert result.stdout.startswith("ac_simple is sound: 24 spans, 1320 m, 216 droppers")
+    assert result.stdout.startswith("ac_simple is valid: 24 spans, 1320 m, 216 droppers")
     assert list(tmp_path.iterdir()) == []
 
 

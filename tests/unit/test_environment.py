@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import re
 import subprocess
 import sys
 import sysconfig
@@ -116,3 +117,26 @@ def test_other_versions_are_told(
         f"Other than the tested versions: numba {there['numba']} (tested: 0.1), "
         "six absent (tested: 1.0)."
     )
+
+
+@pytest.mark.process
+def test_setup_says_what_it_does_and_for_how_long() -> None:
+    """Its steps are named when they begin, a long one says how long it has taken so far, and what
+    breaks in the midst of a step leaves no process behind that would hold the output open."""
+    text = (ROOT / ".setup" / "setup.sh").read_text(encoding="utf-8")
+    speaking = text[text.index("say() {") : text.index("fail() {")]
+    script = f"""set -euo pipefail
+{speaking}
+sleep() {{ command sleep 0.2; }}
+begin "installing things"
+command sleep 0.5
+begin "checking them"
+exit 3
+"""
+    done = subprocess.run(
+        ["bash", "-c", script], capture_output=True, text=True, check=False, timeout=10
+    )
+    assert done.returncode == 3
+    so_far = r"(setup:   installing things, \d s so far\n){1,2}"
+    said = rf"setup: installing things \.\.\.\n{so_far}setup:   \d s\nsetup: checking them \.\.\.\n"
+    assert re.fullmatch(said, done.stderr), done.stderr

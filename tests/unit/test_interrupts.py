@@ -30,7 +30,7 @@ from catenary.solver.statics import line_at_rest
 BEFORE = {
     "the mesh was made": (runner, "mesh_of"),
     "the equilibrium was found": (line_at_rest, "find_form"),
-    "the line was distributed": (runner, "March"),
+    "the solver was prepared": (runner, "March"),
 }
 
 

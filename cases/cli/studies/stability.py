@@ -18,7 +18,7 @@ TABLE, PICTURE = "stability_map.csv", "stability_map.png"
     "stability-map",
     help="Find the largest stable step of every coupling against contact stiffness and head mass, "
     "from the matrices of a step and by marching, and draw it. Some three minutes; exits with 3 "
-    "if the two do not agree.",
+    "if matrices and marches do not agree.",
     epilog="Example: catenary stability-map en50318_2002 -o results/stability",
 )
 @console.guarded

@@ -25,10 +25,10 @@ EXCITATIONS = ("pantograph", "force", "pulse", "hammer")
 
 @app.command(
     "waves",
-    help="Show the waves that a train, a force that moves, a pulse or a hammer sends along a line: "
-    "its motion over place and time, in the frame of the train, and over wavenumber and "
-    "frequency, its energy ahead and behind, beside the waves, pass bands and group velocities "
-    "of the periodic line.",
+    help="Analyse wave propagation along a line under a train, a moving force, a pulse or a "
+    "hammer: motion over place and time, in the frame of the train, and over wavenumber and "
+    "frequency, energy ahead and behind, beside the waves, pass bands and group velocities of the "
+    "periodic line.",
     epilog="Example: catenary waves en50318_2002 -o results/waves; catenary waves results/waves; "
     "catenary waves en50318_2002 --excite hammer --at-m 630 -o results/hammer",
 )

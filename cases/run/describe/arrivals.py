@@ -192,14 +192,14 @@ def _sentence(name: str, found: Arrivals) -> str:
     ends = []
     for what, met in (("far", found.far_end), ("near", found.near_end)):
         ends.append(
-            f"of the {what} end at {met.at:.0f} m ({met.time:.1f} s)"
+            f"from the {what} end at {met.at:.0f} m ({met.time:.1f} s)"
             if met is not None
-            else f"of the {what} end not before the run ends"
+            else f"from the {what} end not before the run ends"
         )
     return (
         f"{name}: {found.run_in:.0f} m or {found.run_in_spans:.1f} spans from start to evaluated "
-        f"stretch, after which the start is estimated to leave {100 * found.start_share:.2g} % of "
-        f"the standard deviation; meets waves {' and '.join(ends)}"
+        f"stretch, where start-up still affects the force by about {100 * found.start_share:.2g} % "
+        f"of sigma; reflections reach the pantograph {' and '.join(ends)}"
     )
 
 
@@ -229,7 +229,7 @@ def _reflections(scene: Scene, traced: Traced) -> list[str]:
         fits = met.at - first >= traced.line.span
         shorter = f", or evaluation.to_m = {math.floor(met.at):g} at most" if fits else ""
         said.append(
-            f"{_subject(traced.names[i])} meets the waves that the far end of the line reflects at "
+            f"The reflection from the end of the line reaches {_object(traced.names[i])} at "
             f"{met.at:.0f} m ({met.time:.1f} s){left}, before the evaluated stretch ends "
             f"({first:g} to {last:g} m): its force is not that of a long line. Take "
             f"line.n_spans = {wanted}{shorter}."
@@ -255,9 +255,9 @@ def _short_run_in(scene: Scene, problem: Problem, traced: Traced) -> list[str]:
         remedy = f"train.start_m = {start:g} at most, or " if fits else ""
         said.append(
             f"{_subject(traced.names[i])} starts {found.run_in:.0f} m, {found.run_in_spans:.1f} "
-            f"spans, before the evaluated stretch: the start is estimated to leave "
-            f"{100 * found.start_share:.0f} % of the standard deviation in its force, where "
-            f"{100 * SHORT_RUN_IN:.0f} % is the limit. Take {remedy}evaluation.from_m = {begin:g} "
+            f"spans, before the evaluated stretch: start-up still affects its force by about "
+            f"{100 * found.start_share:.0f} % of sigma, where {100 * SHORT_RUN_IN:.0f} % is the "
+            f"limit. Take {remedy}evaluation.from_m = {begin:g} "
             "at least."
         )
     return said
@@ -265,6 +265,10 @@ def _short_run_in(scene: Scene, problem: Problem, traced: Traced) -> list[str]:
 
 def _subject(name: str) -> str:
     return "The pantograph" if name == "pantograph" else name.capitalize()
+
+
+def _object(name: str) -> str:
+    return "the pantograph" if name == "pantograph" else name
 
 
 def _short_stretch(problem: Problem, traced: Traced) -> list[str]:

@@ -15,7 +15,7 @@ from catenary.cases.studies.accuracy.runs import Measured
 from catenary.postproc.evaluate.wording import counted
 
 _SEPARATE = ("history by step", "history by mesh")
-_LAST_COLUMNS = ("est/true", "rounds", "s/s")
+_LAST_COLUMNS = ("est/true", "solves", "s/s")
 _USUAL_REPEATS = 3  # that of the command line
 
 
@@ -37,7 +37,7 @@ def page(
         f"{counted(round(found.wall / 60.0), 'minute')}. Errors in percent: of the reference's own "
         "value for mean, deviations and uplift, of its standard deviation for maximum, minimum and "
         'the force "history" (rms). "est/true" is the error that a run estimates itself over the '
-        'true one, "rounds" the solves of the small problem a step, "s/s" processor time of the '
+        'true one, "solves" those of the contact problem a step, "s/s" processor time of the '
         "march per simulated second, the least of those timed: only ratios within this page mean "
         "anything. Where step and mesh are refined together, errors of the history by the step and "
         "by the mesh alone stand beside the whole error, in which they may cancel.",

@@ -46,7 +46,7 @@ def main() -> None:
         from catenary.solver.time_loop.march import March
 
         timed(runner, "_run", "imports of a run", "")
-        timed(March, "run", "mesh, rest, line distributed", "march and records")
+        timed(March, "run", "mesh, rest, solver prepared", "march and records")
         return found
 
     verb.begin = begun

@@ -43,7 +43,8 @@ def test_a_summary_shows_by_how_little_a_limit_is_missed() -> None:
         "n_steps": 1,
         "n_dofs": 1,
         "n_ranks": 1,
-        "real_time_factor": 1.0,
+        "real_time_factor": 76.2,
+        "real_time_factor_with_records": 37.1,
         "acceptance": [
             {
                 "criterion": "mean contact force",
@@ -54,5 +55,7 @@ def test_a_summary_shows_by_how_little_a_limit_is_missed() -> None:
             }
         ],
     }
-    text = summary_text(summary, Path("results"))
+    text = summary_text(summary, Path("results"), {"march": 0.24, "report": 0.75}, 2.04)
+    assert "real-time factor 76.20, with all records 37.10" in text
+    assert "2.0 s from the command to this summary: march 0.2, report 0.8" in text
     assert "FAILED      mean contact force: 143.359, limit 143.356 N" in text

@@ -53,7 +53,7 @@ class FreeWireTable(WireTable):
         None,
         min_length=1,
         max_length=20_001,
-        description="numbers of these supports, 0 where the line starts; all inner ones if absent",
+        description="support numbers; 0 is the first support; all inner ones if absent",
     )
     height_m: Annotated[list[Height], OneOrMore, Field(min_length=1, max_length=20_001)] | None = (
         Field(
@@ -178,7 +178,7 @@ class _AtSupports(Table):
         None,
         min_length=1,
         max_length=20_001,
-        description="numbers of the supports, 0 where the line starts; if absent all inner ones "
+        description="support numbers; 0 is the first support; if absent all inner ones "
         "that the wire passes",
     )
     at_m: list[Place] | None = Field(

@@ -100,7 +100,9 @@ class SuspensionTable(Table):
     stiffness_N_per_m: float = Field(
         gt=0, le=1e9, description="secondary suspension of one bogie, upward"
     )
-    damping_N_s_per_m: float = Field(gt=0, le=1e8, description="of the same")
+    damping_N_s_per_m: float = Field(
+        gt=0, le=1e8, description="secondary damping of one bogie, upward"
+    )
     bogie_distance_m: float = Field(gt=0, le=40, description="between the bogies' middles")
     wheelbase_m: float = Field(gt=0, le=10, description="between the two wheelsets of a bogie")
     pantograph_ahead_m: float = Field(
@@ -112,7 +114,9 @@ class SuspensionTable(Table):
     primary_stiffness_N_per_m: float | None = Field(
         None, gt=0, le=1e9, description="primary suspension of one bogie, upward"
     )
-    primary_damping_N_s_per_m: float | None = Field(None, gt=0, le=1e8, description="of the same")
+    primary_damping_N_s_per_m: float | None = Field(
+        None, gt=0, le=1e8, description="primary damping of one bogie, upward"
+    )
     lateral: SidewaysTable | None = Field(
         None, description="sway and roll; the roof follows the track sideways if absent"
     )
