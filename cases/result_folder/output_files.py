@@ -36,7 +36,8 @@ def new_file(path: Path, suffixes: tuple[str, ...], force: bool) -> None:
 def write_static(path: Path, table: Mapping[str, Any], registration: bool = False) -> None:
     """Write the static table: the droppers as CSV, or the ``registration`` instead, or everything
     as JSON, by the file's suffix."""
-    arms = Registration.of(table) if registration else None
+    wires = [name.removeprefix("wires/") for name in table if name.startswith("wires/")]
+    arms = Registration.of(table, wires) if registration else None
     if registration and arms is None:
         raise InputError("--registration: no steady arm pulls a wire sideways; give line.stagger_m")
     try:

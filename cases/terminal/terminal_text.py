@@ -172,7 +172,7 @@ def static_text(table: Mapping[str, Any], line: Line, half_head: float | None = 
                 within = "within" if np.abs(own).max() <= half_head else "BEYOND"
                 text += f", {within} the {half_head:g} m of the shortest strip to either side"
             lines.append(text)
-    lines += _registration_text(data)
+    lines += _registration_text(data, [wire.name for wire in line.wires])
     lines += [
         f"Elasticity from {place.min():g} to {place.max():g} m: {lift.min():.3f} to "
         f"{lift.max():.3f} mm/N, mean {lift.mean():.3f} mm/N, unevenness "
@@ -181,20 +181,23 @@ def static_text(table: Mapping[str, Any], line: Line, half_head: float | None = 
     return "\n".join(lines)
 
 
-def _registration_text(data: Mapping[str, np.ndarray]) -> list[str]:
+def _registration_text(data: Mapping[str, np.ndarray], wires: Sequence[str]) -> list[str]:
     """Steady arms at rest, those that are alike once; none of a straight wire."""
-    table = Registration.of(data)
+    table = Registration.of(data, wires)
     if table is None:
         return []
     head = ("arm at [m]", "stagger [m]", "radial [N]", "lift [N]", "slope [deg]", "along [N]")
-    lines = ["", "".join(f"{name:>12}" for name in (*head, "slew [deg]"))]
+    heads = "".join(f"{name:>12}" for name in (*head, "slew [deg]"))
+    lines = ["", heads + ("  wire" if table.wires else "")]
     shown: dict[tuple[str, ...], str] = {}
     for place, *figures in table.rows():
+        wire = f"  {figures[-1]}" if table.wires else ""
         if tuple(figures) in shown:
-            lines.append(f"{place:>12} as {shown[tuple(figures)]}")
+            lines.append(f"{place:>12} as {shown[tuple(figures)]}{wire}")
             continue
         shown[tuple(figures)] = place
-        lines.append("".join(f"{figure:>12}" for figure in (place, *figures)))
+        columns = figures[:-1] if table.wires else figures
+        lines.append("".join(f"{figure:>12}" for figure in (place, *columns)) + wire)
     return [*lines, *(f"  {text}" for text in table.warnings()), ""]
 
 

@@ -77,12 +77,20 @@ def line_datasets(
         "line/running_range": np.array(line.running_range),
         "line/evaluation_range": np.array(evaluation, dtype=float),
         "line/droppers": np.asarray(mesh.droppers, dtype=np.int64),
+        "line/arm_wire": _arm_wire(line, mesh),
     }
     for name, nodes in mesh.wires.items():
         datasets[f"line/wires/{name}"] = np.asarray(nodes, dtype=np.int64)
     for name, breaks in mesh.breaks.items():
         datasets[f"line/breaks/{name}"] = np.asarray(breaks, dtype=np.int64)
     return datasets
+
+
+def _arm_wire(line: Line, mesh: LineMesh) -> np.ndarray:
+    """Number of the wire that each steady arm holds, in the order of the line, (n_arms,)."""
+    names = [wire.name for wire in line.wires]
+    of_group = np.array([names.index(arms.wire) for arms in line.steady_arms], dtype=np.int64)
+    return of_group[mesh.arm_group] if of_group.size else np.zeros(0, dtype=np.int64)
 
 
 def static_datasets(

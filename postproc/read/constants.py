@@ -82,6 +82,8 @@ def _between(file: h5py.File, sizes: dict[str, int]) -> list[str]:
     """What does not fit together: numbers of nodes and spans beyond those that there are."""
     faults = []
     limits = {"line/droppers": sizes["N"], "line/dropper_span": sizes["M"] - 1}
+    if is_there(file, "line/arm_wire"):
+        limits["line/arm_wire"] = len(file["line/wires"])
     limits |= {f"line/wires/{name}": sizes["N"] for name in file["line/wires"]}
     for name in _names(file, "line/breaks"):
         limits[f"line/breaks/{name}"] = file[f"line/wires/{name}"].size

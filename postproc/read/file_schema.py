@@ -240,6 +240,7 @@ _NUMBERS = Constant("D", 0, 1e12, whole=True)
 WIRE, BREAKS = _NUMBERS._replace(shape="*"), Constant("*", 1, 1e12, whole=True)
 CONSTANTS: dict[str, Constant] = {
     "line/arm_x": Constant("A"),
+    "line/arm_wire": Constant("A", 0, 1e6, whole=True, later=True),
     "line/dropper_x": Constant("D"),
     "line/end_x": Constant("G", later=True),
     "line/end_wire": Constant("G", 0, 1e6, whole=True, later=True),

@@ -102,7 +102,25 @@ class LineOfRun:
             return None
         names = ("arm_stagger", "arm_force", "arm_tension")
         table = {name: self.static(name) for name in names}
-        return Registration.of({**table, "arm_x": self.line("arm_x")})
+        known = {"arm_x": self.line("arm_x"), "arm_wire": self._arm_wire()}
+        return Registration.of({**table, **known}, list(self.roles))
+
+    def _arm_wire(self) -> np.ndarray:
+        """Number of the wire of each steady arm, empty in files of earlier versions."""
+        return self.line("arm_wire") if "line/arm_wire" in self._file else np.zeros(0, dtype=int)
+
+    def arm_wires(self) -> list[str | None]:
+        """Name of the wire that each steady arm holds; None in files of earlier versions."""
+        names, held = list(self.roles), self._arm_wire().tolist()
+        return [names[number] for number in held] or [None] * self.line("arm_x").size
+
+    def dropper_wires(self) -> np.ndarray:
+        """Numbers of the upper and the lower wire of each dropper, (n_droppers, 2)."""
+        of_node = np.zeros(self.line("node_points").shape[0], dtype=np.int64)
+        wires = self.wires()
+        for number, name in enumerate(self.roles):
+            of_node[wires[name]] = number
+        return of_node[self.line("droppers")].reshape(-1, 2)
 
     @cached_property
     def evaluation(self) -> tuple[float, float]:
@@ -112,7 +130,25 @@ class LineOfRun:
 
     @cached_property
     def reference_span(self) -> int:
-        """The span in the middle of the evaluation stretch, counted from 0, shown for all."""
+        """The span that is shown for all, counted from 0: the one in the middle of the evaluation
+        stretch, or the nearest to it outside of overlaps."""
         masts = self.line("support_x")
         middle = 0.5 * sum(self.evaluation)
-        return int(np.clip(np.searchsorted(masts, middle, side="right") - 1, 0, masts.size - 2))
+        span = int(np.clip(np.searchsorted(masts, middle, side="right") - 1, 0, masts.size - 2))
+        wires = self._contact_wires_in(masts)
+        usual = np.flatnonzero(wires == np.median(wires))
+        if wires[span] <= np.median(wires) or not usual.size:
+            return span
+        away = np.abs(0.5 * (masts[usual] + masts[usual + 1]) - middle)
+        return int(usual[np.argmin(away)])
+
+    def _contact_wires_in(self, masts: np.ndarray) -> np.ndarray:
+        """How many contact wires run in each span, (n_spans,)."""
+        x, elements = self.line("node_points")[:, 0], self.elements()
+        middles = 0.5 * (masts[:-1] + masts[1:])
+        count = np.zeros(middles.size)
+        for name in self.wires_of(Role.CONTACT):
+            low, high = x[elements[name]].T
+            at = np.clip(np.searchsorted(high, middles), None, high.size - 1)
+            count += (low[at] <= middles) & (middles <= high[at])
+        return count

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -30,22 +30,31 @@ class Registration(NamedTuple):
     stagger : (n,) lateral position of the wire there, to the left [m]
     force : (n, 3) of each arm on its wire: to the left, upwards and along the track [N]
     tension : (n,) of each as a bar, negative if its wire pushes it [N]
+    wires : names of the wires that they hold, empty if it is one and the same
     """
 
     x: np.ndarray
     stagger: np.ndarray
     force: np.ndarray
     tension: np.ndarray
+    wires: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, table: Mapping[str, np.ndarray]) -> Registration | None:
-        """Of datasets ``arm_x``, ``arm_stagger`` and so on; None if one is missing."""
+    def of(cls, table: Mapping[str, np.ndarray], wires: Sequence[str] = ()) -> Registration | None:
+        """Of datasets ``arm_x``, ``arm_stagger`` and so on; None if one is missing.
+
+        ``wires`` are the names of all wires of the line, to which ``arm_wire`` refers.
+        """
         names = ("arm_x", "arm_stagger", "arm_force", "arm_tension")
         if any(name not in table for name in names):
             return None
         x, stagger, force, tension = (np.asarray(table[name], dtype=float) for name in names)
         order = np.argsort(x, kind="stable")
-        return cls(x[order], stagger[order], force.reshape(-1, 3)[order], tension[order])
+        held = np.asarray(table.get("arm_wire", []), dtype=int)
+        named: tuple[str, ...] = ()
+        if wires and np.unique(held).size > 1:
+            named = tuple(wires[number] for number in held[order].tolist())
+        return cls(x[order], stagger[order], force.reshape(-1, 3)[order], tension[order], named)
 
     @property
     def pushed(self) -> np.ndarray:
@@ -82,8 +91,8 @@ class Registration(NamedTuple):
         return np.arctan2(along, np.abs(sideways))
 
     def rows(self) -> list[tuple[str, ...]]:
-        """The columns of the table as text: place, stagger, radial force, lift, slope, and what the
-        arm pulls along the track by how much it is slewed."""
+        """The columns of the table as text: place, stagger, radial force, lift, slope, what the arm
+        pulls along the track by how much it is slewed, and its wire where there are several."""
         columns = (
             (self.x, 3),
             (self.stagger, 4),
@@ -94,12 +103,12 @@ class Registration(NamedTuple):
             (np.rad2deg(self.slew), 2),
         )
         texts = [[_fixed(value, digits) for value in values] for values, digits in columns]
-        return list(zip(*texts, strict=True))
+        return list(zip(*texts, *([self.wires] if self.wires else []), strict=True))
 
     def csv(self) -> str:
         """The table as CSV text."""
         stream = io.StringIO()
-        stream.write(csv_text(_HEADS, self.rows()))
+        stream.write(csv_text([*_HEADS, *(["wire"] if self.wires else [])], self.rows()))
         return stream.getvalue()
 
 

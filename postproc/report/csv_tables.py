@@ -17,8 +17,15 @@ _ROWS = 10_000
 
 
 class DropperRow(NamedTuple):
-    """A dropper for the installer: span and number from 1, position from the span's left support
-    and along the track [m], length [m], force at rest [N]."""
+    """A dropper for the installer.
+
+    Attributes
+    ----------
+    span, number : from 1, the latter of the droppers in this span that carry the same wire
+    position, x : from the span's left support and along the track [m]
+    length, force : [m], at rest [N]
+    upper, lower : names of the wires that it hangs from and carries
+    """
 
     span: int
     number: int
@@ -26,6 +33,14 @@ class DropperRow(NamedTuple):
     x: float
     length: float
     force: float
+    upper: str
+    lower: str
+
+
+def joins_several(results: Results) -> bool:
+    """Whether droppers hang from, or carry, several wires, which a table of them is to name."""
+    wires = results.dropper_wires()
+    return bool((wires != wires[:1]).any())
 
 
 def dropper_table(results: Results) -> list[DropperRow]:
@@ -34,7 +49,11 @@ def dropper_table(results: Results) -> list[DropperRow]:
     x = results.line("dropper_x")
     masts = results.line("support_x")
     length, force = results.static("dropper_length"), results.static("dropper_force")
-    number = _numbers_in_spans(span, x)
+    wires, names = results.dropper_wires(), list(results.roles)
+    number = np.zeros(x.size, dtype=np.int64)
+    for carried in np.unique(wires[:, 1]):
+        own = wires[:, 1] == carried
+        number[own] = _numbers_in_spans(span[own], x[own])
     return [
         DropperRow(
             int(span[i]) + 1,
@@ -43,6 +62,8 @@ def dropper_table(results: Results) -> list[DropperRow]:
             float(x[i]),
             float(length[i]),
             float(force[i]),
+            names[wires[i, 0]],
+            names[wires[i, 1]],
         )
         for i in np.argsort(x, kind="stable").tolist()
     ]
@@ -62,7 +83,10 @@ def _numbers_in_spans(span: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 def droppers_csv(results: Results) -> str:
     """The dropper table as CSV text, lengths to a tenth of a millimetre."""
-    heads = ("span", "dropper", "position in span [m]", "position [m]", "length [m]", "force [N]")
+    heads = ["span", "dropper", "position in span [m]", "position [m]", "length [m]", "force [N]"]
+    several = joins_several(results)
+    if several:
+        heads += ["hangs from", "carries"]
     rows = (
         (
             row.span,
@@ -71,6 +95,7 @@ def droppers_csv(results: Results) -> str:
             fixed(row.x, 4),
             fixed(row.length, 4),
             fixed(row.force, 2),
+            *((row.upper, row.lower) if several else ()),
         )
         for row in dropper_table(results)
     )

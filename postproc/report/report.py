@@ -246,6 +246,7 @@ def _html(
         speed_km_h=KMH * results.fact("speed"),
         wave_speed_km_h=KMH * results.fact("wave_speed"),
         droppers=csv_tables.dropper_table(results),
+        several_hangers=csv_tables.joins_several(results),
         registration=results.registration(),
         lateral=_lateral_places(results),
         reference_span=results.reference_span + 1,

@@ -67,7 +67,7 @@ def summarise(
             )
         ],
         "lateral": as_lateral_table(list(statistics.lateral)),
-        "supports": _supports(statistics),
+        "supports": _supports(statistics, results.arm_wires()),
         "defects": attributes.get("defects", []),
         "incidents": attributes.get("incidents", []),
         "arrivals": attributes.get("arrivals", {}),
@@ -139,14 +139,14 @@ def _pantograph(
     }
 
 
-def _supports(statistics: RunStatistics) -> dict[str, Any]:
+def _supports(statistics: RunStatistics, wires: list[str | None]) -> dict[str, Any]:
     supports = statistics.supports
-    rows = zip(supports.x, supports.uplift, supports.evaluated, strict=True)
+    rows = zip(supports.x, supports.uplift, supports.evaluated, wires, strict=True)
     return {
         "max_uplift_mm": 1e3 * supports.maximum,
         "per_support": [
-            {"x_m": x, "max_uplift_mm": 1e3 * uplift, "evaluated": evaluated}
-            for x, uplift, evaluated in rows
+            {"x_m": x, "wire": wire, "max_uplift_mm": 1e3 * uplift, "evaluated": evaluated}
+            for x, uplift, evaluated, wire in rows
         ],
     }
 

@@ -149,4 +149,4 @@ def test_a_run_with_all_records(benchmark: Any, pantographs: str, tmp_path: Path
             walls.append(1e6 * results.attributes["march_wall_s"] / results.n_steps)
 
     benchmark.pedantic(run_once, rounds=RUNS)
-    keep_walls(f"{pantographs}, all records", benchmark, walls)
+    keep_walls(f"{pantographs}, records on the way", benchmark, walls)

@@ -19,6 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.text import Text
 from matplotlib.ticker import AutoLocator, LogLocator, MaxNLocator, NullFormatter
 from matplotlib.transforms import ScaledTranslation
@@ -161,9 +162,12 @@ def log_log(axes: Axes) -> None:
         axis.set_minor_formatter(NullFormatter())
 
 
-def legend_above(axes: Axes, columns: int = 5) -> None:
-    """Legend above the axes at the right, where no curve can pass."""
-    axes.legend(
+def legend_above(axes: Axes, columns: int = 5) -> Legend:
+    """Legend above the axes at the right, where no curve can pass.
+
+    Where it is too long to stand beside the title, ``png`` makes room for it.
+    """
+    return axes.legend(
         loc="lower right",
         bbox_to_anchor=(1.0, 1.0),
         ncols=columns,
@@ -207,6 +211,7 @@ def png(figure: Figure) -> bytes:
     canvas = figure.canvas
     if not isinstance(canvas, FigureCanvasAgg):  # a figure that `new_figure` has not made
         canvas = FigureCanvasAgg(figure)
+    _make_room_for_legends(figure, canvas)
     with warnings.catch_warnings():
         # Names may be written in letters that the font has not; boxes stand for them.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
@@ -216,6 +221,66 @@ def png(figure: Figure) -> bytes:
     resolution = (_RESOLUTION, _RESOLUTION)
     picture.convert("RGB").save(stream, "png", compress_level=_LEVEL, dpi=resolution)
     return stream.getvalue()
+
+
+def _make_room_for_legends(figure: Figure, canvas: FigureCanvasAgg) -> None:
+    """Let a figure of ``stacked`` grow where a legend does not fit beside its title.
+
+    The legend then has fewer columns, and the title stands above it.
+    """
+    if figure.get_layout_engine() is not None:
+        return
+    width, height = figure.get_size_inches()
+    room = (width - _LEFT - _RIGHT) * figure.dpi
+    grown = {
+        axes: _room_above(axes, legend, canvas, room)
+        for axes in figure.axes
+        if (legend := axes.get_legend()) is not None
+    }
+    if not any(grown.values()):
+        return
+    taller = height + sum(grown.values())
+    places = {axes: axes.get_position() for axes in figure.axes}
+    figure.set_size_inches(width, taller)
+    below = 0.0
+    for axes in sorted(figure.axes, key=lambda one: places[one].y0):
+        at = places[axes]
+        low = at.y0 * height + below
+        axes.set_position((at.x0, low / taller, at.width, at.height * height / taller))
+        below += grown.get(axes, 0.0)
+
+
+def _room_above(axes: Axes, legend: Legend, canvas: FigureCanvasAgg, room: float) -> float:
+    """Height that the legend of a panel needs beyond a line [inch]; its title moves above it.
+
+    Parameters
+    ----------
+    room : width of the panel [px]
+    """
+    title = axes.get_title(loc="left")
+    labels = [text.get_text() for text in legend.get_texts()]
+    # A letter is 8 px wide at most and the sign of an entry with its gaps some 60: shorter legends,
+    # as most are, need no measuring.
+    if 8 * (len(title) + sum(map(len, labels))) + 60 * len(labels) < room and len(labels) <= 5:
+        return 0.0
+    renderer = canvas.get_renderer()
+    written = axes.set_title(title, loc="left", fontsize="medium", y=1.0)
+    beside = written.get_window_extent(renderer)
+    columns = 5
+    while True:
+        box = legend.get_window_extent(renderer)
+        if box.width <= room or columns == 1:
+            break
+        columns -= 1
+        legend = legend_above(axes, columns)
+    if len(labels) <= columns and box.width + beside.width + 10 <= room:
+        return 0.0
+    dpi = axes.figure.dpi
+    gap = box.height / dpi
+    if title:
+        axes.set_title(title, loc="left", fontsize="medium", y=1.0, pad=72.0 * gap + 6.0)
+        gap += beside.height / dpi + 0.12
+    return float(max(gap - _ABOVE, 0.0))
 
 
 def _fix_labels(axes: Axes) -> None:

@@ -29,6 +29,7 @@ from catenary.postproc.channels.header import (
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.files.hdf5.checked import seal_attributes
 from catenary.postproc.film.film_data import film_data
+from catenary.postproc.read.line_of_run import LineOfRun
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.report import csv_tables
@@ -108,6 +109,56 @@ def test_the_report_shows_each_wire(tmp_path: Path, usual: dict[str, Any]) -> No
     told = json.loads((tmp_path / "summary.json").read_text())["static"]
     own = told["elasticity_of_wires_mm_per_N"]
     assert own[FIRST]["max"] > own[SECOND]["max"] > told["elasticity_mm_per_N"]["max"]
+
+
+def test_arms_and_droppers_of_several_wires_are_named(
+    tmp_path: Path, usual: dict[str, Any]
+) -> None:
+    """Twins have two of each at a place, of which each tells its wire, and numbers of its own."""
+    path = recorded(twins(0.3), tmp_path, usual)
+    write_report(path, tmp_path)
+    supports = json.loads((tmp_path / "summary.json").read_text())["supports"]["per_support"]
+    at_one = [row["wire"] for row in supports if row["x_m"] == supports[0]["x_m"]]
+    assert sorted(at_one) == [FIRST, SECOND]
+    with Results(path) as results:
+        rows = csv_tables.dropper_table(results)
+        droppers, x = results.line("droppers"), results.line("dropper_x")
+        for name in (FIRST, SECOND):
+            own = [row for row in rows if row.lower == name and row.span == 1]
+            assert [row.number for row in own] == list(range(1, len(own) + 1))
+            nodes = results.wires()[name]
+            expected = np.sort(x[np.isin(droppers[:, 1], nodes)])
+            np.testing.assert_allclose([row.x for row in rows if row.lower == name], expected)
+        assert {row.upper for row in rows} == {"messenger_wire"}
+    text = (tmp_path / "droppers.csv").read_text()
+    assert text.splitlines()[0].endswith(",hangs from,carries") and f",{SECOND}" in text
+    assert "<th>and carries</th>" in (tmp_path / "report.html").read_text()
+
+
+def test_the_span_that_is_shown_has_the_usual_wires() -> None:
+    """Where the middle of the evaluated stretch lies in an overlap, the nearest span outside."""
+
+    class Overlapping(LineOfRun):
+        """Five spans of 50 m, two wires that overlap in the third one."""
+
+        def __init__(self, middle: float) -> None:
+            self.evaluation = (middle - 10.0, middle + 10.0)
+            self.points = np.array([[x, 0.0, 5.0] for x in (0, 50, 100, 150, 101, 150, 200, 250)])
+
+        def line(self, name: str) -> np.ndarray:
+            return {"support_x": np.arange(0.0, 251.0, 50.0), "node_points": self.points}[name]
+
+        def elements(self) -> dict[str, np.ndarray]:
+            return {
+                FIRST: np.array([[0, 1], [1, 2], [2, 3]]),
+                SECOND: np.array([[4, 5], [5, 6], [6, 7]]),
+            }
+
+        def wires_of(self, role: Role) -> list[str]:
+            return [FIRST, SECOND]
+
+    shown = {middle: Overlapping(middle).reference_span for middle in (70.0, 120.0, 130.0, 220.0)}
+    assert shown == {70.0: 1, 120.0: 1, 130.0: 3, 220.0: 4}
 
 
 def test_the_force_on_each_wire_is_recorded_told_and_drawn(

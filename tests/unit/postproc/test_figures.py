@@ -115,3 +115,29 @@ def test_ranges_too_small_for_a_line_are_dashes() -> None:
     )
     (dashes,) = axes.lines
     np.testing.assert_array_equal(dashes.get_xydata(), [[2.0, 60.0], [3.0, 60.0]])
+
+
+@pytest.mark.parametrize("n_wires", [1, 2, 4, 8])
+def test_a_long_legend_stands_below_the_title(n_wires: int) -> None:
+    """However many wires a panel names: no legend covers a title or curve, or leaves the picture."""
+    figure, panels = figures.stacked(5.2, 2)
+    for axes in panels:
+        for number in range(n_wires):
+            axes.plot([0.0, 1.0], [0.0, number], label=f"contact wire {number} alone")
+        figures.tidy(axes, "position [m]", "lift [mm/N]", "Elasticity along a span")
+        figures.legend_above(axes)
+    before = [axes.get_window_extent().height for axes in panels]
+    picture = drawn(figure)
+    boxes = []
+    for axes in panels:
+        legend = axes.get_legend()
+        assert legend is not None and len(legend.get_texts()) == n_wires
+        boxes += [legend.get_window_extent(), axes.get_window_extent()]
+        boxes += [text.get_window_extent() for text in axes.findobj(Text)
+                  if isinstance(text, Text) and text.get_text() == "Elasticity along a span"]  # fmt: skip
+    for place, box in enumerate(boxes):
+        assert box.x0 >= 0 and box.y0 >= 0
+        assert box.x1 <= picture.width and box.y1 <= picture.height
+        assert not any(box.overlaps(other) for other in boxes[place + 1 :])
+    # Panels keep their height: the picture grows.
+    assert [axes.get_window_extent().height for axes in panels] == pytest.approx(before)

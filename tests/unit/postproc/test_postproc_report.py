@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import catenary.postproc.report.report
 from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
@@ -21,6 +22,7 @@ from catenary.postproc.report.pictures import line_pictures
 from catenary.postproc.report.report import write_report
 from catenary.solver.base.errors import InputError
 
+TEMPLATES = Path(catenary.postproc.report.report.__file__).parent / "templates"
 PNG = b"\x89PNG\r\n\x1a\n"
 PICTURES = (
     "contact_force",
@@ -133,6 +135,16 @@ def test_report_is_one_file_that_needs_no_network(report_folder: Path) -> None:
         kind, data = address.split(",")
         assert kind == "data:image/png;base64"
         assert base64.b64decode(data).startswith(PNG)
+
+
+@pytest.mark.parametrize("page", ["report", "study"])
+def test_pages_are_printed_on_a4(page: str) -> None:
+    """And nothing is cut off there: what scrolls on a screen is shown in full on paper."""
+    template = (TEMPLATES / f"{page}.html.j2").read_text(encoding="utf-8")
+    assert "@page { size: A4;" in template
+    printed = template[template.index("@media print") :]
+    assert ".scroll { overflow: visible; }" in printed
+    assert ("<pre" in template) == ("white-space: pre-wrap" in printed)
 
 
 def test_report_says_what_was_found(report_folder: Path, march: Any) -> None:
