@@ -21,11 +21,11 @@ STAMP=.venv/catenary-setup
 
 say() { printf '%s\n' "$*" >&2; }
 
-# begin WORDS: say what is done from now on, and every 15 s how long it has taken so far.
+# begin WORDS [HINT]: say what is done from now on, and every 15 s how long it has taken so far.
 begin() {
     finish
     step=$1 step_begin=$SECONDS
-    say "setup: $step ..."
+    say "setup: $step${2:+ ($2)} ..."
     (
         # Of its own output: what outlives this script would keep a pipe of it open.
         while sleep 15 >/dev/null 2>&1; do
@@ -140,7 +140,7 @@ quietly() {
 install_packages() {
     local name
     local -a names=()
-    begin "installing $# system packages with apt-get, some 30 s"
+    begin "installing $# system packages with apt-get" "some 30 s"
     quietly as_root apt-get update || fail "apt-get update failed"
     for name in "$@"; do
         name=$(name_in_archive "$name")
@@ -210,7 +210,7 @@ make_environment() {
     if [ ! -f "$STAMP" ] || [ "$(head -n 1 "$STAMP")" != "$PWD" ] ||
         ! .venv/bin/python -m pip --version >/dev/null 2>&1 ||
         ! grep -q '^include-system-site-packages = false' .venv/pyvenv.cfg; then
-        begin "making the virtual environment .venv"
+        begin "making the virtual environment .venv" "some 5 s"
         rm -rf .venv
         "${python[@]}" -m venv .venv
         finish
@@ -239,7 +239,7 @@ CODE
     local -a wanted=(--requirement "$work/requirements.txt" --constraint "$work/system.txt")
     tested=.setup/tested/$(.venv/bin/python -I -c \
         'import sys; print("python{}.{}.txt".format(*sys.version_info))')
-    begin "downloading and installing Python packages into .venv (1.2 GB), some 60 s"
+    begin "installing Python packages into .venv" "1.2 GB, some 60 s"
     if [ "$newest" ]; then
         pip_install --upgrade --upgrade-strategy eager "${wanted[@]}"
     elif [ -f "$tested" ]; then
@@ -271,7 +271,7 @@ esac
 if [ ! "$newest" ] && is_current; then
     exit 0
 fi
-say "setup: preparing .venv, which takes one to two minutes the first time"
+say "setup: preparing .venv, which takes one to three minutes the first time"
 choose_python
 make_environment
 install_python_packages

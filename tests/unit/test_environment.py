@@ -128,7 +128,7 @@ def test_setup_says_what_it_does_and_for_how_long() -> None:
     script = f"""set -euo pipefail
 {speaking}
 sleep() {{ command sleep 0.2; }}
-begin "installing things"
+begin "installing things" "some 3 s"
 command sleep 0.5
 begin "checking them"
 exit 3
@@ -138,5 +138,5 @@ exit 3
     )
     assert done.returncode == 3
     so_far = r"(setup:   installing things, \d s so far\n){1,2}"
-    said = rf"setup: installing things \.\.\.\n{so_far}setup:   \d s\nsetup: checking them \.\.\.\n"
+    said = rf"setup: installing things \(some 3 s\) \.\.\.\n{so_far}setup:   \d s\nsetup: checking them \.\.\.\n"
     assert re.fullmatch(said, done.stderr), done.stderr

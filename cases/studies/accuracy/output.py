@@ -204,7 +204,7 @@ def _axis_text(axis: Axis, reference: str, rows: Sequence[Row]) -> str:
     head += f"{'by step':>9}{'by mesh':>9}" if both else ""
     lines = [
         f"{axis.title}: {what} {reference} [%]",
-        f"  {'':{width}}{head}{'est/true':>10}{'rounds':>8}{'s/s':>9}",
+        f"  {'':{width}}{head}{'est/true':>10}{'solves':>8}{'s/s':>9}",
     ]
     for row in rows:
         if not row.done:

@@ -34,10 +34,10 @@ def as_text(found: Costs) -> str:
     )
     lines = [
         f"{found.wish.case}: evaluated from {start:g} to {end:g} m; "
-        f"{counted(found.wish.rounds, 'round')} of {counted(found.n_steps, 'step')} in turns.",
+        f"{counted(found.wish.rounds, 'repetition')} of {counted(found.n_steps, 'step')} in turns.",
         "Forces in N, uplift in mm; of an effect that is switched, what changes. cost: how many "
         "times as long",
-        "a step takes with the effect as without, the median of the rounds.",
+        "a step takes with the effect as without, the median of the repetitions.",
         *([f"Forces are those of {found.names[0]}, which leads."] if several else []),
         "",
         head,

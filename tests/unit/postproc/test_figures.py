@@ -117,14 +117,17 @@ def test_ranges_too_small_for_a_line_are_dashes() -> None:
     np.testing.assert_array_equal(dashes.get_xydata(), [[2.0, 60.0], [3.0, 60.0]])
 
 
+TITLE = "Elasticity along a span"
+
+
 @pytest.mark.parametrize("n_wires", [1, 2, 4, 8])
 def test_a_long_legend_stands_below_the_title(n_wires: int) -> None:
-    """However many wires a panel names: no legend covers a title or curve, or leaves the picture."""
+    """However many wires a panel names: no legend covers a title or a curve, or leaves the page."""
     figure, panels = figures.stacked(5.2, 2)
     for axes in panels:
         for number in range(n_wires):
             axes.plot([0.0, 1.0], [0.0, number], label=f"contact wire {number} alone")
-        figures.tidy(axes, "position [m]", "lift [mm/N]", "Elasticity along a span")
+        figures.tidy(axes, "position [m]", "lift [mm/N]", TITLE)
         figures.legend_above(axes)
     before = [axes.get_window_extent().height for axes in panels]
     picture = drawn(figure)
@@ -133,8 +136,10 @@ def test_a_long_legend_stands_below_the_title(n_wires: int) -> None:
         legend = axes.get_legend()
         assert legend is not None and len(legend.get_texts()) == n_wires
         boxes += [legend.get_window_extent(), axes.get_window_extent()]
-        boxes += [text.get_window_extent() for text in axes.findobj(Text)
-                  if isinstance(text, Text) and text.get_text() == "Elasticity along a span"]  # fmt: skip
+        title = [
+            text for text in texts_of(figure) if text.get_text() == TITLE and text.axes is axes
+        ]
+        boxes += [text.get_window_extent() for text in title]
     for place, box in enumerate(boxes):
         assert box.x0 >= 0 and box.y0 >= 0
         assert box.x1 <= picture.width and box.y1 <= picture.height
