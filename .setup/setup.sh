@@ -27,19 +27,20 @@ begin() {
     step=$1 step_begin=$SECONDS
     say "setup: $step${2:+ ($2)} ..."
     (
-        # Of its own output: what outlives this script would keep a pipe of it open.
+        # A sleep that outlives the script must hold neither of its outputs: whoever reads them
+        # through a pipe would wait for it.
         while sleep 15 >/dev/null 2>&1; do
             say "setup:   $step, $((SECONDS - step_begin)) s so far"
         done
     ) &
     ticker=$!
+    disown "$ticker" # bash says nothing of its end
 }
 
 # finish: end what was begun, and say how long it took.
 finish() {
     [ -n "$ticker" ] || return 0
-    kill "$ticker" 2>/dev/null || true
-    wait "$ticker" 2>/dev/null || true
+    kill -KILL "$ticker" 2>/dev/null || true
     ticker=
     say "setup:   $((SECONDS - step_begin)) s"
 }
@@ -48,7 +49,7 @@ finish() {
 work=
 ticker=
 clean_up() {
-    [ -z "$ticker" ] || kill "$ticker" 2>/dev/null || true
+    [ -z "$ticker" ] || kill -KILL "$ticker" 2>/dev/null || true
     [ -z "$work" ] || rm -rf "$work"
 }
 trap clean_up EXIT

@@ -138,5 +138,6 @@ exit 3
     )
     assert done.returncode == 3
     so_far = r"(setup:   installing things, \d s so far\n){1,2}"
-    said = rf"setup: installing things \(some 3 s\) \.\.\.\n{so_far}setup:   \d s\nsetup: checking them \.\.\.\n"
+    begun = r"setup: installing things \(some 3 s\) \.\.\.\n"
+    said = rf"{begun}{so_far}setup:   \d s\nsetup: checking them \.\.\.\n"
     assert re.fullmatch(said, done.stderr), done.stderr
