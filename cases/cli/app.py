@@ -111,8 +111,7 @@ def _version(wanted: bool) -> None:
     if wanted:
         from catenary.cases.process.versions import versions_text
 
-        if console.speaks():
-            typer.echo(versions_text())
+        console.say(versions_text())
         raise typer.Exit
 
 

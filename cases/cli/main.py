@@ -18,6 +18,7 @@ from catenary.cases.terminal import console
 
 # Verbs of ``run``. They take no other file: a user waits for the first step of a run.
 _OF_RUN = frozenset({"run", "restart", "submit"})
+_OF_HELP = frozenset({"-h", "--help"})
 
 
 def all_verbs() -> typer.Typer:
@@ -57,6 +58,7 @@ def main() -> None:
     """Entry point. Exit codes: 0 done, 1 the run broke, 2 bad input, 3 not accepted (--strict)."""
     from catenary.solver.base.parallel import launched_by_mpirun
 
+    console.open_closed_streams()
     # Modules, tables and pictures make many objects and little garbage: a short run ends before the
     # first collection, which takes 0.15 s of it otherwise. A long series of runs has some.
     gc.set_threshold(500_000, 3, 10)
@@ -97,6 +99,11 @@ def main() -> None:
         os._exit(console.BROKEN)
     except typer.Abort:
         code = console.BROKEN
+    except OSError as error:
+        # What --version prints, and what typer prints of --help.
+        if not isinstance(error, console.OutputLost) and not _OF_HELP.intersection(sys.argv):
+            raise
+        code = console.tell_output_lost(error)
     except Exception as error:
         if not hasattr(error, "format_message") or not hasattr(error, "exit_code"):
             raise

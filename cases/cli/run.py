@@ -240,7 +240,7 @@ def submit(
     settings = [word for value in chosen for word in ("--set", value)]
     script = slurm_script([*words, *settings], out, job, plan.march, plan.memory, options)
     if only_print:
-        typer.echo(script, nl=False)
+        console.print_as_is(script)
         return
     if shutil.which("sbatch") is None:
         raise InputError("sbatch is not on this machine; --print shows the script instead")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import functools
 import inspect
 import logging
@@ -10,11 +11,12 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TextIO
 
 import typer
 
-from catenary.cases.scene.input.plain_text import plain
+from catenary.cases.scene.input.plain_text import plain, shown
+from catenary.postproc.files.disk_errors import reason
 from catenary.solver.base import lone_process
 from catenary.solver.base.errors import CatenaryError, InputError
 from catenary.solver.base.parallel import NO_MEMORY, launched_by_mpirun, on_root
@@ -51,6 +53,10 @@ def waited() -> float:
         return time.perf_counter() - _LOADED
 
 
+class OutputLost(OSError):
+    """Standard output cannot be written to."""
+
+
 def speaks() -> bool:
     """Whether this process is the one that prints: rank 0, or the only one. Not collective."""
     return all(os.environ.get(name, "0") == "0" for name in _RANK_VARIABLES)
@@ -62,21 +68,80 @@ def is_quiet() -> bool:
 
 
 def say(text: str) -> None:
-    """Print to standard output on rank 0, unless the verb is to be quiet. Not collective."""
+    """Print to standard output on rank 0, unless the verb is to be quiet. Not collective.
+
+    Titles and names out of files of strangers do not steer the terminal: what would is escaped.
+    """
     if speaks() and not _quiet:
-        typer.echo(text)
+        print_as_is(shown(text) + "\n")
+
+
+def print_as_is(text: str) -> None:
+    """Print to standard output what the user is to get to the letter. Not collective.
+
+    Raises
+    ------
+    OutputLost
+        If it cannot be written to, as on a full disk or where the reader of a pipe has gone.
+    """
+    try:
+        typer.echo(text, nl=False)
+    except OSError as error:
+        raise OutputLost(error.errno, error.strerror) from error
 
 
 def complain(sentence: str) -> None:
     """Print one sentence to standard error on rank 0. Not collective."""
     if speaks():
-        typer.echo(f"catenary: {plain(' '.join(sentence.split()))}", err=True)
+        _tell("catenary: ", sentence)
 
 
 def warn(sentence: str) -> None:
     """Print a warning to standard error on rank 0, unless quiet. Not collective."""
     if speaks() and not _quiet:
-        typer.echo(f"WARNING {plain(' '.join(sentence.split()))}", err=True)
+        _tell("WARNING ", sentence)
+
+
+def _tell(head: str, sentence: str) -> None:
+    """Print a sentence to standard error; where that cannot be written to nobody hears it."""
+    try:
+        typer.echo(head + plain(" ".join(sentence.split())), err=True)
+    except OSError:
+        _discard(sys.stderr)
+
+
+def _discard(stream: TextIO) -> None:
+    """Let a stream that cannot be written to lead nowhere: Python tries again at its end."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
+
+
+def open_closed_streams() -> None:
+    """Let standard streams that are closed lead nowhere. Not collective.
+
+    The next file that is opened, such as a result file, would get the number of a closed one, and
+    what libraries print would be written into it.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            nowhere = os.open(os.devnull, os.O_RDWR)  # the lowest number that is free, so this one
+            os.set_inheritable(nowhere, True)
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w" if number else "r", encoding="utf-8"))  # noqa: SIM115
+
+
+def tell_output_lost(error: OSError) -> int:
+    """Say that standard output cannot be written to; returns the exit code. Not collective.
+
+    Nothing is written there any more.
+    """
+    _discard(sys.stdout)
+    if error.errno != errno.EPIPE:  # the reader of a pipe, as of `| head`, has seen enough
+        complain(f"the output cannot be printed ({reason(error)})")
+    return BROKEN
 
 
 class LogHandler(logging.Handler):
@@ -146,9 +211,8 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
         except KeyboardInterrupt:
             complain("interrupted")
             code = BROKEN
-        except BrokenPipeError:  # the reader of a pipe has gone, as with `| head`
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            code = BROKEN
+        except OutputLost as error:
+            code = tell_output_lost(error)
         finally:
             # Of this command only: several may be called in one process.
             _quiet = False

@@ -84,3 +84,40 @@ def test_too_low_a_limit_of_memory_is_one_sentence() -> None:
     assert done.returncode == 2
     assert done.stderr.startswith("catenary: this process may take 461 MB of memory (ulimit -v)")
     assert done.stderr.count("\n") == 1 and not done.stdout
+
+
+MAIN = "from catenary.cases.cli.main import main; main()"
+
+
+def in_shell(command: str) -> subprocess.CompletedProcess[str]:
+    """A command line of the program, ``catenary``, with its redirections."""
+    program = f"{sys.executable} -c '{MAIN}'"
+    shell = ["bash", "-c", command.replace("catenary", program)]
+    return subprocess.run(shell, capture_output=True, text=True, timeout=200, check=False)
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("words", ["plan en50318_2002", "list", "--help", "--version"])
+def test_an_output_that_cannot_be_written_is_told(words: str) -> None:
+    done = in_shell(f"catenary {words} > /dev/full")
+    assert done.returncode == 1
+    assert done.stderr == "catenary: the output cannot be printed (No space left on device)\n"
+
+
+@pytest.mark.process
+def test_an_error_that_nobody_can_read_keeps_its_exit_code() -> None:
+    assert in_shell("catenary check no_such_case 2> /dev/full").returncode == 2
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("closed", ["2>&-", ">&-", "<&- >&- 2>&-"])
+def test_streams_that_are_closed_lead_nowhere(closed: str) -> None:
+    """The next file that is opened would have their numbers, and get what libraries print."""
+    done = in_shell(f"catenary check en50318_2002 {closed}")
+    assert done.returncode == 0 and done.stderr == ""
+    assert in_shell(f"catenary check no_such_case {closed}").returncode == 2
+    opened = "import os; h = os.open(os.devnull, os.O_RDONLY); assert h > 2, h"
+    streams = "from catenary.cases.terminal.console import open_closed_streams as o; o()"
+    code = f'{sys.executable} -c "{streams}; {opened}" {closed}'
+    done = subprocess.run(["bash", "-c", code], capture_output=True, timeout=200, check=False)
+    assert done.returncode == 0, done

@@ -81,6 +81,11 @@ def plain(text: str, most: int | None = None) -> str:
     return "".join(letter if letter.isprintable() else escaped(letter) for letter in cut)
 
 
+def shown(text: str) -> str:
+    """``text`` of several lines for a terminal, with what would steer it written as escapes."""
+    return "".join(escaped(one) if one != "\n" and steers(one) else one for one in text)
+
+
 def escaped(letter: str) -> str:
     """A character as an escape, such as those of TOML."""
     known = {"\n": "\\n", "\t": "\\t", "\r": "\\r"}
