@@ -12,6 +12,7 @@ import contextlib
 import errno
 import fcntl
 import os
+import stat
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -77,7 +78,9 @@ class FolderLock:
     def _take(self, folder: Path, me: Owner) -> int:
         """Put the lock in place; returns its descriptor."""
         name = f"{LOCK_FILE}.{me.host}.{me.pid}"
-        handle = os.open(name, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o644, dir_fd=self._directory)
+        with contextlib.suppress(FileNotFoundError):  # of a dead process of the same number
+            os.unlink(name, dir_fd=self._directory)
+        handle = os.open(name, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644, dir_fd=self._directory)
         try:
             os.write(handle, me.text().encode())
             os.fsync(handle)
@@ -121,7 +124,14 @@ class FolderLock:
     def _clear(self, folder: Path, me: Owner, mine: int) -> None:
         """Remove the lock that is there if its process is dead, else refuse."""
         try:
-            old = os.open(LOCK_FILE, os.O_RDWR | os.O_NOFOLLOW, dir_fd=self._directory)
+            if not stat.S_ISREG(self._stat(LOCK_FILE).st_mode):
+                raise InputError(
+                    f"{folder / LOCK_FILE} is a link, a pipe or a folder, and no lock of Catenary; "
+                    "remove it"
+                )
+            # Without O_NONBLOCK a pipe that came meanwhile would be waited for.
+            flags = os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK
+            old = os.open(LOCK_FILE, flags, dir_fd=self._directory)
         except FileNotFoundError:
             return
         try:

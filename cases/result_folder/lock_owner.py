@@ -92,7 +92,7 @@ def read_owner(text: str) -> Owner | None:
     try:
         found = json.loads(text)
         owner = Owner(**{**found, "pid": int(found["pid"])})
-    except (ValueError, TypeError, KeyError):
+    except (ValueError, TypeError, KeyError, RecursionError):
         return None
     words = (value for name, value in asdict(owner).items() if name != "pid")
     sound = all(isinstance(word, str) and (word.isprintable() or not word) for word in words)

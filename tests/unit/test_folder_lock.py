@@ -35,6 +35,35 @@ def left_by(folder: Path, **changed: object) -> Path:
     return path
 
 
+@pytest.mark.parametrize("kind", ["pipe", "link", "folder"])
+def test_what_is_no_lock_is_neither_read_nor_followed(kind: str, tmp_path: Path) -> None:
+    """Whoever opens a pipe and reads waits until somebody writes."""
+    lock, other = tmp_path / "out" / LOCK_FILE, tmp_path / "other"
+    lock.parent.mkdir()
+    other.write_text("mine")
+    {
+        "pipe": lambda: os.mkfifo(lock),
+        "link": lambda: lock.symlink_to(other),
+        "folder": lock.mkdir,
+    }[kind]()
+    with pytest.raises(InputError, match=r"\.catenary\.lock is a link, a pipe or a folder"):
+        FolderLock(lock.parent, "catenary restart")
+    assert other.read_text() == "mine" and names(lock.parent) == [LOCK_FILE]
+
+
+def test_a_link_in_place_of_the_file_that_becomes_the_lock_is_not_followed(tmp_path: Path) -> None:
+    me, other = myself("catenary restart"), tmp_path / "other"
+    other.write_text("mine")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / f"{LOCK_FILE}.{me.host}.{me.pid}").symlink_to(other)
+    FolderLock(tmp_path / "out", "catenary restart").release()
+    assert other.read_text() == "mine"
+
+
+def test_a_lock_of_deep_brackets_names_no_process() -> None:
+    assert read_owner("[" * 60000) is None
+
+
 def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
