@@ -99,6 +99,10 @@ def test_a_blow_is_marched_until_its_waves_have_come_to_the_far_end() -> None:
         ("force", Asked(frequency=101.0), "--frequency-Hz is 101, but must be from 0 to 100"),
         ("force", Asked(frequency=-1.0), "--frequency-Hz is -1, but must be from 0 to 100"),
         ("hammer", Asked(duration=0.005), "--duration-s is 0.005, but must be from 0.01"),
+        ("hammer", Asked(impulse=1e300), "--impulse-Ns is 1e+300, a force of up to 7.85398e+301 N"),
+        ("hammer", Asked(impulse=-1e308), "--impulse-Ns is -1e+308, a force of up to inf N, but"),
+        ("pulse", Asked(force=1e20), "a force of up to 1e+20 N, but forces up to 1e+09 N are"),
+        ("force", Asked(force=-2e9), "--force-N is -2e+09, a force of up to 2e+09 N, but forces"),
     ],
 )
 def test_what_is_impossible_is_refused_in_a_sentence(

@@ -17,6 +17,7 @@ from catenary.cases.studies.waves.seen import NodeMotion
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.solver.base.errors import InputError, RunBroken
+from catenary.solver.contact_problem.coupling import DIVERGED
 from catenary.solver.effects.all_effects import move_together
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Placement, Problem, Train
@@ -111,6 +112,7 @@ def excitation_of(kind: str, asked: Asked, problem: Problem, dt: float) -> Excit
                 "steps a period"
             )
         force = train.placements[0].static_force if asked.force is None else asked.force
+        _refuse_too_strong("--force-N", force, force)
         return MovingForce(force, frequency, train.start, train.speed, train.raise_time)
     if problem.window.mode == BOUNDED:
         raise InputError(
@@ -128,9 +130,22 @@ def excitation_of(kind: str, asked: Asked, problem: Problem, dt: float) -> Excit
             f"--at-m is {at:g}, but must lie on the line, from {ends[0]:g} to {ends[1]:g} m"
         )
     if kind == HAMMER:
-        return hammer(at, IMPULSE if asked.impulse is None else asked.impulse, duration)
+        impulse = IMPULSE if asked.impulse is None else asked.impulse
+        blow = hammer(at, impulse, duration)
+        _refuse_too_strong("--impulse-Ns", impulse, blow.peak)
+        return blow
     force = train.placements[0].static_force if asked.force is None else asked.force
+    _refuse_too_strong("--force-N", force, force)
     return Blow(at, duration, force, False)
+
+
+def _refuse_too_strong(option: str, value: float, peak: float) -> None:
+    """Raise InputError for a force up to ``peak`` [N] beyond those at which a march ends."""
+    if not abs(peak) <= DIVERGED:
+        raise InputError(
+            f"{option} is {value:g}, a force of up to {abs(peak):g} N, but forces up to "
+            f"{DIVERGED:g} N are simulated"
+        )
 
 
 def without_train(problem: Problem, excitation: Excitation) -> Problem:
