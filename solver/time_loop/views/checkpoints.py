@@ -15,6 +15,9 @@ from catenary.solver.integrators.line_integrator import MOTION, LineIntegrator
 from catenary.solver.model.model import Model
 from catenary.solver.schemes.scheme import Scheme
 
+# Unknowns of a node that are displacements [m].
+_MOVES = ("u", "v", "w")
+
 
 class State(Mapping[str, Any]):
     """A state by name, of which each array is made when it is read: those of a long line are large.
@@ -134,15 +137,32 @@ class Checkpoints:
             )
         n_nodes, names = model.mesh.n_nodes, len(model.unknowns)
         row_of_node = like(checkpoint, "row_of_node", model.row_of_node)
-        if not np.array_equal(np.sort(row_of_node), np.arange(n_nodes)):
-            raise impossible("row_of_node does not number the nodes of this line")
+        other = np.flatnonzero(row_of_node != model.row_of_node)
+        if other.size:
+            node = int(other[0])
+            raise impossible(
+                f"row_of_node puts node {node} in row {row_of_node[node]:g}, and along this line "
+                f"it is in row {model.row_of_node[node]}"
+            )
         owned = slice(line.ownership.first, line.ownership.last)
         states = {}
         for name in line.exact_state():
             if name in checkpoint or name in MOTION:
                 by_row = np.reshape(like(checkpoint, name, np.empty(n_nodes * names)), (-1, names))
+                self._refuse_far(name, by_row)
                 states[name] = model.numbering.as_vector(by_row[row_of_node])[owned]
         return states
+
+    def _refuse_far(self, name: str, by_row: np.ndarray) -> None:
+        """Raise InputError for displacements ``by_row`` (n_nodes, unknowns) that cannot be: no node
+        moves further than the line is long. Slopes, and what is no displacement, are let pass."""
+        if name != "displacement":
+            return
+        columns = [number for number, own in enumerate(self._model.unknowns) if own in _MOVES]
+        largest = float(np.abs(by_row[:, columns]).max(initial=0.0))
+        length = float(np.ptp(self._model.mesh.points[:, 0]))
+        if largest > length:
+            raise impossible(f"a node is {largest:g} m from rest on a line of {length:g} m")
 
     def _refuse_other_states(self, checkpoint: dict[str, Any]) -> None:
         """Raise InputError unless the states of contacts and pantographs are of their kinds.

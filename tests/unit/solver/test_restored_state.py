@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -25,24 +26,60 @@ def forces_and_states(kept: dict[str, Any] | None = None) -> History:
     return history
 
 
-def test_a_state_whose_nodes_stand_in_another_order_continues_bit_for_bit() -> None:
-    whole = forces_and_states()
-    kept = next(state for state in whole.watched if state is not None)
-    rows = kept["row_of_node"]
-    order = np.random.default_rng(3).permutation(rows.size)
-    # The node in row i then stood in row order[i].
-    for name in ("displacement", "velocity", "acceleration", "ahead", "velocity_ahead"):
-        before = kept[name].reshape(rows.size, -1)
-        moved = np.empty_like(before)
-        moved[order] = before
-        kept[name] = moved.ravel()
-    kept["row_of_node"] = order[rows]
-    rest = forces_and_states(kept)["contact_force"]
+@pytest.fixture(scope="module")
+def whole() -> History:
+    return forces_and_states()
+
+
+def state_of(whole: History) -> dict[str, Any]:
+    return dict(next(state for state in whole.watched if state is not None))
+
+
+def test_a_state_continues_bit_for_bit(whole: History) -> None:
+    rest = forces_and_states(state_of(whole))["contact_force"]
     assert np.array_equal(rest, whole["contact_force"][50:])
 
 
-def test_a_state_that_does_not_tell_its_nodes_is_refused() -> None:
-    kept = next(state for state in forces_and_states().watched if state is not None)
+def reverse(kept: dict[str, Any]) -> None:
+    kept["row_of_node"] = kept["row_of_node"][::-1].copy()
+
+
+def swap_two(kept: dict[str, Any]) -> None:
+    """The contact wire and the messenger wire at one place."""
+    rows = kept["row_of_node"].copy()
+    first, second = (int(np.flatnonzero(rows == row)[0]) for row in (40, 41))
+    rows[[first, second]] = rows[[second, first]]
+    kept["row_of_node"] = rows
+
+
+def shorten(kept: dict[str, Any]) -> None:
+    kept["row_of_node"] = kept["row_of_node"][:-1]
+
+
+def move_far(kept: dict[str, Any]) -> None:
+    kept["displacement"] = kept["displacement"] + 1e3
+
+
+# Damage of a state, of which its checksum may know nothing, and what is told.
+OTHERS: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
+    "reversed": (reverse, "row_of_node puts node 0 in row .*, and along this line it is in row"),
+    "two nodes": (swap_two, "row_of_node puts node .* in row 41, and along this line it is in row"),
+    "short": (shorten, "row_of_node has the shape"),
+    "far": (move_far, r"a node is 1000.* m from rest on a line of 2.* m"),
+}
+
+
+@pytest.mark.parametrize("how", OTHERS)
+def test_a_state_of_another_line_is_refused(how: str, whole: History) -> None:
+    damage, words = OTHERS[how]
+    kept = state_of(whole)
+    damage(kept)
+    with pytest.raises(InputError, match=words):
+        forces_and_states(kept)
+
+
+def test_a_state_that_does_not_tell_its_nodes_is_refused(whole: History) -> None:
+    kept = state_of(whole)
     del kept["row_of_node"]
     with pytest.raises(InputError, match="earlier version of Catenary"):
         forces_and_states(kept)
