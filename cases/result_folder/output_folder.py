@@ -16,6 +16,7 @@ from catenary.postproc.files.own_files import (
     FIELD_FILES,
     OWN_FILES,
     RUN_FILE,
+    new_part,
     part_of,
     remove_parts,
 )
@@ -64,6 +65,7 @@ def prepare(folder: Path, force: bool) -> None:
     remove_parts(folder)
     trial = part_of(folder / max(OWN_FILES, key=len), os.getpid())
     try:
+        new_part(folder / max(OWN_FILES, key=len))
         with trial.open("wb", buffering=0) as file:
             file.write(b"trial")
     except OSError as error:

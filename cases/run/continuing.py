@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -9,14 +11,22 @@ from typing import Any
 import numpy as np
 
 from catenary.postproc.channels.header import Header
+from catenary.postproc.files.hdf5.self_contained import open_own
+from catenary.postproc.files.own_files import FIELD_FILES
 from catenary.postproc.files.result_file import fault_to_continue
 from catenary.postproc.read.guard import survives
 from catenary.postproc.read.results import Results
 from catenary.solver.base.errors import InputError
+from catenary.solver.model.model import Model
+from catenary.solver.time_loop.views.channels import CHANNELS
 
 # What a restart finds again; the rest of the head may be another version's.
 _SAME = ("case", "n_dofs", "system", "edition")
 _SAME_FACTS = ("time_step", "speed", "wave_speed")
+# What a state and the records of its step both hold, copied from the same arrays; so far apart
+# they may be, as a share of the largest or of 1 m or 1 N.
+_RECORDED = ("contact_force", "head_height", "wire_height", "strip_force", "contact_wire_force")
+_ROUNDING = 1e-9
 # Another machine's rounding at rest, as a share and as a size [m], [N].
 _RELATIVE, _ABSOLUTE = 1e-6, 1e-6
 
@@ -33,6 +43,11 @@ def state_to_continue(result: Path, beyond_end: bool = False) -> dict[str, Any]:
     """
     if not result.exists():
         raise InputError(f"there is no {result} to continue; start the case with `catenary run`")
+    # Refused before anything is written.
+    fields = result.with_name(FIELD_FILES[0])
+    if os.path.lexists(fields) and survives(fields):
+        with contextlib.suppress(OSError, RuntimeError):  # damaged, and begun anew
+            open_own(fields, locking=False).close()
     with Results(result) as results:
         if results.complete and not beyond_end:
             raise InputError(
@@ -75,6 +90,51 @@ def refuse_other_run(
             raise _refusal(result, f"its pantographs have {results.n_strips()} strips")
         datasets = {k: v for k, v in header.datasets.items() if k not in may_change}
         _refuse_other_line(result, results, datasets)
+
+
+def refuse_other_state(result: Path, state: Mapping[str, Any], model: Model) -> None:
+    """Raise InputError unless a state is that of its step in the records. Not collective.
+
+    Records and state were written of the same numbers: contact forces, heights, and the uplift of
+    the line at its steady arms. What the file does not record of that step is let pass, and so are
+    arrays of another size, which the march refuses.
+
+    Parameters
+    ----------
+    state : to continue from, whose arrays of the line have a row for each node along the track
+    model : of the line in the file
+    """
+    step = state["step"]
+    with Results(result) as results:
+        if step >= results.n_rows("time"):
+            return
+        pairs = {
+            name: (np.ravel(state[name]), results.rows(name, slice(step, step + 1))[0])
+            for name in _RECORDED
+            if np.asarray(state.get(name)).dtype.kind in "fiu" and results.has(name)
+        }
+        apart = np.abs(results.line_time - results.time_at(step))
+        moved, shape = (
+            np.asarray(state.get("displacement")),
+            (model.mesh.n_nodes, len(model.unknowns)),
+        )
+        # The line's channels may be recorded at some steps alone.
+        if apart.size and apart.min() < 0.5 * results.dt and moved.size == np.prod(shape):
+            row = int(apart.argmin())
+            at_arms = moved.reshape(shape)[model.row_of_node[model.mesh.steady_arms]]
+            recorded = results.rows("arm_uplift", slice(row, row + 1))[0]
+            pairs["arm_uplift"] = at_arms[:, model.unknowns.index("w")], recorded
+    for name, (found, recorded) in pairs.items():
+        if found.shape != recorded.shape:
+            continue
+        known = np.isfinite(recorded)
+        off = np.abs(found - recorded)[known].max(initial=0.0)
+        if not off <= _ROUNDING * max(1.0, np.abs(recorded[known]).max(initial=0.0)):
+            raise _refusal(
+                result,
+                f"its state of step {step} does not belong to its records: its {name} is up to "
+                f"{off:.3g} {CHANNELS[name].unit} off what they say",
+            )
 
 
 def _refuse_other_line(result: Path, results: Results, datasets: Mapping[str, np.ndarray]) -> None:

@@ -218,7 +218,7 @@ def _marched(
             if comm.rank == 0:
                 header = header_of(scene, problem, at_rest, order.petsc_options, excited)
             if order.resume:
-                on_root(comm, lambda: _refuse_other_run(order, header, problem))
+                on_root(comm, lambda: _refuse_other_run(order, header, problem, at_rest))
             phase.next("the solver was prepared")
             with phases("prepare solver"):
                 march = stack.enter_context(March(comm, *at_rest))
@@ -370,13 +370,16 @@ def _report(out_dir: Path, outcome: Outcome, only_summary: bool) -> RunOutcome:
     return RunOutcome(outcome.outcome, accepted, summary)
 
 
-def _refuse_other_run(order: _Order, header: Header | None, problem: Problem) -> None:
-    from catenary.cases.run.continuing import refuse_other_run
+def _refuse_other_run(
+    order: _Order, header: Header | None, problem: Problem, at_rest: LineAtRest
+) -> None:
+    from catenary.cases.run.continuing import refuse_other_run, refuse_other_state
     from catenary.postproc.files.later_end import CHANGED
 
-    assert header is not None
+    assert header is not None and order.state is not None
     n_strips = tuple(len(place.data.strip_offsets) for place in problem.train.placements)
     refuse_other_run(order.result, header, n_strips, CHANGED if order.extends else ())
+    refuse_other_state(order.result, order.state, at_rest.model)
 
 
 def _let_go_on(order: _Order, header: Header | None, n_steps: int) -> None:

@@ -16,7 +16,8 @@ import numpy as np
 
 from catenary.postproc.files.disk_errors import code_of, reason, remedy
 from catenary.postproc.files.hdf5.checked import FORMAT_BOUNDS
-from catenary.postproc.files.own_files import part_of
+from catenary.postproc.files.hdf5.self_contained import open_own
+from catenary.postproc.files.own_files import new_part
 from catenary.postproc.files.trimming import trimmed
 from catenary.solver.base.errors import RunBroken
 
@@ -147,14 +148,18 @@ def open_to_write(path: Path, mode: str, **how: Any) -> h5py.File:
 
     Raises
     ------
+    InputError
+        If a file that is there already is no regular file, or its tables lie in other files.
     OSError
+        If it cannot be opened.
     """
+    opener = h5py.File if mode == "w" else open_own
     try:
-        return h5py.File(path, mode, **how)
+        return opener(path, mode, **how)
     except OSError as error:
         if code_of(error) not in _NO_LOCKS:
             raise
-    return h5py.File(path, mode, locking=False, **how)
+    return opener(path, mode, locking=False, **how)
 
 
 @contextlib.contextmanager
@@ -162,6 +167,11 @@ def opened(path: Path, mode: str) -> Iterator[h5py.File]:
     """An HDF5 file for writing, cut to what it holds at the end. A context manager.
 
     It is abandoned if something fails.
+
+    Raises
+    ------
+    InputError
+        If a file that is there already is no regular file, or its tables lie in other files.
     """
     file = open_to_write(path, mode, libver=FORMAT_BOUNDS)
     try:
@@ -197,7 +207,7 @@ def appears_whole(path: Path) -> Iterator[Path]:
 
     A context manager. If something fails there is nothing new.
     """
-    partial = part_of(path, os.getpid())
+    partial = new_part(path)
     try:
         yield partial
         os.replace(partial, path)

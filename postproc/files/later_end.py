@@ -25,7 +25,7 @@ from catenary.postproc.files.hdf5.checked import (
     set_attribute,
     text_of,
 )
-from catenary.postproc.files.own_files import part_of
+from catenary.postproc.files.own_files import new_part
 from catenary.postproc.files.result_file import INTERRUPTED
 from catenary.solver.base.errors import RunBroken
 
@@ -49,9 +49,9 @@ def let_go_on(path: Path, header: Header, n_steps: int) -> None:
     RunBroken
         If the file cannot be written; it is as it was.
     """
-    made_as = part_of(path, os.getpid())
+    made_as = new_part(path)
     try:
-        shutil.copyfile(path, made_as)
+        shutil.copyfile(path, made_as, follow_symlinks=False)
         with open_to_write(made_as, "r+", libver=FORMAT_BOUNDS) as file:
             _change(file, header, n_steps)
         os.replace(made_as, path)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import os
 import re
 import time
 from pathlib import Path
@@ -50,6 +51,14 @@ _MAKING = 600.0
 def part_of(path: Path, process: int) -> Path:
     """Name under which a process makes a file that is to appear whole."""
     return path.with_name(f".{path.name}.{process}.part")
+
+
+def new_part(path: Path) -> Path:
+    """The same name for this process, under which nothing is: what a dead process of its number
+    left there, or a link that a stranger did, is removed."""
+    part = part_of(path, os.getpid())
+    part.unlink(missing_ok=True)
+    return part
 
 
 def remove_stale(folder: Path) -> None:

@@ -40,11 +40,13 @@ from catenary.postproc.files.hdf5.checked import (
     set_attribute,
 )
 from catenary.postproc.files.hdf5.chunk_shapes import Chunk, chunks_of, room_of
+from catenary.postproc.files.hdf5.self_contained import open_own
 from catenary.postproc.files.hdf5.shortening import DamagedClock, rows_before, shorten
 from catenary.postproc.files.hdf5.windowed_rows import write_window
 from catenary.postproc.files.kept_extremes import drop_extremes, extremes_at, store_extremes
-from catenary.postproc.files.own_files import part_of
+from catenary.postproc.files.own_files import new_part
 from catenary.postproc.files.trimming import trimmed
+from catenary.solver.base.errors import InputError
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.channels import Channel
 from catenary.solver.time_loop.views.observers import Stage
@@ -99,6 +101,13 @@ class ResultFile:
     record : which part of the line's channels is recorded
     resume : continue a file; what it holds from the stage's start time on is dropped
     on_begun : called when a new file has taken its place
+
+    Raises
+    ------
+    InputError
+        If a file that is to be continued does not have the tables of the run; it is as it was.
+    OSError, RuntimeError
+        If HDF5 could not open or write it.
     """
 
     def __init__(
@@ -115,7 +124,7 @@ class ResultFile:
         on_begun: Callable[[], None] = lambda: None,
     ) -> None:
         self._path = path
-        self._made_as = path if resume else part_of(path, os.getpid())
+        self._made_as = path if resume else new_part(path)
         self._begun = resume
         self._on_begun = on_begun
         self._record = record
@@ -133,10 +142,11 @@ class ResultFile:
         self._room = room_of(table, shapes, rows, record) + MARGIN
         self._start_time = stage.start_time
         self._n_states = 0
-        mode = "r+" if resume else "w"
-        self._file = open_to_write(self._made_as, mode, libver=FORMAT_BOUNDS)
+        place, mode = (path, "r+") if resume else (self._made_as, "w")
+        self._file = open_to_write(place, mode, libver=FORMAT_BOUNDS)
         try:
             if resume:
+                _refuse_other_tables(self._file, path, table)
                 _cut(self._file, stage.start_time - 0.5 * stage.dt)
             else:
                 _write_head(self._file, stage, header, n_ranks, record)
@@ -151,6 +161,9 @@ class ResultFile:
             set_attribute(self._file, "outcome", RUNNING)
             self._file.flush()
             self._reserve()
+        except InputError:
+            self._file.close()
+            raise
         except (OSError, RuntimeError):
             self.abandon()
             raise
@@ -284,6 +297,31 @@ def _table(
     return table
 
 
+def _refuse_other_tables(
+    file: h5py.File, path: Path, table: Mapping[str, tuple[Channel, int]]
+) -> None:
+    """Raise InputError unless a file has all growing tables of a run with their columns, and
+    nothing but tables where states and extremes are written."""
+
+    def refuse(what: str) -> InputError:
+        return InputError(f"{path} cannot be continued: {what}; start the run anew")
+
+    for name, (channel, columns) in table.items():
+        if name not in file:
+            raise refuse(f"{name} is missing")
+        wanted = () if channel.per == channels.RUN else (columns,)
+        if file[name].shape[1:] != wanted:
+            raise refuse(f"{name} has the columns {file[name].shape[1:]} in place of {wanted}")
+    for name in ("checkpoint", "extremes"):
+        kept = file.get(name)
+        if not isinstance(kept, h5py.Group):
+            raise refuse(f"{name} is missing")
+        for slot in kept.values():
+            inner = slot.values() if isinstance(slot, h5py.Group) else [None]
+            if not all(isinstance(one, h5py.Dataset) for one in inner):
+                raise refuse(f"{slot.name[1:]} does not hold tables alone")
+
+
 def _write_head(
     file: h5py.File, stage: Stage, header: Header, n_ranks: int, record: LineRecord
 ) -> None:
@@ -362,16 +400,50 @@ def complete_rows(file: h5py.File) -> list[int]:
     return [*found, *_rows(file)[len(found) :]]
 
 
-def fault_to_continue(path: Path, time: float) -> str:
-    """Why a run cannot go on from ``time`` [s] in a result file, as a clause; empty if it can.
+def _told_rows(file: h5py.File) -> list[int]:
+    """The same of a file that nobody has examined: where the numbers cannot be, the length of the
+    tables counts."""
+    counted = _rows(file)
+    told = np.asarray(file[COMPLETE][...]) if COMPLETE in file else np.zeros(0, dtype=int)
+    if told.ndim != 1 or told.dtype.kind not in "iu" or told.size > len(counted):
+        return counted
+    rows = [*told.tolist(), *counted[told.size :]]
+    return rows if all(0 <= n <= most for n, most in zip(rows, counted, strict=True)) else counted
 
-    Not collective.
+
+def fault_to_continue(path: Path, time: float) -> str:
+    """Why a run cannot go on in a result file, as a clause; empty if it can. Not collective.
+
+    Parameters
+    ----------
+    time : from which on it goes on [s]
+
+    Raises
+    ------
+    InputError
+        If the file is none of its own, see ``open_own``.
     """
-    with h5py.File(path, "r", locking=False) as file:
+    with open_own(path, locking=False) as file:
         try:
-            _rows_to_keep(file, time)
+            kept = _rows_to_keep(file, time)
         except DamagedClock as error:
             return str(error)
+        for rows, paths in zip(kept, _tables_by_clock(file), strict=True):
+            for table_path in paths:
+                fault = _fault_to_append(file[table_path], rows)
+                if fault:
+                    return f"{table_path} {fault}"
+    return ""
+
+
+def _fault_to_append(table: Any, rows: int) -> str:
+    """Why a table cannot be appended to behind its first ``rows``, empty if it can."""
+    if not isinstance(table, h5py.Dataset) or table.dtype != np.float64 or not table.ndim:
+        return "is no table of numbers"
+    if table.chunks is None or table.maxshape[0] is not None:
+        return "cannot grow"
+    if table.shape[0] < rows:
+        return f"ends after {table.shape[0]} of {rows} records"
     return ""
 
 
@@ -386,7 +458,7 @@ def _rows_to_keep(file: h5py.File, time: float) -> list[int]:
     """Records before ``time`` [s] of each clock."""
     return [
         rows_before(file[clock], complete, time) if clock in file else 0
-        for clock, complete in zip(_CLOCKS, complete_rows(file), strict=True)
+        for clock, complete in zip(_CLOCKS, _told_rows(file), strict=True)
     ]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,15 +9,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from catenary.postproc.files.hdf5.checked import text_of
+from catenary.postproc.files.hdf5.self_contained import open_own
 from catenary.postproc.read.guard import survives
 from catenary.postproc.record.snapshots.blocks import ARMS, OTHER_PARTS
-from catenary.postproc.record.snapshots.fields_file import (
-    FORMAT,
-    PLACES,
-    RESTS_BEYOND,
-    SIZES,
-)
+from catenary.postproc.record.snapshots.field_layout import PLACES
+from catenary.postproc.record.snapshots.fields_schema import BlockTables, FieldsFault, read_fields
 from catenary.solver.base.errors import InputError
 
 FIELDS_FILE = "fields.h5"
@@ -86,7 +81,7 @@ class Snapshots:
             raise InputError(f"{path} is damaged: HDF5 does not read it")
         self._path, self._n_nodes, self._until = path, n_nodes, until
         # Without a lock: a run may be writing it, or be continued while this is open.
-        self._file = h5py.File(path, "r", locking=False)
+        self._file = open_own(path, locking=False)
         try:
             self._open()
         except BaseException:
@@ -95,41 +90,34 @@ class Snapshots:
 
     def _open(self) -> None:
         path, file = self._path, self._file
-        if text_of(file.attrs.get("format")) != FORMAT and "uplift" in file:
-            raise InputError(
-                f"{path} was written by an earlier version of Catenary; run the scene again"
-            )
         try:
-            times = np.asarray(file["times"][...], dtype=float)
-        except (KeyError, OSError, TypeError, ValueError) as error:
-            raise InputError(f"{path} is damaged: it has no times of snapshots") from error
-        n = int(np.append(np.isfinite(times), False).argmin()) if times.ndim == 1 else 0
-        times, n_places = times[:n], times.size
-        self.times = times[times <= self._until + _SAME_TIME]
-        if self.times.size < 2 or not (np.diff(self.times) > 0).all():
-            raise InputError(
-                f"{path} has fewer than two snapshots in order of time; if its run has just "
-                "begun, wait for more"
-            )
-        try:
-            self.parts = tuple(json.loads(text_of(file.attrs["parts"])))
-            self._of_this_line = int(file.attrs["n_nodes"]) == self._n_nodes
-            wires = [file[name] for name in self.parts if name not in OTHER_PARTS]
-            if not all({"uplift", "displacement"} & set(wire) for wire in wires):
+            tables = read_fields(file)
+        except FieldsFault as error:
+            if "uplift" in file:
                 raise InputError(
-                    f"{path} has neither uplift nor displacement; run the scene again with one of "
-                    "them in output.fields"
-                )
-            rests = bool(file.attrs.get(RESTS_BEYOND, 0))
-            self._wires = [_wire(group, rests) for group in wires]
-            scalar = all("uplift" in wire for wire in wires)
-            self.field = "uplift" if scalar else "displacement_Z"
-            self.has_vectors = all(wire.vectors is not None for wire in self._wires)
-            self._sizes = np.asarray(file[SIZES][...], dtype=int)
-            if file[PLACES].shape != (n_places, self._sizes.size + int(self._sizes.sum())):
-                raise ValueError(f"{PLACES} has another size")
-        except (KeyError, OSError, TypeError, ValueError) as error:
+                    f"{path} was written by an earlier version of Catenary; run the scene again"
+                ) from error
             raise InputError(f"{path} is damaged: {error}") from error
+        self.times = tables.times[tables.times <= self._until + _SAME_TIME]
+        if self.times.size < 2:
+            raise InputError(
+                f"{path} has fewer than two snapshots; if its run has just begun, wait for more"
+            )
+        self.parts = tuple(tables.blocks)
+        self._of_this_line = tables.n_nodes == self._n_nodes
+        self._blocks, self._sizes = tables.blocks, tables.n_places
+        wires = [name for name in self.parts if name not in OTHER_PARTS]
+        if not all({"uplift", "displacement"} & set(file[name]) for name in wires):
+            raise InputError(
+                f"{path} has neither uplift nor displacement; run the scene again with one of "
+                "them in output.fields"
+            )
+        self._wires = [
+            _wire(tables.blocks[name], file[name], tables.rests_beyond) for name in wires
+        ]
+        scalar = all("uplift" in file[name] for name in wires)
+        self.field = "uplift" if scalar else "displacement_Z"
+        self.has_vectors = all(wire.vectors is not None for wire in self._wires)
         shown = sum(wire.x.size if wire.rests else wire.count for wire in self._wires)
         self.whole = bool(np.all(shown == self._n_nodes))
 
@@ -143,8 +131,10 @@ class Snapshots:
         """Hinges of the steady arms that are shown, (k, 3) [m], and nodes that they hold, (k,)."""
         if ARMS not in self.parts:
             return np.zeros((0, 3)), np.zeros(0, dtype=int)
-        group = self._file[ARMS]
-        return group["points"][0::2], group["nodes"][1::2]
+        if not self._of_this_line:
+            raise InputError(f"{self._path} does not belong to the run.h5 beside it")
+        block = self._blocks[ARMS]
+        return block.points[0::2], block.nodes[1::2]
 
     def shown(self, number: int) -> tuple[float, float]:
         """From and to of the wires whose motion a snapshot tells, as far as each reaches [m]."""
@@ -289,11 +279,8 @@ def _between(wire: _Wire, number: int, x: float, table: h5py.Dataset, axis: int)
     return float(np.interp(x, wire.x[at : at + 2], values))
 
 
-def _wire(group: h5py.Group, rests: bool) -> _Wire:
-    first, count = group["first"][...], group["count"][...]
-    start = np.cumsum(count) - count
+def _wire(block: BlockTables, group: h5py.Group, rests: bool) -> _Wire:
+    start = np.cumsum(block.count) - block.count
     values = group["uplift" if "uplift" in group else "displacement"]
-    if values.shape[0] != int(count.sum()):
-        raise ValueError(f"{values.name} is too short")
-    nodes, x = group["nodes"][...], group["points"][:, 0]
-    return _Wire(nodes, x, first, count, start, values, group.get("displacement"), rests)
+    x, vectors = block.points[:, 0], group.get("displacement")
+    return _Wire(block.nodes, x, block.first, block.count, start, values, vectors, rests)

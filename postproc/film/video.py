@@ -43,6 +43,8 @@ def write(
     """
     parts = [path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}") for path in (mp4, gif)]
     try:
+        for part in parts:  # a link that was put there would be written through
+            part.unlink(missing_ok=True)
         count, small = _write_mp4(pictures, size, rate, parts[0], later)
         small[0].save(
             parts[1], save_all=True, append_images=small[1:], loop=0, disposal=1,

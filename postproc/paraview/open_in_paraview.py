@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from catenary.mbs.shape import BODY, HEAD, SPRING, Shape
+from catenary.postproc.files.disk import write_whole
 from catenary.postproc.film.film_data import FilmData, film_data
 from catenary.postproc.film.pantograph_shape import MovingPantographs
 from catenary.postproc.film.scale import Picture, room_above
@@ -57,14 +57,13 @@ def write_script(
         with Snapshots(folder, len(data.points), until=float(data.time[-1])) as snapshots:
             pantographs = MovingPantographs(data, snapshots, shapes)
             settings = _settings(folder, data, snapshots, motion, pantographs, look)
+            if target.is_symlink():
+                raise InputError(f"{target} is a link, through which nothing is written; remove it")
             try:
                 target.mkdir(exist_ok=True)
                 vtkhdf = write_vtkhdf(folder / FIELDS_FILE)
                 files = scenery.write(data, pantographs, snapshots, target)
-                script = _script(settings)
-                part = target / f".{SCRIPT}.{os.getpid()}"
-                part.write_text(script, encoding="utf-8")
-                os.replace(part, target / SCRIPT)
+                write_whole(target / SCRIPT, _script(settings))
             except OSError as error:
                 raise InputError(f"{target} cannot be written: {error}") from error
     return [target / SCRIPT, *files.files, vtkhdf]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from catenary.postproc.files.disk import open_to_write
+from catenary.postproc.files.disk import appears_whole, open_to_write, write_whole
 from catenary.postproc.film.film_data import FilmData
 from catenary.postproc.film.pantograph_shape import MovingPantographs
 from catenary.postproc.film.snapshots import Snapshots
@@ -62,7 +62,7 @@ def write(
     n_points = sum(int(shape.cells.max()) + 1 for shape in pantographs.shapes)
     has_train = data.excitation is None
     n_corners = len(boxes(data.position[0], pantographs.roof))
-    with open_to_write(folder / NUMBERS, "w") as file:
+    with appears_whole(folder / NUMBERS) as part, open_to_write(part, "w") as file:
         file["track/points"], file["track/cells"] = rails, lines_of_rails
         file["pantographs/cells"] = cells
         file["pantographs/number"], file["pantographs/kind"] = number, kind
@@ -193,4 +193,4 @@ def _write_text(path: Path, grids: list[tuple[float | None, str, str, str]]) -> 
         body = "\n".join(parts)
         text.append(f'<Grid Name="{path.stem}" GridType="Uniform">{at}\n{body}\n</Grid>\n')
     text.append(("</Grid>\n" if in_time else "") + "</Domain>\n</Xdmf>\n")
-    path.write_text("".join(text), encoding="utf-8")
+    write_whole(path, "".join(text))

@@ -33,6 +33,7 @@ def write_state(script: Path) -> tuple[Path | None, str]:
     state = script.with_name(STATE)
     part = script.with_name(f".{script.stem}.{os.getpid()}{state.suffix}")
     try:
+        part.unlink(missing_ok=True)  # a link that was put there would be written through
         for _ in range(_ATTEMPTS):
             done = subprocess.run(
                 [*command, str(script), "--state", str(part)],

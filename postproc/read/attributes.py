@@ -12,7 +12,7 @@ from catenary.postproc.read.file_schema import ATTRIBUTES, REQUIRED
 
 # What HDF5 and h5py raise at a damaged file.
 HDF5_ERRORS = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError)
-_MISSING = object()
+MISSING = object()
 
 
 def read_attributes(file: h5py.File) -> tuple[dict[str, Any], list[str], list[str]]:
@@ -31,17 +31,17 @@ def read_attributes(file: h5py.File) -> tuple[dict[str, Any], list[str], list[st
     }
     fatal, partial = [], []
     for name, declared in ATTRIBUTES.items():
-        value = raw.get(name, _MISSING)
+        value = raw.get(name, MISSING)
         fault = ""
         if name in broken:
             fault = f'its attribute "{name}" ' + (
-                "is missing" if value is _MISSING else "differs from its checksum"
+                "is missing" if value is MISSING else "differs from its checksum"
             )
-        elif value is not _MISSING:
-            value = _decoded(value, declared.is_json)
-            if value is _MISSING or not declared.sound(value):
+        elif value is not MISSING:
+            value = decoded(value, declared.is_json)
+            if value is MISSING or not declared.sound(value):
                 fault = f'its attribute "{name}" is not {declared.must_be}{_where(value)}'
-        if not fault and value is not _MISSING:
+        if not fault and value is not MISSING:
             values[name] = value
         elif declared.fallback is REQUIRED:
             fatal.append(fault or f'its attribute "{name}" is missing')
@@ -73,14 +73,14 @@ def _raw(file: h5py.File) -> tuple[dict[str, Any], set[str]]:
     return values, unreadable
 
 
-def _decoded(value: Any, is_json: bool) -> Any:
-    """The value, of JSON what it says, ``_MISSING`` if it says nothing."""
+def decoded(value: Any, is_json: bool) -> Any:
+    """The value, of JSON what it says, ``MISSING`` if it says nothing."""
     if not is_json:
         return value
     try:
         return json.loads(value, parse_constant=_refuse)
     except (ValueError, TypeError, RecursionError):
-        return _MISSING
+        return MISSING
 
 
 def _refuse(word: str) -> None:
@@ -89,7 +89,7 @@ def _refuse(word: str) -> None:
 
 def _where(value: Any) -> str:
     """A value, cut short."""
-    if value is _MISSING:
+    if value is MISSING:
         return ""
     shown = " ".join(str(value).split())
     return f" ({shown[:40]}{'...' if len(shown) > 40 else ''})"

@@ -25,7 +25,7 @@ def constant_faults(file: h5py.File) -> tuple[list[str], dict[str, int]]:
         except HDF5_ERRORS:
             faults.append(f"{path} is missing or cannot be read")
             continue
-        fault = _fault(values, declared, sizes)
+        fault = values_fault(values, declared, sizes)
         if fault:
             faults.append(f"{path} {fault}")
     listed = line_columns()
@@ -44,7 +44,7 @@ def _columns(file: h5py.File, path: str, declared: Constant, sizes: dict[str, in
         values = np.asarray(file[path][...])
     except HDF5_ERRORS:
         return [f"{path} cannot be read"]
-    fault = _fault(values, declared._replace(whole=True), sizes)
+    fault = values_fault(values, declared._replace(whole=True), sizes)
     return [f"{path} {fault}"] if fault else []
 
 
@@ -55,7 +55,7 @@ def _names(file: h5py.File, path: str) -> list[str]:
         return []
 
 
-def _fault(values: np.ndarray, declared: Constant, sizes: dict[str, int]) -> str:
+def values_fault(values: np.ndarray, declared: Constant, sizes: dict[str, int]) -> str:
     """What is wrong with the values, empty if nothing is; letters without a size get theirs."""
     kinds = "iu" if declared.whole else "fiu"
     if values.dtype.kind not in kinds:

@@ -22,9 +22,17 @@ RESULT_FILE = "run.h5"
 LIMIT, PER_SECOND = 30.0, 10e6
 # The process is to be no rank of a run, with its launcher's variables.
 _OF_LAUNCHERS = ("OMPI_", "PMIX_", "PMI_")
+# A file that is refused is so again, with a sentence, by who opens it next.
 _WALK = """
-import sys, h5py
-with h5py.File(sys.argv[1], "r", locking=False) as file:
+import sys
+from pathlib import Path
+from catenary.postproc.files.hdf5.self_contained import open_own
+from catenary.solver.base.errors import InputError
+try:
+    file = open_own(Path(sys.argv[1]), locking=False)
+except InputError:
+    sys.exit()
+with file:
     file.visititems(lambda name, item: print(name, getattr(item, "shape", None)))
 """
 

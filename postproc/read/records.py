@@ -59,16 +59,17 @@ def table_faults(file: h5py.File, about: dict[str, Any], sizes: dict[str, int]) 
     found = []
     with_steps, apart = line_tables(about)
     (always, others), energies = step_tables(), _energies(file)
+    most = about["n_steps_planned"] + 1
     for path, declared in {"time": CLOCK, **always, **with_steps}.items():
-        fault = _shape_fault(file, path, declared, sizes)
+        fault = _shape_fault(file, path, declared, sizes, most)
         if fault:
             found.append(TableFault(path, fault, declared.essential))
     for path, declared in apart.items():
-        fault = _shape_fault(file, path, declared, sizes)
+        fault = _shape_fault(file, path, declared, sizes, most)
         if fault:
             found.append(TableFault(path, fault, False))
     for path, declared in {**others, **energies}.items():
-        fault = _shape_fault(file, path, declared, sizes)
+        fault = _shape_fault(file, path, declared, sizes, most)
         if fault and is_there(file, path.split("/")[0] if path in energies else path):
             found.append(TableFault(path, fault, False))
     return found
@@ -208,7 +209,11 @@ def _length(file: h5py.File, path: str) -> int:
         return 0
 
 
-def _shape_fault(file: h5py.File, path: str, declared: Growing, sizes: dict[str, int]) -> str:
+def _shape_fault(
+    file: h5py.File, path: str, declared: Growing, sizes: dict[str, int], most: int
+) -> str:
+    """What is wrong with the shape of a growing table, empty if nothing is; ``most`` rows are
+    planned."""
     try:
         table = file[path]
         shape, kind = table.shape, table.dtype.kind
@@ -218,6 +223,8 @@ def _shape_fault(file: h5py.File, path: str, declared: Growing, sizes: dict[str,
         return "does not hold numbers"
     if len(shape) != (2 if declared.columns else 1):
         return f"has {len(shape)} dimensions"
+    if shape[0] > most:
+        return f"has {shape[0]} rows, of {most} that the run plans"
     if declared.columns and shape[1] != sizes.setdefault(declared.columns, shape[1]):
         return f"has {shape[1]} columns in place of {sizes[declared.columns]}"
     return ""

@@ -13,6 +13,7 @@ from pathlib import Path
 import h5py
 
 from catenary.postproc.files.hdf5.checked import text_of
+from catenary.postproc.files.hdf5.self_contained import open_own
 from catenary.postproc.files.result_file import RUNNING
 from catenary.postproc.read.attributes import HDF5_ERRORS
 from catenary.postproc.read.records import complete_of
@@ -38,11 +39,13 @@ def opened(path: Path) -> tuple[h5py.File, Complete | None]:
 
     Raises
     ------
+    InputError
+        If it is no regular file, or its tables lie in other files.
     OSError, RuntimeError
         If HDF5 does not open it.
     """
     for attempt in range(_ATTEMPTS):
-        file = h5py.File(path, "r", locking=False)
+        file = open_own(path, locking=False)
         try:
             outcome = text_of(file.attrs.get("outcome"))
             if not isinstance(outcome, str) or outcome != RUNNING:

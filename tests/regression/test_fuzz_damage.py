@@ -145,7 +145,35 @@ NOT_CONTINUED: dict[str, tuple[Callable[[h5py.File], None], str]] = {
         '"edition" is not one',
     ),
     "state NaN": (in_both_states("displacement", np.nan), "displacement holds NaN or infinity"),
-    "state of other nodes": (in_both_states("row_of_node", 3), "does not number the nodes"),
+    "state of other nodes": (in_both_states("row_of_node", 3), "row_of_node puts node 0 in row 3"),
+    "state of other forces": (
+        in_both_states("contact_force", 99.0),
+        "its contact_force is up to",
+    ),
+    "state of other motion": (
+        in_both_states("displacement", 0.1),
+        "its arm_uplift is up to",
+    ),
+    "a channel gone": (
+        lambda file: file.__delitem__("channels/head_height"),
+        "channels/head_height is missing",
+    ),
+    "a line channel gone": (
+        lambda file: file.__delitem__("line_channels/arm_uplift"),
+        "line_channels/arm_uplift is missing",
+    ),
+    "a short line channel": (
+        lambda file: file["line_channels/arm_uplift"].resize(300, axis=0),
+        "line_channels/arm_uplift ends after 300 of",
+    ),
+    "times without end": (
+        lambda file: file["time"].resize(10**15, axis=0),
+        "time has 1000000000000000 rows, of 2017 that the run plans",
+    ),
+    "states that are none": (
+        lambda file: file.create_group("checkpoint/0/more"),
+        "checkpoint/0 does not hold tables alone",
+    ),
     "no rows": (lambda file: file["complete_rows"].__setitem__(0, 0), "none of its records"),
     "other line": (lambda file: file.attrs.__setitem__("n_dofs", 12), "n_dofs is 12, its scene"),
 }
@@ -164,6 +192,20 @@ def test_what_cannot_be_is_not_continued(how: str, runs: dict[str, Path], tmp_pa
     assert done.code == 2, done
     assert words in done.sentences[-1] and "Traceback" not in done.stderr
     assert (out / "run.h5").read_bytes() == before
+
+
+def test_counts_of_rows_that_cannot_be_are_replaced(runs: dict[str, Path], tmp_path: Path) -> None:
+    """The length of the tables counts in their place, as for a report."""
+    out = tmp_path / "out"
+    shutil.copytree(runs["interrupted"], out)
+    with h5py.File(out / "run.h5", "r+") as file:
+        file["complete_rows"][...] = 10**15
+    done = catenary("restart", str(out), cwd=tmp_path)
+    assert done.code == 0, done
+    with h5py.File(out / "run.h5") as found, h5py.File(runs["finished"] / "run.h5") as whole:
+        assert found["complete_rows"][...].tolist() == whole["complete_rows"][...].tolist()
+        force = "channels/contact_force"
+        assert np.allclose(found[force][...], whole[force][...], rtol=1e-9, atol=1e-9)
 
 
 LINE = "line_channels/dropper_force"

@@ -14,6 +14,12 @@ import numpy as np
 from catenary.postproc.record.snapshots.blocks import FIXED, Block
 from catenary.postproc.record.snapshots.field_kinds import USUAL_FIELDS, FieldKind, kinds_of
 
+# What the file is, as its attribute ``format`` says.
+FORMAT = "catenary-fields-2"
+# Where the bases, masses and bodies of the pantographs are, and how many numbers each has of it.
+PLACES, SIZES = "pantograph_places", "pantograph_sizes"
+# Its attribute that is 1 where wires are at rest at all points that a snapshot does not show.
+RESTS_BEYOND = "rests_beyond"
 # More than HDF5's tables take for a dataset or a group with its attributes [bytes].
 _TABLES = 1024
 

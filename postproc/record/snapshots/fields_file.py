@@ -21,21 +21,23 @@ from h5py import h5d, h5p, h5s, h5t
 from catenary.postproc.files.disk import MARGIN, check_in_place, opened, reserve, write_at
 from catenary.postproc.files.hdf5.array_writes import put_array
 from catenary.postproc.files.hdf5.checked import set_attribute, text_of
-from catenary.postproc.files.own_files import part_of
+from catenary.postproc.files.own_files import new_part
 from catenary.postproc.record.snapshots.blocks import Block
-from catenary.postproc.record.snapshots.field_layout import FieldRecord, Slots, layout_of
+from catenary.postproc.record.snapshots.field_layout import (
+    FORMAT,
+    PLACES,
+    RESTS_BEYOND,
+    SIZES,
+    FieldRecord,
+    Slots,
+    layout_of,
+)
 from catenary.postproc.record.snapshots.field_values import FieldValues, Gathered
 from catenary.postproc.record.snapshots.growing_xdmf import GrowingXdmf, grids_of
 from catenary.postproc.record.snapshots.vtkhdf import SUFFIX, write_vtkhdf
 
 logger = logging.getLogger("catenary.fields")
 
-# What the file is, as its attribute ``format`` says.
-FORMAT = "catenary-fields-2"
-# Where the bases, masses and bodies of the pantographs are, and how many numbers each has of it.
-PLACES, SIZES = "pantograph_places", "pantograph_sizes"
-# Its attribute that is 1 where wires are at rest at all points that a snapshot does not show.
-RESTS_BEYOND = "rests_beyond"
 # Rows of a table that are copied at once.
 _ROWS_OF_COPY = 1 << 16
 # Tables of a block beside its fields.
@@ -108,7 +110,7 @@ class FieldsFile:
         OSError
         """
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        self._made_as = part_of(self.path, os.getpid())
+        self._made_as = new_part(self.path)
         self._plan(numbers)
         try:
             with opened(self._made_as, "w") as file:
@@ -126,19 +128,25 @@ class FieldsFile:
         Parameters
         ----------
         numbers : of the snapshots to come, counted from the start of the run
+
+        Raises
+        ------
+        InputError
+            If it is no regular file, or its tables lie in other files.
         """
-        if not self.path.exists():
+        if not os.path.lexists(self.path):
             return False
         # Of all that reads files this alone is for runs that continue one.
         from catenary.postproc.read.guard import survives
+        from catenary.postproc.record.snapshots.fields_schema import FieldsFault, read_fields
 
         try:
             if not survives(self.path):
                 raise ValueError("HDF5 does not read it")
             with opened(self.path, "r+") as file:
-                times = file["times"]
-                kept = times[...]
-                kept = kept[kept < start_time - 0.01 * self._every]
+                kept, times = read_fields(file).times, file["times"]
+                # The step from which the run goes on is shown again, that before it is not.
+                kept = kept[kept < start_time - 0.5 * self._dt]
                 begin = round(float(kept[0]) / self._every) if kept.size else int(numbers[0])
                 planned = np.arange(begin, numbers[-1] + 1)
                 self._plan(planned[: times.size])
@@ -149,7 +157,7 @@ class FieldsFile:
             if planned.size > len(self._planned):
                 self._lengthen(planned)
                 return True
-        except (OSError, KeyError, RuntimeError, TypeError, ValueError):
+        except (OSError, KeyError, RuntimeError, TypeError, ValueError, FieldsFault):
             logger.warning(
                 "%s cannot be continued, it is damaged or of another version: its snapshots now "
                 "begin at t = %.3f s",

@@ -30,6 +30,7 @@ from catenary.postproc.files.hdf5.array_writes import (
     whole_array,
 )
 from catenary.postproc.files.hdf5.checked import text_of
+from catenary.postproc.files.hdf5.self_contained import open_own
 from catenary.postproc.record.snapshots.field_kinds import KINDS, FieldKind
 
 SUFFIX = ".vtkhdf"
@@ -54,7 +55,7 @@ def write_vtkhdf(numbers: Path) -> Path:
         If the numbers cannot be read, or the file not written.
     """
     path = numbers.with_suffix(SUFFIX)
-    with h5py.File(numbers, "r", locking=False) as source, appears_whole(path) as part:
+    with open_own(numbers, locking=False) as source, appears_whole(path) as part:
         times = whole_array(source, "times")
         n = int(np.isfinite(times).sum())
         names = json.loads(text_of(source.attrs["parts"]))

@@ -96,6 +96,21 @@ def test_resumed_fields_replace_what_follows(tmp_path: Path, make_march: Any) ->
 
 
 @pytest.mark.process
+@pytest.mark.parametrize("last", [0, 1, 401, 405])
+def test_no_snapshot_before_the_state_is_lost(
+    last: int, tmp_path: Path, make_march: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A run that is stopped in its first step has a state of it; the snapshots stand 400 steps
+    apart, a hundredth of which is more than the steps between a snapshot and the state."""
+    march, path = make_march(n_steps=1300), tmp_path / "fields.xdmf"
+    march.drive(watch(march, path, every=400), outcome="interrupted", last=last)
+    with caplog.at_level("WARNING", "catenary.fields"):
+        march.drive(watch(march, path, every=400, resume=True), first_step=last)
+    assert not caplog.records
+    np.testing.assert_allclose(pyvista.get_reader(path).time_values, 0.4 * np.arange(4))
+
+
+@pytest.mark.process
 def test_a_snapshot_that_a_kill_left_half_written_is_replaced(
     tmp_path: Path, make_march: Any
 ) -> None:

@@ -187,7 +187,7 @@ def test_what_cannot_be_shown_is_refused(folder: Path) -> None:
         snapshots.uplift(3)
     with h5py.File(folder / "fields.h5", "r+") as file:
         _drop_times(file)
-    with pytest.raises(InputError, match="no times"):
+    with pytest.raises(InputError, match="times is missing"):
         Snapshots(folder, n_nodes)
     (folder / "fields.h5").write_bytes(b"no file of HDF5")
     with pytest.raises(InputError, match="HDF5 does not read it"):

@@ -1,0 +1,245 @@
+"""The attributes and tables of ``fields.h5``, declared once, and read against the declaration.
+
+As ``file_schema`` and ``sound_file`` do for ``run.h5``. Fields themselves are checked for kind and
+length here, and for their values snapshot by snapshot. Not collective.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import h5py
+import numpy as np
+from h5py import h5d
+
+from catenary.postproc.files.hdf5.checked import text_of
+from catenary.postproc.read.attributes import HDF5_ERRORS, decoded
+from catenary.postproc.read.constants import values_fault
+from catenary.postproc.read.file_schema import (
+    LARGEST,
+    REQUIRED,
+    Attribute,
+    Constant,
+    is_text,
+    is_whole,
+)
+from catenary.postproc.record.snapshots.blocks import FIXED, OTHER_PARTS
+from catenary.postproc.record.snapshots.field_kinds import KINDS, FieldKind
+from catenary.postproc.record.snapshots.field_layout import FORMAT, PLACES, RESTS_BEYOND, SIZES
+
+# More snapshots or pantographs' numbers than any run has; nothing larger is read.
+_MOST_SNAPSHOTS, _MOST_PARTS, _MOST_PLACES = 10**7, 10**4, 10**6
+# Times that are read together.
+_TIMES = 1 << 16
+
+
+def _parts(value: Any) -> bool:
+    return (
+        isinstance(value, list)
+        and 0 < len(value) <= _MOST_PARTS
+        and all(is_text(name) and name not in ("", ".") and "/" not in name for name in value)
+        and len(set(value)) == len(value)
+    )
+
+
+ATTRIBUTES: dict[str, Attribute] = {
+    "format": Attribute(f'"{FORMAT}"', lambda value: value == FORMAT),
+    "n_nodes": Attribute("a whole number from 1", lambda value: is_whole(value, 1)),
+    "parts": Attribute("a list of names, each of them once", _parts, is_json=True),
+    RESTS_BEYOND: Attribute("0 or 1", lambda value: is_whole(value, 0) and value <= 1, fallback=0),
+}
+# Letters: T snapshots that are planned, B points of a block, C its cells.
+_SNAPSHOTS = Constant("T", 0, 1e12, whole=True)
+BLOCK: dict[str, Constant] = {
+    "points": Constant("B3"),
+    "nodes": Constant("B", 0, 1e12, whole=True),
+    "cells": Constant("C2", 0, 1e9, whole=True),
+    "first": _SNAPSHOTS,
+    "count": _SNAPSHOTS,
+    "cell_first": _SNAPSHOTS,
+    "cell_count": _SNAPSHOTS,
+}
+
+
+@dataclass(frozen=True)
+class BlockTables:
+    """The tables of a block beside its fields, sound; see `field_layout.Slots`.
+
+    points (B, 3) [m], nodes (B,), cells (C, 2), the others (T,).
+    """
+
+    points: np.ndarray
+    nodes: np.ndarray
+    cells: np.ndarray
+    first: np.ndarray
+    count: np.ndarray
+    cell_first: np.ndarray
+    cell_count: np.ndarray
+
+
+class FieldTables(NamedTuple):
+    """A ``fields.h5`` that is sound.
+
+    Attributes
+    ----------
+    n_nodes : of the line
+    rests_beyond : whether wires are at rest at all points that a snapshot does not show
+    times : of the snapshots that are there, ascending (n,) [s]
+    n_places : how many numbers of each pantograph there are, (pantographs,)
+    blocks : tables of each block by its name, in the order of the file
+    """
+
+    n_nodes: int
+    rests_beyond: bool
+    times: np.ndarray
+    n_places: np.ndarray
+    blocks: dict[str, BlockTables]
+
+
+class FieldsFault(Exception):
+    """What is wrong with a file of snapshots; the message is a clause."""
+
+
+def read_fields(file: h5py.File) -> FieldTables:
+    """All of a file of snapshots but the fields and the places of pantographs.
+
+    Raises
+    ------
+    FieldsFault
+        If anything is missing, of another kind, or does not fit the rest.
+    """
+    about = _attributes(file)
+    clock = _table(file, "times", np.dtype("<f8"), (None,))
+    n_planned = clock.shape[0]
+    if n_planned > _MOST_SNAPSHOTS:
+        raise FieldsFault(f"times has {n_planned} rows, and no run has so many snapshots")
+    sizes = _read(file, SIZES, Constant("P", 0, _MOST_PLACES, whole=True), {})
+    _table(file, PLACES, np.dtype("<f8"), (n_planned, sizes.size + int(sizes.sum())))
+    n_nodes = int(about["n_nodes"])
+    blocks = {name: _block(file, name, n_planned, n_nodes) for name in about["parts"]}
+    return FieldTables(n_nodes, bool(about[RESTS_BEYOND]), _times(clock), sizes, blocks)
+
+
+def _attributes(file: h5py.File) -> dict[str, Any]:
+    """The root attributes, sound."""
+    found = {}
+    for name, declared in ATTRIBUTES.items():
+        if declared.fallback is not REQUIRED and name not in file.attrs:
+            found[name] = declared.fallback
+            continue
+        try:
+            value = decoded(text_of(file.attrs[name]), declared.is_json)
+        except HDF5_ERRORS as error:
+            raise FieldsFault(f'its attribute "{name}" is missing or cannot be read') from error
+        if not declared.sound(value):
+            raise FieldsFault(f'its attribute "{name}" is not {declared.must_be}')
+        found[name] = value
+    return found
+
+
+def _table(
+    file: h5py.File, path: str, kind: np.dtype | None, shape: tuple[int | None, ...]
+) -> h5py.Dataset:
+    """A table, whose numbers stand one after another in the file.
+
+    Parameters
+    ----------
+    kind : type of its numbers, None for any
+    shape : number of its rows and columns, None for any
+    """
+    try:
+        table = file[path]
+        there, own = table.shape, table.dtype
+        layout = table.id.get_create_plist().get_layout()
+    except HDF5_ERRORS as error:
+        raise FieldsFault(f"{path} is missing or cannot be read") from error
+    if kind is not None and own != kind:
+        raise FieldsFault(f"{path} holds {own} in place of {kind}")
+    wanted = (
+        tuple(size if one is None else one for one, size in zip(shape, there, strict=False))
+        + shape[len(there) :]
+    )
+    if there != wanted:
+        raise FieldsFault(f"{path} has the shape {there} in place of {wanted}")
+    if layout != h5d.CONTIGUOUS or (table.size and table.id.get_offset() is None):
+        raise FieldsFault(f"{path} does not stand in one piece in the file")
+    return table
+
+
+def _read(file: h5py.File, path: str, declared: Constant, sizes: dict[str, int]) -> np.ndarray:
+    """The values of a table as it is declared; letters without a size get theirs."""
+    table = _table(file, path, None, (None,) * len(declared.shape))
+    try:
+        values = np.asarray(table[...])
+    except (*HDF5_ERRORS, MemoryError) as error:
+        raise FieldsFault(f"{path} cannot be read") from error
+    fault = values_fault(values, declared, sizes)
+    if fault:
+        raise FieldsFault(f"{path} {fault}")
+    return values
+
+
+def _times(clock: h5py.Dataset) -> np.ndarray:
+    """The times up to the first that is not there, which ascend [s]."""
+    parts = [np.zeros(0)]
+    for start in range(0, clock.shape[0], _TIMES):
+        part = clock[start : start + _TIMES]
+        there = int(np.append(np.isfinite(part), False).argmin())
+        parts.append(part[:there])
+        if there < part.size:
+            break
+    times = np.concatenate(parts)
+    if not (np.diff(times) > 0.0).all():
+        raise FieldsFault("times does not ascend")
+    if times.size and not 0.0 <= times[0] <= times[-1] <= LARGEST["s"]:
+        raise FieldsFault(f"times reaches from {times[0]:g} to {times[-1]:g} s, which cannot be")
+    return times
+
+
+def _block(file: h5py.File, name: str, n_planned: int, n_nodes: int) -> BlockTables:
+    """The tables of a block, which fit each other, the line and the block's fields."""
+    sizes = {"T": n_planned}
+    is_wire = name not in OTHER_PARTS
+    lowest = 0 if is_wire else FIXED
+    declared = {**BLOCK, "nodes": BLOCK["nodes"]._replace(low=lowest, high=n_nodes - 1)}
+    found = BlockTables(
+        **{own: _read(file, f"{name}/{own}", how, sizes) for own, how in declared.items()}
+    )
+    # Of a wire two points at least are shown; of all else two belong together.
+    least, step, most = (2, 1, sizes["B"]) if is_wire else (0, 2, sizes["B"])
+    wrong = (found.count < least) | (found.first + found.count > most)
+    wrong |= (found.first % step != 0) | (found.count % step != 0)
+    if wrong.any() or most % step:
+        raise FieldsFault(f"{name}/first and {name}/count do not show points out of its {most}")
+    fault = _cells_fault(found)
+    if fault:
+        raise FieldsFault(f"{name}/{fault}")
+    for kind in KINDS.values():
+        if kind.name in file[name]:
+            _field(file, name, kind, int(found.count.sum()))
+    return found
+
+
+def _cells_fault(block: BlockTables) -> str:
+    """What is wrong with the cells of the snapshots, as a clause behind the name of the block."""
+    begin, number = block.cell_first, block.cell_count
+    if (begin + number > len(block.cells)).any():
+        return f"cell_count shows other cells than its {len(block.cells)}"
+    largest = np.append(block.cells.max(axis=1, initial=-1), -1)
+    if not begin.any():  # all snapshots have the first of the same cells
+        reached = np.maximum.accumulate(largest)[number - 1]
+    elif (begin == np.cumsum(number) - number).all():  # each has its own
+        reached = np.maximum.reduceat(largest, begin)
+    else:
+        return "cell_first does not ascend by cell_count"
+    if (np.where(number > 0, reached, -1) >= block.count).any():
+        return "cells join points that a snapshot does not show"
+    return ""
+
+
+def _field(file: h5py.File, name: str, kind: FieldKind, n_points: int) -> None:
+    """Raise FieldsFault unless a field has its numbers for all points of all snapshots."""
+    rows = kind.values_of(n_points)
+    shape = (rows, kind.components)[: 1 + (kind.components > 1)]
+    _table(file, f"{name}/{kind.name}", np.dtype(kind.number), shape)
