@@ -218,6 +218,8 @@ def _run_files(folder: Path) -> Iterator[os.stat_result]:
 
 
 def _is_hdf5(path: Path) -> bool:
+    if not path.is_file():  # a pipe would be waited for
+        return False
     try:
         with path.open("rb") as file:
             return file.read(len(_HDF5)) == _HDF5

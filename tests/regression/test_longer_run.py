@@ -8,6 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from damaging import unseal
 from program import MPIRUN, assert_same_histories, assert_sound, catenary, short_run
 
 from catenary.cases.run.extending import extended_scene
@@ -54,6 +55,17 @@ def test_a_run_goes_on_to_a_later_end(whole: Path, begun: Path, tmp_path: Path) 
         for name in ("n_steps_planned", "arrivals", "effects_on", "effects_off", "n_steps"):
             assert found.attributes[name] == expected.attributes[name], name
     assert_same_tables(out, whole)
+
+
+def test_a_file_without_checksums_goes_on_as_well(begun: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    shutil.copytree(begun, out)
+    with h5py.File(out / "run.h5", "r+") as file:
+        unseal(file)
+    words = ["restart", str(out), *LATER, "--", "-march_ts_max_steps", "800"]
+    assert catenary(*words, cwd=tmp_path).code == 1
+    with Results(out) as results:
+        assert results.damage == [] and results.outcome == "interrupted"
 
 
 @pytest.mark.skipif(MPIRUN is None, reason="needs mpirun")

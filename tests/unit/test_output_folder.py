@@ -117,6 +117,12 @@ def test_links_and_folders_in_place_of_the_result(tmp_path: Path) -> None:
         refuse_earlier(tmp_path, force=True)
 
 
+def test_a_pipe_in_place_of_the_result_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "run.h5")
+    with pytest.raises(InputError, match="is there already, and is no result file"):
+        refuse_earlier(tmp_path, force=False)
+
+
 LARGE = {
     "bytes": (RunSize(230e9, 60.0, 1000), "1000 steps take about 1 min and 230.0 GB in "),
     "steps": (RunSize(1e9, 600.0, 8_000_000), "8000000 steps take about 10 min and 1.0 GB in "),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from measuring import COMM
 from typer.testing import CliRunner
 
 from catenary.cases.cli.main import app
+from catenary.cases.cli.studies.sweep import _refuse_other_sweep
 from catenary.cases.result_folder import output_folder
 from catenary.cases.run.planning.needs import needs_before_meshing
 from catenary.cases.run.runner import run_case
@@ -409,3 +411,14 @@ def test_a_sweep_without_room_for_all_its_runs_is_refused(
     passing = [replace(job, keep_results=False) for job in jobs]
     room[0] = 1.5 * max(one, other) + 2e6  # and a report, by which a run alone is judged
     assert [end.outcome for end in run_jobs(passing, tmp_path / "out", COMM)] == ["done", "done"]
+
+
+@pytest.mark.parametrize("text", ["[" * 5000, '{"variants": [{"name": 3}, 4]}', "{"])
+def test_a_table_that_no_sweep_wrote_names_no_variants(text: str, tmp_path: Path) -> None:
+    (tmp_path / "sweep.json").write_text(text)
+    _refuse_other_sweep(tmp_path, [], False)
+
+
+def test_a_pipe_in_place_of_a_record_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "variant.json")
+    assert read_record(tmp_path / "variant.json") is None

@@ -179,8 +179,9 @@ def _refuse_other_sweep(out: Path, variants: Sequence[Variant], force: bool) -> 
     if force or not path.is_file():
         return
     try:
-        there = {one["name"] for one in json.loads(path.read_text(encoding="utf-8"))["variants"]}
-    except (OSError, ValueError, KeyError, TypeError):
+        table = json.loads(path.read_text(encoding="utf-8"))
+        there = {str(one["name"]) for one in table["variants"]}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         there = set()
     other = sorted(there - {variant.name for variant in variants})
     if other:

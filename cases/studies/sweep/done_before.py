@@ -92,6 +92,8 @@ def _number_or_null(value: Any) -> bool:
 
 def _table(path: Path) -> dict[str, Any] | None:
     """A JSON table, None if there is no file or no whole table in it, which is logged."""
+    if not path.is_file():  # a pipe would be waited for
+        return None
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except OSError:
