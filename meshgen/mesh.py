@@ -120,6 +120,27 @@ def reduced(mesh: LineMesh, places: np.ndarray, within: float) -> LineMesh:
     )
 
 
+def with_nodes_at(mesh: LineMesh, wire: str, places: np.ndarray, within: float) -> LineMesh:
+    """The mesh with nodes of a wire at ``places`` (n,) [m], if none is nearer than ``within``."""
+    nodes = mesh.wires[wire]
+    x = mesh.x(nodes)
+    before = np.clip(np.searchsorted(x, places) - 1, 0, x.size - 2)
+    new = np.minimum(places - x[before], x[before + 1] - places) > within
+    places, before = places[new], before[new]
+    first, second = mesh.points[nodes[before]], mesh.points[nodes[before + 1]]
+    share = (places - first[:, 0]) / (second[:, 0] - first[:, 0])
+    numbers = mesh.n_nodes + np.arange(places.size)
+    breaks = mesh.breaks
+    if wire in breaks:
+        breaks = breaks | {wire: breaks[wire] + np.searchsorted(before + 1, breaks[wire])}
+    return replace(
+        mesh,
+        points=np.concatenate([mesh.points, first + share[:, None] * (second - first)]),
+        wires=mesh.wires | {wire: np.insert(nodes, before + 1, numbers)},
+        breaks=breaks,
+    )
+
+
 def elements_of(nodes: np.ndarray, breaks: np.ndarray = _NONE) -> np.ndarray:
     """First and second node of the elements of a wire, (n, 2), in order of x.
 

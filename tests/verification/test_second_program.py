@@ -83,6 +83,7 @@ def _of_run(plain: PlainLine, history: History) -> dict[str, float]:
 
 
 @pytest.mark.study
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("case", CASES)
 def test_expected_figures_are_those_of_the_second_program(case: str) -> None:
     path = shipped()[case].parent / "reference" / "expected.csv"

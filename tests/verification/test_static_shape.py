@@ -17,6 +17,7 @@ from small_lines import (
     problem_of,
 )
 
+from catenary.meshgen.hardware import Fittings
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
@@ -215,14 +216,17 @@ def test_droppers_are_cut_shorter_than_they_hang() -> None:
         print(f"stretched by {(distance - form.dropper_length).max() * 1e3:.2f} mm at most")
 
 
-@pytest.mark.parametrize("lateral", [False, True])
-def test_droppers_are_cut_to_the_same_lengths_on_every_mesh(lateral: bool) -> None:
+@pytest.mark.parametrize("more", ["", "lateral_motion", "fittings"])
+def test_droppers_are_cut_to_the_same_lengths_on_every_mesh(more: str) -> None:
     """Meshes of one and five elements a gap, beside Hermite's elements that resolve the layer."""
     line = ac_simple_line(5)
-    effects = HANGING | {"lateral_motion"} if lateral else HANGING
-    if lateral:
+    if more == "lateral_motion":
         line = replace(line, steady_arm=replace(line.steady_arm, inclination=np.deg2rad(10.0)))
-    problem = problem_of(line, effects)
+    problem = problem_of(line, HANGING | {more} if more else HANGING)
+    if more == "fittings":
+        # Between droppers, and between nodes of the meshes.
+        heavy = Fittings("section_insulator", CONTACT_WIRE, (123.4, 150.15), (15.0, 8.0))
+        problem = replace(problem, line=replace(problem.line, fittings=(heavy,)))
     coarse, usual = (lengths_to_cut(problem, mesh_of(line, n)) for n in (1, 5))
     # What is left are the same nodes; where a mesh divides gaps they differ by round-off of x.
     check("lengths [m]", coarse, usual, within=1e-9)
@@ -260,6 +264,18 @@ def test_a_dropper_that_would_be_slack_is_refused() -> None:
     bad = replace(line, pre_sag=(line.pre_sag[0], sag, line.pre_sag[0]))
     with pytest.raises(InputError, match=r"span 2 at 17\.00 m .* slack at rest"):
         find_form(problem_of(bad, HANGING), mesh_of(bad, 2))
+
+
+def test_soft_droppers_settle_on_a_fine_mesh() -> None:
+    """Round-off of 12 EI / h^3 times a height is some 1e-6 N, which stretches 1e3 N/m by 1e-9 m,
+    in each pass another one, as what arms lift differs by round-off too."""
+    line = ac_simple_line(3)
+    soft = replace(line, dropper=replace(line.dropper, stiffness=1e3))
+    soft = replace(soft, dropper_positions=((20.0, 20.8, 35.0),) * 3, pre_sag=((0.0,) * 3,) * 3)
+    soft = replace(soft, steady_arm=replace(line.steady_arm, inclination=np.deg2rad(10.0)))
+    problem = problem_of(soft, HANGING | {"lateral_motion"})
+    _, form = find_form(problem, mesh_of(soft, 64))
+    assert (form.dropper_length > 0.0).all()
 
 
 def test_a_dropper_that_would_be_cut_to_nothing_is_refused() -> None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from catenary.meshgen.geometry import SAME_CUT
 from catenary.meshgen.line import Line
-from catenary.meshgen.mesh import LineMesh, reduced
+from catenary.meshgen.mesh import LineMesh, reduced, with_nodes_at
 from catenary.meshgen.wires import Wire
 from catenary.solver.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
@@ -38,6 +38,8 @@ from catenary.solver.statics.rest_loads import dead_loads, exact_moments
 # Lengths are printed to a tenth of a millimetre; the iteration contracts by the ratio of dropper
 # weight to tension sag, about 1e-3, so that this costs one more pass and leaves no trace in forces.
 _LENGTH_TOLERANCE = 1e-10
+# Round-off of a dropper's force in terms of stiffness times height of the elements beside it.
+_ROUND_OFF = 100.0 * float(np.finfo(float).eps)
 _MAX_PASSES = 30
 # Of what steady arms lift, which follows from the lateral plane, in terms of the largest tension:
 # some ten times what round-off leaves of vertical forces on lines of 20 kN.
@@ -69,12 +71,15 @@ def lengths_to_cut(problem: Problem, mesh: LineMesh) -> np.ndarray:
     """Unstretched lengths to which droppers are cut, (n_droppers,) [m]. Not collective.
 
     They hold for any mesh: wires bend within sqrt(EI / T), some 0.1 m, of what holds them, which
-    elements of a mesh do not resolve. Here elements go from one dropper, clamp or support to the
-    next and are exact. A line of ``find_form`` has lengths of its own, for it to be balanced on its
-    mesh.
+    elements of a mesh do not resolve. Here elements go from one dropper, clamp, fitting or support
+    to the next and are exact. A line of ``find_form`` has lengths of its own, for it to be balanced
+    on its mesh.
     """
-    places = problem.line.support_positions
-    joints = reduced(mesh, places, SAME_CUT)
+    places = [problem.line.support_positions]
+    for fittings in problem.line.fittings:
+        places.append(np.array(fittings.x))
+        mesh = with_nodes_at(mesh, fittings.wire, places[-1], SAME_CUT)
+    joints = reduced(mesh, np.concatenate(places), SAME_CUT)
     cut, form = _cut(_as_installed(problem), joints, pushing=True, exact=True)
     return form.dropper_length + errors_of_length(problem, cut)
 
@@ -102,10 +107,13 @@ def _cut(
     exact : whether wires bend as tensioned beams do, or by Hermite's functions as in motion
     """
     length = mesh.points[mesh.droppers[:, 0], 2] - mesh.points[mesh.droppers[:, 1], 2]
+    apart, stretched = length, np.zeros(length.size)
     hanging: _HangingWires | None = None
     model: Model | None = None
     lateral: LateralShape | None = None
     close = _FORCE_TOLERANCE * max(wire.tension for wire in problem.line.wires)
+    noise, slackest = _noise(problem, mesh), min(wire.tension for wire in problem.line.wires)
+    give = float(np.diff(problem.line.support_positions).max()) / (4.0 * slackest)
     for _ in range(_MAX_PASSES):
         model = build(problem, mesh, length, before=model, apart=True)
         hanging = hanging or _HangingWires(model, exact)
@@ -116,8 +124,13 @@ def _cut(
             form = _with_lateral(model, form, exact)
             lateral = form.lateral
             still_lifted = _most_change(before, lateral)
-        change = np.abs(form.dropper_length - length).max(initial=0.0)
-        length = form.dropper_length
+        distance = np.linalg.norm(form.dropper_vectors(mesh.droppers), axis=1)
+        stretch = distance - form.dropper_length
+        # Less what round-off of forces moves droppers, and wires between masts, by.
+        moves = np.abs(distance - apart) - noise * give
+        grown = np.abs(stretch - stretched) - noise / model.dropper_stiffness
+        change = max(moves.max(initial=0.0), grown.max(initial=0.0))
+        length, apart, stretched = form.dropper_length, distance, stretch
         if change < _LENGTH_TOLERANCE and still_lifted < close:
             return model, form
     raise InputError(
@@ -125,6 +138,16 @@ def _cut(
         f"by {1e3 * change:.2g} mm, and what steady arms lift by {still_lifted:.2g} N, as both "
         "stretch the line; make line.dropper.mass_kg_per_m smaller, or the tensions greater"
     )
+
+
+def _noise(problem: Problem, mesh: LineMesh) -> float:
+    """Round-off of forces of droppers [N], which fine elements of stiff wires make."""
+    stiffest = 0.0
+    for wire in problem.line.wires:
+        shortest = float(np.diff(mesh.x(mesh.elements(wire.name)), axis=1).min())
+        beside = 12.0 * wire.bending_stiffness / shortest**3 + 2.0 * wire.tension / shortest
+        stiffest = max(stiffest, beside)
+    return _ROUND_OFF * stiffest * float(np.abs(mesh.points[:, 2]).max())
 
 
 def about(model: Model, form: Equilibrium) -> tuple[Model, Equilibrium]:
