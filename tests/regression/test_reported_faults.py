@@ -425,7 +425,8 @@ FAULTS = (
         "end, tell, or are alike with a quarter of the step",
         "regression/test_fuzz_stability.py",
         "test_nothing_runs_away_without_a_word",
-    # Conductor rails and the pantographs under them
+        # Conductor rails and the pantographs under them
+    ),
     Fault(
         "a conductor rail, 120 km/h",
         "refused and judged by sqrt(T / m), 13.5 km/h",
@@ -453,6 +454,7 @@ FAULTS = (
         "counted; check and pantograph say that the force depends on the height",
         "unit/mbs/test_tied_chains.py",
         "test_a_tied_chain_says_by_how_much_its_force_depends_on_the_height",
+    ),
     # ---- wind, lateral damping, lengths of droppers ---------------------------------------------
     Fault(
         "windy_viaduct: 0.00097 u^2 of the train's own flow in a wind across the track",
@@ -509,6 +511,7 @@ FAULTS = (
         "made by a second program on equal inputs",
         "verification/test_second_program.py",
         "test_expected_figures_are_those_of_the_second_program",
+    ),
     # ---- other programs, other systems --------------------------------------------------------
     Fault(
         "a matplotlibrc with text.usetex, or a dark style, in the working directory",
@@ -579,6 +582,7 @@ FAULTS = (
         "-0.04 N; 0",
         "unit/postproc/test_csv_text.py",
         "test_zero_has_no_sign",
+    ),
     # ---- what a user sees and waits for -------------------------------------------------------
     Fault(
         "make setup in a fresh clone",
@@ -642,6 +646,7 @@ FAULTS = (
         "the spans that move: 46 MB, 1.2 times",
         "regression/test_windowed_records.py",
         "test_snapshots_show_what_moves",
+    ),
     # ---- a result file is data ----------------------------------------------------------------
     Fault(
         "a state in run.h5 whose numbers lie in a file of the user",

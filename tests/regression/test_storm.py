@@ -1,4 +1,4 @@
-"""A storm over the viaduct: bounded, or refused and ended in a sentence, never "done" without one."""
+"""A storm over the viaduct: bounded, refused or ended in a sentence, never "done" without one."""
 
 from __future__ import annotations
 

@@ -142,6 +142,8 @@ def _words(seed: int, n_steps: int, wide: random.Random | None) -> dict[str, obj
         behind = []
     words["train.pantographs"] = f"[{','.join(names if behind else names[:1])}]"
     words["line.dropper.slack_damping"] = rng.choice(SLACK_DAMPINGS)
+    if random.Random(f"stiff {seed}").random() < 0.3:
+        words["effects.stiff_link_damping"] = "false"
     if wide is not None:
         room = min(start - (rear if behind else 0.0), length - way - start)
         put_more(wide, words, span, room, n_steps)

@@ -189,9 +189,9 @@ def test_no_effect_is_found_by_its_name() -> None:
 def test_the_table_names_every_shipped_effect() -> None:
     """A new effect must be counted here as well; what depends on the matrices of others stands in
     `test_absorbing_layers.py`, `test_periodic_ends.py`, `test_axial_counting.py`; what twin wires
-    have in `test_twin_counting.py`."""
+    have in `test_twin_counting.py`, stiff links in `test_stiff_links.py`."""
     elsewhere = {"absorbing_layers", "periodic_ends", "axial_motion", "tensioners", "temperature"}
-    elsewhere |= {"lateral_motion", "relative_motion"}
+    elsewhere |= {"lateral_motion", "relative_motion", "stiff_link_damping"}
     assert set(effects.registry()) == {"vertical", *elsewhere, *BLOCKS}
 
 
