@@ -13,6 +13,7 @@ import numpy as np
 
 from catenary.meshgen.slowest_wave import slowest_wave, slowest_wave_of
 from catenary.meshgen.wires import Role
+from catenary.solver.effects import all_effects as effects
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.window import BOUNDED, EXACT, ROUND_OFF, WindowChoice
 
@@ -117,17 +118,20 @@ def reach_of_motion(problem: Problem) -> Reach | None:
     All of it may without a window, under gusts, with incidents, whose loads stay where they are,
     and where motion bounds the window and waves of the wires' stretch leave the train behind.
     """
-    window, wind = problem.window, problem.wind
-    gusts = wind is not None and wind.gusts is not None and "gusts" in problem.effects
-    if not window.moves or problem.incidents or gusts:
+    window = problem.window
+    if not window.moves or problem.incidents:
+        return None
+    laws, wires = effects.simulated(problem), problem.line.wires
+    if laws.wind is not None and laws.wind.gusts is not None:
         return None
     span = float(np.diff(problem.line.support_positions).max())
     if window.by_motion == 0.0:
         return Reach(window.spans_behind * span, window.spans_ahead * span)
-    if "axial_motion" in problem.effects:
-        return None
+    groups = effects.unknown_groups(effects.active(problem), wires)
+    if any("u" in names for group in groups for names in group.values()):
+        return None  # waves along the track are far faster
     margin = _BEYOND_FRONT * span
-    return Reach(margin, margin, max(wire.wave_speed for wire in problem.line.wires))
+    return Reach(margin, margin, max(slowest_wave_of(problem.line, wire) for wire in wires))
 
 
 def estimated_error(problem: Problem, ahead: float, behind: float) -> float:
