@@ -17,7 +17,7 @@ from catenary.solver.base.petsc_events import NAMES
 ONE_BY_ONE, OF_RANKS = {"LineProduct", "LineSolve"}, {"ContactReduce", "ContactReply"}
 # Whoever asks for events is shown those of single steps.
 OF_BLOCKS = {"Steps"}
-STAGES = ["mesh", "equilibrium", "distribute", "march", "report"]
+STAGES = ["mesh", "equilibrium", "prepare solver", "march", "report"]
 # An end that comes early, and its exit code: what needs some steps only need not wait for 2016.
 EARLY, INTERRUPTED = ["-march_ts_max_steps", "400"], 1
 NO_EFFECT = "had no effect"

@@ -22,7 +22,7 @@ ENDLESS = ("pantographs.three_masses.strips=",)
 
 def run(folder: Path, speed: float, *more: str) -> tuple[int, str]:
     words = (*LINE, f"wind.speed_m_per_s={speed:g}", *more)
-    ended = catenary("run", "windy_viaduct", "-o", folder, "--set", *words)
+    ended = catenary("run", "windy_viaduct", "-o", folder, "--set", *words, cwd=folder.parent)
     return ended.returncode, ended.stdout + ended.stderr
 
 
@@ -44,8 +44,9 @@ def test_arms_that_are_pushed_are_told_and_a_march_that_they_end_ends(tmp_path: 
 
 
 @pytest.mark.parametrize("verb", ["check", "static"])
-def test_pushed_arms_are_told_before_a_run(verb: str) -> None:
-    ended = catenary(verb, "windy_viaduct", "--set", *LINE, "wind.speed_m_per_s=50")
+def test_pushed_arms_are_told_before_a_run(verb: str, tmp_path: Path) -> None:
+    words = (*LINE, "wind.speed_m_per_s=50")
+    ended = catenary(verb, "windy_viaduct", "--set", *words, cwd=tmp_path)
     assert ended.returncode == 0
     assert "wires push 6 of 13 steady arms, the one at 660 m the most, with 13" in (
         ended.stdout + ended.stderr
