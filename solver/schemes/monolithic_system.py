@@ -18,7 +18,7 @@ from scipy import sparse
 
 from catenary.mbs.air.air_forces import AirForces
 from catenary.mbs.build import steady_forces
-from catenary.mbs.head.newmark_head import raised
+from catenary.mbs.head.newmark_head import raised, raising_rate
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.contact.train.air_around import airflow
 from catenary.solver.integrators.loads.line_loads import LineLoads
@@ -97,6 +97,11 @@ class WholeSystem:
                 for place, kind, lifted in zip(train.placements, data, on_frame, strict=True)
             ]
         )
+        # Of chains that are tied to their bases, these rise with the lift: spring and damper, 0 of
+        # others, and from where, see ``place``.
+        tied = np.array([kind.tied for kind in data])
+        self._rises = tied * np.array([[k.stiffnesses[-1], k.dampings[-1]] for k in data]).T
+        self._way = np.zeros(tied.size)
         nodes = model.contact_nodes
         self._x = model.mesh.x(nodes)
         self._wire = np.stack([model.dofs(nodes), model.dofs(nodes, "theta_y")], axis=1)
@@ -198,11 +203,19 @@ class WholeSystem:
         """Which links have switched, (n_links,) bool: riders with their masters."""
         return np.asarray(reserve[self._master] < 0.0)
 
+    def place(self, head_height: np.ndarray) -> None:
+        """Let bases that rise do so from where heads start, (n_pantographs,) [m]."""
+        stiff = self._rises[0] > 0.0
+        stands = self.level + self._base[stiff] / self._rises[0, stiff]
+        self._way[stiff] = head_height[stiff] - stands
+
     def residual(self, time: float, u: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """F(t, u, v, a), (n,) [N]; at held unknowns u itself."""
         result = self._mass @ a + self._damping @ v + self._stiffness @ u
         grown = raised(time, self._train.raise_time)
         result[self._carriers] -= grown * self._static + self._base
+        moved = np.array([1.0 - grown, -raising_rate(time, self._train.raise_time)])
+        result[self._carriers] -= self._way * (moved @ self._rises)
         for p, air in self._air:
             on_head, on_frame, _ = air.now(time)
             result[self.heads[p]] -= on_head

@@ -46,6 +46,7 @@ class TSAlpha2:
 
     def __post_init__(self) -> None:
         n = self.system.n
+        self.system.place(self.pantographs.head_height)
         self._u, self._v = np.zeros(n), np.zeros(n)
         for head, after, height in zip(
             self.system.heads,
