@@ -63,6 +63,7 @@ _CONSTANTS: dict[str, _Table] = {
         ("clock",), "-", "rows that are whole: of channels, energies, and channels of the line"
     ),
     "line/arm_x": _Table((ARM,), "m", f"{_PLACE} of steady arms"),
+    "line/arm_wire": _Table((ARM,), "-", "number of the wire that each steady arm holds"),
     "line/dropper_x": _Table((DROPPER,), "m", f"{_PLACE} of droppers"),
     "line/dropper_span": _Table((DROPPER,), "-", "span of each dropper, from 0"),
     "line/droppers": _Table((DROPPER, "upper_lower"), "-", "nodes of each dropper"),

@@ -92,21 +92,23 @@ def _pushed_near(model: Model, x: float) -> str:
 
 
 def refuse_lost_wire(model: Model, form: Equilibrium) -> None:
-    """Refuse a line whose contact wires stand beside a pantograph's strips at rest, as blown there
-    by the wind. Not collective.
+    """Refuse a line of several contact wires that all stand beside a pantograph's strips at rest,
+    blown there by the wind. Not collective.
+
+    A wire that is alone is followed beside the strips, which is told.
 
     Raises
     ------
     InputError
         With the stretch of the run in which a head finds no wire.
     """
-    if form.lateral is None:
+    wires = model.nodes_of(Role.CONTACT)
+    if form.lateral is None or len(wires) == 1:
         return
     train, shape = model.problem.train, form.lateral
     halves = [place.data.strips.half_length for place in train.placements]
     half = np.nanmin([*halves, np.inf])
     trailing = max(place.behind for place in train.placements)
-    wires = model.nodes_of(Role.CONTACT)
     x = np.unique(np.concatenate([model.mesh.x(nodes) for nodes in wires]))
     x = x[(x >= train.start - trailing) & (x <= train.end)]
     beside = np.full(x.size, np.inf)

@@ -91,12 +91,12 @@ def test_what_cannot_be_is_refused_in_a_sentence(assignments: list[str], sentenc
 def test_plan_and_arrivals_tell_how_the_line_ends() -> None:
     short = load_scene("en50318_2002", ["line.n_spans=16", "evaluation.to_m=900"])
     fixed = arrival_facts(short, problem_of(short))
-    assert any("far end of the line reflects" in text for text in fixed["warnings"])
+    assert any("reflection from the end of the line" in text for text in fixed["warnings"])
     scene = load_scene(
         "en50318_2002", ["line.n_spans=16", "evaluation.to_m=700", LAYER, f"{END}.spans=4"]
     )
     facts = arrival_facts(scene, problem_of(scene))
-    assert not any("reflects" in text for text in facts["warnings"])
+    assert not any("reflection" in text for text in facts["warnings"])
     (inside,) = (text for text in facts["warnings"] if "inside the absorbing layer" in text)
     assert "begins at 720 m" in inside
     assert facts["pantographs"][0]["far_end_met_at_m"] is None
@@ -113,8 +113,8 @@ def test_the_far_end_is_not_met_where_a_window_ends_before_it() -> None:
         return arrival_facts(scene, problem_of(scene))
 
     whole, moving = facts(line[:2]), facts([*line, *window])
-    assert any("far end of the line reflects" in text for text in whole["warnings"])
-    assert not any("reflects" in text for text in moving["warnings"])
+    assert any("reflection from the end of the line" in text for text in whole["warnings"])
+    assert not any("reflection" in text for text in moving["warnings"])
     by_motion = facts([*line, "window.tolerance=1e-6"])
     assert by_motion["warnings"] == whole["warnings"]
     # A window that reaches the end under way: what is reflected from then on is met later.

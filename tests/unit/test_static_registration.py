@@ -54,7 +54,7 @@ def test_arms_that_the_wind_pushes_are_told(tmp_path: Path) -> None:
     words += ["evaluation.to_m=770", "wind.speed_m_per_s=35"]
     result = invoke("static", "windy_viaduct", *(w for c in words for w in ("--set", c)))
     assert result.exit_code == 0, result.output
-    assert "pushed by the wire" in result.stdout
+    assert "At rest wires push" in result.stdout
 
 
 @pytest.mark.parametrize(

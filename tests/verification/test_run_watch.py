@@ -123,3 +123,18 @@ def test_a_contact_that_is_lost_for_good_is_told() -> None:
     assert outcome == "done"
     assert "has not touched a wire for more than a span, from" in watch.remarks[0]
     assert "touches no wire from" in watch.remarks[1]
+
+
+@pytest.mark.parametrize(("force", "ends"), [(1.8e3, False), (2e4, True)])
+def test_motion_beyond_linear_theory_is_told_and_ends_a_march(force: float, ends: bool) -> None:
+    """The elasticity of 0.4 mm/N lifts the wire, and with it arms of 1 m, by 0.7 and 8 m."""
+    line = en50318_line(4)
+    course = train(70.0, 60.0, 150.0, static_force=force, nominal_height=5.5)
+    problem = problem_of(
+        line, SLACKENS | {"structural_damping"}, train=course, numerics=numerics(2e-3)
+    )
+    watch, outcome = watch_of(problem)
+    assert any("is lifted by" in text and "holds up to 0.5" in text for text in watch.remarks)
+    assert (outcome != "done") == ends
+    if ends:
+        assert outcome.startswith("at ") and "ends at 1:" in outcome

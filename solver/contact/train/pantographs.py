@@ -107,12 +107,14 @@ class Pantographs:
         self._all_start = np.concatenate([np.repeat(strip_start, n_wires), self._start])
         shares = self.n * n_wires if n_wires > 1 else 0
         sizes = (self.n, 3 * self.n, strip_start.size, shares, self.n)
+        endless = np.full(self.n_contacts, np.inf)
         places_and_outputs = np.zeros(self.n_contacts + sum(sizes))
         self._all_places = places_and_outputs[: self._all_start.size]
         self.candidates = Candidates(
             places_and_outputs[: self.n_contacts],
             np.tile(np.arange(n_wires), strip_start.size),
-            np.repeat(np.repeat(half_length, counts), n_wires),
+            # A wire that is alone is never out of reach: beside the strips it runs on the horns.
+            np.repeat(np.repeat(half_length, counts), n_wires) if n_wires > 1 else endless,
         )
         rake = [
             placement.data.strips.rake * simulated.raked_strips for placement in train.placements

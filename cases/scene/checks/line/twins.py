@@ -31,6 +31,7 @@ _ALIKE = frozenset(
         "uplift_stops",
         "structural_damping",
         "dropper_slackening",
+        "stiff_link_damping",
         "residual_dropper_stiffness",
         "contact_loss",
         "contact_damping",
