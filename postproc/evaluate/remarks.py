@@ -159,7 +159,7 @@ def _about_droppers(results: Results) -> list[str]:
             "(effects.stiff_link_damping) keeps their switches from making energy, and softens the "
             f"forces of a few steps. Take {longest} to do without."
         ]
-    if results.fact("dropper_stiffness_damping") >= 0.5 * dt:
+    if results.fact("dropper_stiffness_damping") >= dt:
         return []
     return [
         f"{said}: when they slacken and tighten they give the line energy that it did not have. "

@@ -4,8 +4,8 @@ Average acceleration reflects the force of a spring with omega dt >> 1 from step
 amplification factor goes to -1) and does the work (T_n + T_n+1) / 2 times the stretch of a step. A
 link that slackens from a stretch a to a gap b thereby returns k a (a + b) / 2, though only
 k a^2 / 2 was stored, and a stiff link switches in every other step: the line gains energy. A damper
-alpha k in the link with alpha = dt / 2 makes the amplification factor zero and the work of a
-slackening link at most what it stored (docs/theory.md, section 6).
+alpha k in the link makes the factor (2 alpha - dt) / (2 alpha + dt): with alpha = dt it is 1/3, and
+a link that slackens returns less than it stored (docs/theory.md, section 6).
 """
 
 from __future__ import annotations
@@ -48,13 +48,13 @@ def _given(problem: Problem) -> Damping:
 
 
 def _added(problem: Problem) -> dict[str, float]:
-    """By component the alpha [s] that its links lack to have dt / 2."""
+    """By component the alpha [s] that its links lack to have dt."""
     given, dt = _given(problem), problem.numerics.dt
     found = {}
     for name, stiffness in _one_sided(problem):
         alpha, _ = given.per_component.get(name, (given.alpha, given.beta))
-        if stiffness * dt**2 > STIFF and alpha < 0.5 * dt:
-            found[name] = 0.5 * dt - alpha
+        if stiffness * dt**2 > STIFF and alpha < dt:
+            found[name] = dt - alpha
     return found
 
 
@@ -71,7 +71,7 @@ register(
     Effect(
         NAME,
         "numerical damping of droppers and stops that are stiff for the time step",
-        "a damper alpha k in each link that acts one way, with alpha = dt / 2",
+        "a damper alpha k in each link that acts one way, with alpha = dt",
         "amplification factor of average acceleration for omega dt >> 1; docs/theory.md section 6",
         default=True,
         applies=lambda p: bool(_added(p)),

@@ -30,27 +30,27 @@ def model_of(problem: Problem) -> Model:
     return find_form(problem, mesh_of(en50318_line(2), 1))[0]
 
 
-def test_stiff_droppers_get_what_they_lack_of_half_a_step() -> None:
+def test_stiff_droppers_get_what_they_lack_of_a_step() -> None:
     problem, dt = stiff(1e6, 1e-3), 1e-3
     laws = simulated(problem)
-    assert laws.damping.per_component == {"droppers": (0.5 * dt, 0.01)}
-    assert laws.added_alpha == {"droppers": 0.5 * dt - ALPHA}
+    assert laws.damping.per_component == {"droppers": (dt, 0.01)}
+    assert laws.added_alpha == {"droppers": dt - ALPHA}
     model = model_of(problem)
-    assert model.dropper_damping == pytest.approx(np.full(18, 0.5 * dt * 1e6), rel=1e-12)
+    assert model.dropper_damping == pytest.approx(np.full(18, dt * 1e6), rel=1e-12)
     assert np.array_equal(model.released_damping, model.dropper_damping)
 
 
 def test_it_is_released_with_the_spring_where_dampers_are_kept() -> None:
     kept = replace(stiff(1e6, 1e-3), slack_dampers_act=True)
     model = model_of(kept)
-    assert model.released_damping == pytest.approx(np.full(18, 4e-4 * 1e6), rel=1e-12)
+    assert model.released_damping == pytest.approx(np.full(18, 9e-4 * 1e6), rel=1e-12)
 
 
 @pytest.mark.parametrize(
     ("problem", "why"),
     [
         (stiff(0.99 * STIFF * 1e6, 1e-3), "not stiff for the step"),
-        (stiff(1e6, 1e-3, alpha=5e-4), "damped by half a step already"),
+        (stiff(1e6, 1e-3, alpha=1e-3), "damped by a step already"),
         (stiff(1e6, 1e-3, EFFECTS - {"dropper_slackening"}), "droppers that do not switch"),
         (stiff(1e6, 1e-3, WHOLE), "left out"),
     ],
@@ -69,4 +69,4 @@ def test_stiff_stops_have_it_as_well() -> None:
     problem = problem_of(
         replace(line, steady_arm=arm), effects, damping=Damping(0.0, 0.0), numerics=numerics(1e-3)
     )
-    assert simulated(problem).added_alpha == {UPLIFT_STOPS: 5e-4}
+    assert simulated(problem).added_alpha == {UPLIFT_STOPS: 1e-3}
