@@ -40,8 +40,8 @@ TOLD_SHARE = 0.05
 TOLD_ROTATION, MOST_ROTATION = 0.1, 1.0
 TOLD_ARM, MOST_ARM = 0.5, 1.0
 _ROTATIONS = ("theta_y", "theta_z")
-# Time between two looks at energy and motion [s]: what runs away grows tenfold in it at most.
-_LOOKS = 0.25
+# Time between two looks at energy and motion [s]. A look takes as long as twenty steps of 1 ms.
+_LOOKS = 1.0
 
 
 def watch_cadence(dt: float) -> int:

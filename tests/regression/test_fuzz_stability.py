@@ -44,7 +44,7 @@ LITTLE_ENERGY, LITTLE_ROTATION = 10.0, 0.02
 
 
 class Seen(NamedTuple):
-    """How a run ended, its telling remarks, and the largest energy [J] and rotation [rad] of the line."""
+    """How a run ended, its telling remarks, and the line's largest energy [J] and rotation [rad]."""
 
     outcome: str
     remarks: list[str]
