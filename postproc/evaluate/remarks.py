@@ -217,8 +217,9 @@ def _about_head(head: _Contact) -> list[str]:
         )
     if head.omega * head.dt > _RESOLVED:
         result.append(
-            f"{said}: a step of {1e3 * head.dt:g} ms does not resolve its hops. Forces "
-            "below 20 Hz hold, but the loss of contact counts steps, not losses. Take a smaller "
-            "numerics.dt_s, or a contact that damps."
+            f"{said}: a step of {1e3 * head.dt:g} ms does not resolve its hops. If the head loses "
+            "contact they feed the line, with forces several times too large, and the loss of "
+            "contact counts steps, not losses. Take a smaller numerics.dt_s, a contact that damps, "
+            "or numerics.newmark_gamma = 0.6 with newmark_beta = 0.3025."
         )
     return result

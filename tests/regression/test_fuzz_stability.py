@@ -34,6 +34,7 @@ WILDLY = 10.0
 TELLING = (
     "The time integration makes energy",
     "they give the line energy",
+    "does not resolve its hops",
     "has turned by",
     "is lifted by",
     "touches no wire",
@@ -44,7 +45,7 @@ LITTLE_ENERGY, LITTLE_ROTATION = 10.0, 0.02
 
 
 class Seen(NamedTuple):
-    """How a run ended, its telling remarks, and the line's largest energy [J] and rotation [rad]."""
+    """How a run ended, what it told, and the largest energy [J] and rotation [rad] of the line."""
 
     outcome: str
     remarks: list[str]
