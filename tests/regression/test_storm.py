@@ -54,3 +54,13 @@ def test_pushed_arms_are_told_before_a_run(verb: str, tmp_path: Path) -> None:
     assert "wires push 6 of 13 steady arms, the one at 660 m the most, with 13" in (
         ended.stdout + ended.stderr
     )
+
+
+def test_of_several_wires_one_must_be_above_the_strips(tmp_path: Path) -> None:
+    """Of two wires one beside the strips is out of reach: an overlap passes the force so."""
+    blown = ("effects.lateral_motion=true", "wind={speed_m_per_s=70,height_m=6}")
+    wires = ("line.contact_wire.diameter_mm=14.4", "line.messenger_wire.diameter_mm=14")
+    ended = catenary("check", "overlap", "--set", *blown, *wires, cwd=tmp_path)
+    assert ended.code == 2
+    assert "at rest the contact wire stands beside the strips at" in ended.stderr
+    assert "strips end at 0.6 m, so that a pantograph would lose it" in ended.stderr
