@@ -158,7 +158,8 @@ def _conclude(
     files += write_all(out_dir, {"study.csv": sweep_output.as_csv(table)})
     told = [f"{name}: {value}" for name, value in facts.items()]
     listed = [str(path) for path in files if path.stem == "study"]
-    return "\n".join([verdict_text(study), "", *told, "", *listed])
+    remarks = sweep_output.remarks_of(ended)
+    return "\n".join([verdict_text(study), "", *told, *remarks, "", *listed])
 
 
 def _load(path: Path) -> ModuleType:

@@ -30,7 +30,7 @@ IN_PARALLEL = (
 
 @pytest.mark.parametrize("case", hard_cases(), ids=lambda case: case.name)
 def test_a_hard_case_keeps_its_limits(case: HardCase) -> None:
-    found = check_case(case, MPI.COMM_SELF, MPI.COMM_SELF, short=False)
+    found, _ = check_case(case, MPI.COMM_SELF, MPI.COMM_SELF, short=False)
     for row in found:
         print(f"{row.name}: {row.value:.3g}, limit {row.limit:.3g} {row.note}")
     assert [row.name for row in found if not row.passed] == []
@@ -48,7 +48,7 @@ def test_ranks_agree_on_hard_cases(tmp_path: Path) -> None:
     )
     assert done.code == 0, done.stdout + done.stderr
     rows = table(tmp_path / "out")
-    assert {row["kept"] for row in rows} == {"yes"}
+    assert {row["kept"] for row in rows if row["criterion"] != "remarks"} == {"yes"}
     compared = [row["case"] for row in rows if row["criterion"] == "1 and 2 ranks, relative"]
     assert compared == list(IN_PARALLEL)
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
-from catenary.cases.studies.accuracy import markdown, runs
+from catenary.cases.studies.accuracy import markdown, output, runs
 from catenary.cases.studies.accuracy.analysis import QUANTITIES, Row
 from catenary.cases.studies.accuracy.axes import AXES, mesh
 from catenary.cases.studies.accuracy.plan import Plan, PlannedAxis
@@ -53,6 +54,24 @@ def test_a_page_has_words_for_names_and_no_empty_column() -> None:
     assert "broke" in table[4]
 
 
+def test_remarks_stand_below_the_tables_with_the_levels_that_they_are_of() -> None:
+    finer = replace(row("5_elements", 1.0), sizes={"h": 0.2})
+    rows = [replace(row("1_elements", 4.0), remarks=["lost"]), finer]
+    runs_of = {"1_elements": ["lost"], "5_elements": [], REFERENCE: ["stiff"]}
+    plan = Plan("a_case", [planned()], [], 2, True, [], ["elements"])
+    percent = {"elements": dict.fromkeys(QUANTITIES, 0.1)}
+    found = Measured(plan, rows, percent, 60.0, runs_of)
+    lines = markdown.page(found, [], {"elements": []}, "").splitlines()
+    table = [line for line in lines if line.startswith("|")]
+    assert [line.split("|")[-2].strip() for line in table] == ["remarks", "---", "1", ""]
+    told = ["elements 1 element: lost", "elements 0.2 ms 40 elements: stiff"]
+    assert [line for line in lines if line.startswith("- ")] == [f"- {text}" for text in told]
+    text = output.as_text(found, 1.0).splitlines()
+    assert text[-2:] == [f"REMARK      {line}" for line in told]
+    assert [line.split()[-1] for line in text[1:4]] == ["remarks", "1", "0"]
+    assert output.as_table(rows[0])["remarks"] == ["lost"]
+
+
 @pytest.mark.parametrize(
     ("name", "words"),
     [
@@ -77,6 +96,7 @@ def test_the_least_time_is_told() -> None:
             ],
             "supports": {"max_uplift_mm": 50.0},
             "indicators": {"time_step": {"force_error_N": [0.5]}},
+            "remarks": [f"of {name}"],
         }
         return Ended(Variant(name, ()), "done", summary, {"histories": [[1.0, 2.0]]})
 
@@ -86,3 +106,5 @@ def test_the_least_time_is_told() -> None:
     found = runs.evaluate(Plan("a_case", [one], [], 3), [ended(n) for n in names], times, 1.0)
     assert [each.cost for each in found.rows] == [0.04, 0.04]
     assert [each.timings for each in found.rows] == [3, 3]
+    assert [each.remarks for each in found.rows] == [["of 1_elements"], ["of 5_elements"]]
+    assert found.remarks[REFERENCE] == [f"of {REFERENCE}"]

@@ -196,6 +196,15 @@ def test_table_csv_and_json_hold_the_same(found: Costs, tmp_path: Path) -> None:
     change = record["rows"][2]["change_of_mean_N"]
     assert f"{change:+9.2f}" in next(line for line in text.splitlines() if "arm_stiff" in line)
     assert f"without {TWO[1]}" in text and "evaluated from 90 to 120 m" in text
+    assert found.remarks and "; ".join(found.remarks) == rows[0]["remarks"]
+    for number, row in enumerate(found.rows, start=1):
+        assert record["rows"][number]["remarks"] == row.remarks
+    both = [("as it is", found.remarks), *((f"without {r.switch.name}", r.remarks)
+            for r in found.rows)]  # fmt: skip
+    for name, remarks in both:
+        for remark in remarks:
+            (line,) = [line for line in text.splitlines() if line.endswith(f": {remark}")]
+            assert line.startswith("REMARK      ") and name in line
 
 
 def test_an_effect_that_a_scene_refuses_to_leave_out_is_told() -> None:

@@ -25,11 +25,28 @@ def test_the_error_falls_with_the_size_of_the_window(tmp_path: Path) -> None:
     # One span ahead and behind: some tenths of a per cent; the program's own is as good as exact.
     assert 1e-3 < small < 5.0 and usual < 1e-3 * small
     assert all(abs(one.sigma) <= one.history for one in curve.errors)
-    assert "chosen by the program" in window_error.as_text([curve]).splitlines()[-1]
+    told = window_error.as_text([curve])
+    assert "chosen by the program" in told.splitlines()[-1] and "REMARK" not in told
     names = {path.name for path in window_error.write(tmp_path, [curve])}
     assert names == {"window_error.csv", "window_error.png"}
     rows = (tmp_path / "window_error.csv").read_text().splitlines()
     assert len(rows) == 4 and rows[0].startswith("with,spans_ahead")
+
+
+def test_what_marches_tell_of_themselves_is_told_of_the_windows() -> None:
+    """The vehicle sinks by a metre, its pantograph with it, and stays down for a span."""
+    lost = (
+        "effects.vehicle_motion=true",
+        "vehicle.vertical.by_place=[[0,0],[335,0],[345,-1.0],[900,-1.0]]",
+        "pantographs.lumped.stiffnesses_N_per_m=[4200.0,1000.0]",
+    )
+    curve = window_error.curve_of("", load_scene("ambrosio2012", (*SHORT, *lost)), [5])
+    said, on = curve.remarks
+    assert "has not touched a wire for more than a span" in said and "to the end of the run" in on
+    assert [one.remarks for one in curve.errors] == [(said, on)] * 2
+    names = "whole line, 5 spans, 8 spans"
+    told = window_error.as_text([curve]).splitlines()
+    assert told[-2:] == [f"REMARK      {names}: {text}" for text in (said, on)]
 
 
 def test_sizes_that_cannot_be_are_refused() -> None:

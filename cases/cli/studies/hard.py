@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -64,19 +65,27 @@ def hard(
     from mpi4py import MPI
 
     from catenary.cases.studies.hard.checks import check_case
+    from catenary.cases.studies.told_remarks import remark_lines
     from catenary.postproc.files.disk import write_all
     from catenary.solver.base.parallel import on_root
 
     found: list[Criterion] = []
+    told: dict[str, dict[str, list[str]]] = {}
     for number, case in enumerate(cases, start=1):
         console.say(f"[{number}/{len(cases)}] {case.name}: {case.what}")
-        rows = check_case(case, comm, MPI.COMM_SELF, shortened)
+        rows, remarks = check_case(case, comm, MPI.COMM_SELF, shortened)
         console.say("\n".join(_line(row) for row in rows))
         found += rows
+        told[case.name] = remarks
     failed = [row for row in found if not row.passed]
+    lines = remark_lines(march for remarks in told.values() for march in remarks.items())
+    if lines:
+        console.say("\n" + "\n".join(lines) + "\n")
     if out is not None:
         folder = out
-        texts = dict(zip(TABLES, (as_csv(found), as_markdown(cases, found)), strict=True))
+        texts = dict(
+            zip(TABLES, (as_csv(found, told), as_markdown(cases, found, told)), strict=True)
+        )
         on_root(comm, lambda: write_all(folder, texts))
         console.say("\n".join(str(folder / name) for name in TABLES))
     console.say(
@@ -86,26 +95,40 @@ def hard(
     return console.NOT_ACCEPTED if failed else console.DONE
 
 
-def as_csv(found: list[Criterion]) -> str:
-    """All that was measured, a line each."""
+def as_csv(found: list[Criterion], told: Mapping[str, Mapping[str, list[str]]]) -> str:
+    """All that was measured, a line each, and the remarks on each case that has any.
+
+    ``told``: by case and march, what this one told of itself.
+    """
     heads = ("case", "criterion", "value", "limit", "kept", "note")
     rows = (
         (row.case, row.name, f"{row.value:.3g}", f"{row.limit:.3g}", _yes(row.passed), row.note)
         for row in found
     )
-    return csv_text(heads, rows)
+    remarked = (
+        (case, "remarks", len(texts), "", "", "; ".join(texts))
+        for case, remarks in told.items()
+        if (texts := [f"{march}: {text}" for march, own in remarks.items() for text in own])
+    )
+    return csv_text(heads, (*rows, *remarked))
 
 
 def _yes(passed: bool) -> str:
     return "yes" if passed else "no"
 
 
-def as_markdown(cases: list[HardCase], found: list[Criterion]) -> str:
-    """The same as a table with a line for each case."""
-    heads = ("case", "what is hard; *a right answer*", *_COLUMNS.values(), "others", "kept")
+def as_markdown(
+    cases: list[HardCase], found: list[Criterion], told: Mapping[str, Mapping[str, list[str]]]
+) -> str:
+    """The same as a table with a line for each case, and below it the remarks."""
+    from catenary.cases.studies.told_remarks import remark_lines
+
+    heads = (
+        "case", "what is hard; *a right answer*", *_COLUMNS.values(), "others", "remarks", "kept",
+    )  # fmt: skip
     lines = [
         f"| {' | '.join(heads)} |",
-        "|---|---|" + "---|" * (len(_COLUMNS) + 2),
+        "|---|---|" + "---|" * (len(_COLUMNS) + 3),
     ]
     for case in cases:
         rows = {row.name: row for row in found if row.case == case.name}
@@ -117,7 +140,11 @@ def as_markdown(cases: list[HardCase], found: list[Criterion]) -> str:
         )
         kept = "yes" if all(row.passed for row in rows.values()) else "**no**"
         words = f"`{case.name}` | {case.what}; *{case.right}*"
-        lines.append(f"| {words} | {' | '.join(columns)} | {others} | {kept} |")
+        remarks = sum(len(own) for own in told.get(case.name, {}).values()) or ""
+        lines.append(f"| {words} | {' | '.join(columns)} | {others} | {remarks} | {kept} |")
+    below = remark_lines(march for remarks in told.values() for march in remarks.items())
+    if below:
+        lines += ["", *(f"- {line.split(maxsplit=1)[1]}" for line in below)]
     return "\n".join(lines) + "\n"
 
 

@@ -170,7 +170,7 @@ def waves(
 
             start_petsc([])
             studied = study.study_excited(scene, excite, asked, out, force)
-    text = study.as_text(studied.theory, studied.measured)
+    text = study.as_text(studied.theory, studied.measured, studied.remarks)
     console.say(text + "\n" + "\n".join(map(str, studied.files)))
     return console.DONE
 
@@ -183,6 +183,7 @@ def _separations(
     from catenary.cases.process.petsc_options import start_petsc
     from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.sweep.jobs import RunOptions
+    from catenary.cases.studies.sweep.output import remarks_of
     from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product
     from catenary.cases.studies.waves import separation
     from catenary.cases.studies.waves.study import theory_of
@@ -200,7 +201,8 @@ def _separations(
         theory, span = theory_of(scene)
         files = separation.write(out, ended, theory, span)
     said = separation.as_text(separation.curves_of(ended), theory, span)
-    console.say("\n" + said + "\n" + "\n".join(map(str, files)))
+    lines = [*([said] if said else []), *remarks_of(ended), *map(str, files)]
+    console.say("\n" + "\n".join(lines))
     return verdict(ended, "curve")
 
 

@@ -72,6 +72,7 @@ class Row:
     iterations : rounds a step takes: of its small problem, or corrections (whole solves)
     by_step, by_mesh : quantity -> error of the step alone and of the mesh alone in percent, where
         both are refined: they may cancel in ``percent``
+    remarks : sentences about what decides the run's results
     """
 
     axis: str
@@ -86,6 +87,7 @@ class Row:
     iterations: float = math.nan
     by_step: dict[str, float] = field(default_factory=dict)
     by_mesh: dict[str, float] = field(default_factory=dict)
+    remarks: Sequence[str] = ()
 
     def worst(self, quantity: str) -> float:
         """The largest of the whole error and those of step and mesh alone [%]."""

@@ -12,10 +12,11 @@ from catenary.cases.studies.accuracy.axes import AXES
 from catenary.cases.studies.accuracy.axis import DISCRETISATION, Axis
 from catenary.cases.studies.accuracy.plan import PlannedAxis
 from catenary.cases.studies.accuracy.runs import Measured
+from catenary.cases.studies.told_remarks import remark_lines
 from catenary.postproc.evaluate.wording import counted
 
 _SEPARATE = ("history by step", "history by mesh")
-_LAST_COLUMNS = ("est/true", "solves", "s/s")
+_LAST_COLUMNS = ("est/true", "solves", "s/s", "remarks")
 _USUAL_REPEATS = 3  # that of the command line
 
 
@@ -49,13 +50,17 @@ def page(
         axis = planned.axis
         parts.append(f"## {axis.title[0].upper()}{axis.title[1:]}")
         if axis.kind == DISCRETISATION:
-            told = uncertainty_text(planned, found.uncertainty[axis.name])
+            doubt = uncertainty_text(planned, found.uncertainty[axis.name])
             reference = run_in_words(planned.reference)
-            parts.append(f"Reference: {reference}. {told[0].upper()}{told[1:]}.")
+            parts.append(f"Reference: {reference}. {doubt[0].upper()}{doubt[1:]}.")
         else:
             parts.append("Differences from the case as it is: of models, not errors.")
         parts.append(_table(axis, found.rows_of(axis.name)))
         parts += [line.strip()[0].upper() + line.strip()[1:] + "." for line in orders[axis.name]]
+    told = remark_lines(runs_with_remarks(found))
+    if told:
+        parts.append("## Remarks")
+        parts.append("\n".join(f"- {line.split(maxsplit=1)[1]}" for line in told))
     return "\n\n".join(parts) + "\n"
 
 
@@ -67,6 +72,28 @@ def _command(found: Measured) -> str:
     repeats = "" if found.plan.repeats == _USUAL_REPEATS else f" --repeats {found.plan.repeats}"
     changes = "".join(f" --set {shlex.quote(one)}" for one in found.plan.overrides)
     return f"catenary accuracy {found.plan.case}{some}{quick}{repeats}{changes}"
+
+
+def runs_with_remarks(found: Measured) -> list[tuple[str, Sequence[str]]]:
+    """All runs in words, by the levels that they are of, with their remarks.
+
+    A run of several axes has the words of each; one that is of none, such as a reference, has its
+    own.
+    """
+    words: dict[str, list[str]] = {}
+    for planned in found.plan.axes:
+        for level, name in planned.runs.items():
+            words.setdefault(name, []).append(f"{planned.axis.name} {in_words(level)}")
+    return [
+        (" or ".join(words.get(name, [_whole_in_words(name)])), remarks)
+        for name, remarks in found.remarks.items()
+    ]
+
+
+def _whole_in_words(name: str) -> str:
+    """The name of a run as axis and level in words."""
+    axis, _, level = name.rpartition("__")
+    return f"{axis} {in_words(level)}".strip()
 
 
 def uncertainty_text(planned: PlannedAxis, percent: Mapping[str, float]) -> str:
@@ -114,7 +141,8 @@ def _cells(axis: Axis, row: Row, both: bool) -> list[str]:
     figures = [row.percent.get(name, math.nan) for name in QUANTITIES]
     if both:
         figures += [row.by_step.get(HISTORY, math.nan), row.by_mesh.get(HISTORY, math.nan)]
-    return [_short(value) for value in (*figures, ratio, row.iterations, row.cost)]
+    told = [_short(value) for value in (*figures, ratio, row.iterations, row.cost)]
+    return [*told, str(len(row.remarks) or "")]
 
 
 def _short(value: float) -> str:

@@ -22,9 +22,14 @@ from catenary.cases.studies.accuracy.analysis import (
     pareto,
 )
 from catenary.cases.studies.accuracy.axis import DISCRETISATION, Axis
-from catenary.cases.studies.accuracy.markdown import run_in_words, uncertainty_text
+from catenary.cases.studies.accuracy.markdown import (
+    run_in_words,
+    runs_with_remarks,
+    uncertainty_text,
+)
 from catenary.cases.studies.accuracy.runs import Measured
 from catenary.cases.studies.sweep import output as sweep_output
+from catenary.cases.studies.told_remarks import remark_lines
 from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.report.pictures import figures
 
@@ -73,6 +78,7 @@ def as_table(row: Row) -> dict[str, Any]:
     table["rounds_per_step"] = _known(row.iterations)
     table["march_s_per_s"] = _known(row.cost)
     table["n_timed"] = row.timings
+    table["remarks"] = list(row.remarks)
     return table
 
 
@@ -86,7 +92,7 @@ def as_text(found: Measured, target: float) -> str:
             parts.append(f"  {uncertainty_text(planned, found.uncertainty[axis.name])}")
         parts += _order_lines(axis, rows)
         parts.append("")
-    return "\n".join([*parts, *advices(found, target)])
+    return "\n".join([*parts, *advices(found, target), *remark_lines(runs_with_remarks(found))])
 
 
 def advices(found: Measured, target: float) -> list[str]:
@@ -189,6 +195,7 @@ def _record(found: Measured, target: float) -> dict[str, Any]:
         "wall_s": found.wall,
         "axes": axes,
         "rows": [as_table(row) for row in found.rows],
+        "remarks": {name: list(told) for name, told in found.remarks.items() if told},
     }
 
 
@@ -204,7 +211,7 @@ def _axis_text(axis: Axis, reference: str, rows: Sequence[Row]) -> str:
     head += f"{'by step':>9}{'by mesh':>9}" if both else ""
     lines = [
         f"{axis.title}: {what} {reference} [%]",
-        f"  {'':{width}}{head}{'est/true':>10}{'solves':>8}{'s/s':>9}",
+        f"  {'':{width}}{head}{'est/true':>10}{'solves':>8}{'s/s':>9}{'remarks':>9}",
     ]
     for row in rows:
         if not row.done:
@@ -218,7 +225,7 @@ def _axis_text(axis: Axis, reference: str, rows: Sequence[Row]) -> str:
         ratio = row.estimate / true if axis.refined == "dt" and true else math.nan
         lines.append(
             f"  {row.level:{width}}{figures}{_short(_known(ratio)):>10}{row.iterations:>8.2f}"
-            f"{row.cost:>9.4f}"
+            f"{row.cost:>9.4f}{len(row.remarks):>9}"
         )
     return "\n".join(lines)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -39,12 +39,14 @@ class Measured:
     uncertainty : by axis name, of the reference itself (percent by quantity, infinite where it is
         not known), only of discretisation axes
     wall : time of all runs [s]
+    remarks : by name of a run, of levels and references, sentences about what decides its results
     """
 
     plan: Plan
     rows: Sequence[Row]
     uncertainty: Mapping[str, dict[str, float]]
     wall: float
+    remarks: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def rows_of(self, axis: str) -> list[Row]:
         """The rows of an axis."""
@@ -120,7 +122,8 @@ def evaluate(
         if planned.chains:
             chains = [[_found(runs[name]) for name in chain] for chain in planned.chains]
             uncertainty[planned.axis.name] = uncertainties(_found(runs[planned.reference]), chains)
-    return Measured(plan, rows, uncertainty, wall)
+    remarks = {one.variant.name: one.remarks for one in ended}
+    return Measured(plan, rows, uncertainty, wall, remarks)
 
 
 def _names(planned: PlannedAxis) -> list[str]:
@@ -159,6 +162,7 @@ def _row(
         counted["rounds"] / counted["steps"],
         by_step,
         by_mesh,
+        one.remarks,
     )
 
 

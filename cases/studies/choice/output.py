@@ -8,6 +8,7 @@ from typing import Any
 
 from catenary.cases.studies.choice.advice import advice
 from catenary.cases.studies.choice.study import FIGURES, UPLIFT, Costs, Measured, Size
+from catenary.cases.studies.told_remarks import remark_lines
 from catenary.postproc.evaluate.wording import counted, fixed
 from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.files.disk import plain, write_all
@@ -63,6 +64,8 @@ def as_text(found: Costs) -> str:
                 )
     lines += ["", "Advice:"]
     lines += [f"  {row.switch.name:{width}}  {sentence(found, row)}" for row in found.rows]
+    told = remark_lines([("as it is", found.remarks), *map(_told, found.rows)])
+    lines += ["", *told] if told else []
     if found.wish.only:
         return "\n".join(lines)
     if found.choice.always:
@@ -72,6 +75,11 @@ def as_text(found: Costs) -> str:
         wide = max(map(len, found.choice.lacking))
         lines += [f"  {name:{wide}}  {data}" for name, data in found.choice.lacking.items()]
     return "\n".join(lines)
+
+
+def _told(row: Measured) -> tuple[str, list[str]]:
+    """A run's name as in the table, and its remarks."""
+    return f"{'without' if row.switch.on else 'with'} {row.switch.name}", row.remarks
 
 
 def sentence(found: Costs, row: Measured) -> str:
@@ -137,7 +145,7 @@ def rows_of(found: Costs) -> list[dict[str, Any]]:
         {"effect": "", "simulated": "as it is", "together": [], "outcome": "done"},
         found.size,
         found.figures,
-        {"us_per_step": found.step, "cost": None, **place, "advice": ""},
+        {"us_per_step": found.step, "cost": None, **place, "advice": "", "remarks": found.remarks},
     )
     for row in found.rows:
         add(
@@ -154,6 +162,7 @@ def rows_of(found: Costs) -> list[dict[str, Any]]:
                 "cost": row.cost if row.done else None,
                 **place,
                 "advice": sentence(found, row),
+                "remarks": row.remarks,
             },
         )
     return rows
@@ -162,14 +171,14 @@ def rows_of(found: Costs) -> list[dict[str, Any]]:
 def as_csv(found: Costs) -> str:
     """The rows as CSV text; what is unknown is empty."""
     rows = rows_of(found)
-    return csv_text(list(rows[0]), ([_cell(value) for value in row.values()] for row in rows))
+    return csv_text(list(rows[0]), ([_cell(*item) for item in row.items()] for row in rows))
 
 
-def _cell(value: Any) -> Any:
+def _cell(name: str, value: Any) -> Any:
     if value is None:
         return ""
     if isinstance(value, list):
-        return " ".join(value)
+        return ("; " if name == "remarks" else " ").join(value)
     return f"{value:.9g}" if isinstance(value, float) else value
 
 

@@ -80,6 +80,7 @@ class Measured:
     size : of the line
     ratio : time of a step over that of the scene as it is
     figures : of each pantograph, ``FIGURES`` by name; and ``UPLIFT`` of the line under that name
+    remarks : sentences about what decides the run's results
     """
 
     switch: Switch
@@ -87,6 +88,7 @@ class Measured:
     size: Size | None = None
     ratio: float = math.nan
     figures: list[dict[str, float | None]] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
 
     @property
     def done(self) -> bool:
@@ -108,7 +110,7 @@ class Costs:
     wish, choice : what was asked for, and what the scene leaves to choose
     stretch : evaluated, from and to [m]
     n_steps : of a timed round
-    size, figures : of the scene as it is, as in ``Measured``
+    size, figures, remarks : of the scene as it is, as in ``Measured``
     step : least time of a step of it [us]
     names : of the pantographs
     rows : one of each switch
@@ -123,6 +125,7 @@ class Costs:
     figures: list[dict[str, float | None]]
     names: list[str]
     rows: list[Measured]
+    remarks: list[str] = field(default_factory=list)
 
 
 def jobs_of(wish: Wish) -> tuple[Choice, list[Job], dict[str, str]]:
@@ -232,13 +235,15 @@ def measure(
                 continue
             with RepeatedMarch(comm, _at_rest(job.scene), first, n_steps) as march:
                 timed, own = beside(march, as_it_is, wish.rounds), size_of(march)
-            rows.append(Measured(switch, "done", own, timed.ratio, figures_of(one.summary)))
+            figures = figures_of(one.summary)
+            rows.append(Measured(switch, "done", own, timed.ratio, figures, one.remarks))
             step = min(step, timed.least_of_other)
         size = size_of(as_it_is)
     names = [one["name"] for one in whole.summary["pantographs"]]
     start, end = scene.evaluation.from_m, scene.evaluation.to_m
     figures = figures_of(whole.summary)
-    return Costs(wish, choice, (start, end), n_steps, size, step, figures, names, rows)
+    stretch = start, end
+    return Costs(wish, choice, stretch, n_steps, size, step, figures, names, rows, whole.remarks)
 
 
 def _round_of(problem: Problem) -> tuple[int, int]:

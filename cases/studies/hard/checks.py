@@ -36,7 +36,14 @@ class Criterion(NamedTuple):
     note: str = ""
 
 
-def check_case(case: HardCase, world: Any, alone: Any, short: bool = False) -> list[Criterion]:
+class Checked(NamedTuple):
+    """What was measured of a hard case, and what the runs of its forms told of themselves."""
+
+    found: list[Criterion]
+    remarks: dict[str, list[str]]
+
+
+def check_case(case: HardCase, world: Any, alone: Any, short: bool = False) -> Checked:
     """Run a hard case in all its forms and measure it. Collective on ``world``.
 
     Parameters
@@ -45,33 +52,45 @@ def check_case(case: HardCase, world: Any, alone: Any, short: bool = False) -> l
     alone : a communicator of this process alone
     short : the case's short form; steps are halved once only then
     """
-    found: list[Criterion] = on_root(
-        world, lambda: _check_alone(case, alone, short), takes_long=True
-    )
+    checked: Checked = on_root(world, lambda: _check_alone(case, alone, short), takes_long=True)
     if world.size > 1:
-        found = [*found, _ranks(case, world, alone, short)]
-    return found
+        checked.found.append(_ranks(case, world, alone, short))
+    return checked
 
 
-def _check_alone(case: HardCase, comm: Any, short: bool) -> list[Criterion]:
+def _check_alone(case: HardCase, comm: Any, short: bool) -> Checked:
+    runs: dict[str, Watched] = {}
+    found = _measured(case, comm, short, runs)
+    return Checked(found, {name: run.remarks for name, run in runs.items()})
+
+
+def _measured(case: HardCase, comm: Any, short: bool, runs: dict[str, Watched]) -> list[Criterion]:
+    """What is measured of a case; puts its marches into ``runs``, by name."""
+
+    def marched(form: str, rest: LineAtRest, with_work: bool = False) -> Watched:
+        made = hard_runs.run(rest, comm, with_work, self_watched=True)
+        runs[f"{case.name} {form}".strip()] = made
+        return made
+
     rest = hard_runs.at_rest(case.scene(short), comm)
     if case.kind == "free":
         freed = hard_runs.run_free(rest, comm, case.short_steps if short else case.steps)
         drift = float(np.abs(freed.energy / freed.energy[0] - 1.0).max())
         return [_below(case, "relative change of energy", drift, case.energy_gain)]
-    base = hard_runs.run(rest, comm, with_work=True)
+    base = marched("", rest, with_work=True)
     found = [_holds(case, "runs to its end", base.outcome == "done", base.outcome)]
     if base.outcome != "done":
         return found
     found.append(_holds(case, "everything is finite", base.all_finite))
     found += _bounded(case, rest, base)
-    halved = hard_runs.run(_rest(case, comm, short, 1), comm, with_work=True)
+    halved = marched("at half the step", _rest(case, comm, short, 1), with_work=True)
     found += _energy(case, base, halved)
     if case.refined and not short:
-        quartered = hard_runs.run(_rest(case, comm, short, 2), comm)
+        quartered = marched("at a quarter of the step", _rest(case, comm, short, 2))
         found.append(_refined(case, base, halved, quartered))
     if case.fixed_point != "left out":
-        found.append(_correction(case, base, comm, short))
+        corrected = hard_runs.at_rest(case.scene(short, fixed_point=True), comm)
+        found.append(_correction(case, base, marched("by fixed-point correction", corrected)))
     return [*found, *_needs(case, rest, base)]
 
 
@@ -117,10 +136,8 @@ def _apart(coarse: Watched, fine: Watched) -> float:
     return float(np.sqrt((difference**2).mean()) / fine.height.std())
 
 
-def _correction(case: HardCase, base: Watched, comm: Any, short: bool) -> Criterion:
+def _correction(case: HardCase, base: Watched, other: Watched) -> Criterion:
     """The paper's correction agrees, or breaks where the table says so."""
-    scene = case.scene(short, fixed_point=True)
-    other = hard_runs.run(hard_runs.at_rest(scene, comm), comm)
     if case.fixed_point == "breaks":
         name = "the fixed-point correction breaks"
         return _holds(case, name, other.outcome != "done", other.outcome)

@@ -19,6 +19,8 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard.balance import LineBalance
+from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watched
+from catenary.solver.base.errors import RunBroken
 from catenary.solver.base.parallel import on_root
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.integrators.make_line import make_line
@@ -54,6 +56,7 @@ class Watched:
     one_switch : the most that one dropper may have made in one switch [J], see `LineBalance`
     counters : of the scheme
     kept : by step, dropper forces [N] and the line's displacement as incidents found them
+    remarks : what a run's own watch told, see `RunWatch`; none without one
     """
 
     outcome: str = ""
@@ -71,6 +74,7 @@ class Watched:
     one_switch: float = 0.0
     counters: dict[str, int] = field(default_factory=dict)
     kept: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
 
     def energy_gain(self, besides: Collection[int] = ()) -> float:
         """The most that energy less work rises above its least value before, of the largest energy.
@@ -236,6 +240,27 @@ class Watcher:
         return forces
 
 
+class _EndlessWatch(RunWatch):
+    """The watch of all runs; what would end a run is a remark, so that more can be measured."""
+
+    _ended = False
+
+    def observe(self, view: StepView) -> None:
+        """Look at a step, unless a run would have ended before. Collective."""
+        if self._ended:
+            return
+        try:
+            super().observe(view)
+        except RunBroken as broken:
+            self._ended = True
+            self.remarks.append(f"A run would end here: {broken}.")
+
+    def observe_rows(self, first_step: int, times: np.ndarray, rows: np.ndarray) -> None:
+        """Look at steps of which only rows are left, unless a run would have ended before."""
+        if not self._ended:
+            super().observe_rows(first_step, times, rows)
+
+
 def at_rest(scene: Scene, comm: Any) -> LineAtRest:
     """The line of a scene in equilibrium, on all ranks. Collective."""
     return line_at_rest_on_all(problem_of(scene), on_root(comm, lambda: mesh_of(scene)), comm)
@@ -259,16 +284,24 @@ def node_places(rest: LineAtRest) -> np.ndarray:
     return rest.model.contact_x
 
 
-def run(rest: LineAtRest, comm: Any, with_work: bool = False) -> Watched:
-    """March to the end, or to where it breaks. Collective; ``with_work`` on one rank only."""
+def run(
+    rest: LineAtRest, comm: Any, with_work: bool = False, self_watched: bool = False
+) -> Watched:
+    """March to the end, or to where it breaks. Collective; ``with_work`` on one rank only.
+
+    ``self_watched``: judged by the watch of all runs as well, which does not end it here.
+    """
     wire = ContactWires(rest.model, rest.form, distribute(rest.model, 1, 0)) if with_work else None
     simulated = rest.model.simulated
     balance = LineBalance(rest.model, rest.problem, rest.form.dropper_force) if with_work else None
     keep = [happened.step for happened in in_steps(simulated.incidents, rest.problem.numerics.dt)]
     watcher = Watcher(wire, keep, balance)
+    watch = _EndlessWatch(comm, watched(rest), watch_cadence(rest.problem.numerics.dt))
     with March(comm, *rest) as march:
-        ended = march.run([watcher])
-    return watcher.watched(ended.outcome, ended.counters)
+        ended = march.run([watcher, watch] if self_watched else [watcher])
+    found = watcher.watched(ended.outcome, ended.counters)
+    found.remarks = watch.remarks
+    return found
 
 
 def run_free(rest: LineAtRest, comm: Any, n_steps: int) -> Watched:

@@ -100,6 +100,11 @@ class Ended:
         """Whether the run came to its end."""
         return self.outcome == "done"
 
+    @property
+    def remarks(self) -> list[str]:
+        """Sentences about what decides the results, none unless done."""
+        return list(self.summary.get("remarks", []))
+
 
 def interrupted(ended: Sequence[Ended]) -> bool:
     """Whether a signal ended the last of some runs, after which no other began."""

@@ -18,6 +18,7 @@ from catenary.cases.studies.sweep.axis_words import (
 )
 from catenary.cases.studies.sweep.jobs import LINE_COLUMNS, PANTOGRAPH_COLUMNS, Ended
 from catenary.cases.studies.sweep.variants import NAMES
+from catenary.cases.studies.told_remarks import remark_lines
 from catenary.postproc.evaluate.wording import fixed
 from catenary.postproc.files.csv_text import csv_text, number_text
 from catenary.postproc.files.disk import plain, write_all
@@ -44,7 +45,7 @@ def rows(ended: Sequence[Ended]) -> list[dict[str, Any]]:
         tail: dict[str, Any] = {
             "passed": one.summary.get("passed"),
             "failed": failed_criteria(one.summary),
-            "remarks": one.summary.get("remarks", []),
+            "remarks": one.remarks,
             "wall_s": one.wall,
         }
         for pantograph in one.summary.get("pantographs", [{}]):
@@ -122,16 +123,12 @@ def as_text(ended: Sequence[Ended]) -> str:
             f"{_short(row['loss_percent'], 3):>10}{_short(row['max_uplift_mm']):>13}"
             f"{_short(row['n_slackened'], 0):>11}  {_verdict(row)}"
         )
-    return "\n".join([*lines, *_remarks(ended)])
+    return "\n".join([*lines, *remarks_of(ended)])
 
 
-def _remarks(ended: Sequence[Ended]) -> list[str]:
-    """Remarks on the variants, each once with those that it is of."""
-    of: dict[str, list[str]] = {}
-    for one in ended:
-        for text in one.summary.get("remarks", []):
-            of.setdefault(text, []).append(one.variant.name)
-    return [f"REMARK      {', '.join(names)}: {text}" for text, names in of.items()]
+def remarks_of(ended: Sequence[Ended]) -> list[str]:
+    """Lines of remarks on the variants, each once with those that it is of."""
+    return remark_lines((one.variant.name, one.remarks) for one in ended)
 
 
 def _verdict(row: Mapping[str, Any]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -31,6 +31,8 @@ from catenary.cases.studies.waves.seen import (
     waves_seen,
 )
 from catenary.cases.studies.waves.theory import WaveTheory, wave_theory
+from catenary.postproc.evaluate.error_indicators import indicate
+from catenary.postproc.evaluate.remarks import all_remarks
 from catenary.postproc.files.disk import write_all
 from catenary.postproc.film.film_data import FilmData, film_data
 from catenary.postproc.film.snapshots import Snapshots
@@ -54,11 +56,12 @@ _BEHIND, _AHEAD = 300.0, 200.0
 
 
 class Studied(NamedTuple):
-    """What theory says, what is measured, and the files that show it."""
+    """What theory says, what is measured, the files that show it, and remarks on the run."""
 
     theory: WaveTheory
     measured: list[Row]
     files: list[Path]
+    remarks: list[str]
 
 
 def study_waves(folder: Path) -> Studied:
@@ -79,11 +82,12 @@ def study_waves(folder: Path) -> Studied:
             rest = line_at_rest(problem, mesh_of(scene))
             energy = EnergyMotion(rest, _numbers_in(data, rest))
             seen = waves_seen(data, snapshots, [energy])
+        remarks = all_remarks(results, indicate(results))
     theory = wave_theory(problem, rest)
     what = "train"
     if data.excitation is not None:
         what = "force" if isinstance(data.excitation, MovingForce) else "blow"
-    return _write(folder, theory, rest, seen, energy.seen(), data.supports, what)
+    return _write(folder, theory, rest, seen, energy.seen(), data.supports, what, remarks)
 
 
 def study_excited(scene: Scene, kind: str, asked: Asked, folder: Path, force: bool) -> Studied:
@@ -117,17 +121,16 @@ def study_excited(scene: Scene, kind: str, asked: Asked, folder: Path, force: bo
         return [Watch(max(1, round(every / problem.numerics.dt)), found[-1][1:])]
 
     run = ExcitedRun(without_train(problem, excitation), excitation, every, watching)
-    outcome = run_case(
-        scene, folder, MPI.COMM_SELF, force=force, only_summary=True, excited=run
-    ).outcome
-    if outcome != "done":
-        raise RunBroken(outcome)
+    ended = run_case(scene, folder, MPI.COMM_SELF, force=force, only_summary=True, excited=run)
+    if ended.outcome != "done":
+        raise RunBroken(ended.outcome)
     ((rest, wire, energy),) = found
     theory = wave_theory(problem, rest)
     supports = problem.line.support_positions[1:-1]
     what = "force" if moves else "blow"
     seen = wire.seen(*course_of(excitation))
-    return _write(folder, theory, rest, seen, energy.seen(), supports, what)
+    remarks = ended.summary["remarks"]
+    return _write(folder, theory, rest, seen, energy.seen(), supports, what, remarks)
 
 
 def study_obstacles(scene: Scene, folder: Path, force: bool) -> tuple[str, list[Path]]:
@@ -180,6 +183,7 @@ def _write(
     energy: EnergySeen,
     supports: np.ndarray,
     what: str,
+    remarks: list[str],
 ) -> Studied:
     """Pictures and tables of what is seen and what theory says."""
     moving, origin = ("pantographs", "first pantograph") if what == "train" else (what, what)
@@ -211,7 +215,7 @@ def _write(
         )
     for name, draw in drawings.items():
         content |= figures.painted(name, draw)
-    return Studied(theory, measured, write_all(folder, content))
+    return Studied(theory, measured, write_all(folder, content), remarks)
 
 
 def energy_rows(energy: EnergySeen, seen: WavesSeen) -> list[Row]:
@@ -260,8 +264,8 @@ def band_rows(theory: WaveTheory) -> list[Row]:
     ]
 
 
-def as_text(theory: WaveTheory, measured: list[Row]) -> str:
-    """Figures for a terminal."""
+def as_text(theory: WaveTheory, measured: list[Row], remarks: Sequence[str] = ()) -> str:
+    """Figures for a terminal, and remarks on the run that shows the waves."""
     rows = [*as_rows(theory), *measured]
     lines = [f"{row['meaning']}: {row['value']:.4g} {row['unit']}" for row in rows]
     for what, bands in (("Pass bands", theory.bands()), ("Outrun the train", theory.outrunning())):
@@ -270,4 +274,4 @@ def as_text(theory: WaveTheory, measured: list[Row]) -> str:
             lines.append(f"{what}: {text} Hz")
     if theory.why_not:
         lines.append(f"No pass bands: {theory.why_not}")
-    return "\n".join(lines)
+    return "\n".join([*lines, *(f"REMARK      {text}" for text in remarks)])

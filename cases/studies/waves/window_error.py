@@ -20,8 +20,10 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.convert.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.output import as_csv
+from catenary.cases.studies.told_remarks import remark_lines
 from catenary.postproc.evaluate.filters import low_pass
 from catenary.postproc.files.disk import write_all
+from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watched
 from catenary.postproc.report.pictures import figures
 from catenary.solver.base.errors import InputError, RunBroken
 from catenary.solver.problem.window import WindowChoice
@@ -49,6 +51,7 @@ class Error(NamedTuple):
     sigma : difference of the standard deviation, with its sign [%]
     estimated : of ``history`` by the program [%]
     is_default : whether the program chooses this window
+    remarks : what the march in this window told of itself
     """
 
     ahead: float
@@ -57,6 +60,7 @@ class Error(NamedTuple):
     sigma: float
     estimated: float
     is_default: bool
+    remarks: tuple[str, ...]
 
     @property
     def spans(self) -> float:
@@ -64,10 +68,14 @@ class Error(NamedTuple):
 
 
 class Curve(NamedTuple):
-    """Errors by ascending size, of a line called ``name``, empty if there is no other."""
+    """Errors by ascending size, of a line called ``name``, empty if there is no other.
+
+    ``remarks`` are what the march of the whole line told of itself.
+    """
 
     name: str
     errors: tuple[Error, ...]
+    remarks: tuple[str, ...]
 
 
 def parse_sizes(text: str) -> list[int]:
@@ -117,10 +125,10 @@ def curve_of(name: str, scene: Scene, sizes: Sequence[int]) -> Curve:
         ahead = float(min(size - 1, math.ceil(_AHEAD * size)))
         windows.add((ahead, size - ahead))
     rest = line_at_rest(replace(problem, window=WindowChoice()), mesh_of(scene))
-    whole = _forces(rest, WindowChoice())
+    whole, of_whole = _forces(rest, WindowChoice())
     errors = []
     for ahead, behind in sorted(windows, key=sum):
-        found = _forces(rest, spans_of_window(problem, ahead, behind))
+        found, remarks = _forces(rest, spans_of_window(problem, ahead, behind))
         history, sigma = _worst(found, whole)
         errors.append(
             Error(
@@ -130,9 +138,10 @@ def curve_of(name: str, scene: Scene, sizes: Sequence[int]) -> Curve:
                 sigma,
                 estimated_error(problem, ahead, behind),
                 (ahead, behind) == (usual.spans_ahead, usual.spans_behind),
+                tuple(remarks),
             )
         )
-    return Curve(name, tuple(errors))
+    return Curve(name, tuple(errors), tuple(of_whole))
 
 
 def write(folder: Path, curves: Sequence[Curve]) -> list[Path]:
@@ -143,6 +152,7 @@ def write(folder: Path, curves: Sequence[Curve]) -> list[Path]:
             "history_percent_of_std": one.history, "std_percent": one.sigma,
             "estimated_percent": one.estimated,
             "default": int(one.is_default),
+            "remarks": [*(f"whole line: {text}" for text in curve.remarks), *one.remarks],
         }
         for curve in curves
         for one in curve.errors
@@ -182,9 +192,11 @@ def draw(curves: Sequence[Curve]) -> Figure:
 
 
 def as_text(curves: Sequence[Curve]) -> str:
-    """A line for each window, for a terminal."""
+    """A line for each window, for a terminal, and the remarks on all marches."""
     lines = []
+    told: list[tuple[str, tuple[str, ...]]] = []
     for curve in curves:
+        told.append((f"{curve.name} whole line".strip(), curve.remarks))
         for one in curve.errors:
             chosen = ", chosen by the program" if one.is_default else ""
             lines.append(
@@ -192,7 +204,8 @@ def as_text(curves: Sequence[Curve]) -> str:
                 f"{one.history:.2g} % of sigma (estimated {one.estimated:.2g}), sigma "
                 f"{one.sigma:+.2g} %".strip()
             )
-    return "\n".join(lines)
+            told.append((f"{curve.name} {one.spans:g} spans".strip(), one.remarks))
+    return "\n".join([*lines, *remark_lines(told)])
 
 
 class _Forces:
@@ -226,17 +239,20 @@ class _Forces:
         return rows.reshape(len(rows), 2, -1)
 
 
-def _forces(rest: LineAtRest, window: WindowChoice) -> list[np.ndarray]:
-    """Filtered force (n,) of each pantograph in the stretch [N]."""
+def _forces(rest: LineAtRest, window: WindowChoice) -> tuple[list[np.ndarray], list[str]]:
+    """Filtered force (n,) of each pantograph in the stretch [N], and what the march told."""
     problem, seen = replace(rest.problem, window=window), _Forces()
-    with March(MPI.COMM_SELF, *rest._replace(problem=problem)) as run:
-        outcome = run.run([seen])
+    at_rest = rest._replace(problem=problem)
+    watch = RunWatch(MPI.COMM_SELF, watched(at_rest), watch_cadence(problem.numerics.dt))
+    with March(MPI.COMM_SELF, *at_rest) as run:
+        outcome = run.run([seen, watch])
     if outcome.outcome != "done":
         raise RunBroken(outcome.outcome)
     position, force = seen.table().transpose(1, 2, 0)
     first, last = problem.evaluation
     filtered = low_pass(force.T, problem.numerics.dt).T
-    return [own[(at >= first) & (at <= last)] for own, at in zip(filtered, position, strict=True)]
+    both = zip(filtered, position, strict=True)
+    return [own[(at >= first) & (at <= last)] for own, at in both], watch.remarks
 
 
 def _worst(found: list[np.ndarray], whole: list[np.ndarray]) -> tuple[float, float]:
