@@ -157,12 +157,9 @@ def judge(results: Results, statistics: RunStatistics) -> list[Criterion]:
 
 def _pictures(results: Results, statistics: RunStatistics) -> list[_Picture]:
     """The pictures of a run, without those that cannot be drawn, which is logged."""
-    try:
-        # A summary alone does without Matplotlib.
-        from catenary.postproc.report.pictures import figures
-    except (OSError, UnicodeDecodeError) as error:
-        logger.warning("no picture was drawn: Matplotlib cannot read a matplotlibrc (%s)", error)
-        return []
+    # A summary alone does without Matplotlib.
+    from catenary.postproc.report.pictures import figures
+
     pictures = []
     for name, caption, draw in _drawings(results, statistics):
         data = figures.painted(f"{name}.png", draw)

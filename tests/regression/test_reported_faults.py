@@ -521,6 +521,13 @@ FAULTS = (
         "test_a_users_settings_change_no_picture_and_stay_the_users",
     ),
     Fault(
+        "a matplotlibrc that is no text",
+        "a traceback of sweep, waves, mesh and others; a report without pictures",
+        "is not read",
+        "unit/postproc/test_own_style.py",
+        "test_a_matplotlibrc_that_cannot_be_read_changes_no_picture",
+    ),
+    Fault(
         "a picture that cannot be drawn",
         "cost the summary",
         "is left out with a warning; the summary is written before",

@@ -93,14 +93,37 @@ def test_the_summary_is_there_before_the_first_picture(
     assert json.loads((tmp_path / "summary.json").read_text())["outcome"] == "done"
 
 
+BROKEN = {
+    "none": b"",
+    "no text": b"axes.facecolor: \xff\xfe\x00",
+    "other words": b"axes.facecolor black\nnonsense\ntext.usetex: perhaps\n",
+    "a folder": None,
+}
+
+
 @pytest.mark.process
-def test_a_matplotlibrc_that_is_no_text_ends_no_report(run_folder: Path, tmp_path: Path) -> None:
-    shutil.copytree(run_folder, tmp_path / "run")
-    (tmp_path / "run" / "summary.json").unlink(missing_ok=True)
-    (tmp_path / "matplotlibrc").write_bytes(b"axes.facecolor: \xff\xfe\n")
-    with catenary_started("report", "run", cwd=tmp_path) as program:
-        done = program.end()
-    assert done.code == 0, done.stderr
-    assert any("no picture was drawn: Matplotlib cannot read" in one for one in done.sentences)
-    assert (tmp_path / "run" / "summary.json").exists()
-    assert (tmp_path / "run" / "report.html").exists()
+@pytest.mark.parametrize("where", ["in the working directory", "of the user"])
+def test_a_matplotlibrc_that_cannot_be_read_changes_no_picture(
+    run_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    folder, run = tmp_path, tmp_path / "run"
+    shutil.copytree(run_folder, run)
+    if where == "of the user":
+        monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+        folder = tmp_path / "config" / "matplotlib"
+        folder.mkdir(parents=True)
+    expected: dict[str, bytes] = {}
+    for what, content in BROKEN.items():
+        (folder / "matplotlibrc").unlink(missing_ok=True)
+        if content is None:
+            (folder / "matplotlibrc").mkdir()
+        elif content:
+            (folder / "matplotlibrc").write_bytes(content)
+        for path in [run / "summary.json", *run.glob("*.png")]:
+            path.unlink(missing_ok=True)
+        with catenary_started("report", "run", cwd=tmp_path) as program:
+            done = program.end()
+        assert (done.code, done.stderr, (run / "summary.json").exists()) == (0, "", True), what
+        pictures = {path.name: path.read_bytes() for path in run.glob("*.png")}
+        expected = expected or pictures
+        assert len(pictures) >= 7 and pictures == expected, what
