@@ -54,7 +54,8 @@ def curve_load(model: Model) -> np.ndarray:
 
 def exact_moments(model: Model) -> np.ndarray:
     """What exact elements add to ``dead_loads`` and ``curve_load`` of a line in still air,
-    (n_dofs,) [N m]: under a uniform load their ends carry smaller moments."""
+    (n_dofs,) [N m]: under a uniform load their ends carry smaller moments. Droppers have no part in
+    it."""
     load, line = np.zeros(model.n_dofs), model.problem.line
     curve = line.curve if model.simulated.lateral else None
     for wire in line.wires:

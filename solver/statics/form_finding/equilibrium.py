@@ -121,7 +121,7 @@ def _cut(
         _check(problem.line, mesh, form, pushing)
         still_lifted, before = 0.0, lateral
         if model.simulated.lateral:
-            form = _with_lateral(model, form, exact)
+            form = _with_lateral(model, form, hanging.moments)
             lateral = form.lateral
             still_lifted = _most_change(before, lateral)
         distance = np.linalg.norm(form.dropper_vectors(mesh.droppers), axis=1)
@@ -158,9 +158,9 @@ def about(model: Model, form: Equilibrium) -> tuple[Model, Equilibrium]:
     return build(model.problem, model.mesh, model.dropper_lengths, form=form), form
 
 
-def _with_lateral(model: Model, form: Equilibrium, exact: bool) -> Equilibrium:
+def _with_lateral(model: Model, form: Equilibrium, moments: np.ndarray | None) -> Equilibrium:
     """The equilibrium with its lateral plane, in which droppers may lean."""
-    shape = lateral_shape(model, form, exact)
+    shape = lateral_shape(model, form, moments)
     form = replace(form, lateral=shape)
     vectors = form.dropper_vectors(model.mesh.droppers)
     length = np.linalg.norm(vectors, axis=1)
@@ -183,10 +183,15 @@ class _HangingWires:
     Unknowns are height and slope at each node. Where a height is given, the upward force that holds
     the wire there is unknown in its place; that of a dropper also pulls down its upper end. Where
     the line goes on height and slope are given, and those of the mast before.
+
+    Attributes
+    ----------
+    moments : what exact elements add to all loads, None if they are Hermite's
     """
 
     def __init__(self, model: Model, exact: bool = False) -> None:
-        self._w, self._exact = 2 * model.row_of_node, exact
+        self._w = 2 * model.row_of_node
+        self.moments = exact_moments(model) if exact else None
         n = 2 * model.mesh.n_nodes
         parts, self._spring_load = _springs_and_wires(model, self._w, exact)
         nodes, heights, held_at = _given_heights(model)
@@ -213,8 +218,8 @@ class _HangingWires:
         mesh, every = model.mesh, np.arange(model.mesh.n_nodes)
         load = self._spring_load - self._factor.from_given
         dead = dead_loads(model)
-        if self._exact:
-            dead += exact_moments(model)
+        if self.moments is not None:
+            dead += self.moments
         load[self._w] += dead[model.dofs(every)]
         load[self._w + 1] += dead[model.dofs(every, "theta_y")]
         holding = _holding(model)

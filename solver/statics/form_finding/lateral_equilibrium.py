@@ -22,7 +22,7 @@ from catenary.solver.statics.form_finding.sparse_sum import (
     summed,
     wire_parts,
 )
-from catenary.solver.statics.rest_loads import curve_load, dead_loads, exact_moments
+from catenary.solver.statics.rest_loads import curve_load, dead_loads
 
 # An arm that hangs freely carries its weight up to this inclination, the wire what is beyond [rad].
 STEEPEST = np.deg2rad(20.0)
@@ -30,13 +30,16 @@ STEEPEST = np.deg2rad(20.0)
 _UPRIGHT = np.deg2rad(60.0)
 
 
-def lateral_shape(model: Model, form: Equilibrium, exact: bool = False) -> LateralShape:
+def lateral_shape(
+    model: Model, form: Equilibrium, moments: np.ndarray | None = None
+) -> LateralShape:
     """The line at rest in the lateral plane. Not collective.
 
     Parameters
     ----------
     form : the line at rest in the vertical plane, whose forces of droppers are vertical ones
-    exact : whether elements bend as tensioned beams do, or by Hermite's functions as in motion
+    moments : ``exact_moments`` where elements bend as tensioned beams do, None where they do by
+        Hermite's functions as in motion
 
     Raises
     ------
@@ -47,12 +50,12 @@ def lateral_shape(model: Model, form: Equilibrium, exact: bool = False) -> Later
     at, n = 2 * model.row_of_node, 2 * mesh.n_nodes
     upper, lower = mesh.droppers.T
     rise = form.height[upper] - form.height[lower]
-    parts = wire_parts(model, at, exact) + clamp_parts(model, at)
+    parts = wire_parts(model, at, exact=moments is not None) + clamp_parts(model, at)
     parts.append(springs_between(at[mesh.droppers], form.dropper_force / rise))
     stiffness, load = summed(parts, n).tocsr(), np.zeros(n)
     every, pulls = np.arange(mesh.n_nodes), dead_loads(model) + curve_load(model)
-    if exact:
-        pulls += exact_moments(model)
+    if moments is not None:
+        pulls += moments
     load[at], load[at + 1] = pulls[model.dofs(every, "v")], pulls[model.dofs(every, "theta_z")]
     nodes, places = _held(model)
     given = np.zeros(n, dtype=bool)
