@@ -32,6 +32,18 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     return out, ran.stdout
 
 
+def test_remarks_on_runs_are_told_with_those_that_they_are_of(done: tuple[Path, str]) -> None:
+    out, said = done
+    with (out / "study.csv").open(encoding="utf-8") as file:
+        remarks = {row["variant"]: row["remarks"] for row in csv.DictReader(file)}
+    told = [line for line in said.splitlines() if line.startswith("REMARK")]
+    assert any(remarks.values()) and told
+    for line in told:
+        whose, text = line.split(maxsplit=1)[1].split(": ", 1)
+        names = list(remarks) if whose.startswith("all ") else whose.split(", ")
+        assert all(text in remarks[name] for name in names), line
+
+
 def test_every_statement_has_a_verdict_under_every_reading(done: tuple[Path, str]) -> None:
     out, said = done
     page = html.unescape((out / "study.html").read_text())

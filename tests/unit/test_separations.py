@@ -118,6 +118,8 @@ def test_the_verb_runs_and_draws_a_curve(tmp_path: Path) -> None:
     done = catenary(*words, cwd=tmp_path, pictures=True)
     assert done.code == 0, done.stderr
     assert "alone, trailing" in done.stdout
+    told = [line for line in done.stdout.splitlines() if line.startswith("REMARK")]
+    assert any("alone, 35m: A head of" in line for line in told)
     pairs = tmp_path / "pairs"
     assert (pairs / "separations.png").stat().st_size > 1000
     rows = (pairs / "separations.csv").read_text().splitlines()
