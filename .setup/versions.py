@@ -1,6 +1,7 @@
 """Versions that were tested together: one file for each Python, ``tested/pythonX.Y.txt``.
 
-``versions.py write`` makes the file anew from what is installed.
+``versions.py write`` makes the file anew from what is installed; ``versions.py is-tested`` ends with 0
+if there is one for this Python, else with 1.
 """
 
 import platform
@@ -74,3 +75,5 @@ def write() -> None:
 
 if __name__ == "__main__" and sys.argv[1:] == ["write"]:
     write()
+if __name__ == "__main__" and sys.argv[1:] == ["is-tested"]:
+    sys.exit(not TESTED.is_file())

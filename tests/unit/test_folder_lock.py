@@ -125,6 +125,8 @@ UNKNOWN = {
 
 @pytest.mark.parametrize("who", GONE)
 def test_a_lock_of_a_dead_process_is_taken_over(who: str, tmp_path: Path) -> None:
+    if "boot" in GONE[who] and not myself("catenary run case").machine:
+        pytest.skip("a machine without a number in /etc/machine-id may be another one of its name")
     left_by(tmp_path, **GONE[who])
     lock = FolderLock(tmp_path, "catenary run case")
     assert names(tmp_path) == [LOCK_FILE]
