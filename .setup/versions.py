@@ -1,7 +1,7 @@
 """Versions that were tested together: one file for each Python, ``tested/pythonX.Y.txt``.
 
-``versions.py write`` makes the file anew from what is installed; ``versions.py is-tested`` ends with 0
-if there is one for this Python, else with 1.
+``versions.py write`` makes the file anew from what is installed; ``versions.py is-tested`` ends
+with 0 if there is one for this Python, else with 1.
 """
 
 import platform
