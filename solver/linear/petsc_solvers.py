@@ -57,6 +57,15 @@ class Wrapped(NamedTuple):
     array: np.ndarray
     vector: PETSc.Vec
 
+    def tell_petsc(self) -> None:
+        """Tell PETSc that the array was written.
+
+        A vector remembers its norm until PETSc is told that its numbers are others: an iteration
+        would take the norm of an earlier right-hand side, or keep an initial guess because it
+        believes that it is zero already (PETSc 3.22).
+        """
+        self.vector.stateIncrease()
+
 
 class PartSolver:
     """Factors of this rank's part of the step operator, all of it on one rank.
@@ -139,6 +148,8 @@ class PartSolver:
         self._solve(right, solution)
 
     def _solve_by_petsc(self, right: Wrapped, solution: Wrapped) -> None:
+        right.tell_petsc()
+        solution.tell_petsc()
         self._ksp.solve(right.vector, solution.vector)
 
     def _solve_by_stations(self, right: Wrapped, solution: Wrapped) -> None:
@@ -242,6 +253,8 @@ class SchwarzSolver:
 
     def solve(self, right: Wrapped, solution: Wrapped) -> None:
         """Solve A ``solution`` = ``right``. Collective."""
+        right.tell_petsc()
+        solution.tell_petsc()
         self._ksp.solve(right.vector, solution.vector)
 
     @property
