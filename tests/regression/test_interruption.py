@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 import pytest
 from damaging import unseal
+from mpi4py import MPI
 from program import (
     MPIRUN,
     assert_same_histories,
@@ -32,6 +33,11 @@ FLUSH = 100
 SHORT_FLUSHES = f"output.flush_every_steps={FLUSH}"
 
 needs_mpirun = pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
+
+
+def is_open_mpi_5() -> bool:
+    vendor, version = MPI.get_vendor()
+    return vendor == "Open MPI" and version >= (5, 0, 0)
 
 
 @pytest.fixture(scope="module")
@@ -128,7 +134,8 @@ def test_a_signal_to_mpirun_closes_the_file(number: signal.Signals, tmp_path: Pa
     assert done.left == []
     assert "Traceback" not in done.stderr
     sentence = f"catenary: the run was interrupted; `catenary restart {out}` continues it"
-    assert done.sentences == [sentence]
+    # From version 5 on Open MPI passes no output on after the signal: the file alone tells.
+    assert done.sentences == ([] if is_open_mpi_5() else [sentence])
     rows = assert_sound(out / "run.h5")
     with Results(out) as results:
         assert results.outcome == "interrupted"
