@@ -12,6 +12,7 @@ PYTEST := $(PYTHON) -m pytest
 PYTEST_SHARED = $(PYTEST) -p no:benchmark --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 # An uncaught error on one rank ends all; ranks must not write one cache at a time.
 MPI_PYTEST := $(PYTHON) -m mpi4py -m pytest -p no:cacheprovider
+KERNELS := $(wildcard solver/kernels/*.cpp solver/kernels/*.hpp)
 PARTS := meshgen solver mbs postproc cases
 RESULT := results/ambrosio2012
 SEED ?= 1
@@ -35,7 +36,7 @@ endif
 # The targets share .venv and two cores: one after the other, also under make -j.
 .NOTPARALLEL:
 .PHONY: help setup setup-newest compile update-versions run check test test-studies test-unit \
-    test-verification test-regression test-mpi test-ranks bench long-runs fuzz test-paraview test-readers lint types mypy format clean
+    test-verification test-regression test-mpi test-ranks bench long-runs fuzz test-paraview test-readers sanitize lint types mypy format clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -124,9 +125,25 @@ test-readers: setup ## what other programs read of a run: versions of VTK and xa
 	    for film in film film_of_window; do $$place/bin/python tests/readers/$$script.py build/$$film; done; \
 	done
 
-lint: setup ## ruff (lint and format) and mypy
+# GCC's sanitizers. The package is laid apart, with kernels that check each access and each operation,
+# and is found before the editable one; its Numba loops are kept apart too. The libraries that are loaded
+# first are those that replace malloc, and the one whose exceptions they watch.
+SANITIZED := $(CURDIR)/build/sanitized
+SANITIZED_TESTS ?= $(addprefix tests/unit/solver/,test_station_passes.py test_varying_stations.py test_repeated_blocks.py)
+
+sanitize: setup ## tests with kernels that check memory and arithmetic; SANITIZED_TESTS="FILE..."
+	rm -rf $(SANITIZED)/package
+	$(PYTHON) -I setup.py --quiet build --build-lib $(SANITIZED)/package build_ext --sanitize
+	PYTHONPATH=$(SANITIZED)/package CATENARY_CACHE_DIR=$(SANITIZED)/loops PYTHONMALLOC=malloc \
+	    ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
+	    LD_PRELOAD="$$(g++ -print-file-name=libasan.so) $$(g++ -print-file-name=libstdc++.so)" \
+	    $(PYTEST) -p no:benchmark --timeout=3000 $(SANITIZED_TESTS)
+
+lint: setup ## ruff (lint and format), mypy, clang-format and the compiler's warnings
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
+	.venv/bin/clang-format --dry-run -Werror $(KERNELS)
+	$(PYTHON) -I setup.py --quiet build_ext --strict
 	@$(MAKE) --no-print-directory types
 
 # Its cache, .mypy_cache, stays: without it the check takes some 10 s, with it below one. What NumPy
@@ -141,10 +158,11 @@ mypy:
 	@for part in $(PARTS); do ln -sfn ../../../$$part build/typing/catenary/$$part; done
 	MYPYPATH=build/typing $(PYTHON) -m mypy $(PARTS:%=-p catenary.%)
 
-format: setup ## bring all files into ruff's format
+format: setup ## bring all files into the format of ruff and clang-format
 	$(PYTHON) -m ruff check --fix .
 	$(PYTHON) -m ruff format .
+	.venv/bin/clang-format -i $(KERNELS)
 
 clean: ## remove what can be made again, results and .venv excepted
-	rm -rf build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf build solver/kernels/*.so *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +

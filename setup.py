@@ -1,8 +1,125 @@
-"""Maps the five folders of the repository into the namespace package ``catenary``."""
+"""Maps the five folders of the repository into the namespace package ``catenary``, and builds the
+kernels of the time loop, ``catenary.solver.kernels.native``, from C++.
 
+setuptools builds them with pybind11, because this file describes all packages already. nanobind
+wants CMake, which would describe them a second time.
+"""
+
+import logging
+import os
+import shlex
+import subprocess
+import sys
+import sysconfig
+import time
+from glob import glob
+from pathlib import Path
+from typing import IO
+
+from pybind11.setup_helpers import ParallelCompile, Pybind11Extension
 from setuptools import find_packages, setup
+from setuptools.command.build_ext import build_ext
+from setuptools.errors import CompileError, LinkError
 
 PARTS = ("meshgen", "solver", "mbs", "postproc", "cases")
+KERNELS = "solver/kernels"
+
+# No target is named: a wheel runs on every processor of its architecture, and a source that has
+# loops for a newer one says so itself, by pragmas. Pybind11Extension adds -fvisibility=hidden and
+# -g0; -MMD writes down which headers a source includes.
+FLAGS = [
+    *("-O3", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math"),
+    *("-Wall", "-Wextra", "-Wno-psabi", "-MMD"),
+]
+SANITIZED = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+SANITIZED_FLAGS = ["-O1", "-g", "-fno-omit-frame-pointer", "-U_FORTIFY_SOURCE", *SANITIZED]
+
+
+class BuildKernels(build_ext):
+    """Compiles on all cores, and only what has changed since.
+
+    Objects stay in ``build/kernels``, however the package is installed. Beside each lie the names
+    of the headers that it was made from, the command that made it, and what the compiler warned of.
+    """
+
+    user_options = [
+        *build_ext.user_options,
+        ("strict", None, "refuse sources of which the compiler warns (make lint)"),
+        ("sanitize", None, "check memory and arithmetic, with objects apart (make sanitize)"),
+    ]
+    boolean_options = [*build_ext.boolean_options, "strict", "sanitize"]
+
+    def initialize_options(self) -> None:
+        """Show warnings and no more, unless told otherwise: compilers to come have new ones."""
+        super().initialize_options()
+        self.strict = self.sanitize = False
+
+    def finalize_options(self) -> None:
+        """Choose the folder of the objects; ``compile_or_link`` says which are made anew."""
+        super().finalize_options()
+        folder = "build/sanitized/objects" if self.sanitize else "build/kernels"
+        self.build_temp = f"{folder}/{sysconfig.get_platform()}-{sys.implementation.cache_tag}"
+        self.force = True
+
+    def build_extensions(self) -> None:
+        """Run compiler and linker by ``compile_or_link``."""
+        if self.sanitize:
+            for extension in self.extensions:
+                extension.extra_compile_args += SANITIZED_FLAGS
+                extension.extra_link_args += SANITIZED
+        # setuptools 84 calls one, earlier ones the other.
+        self.compiler.call = self.compiler.spawn = self.compile_or_link
+        super().build_extensions()
+
+    def compile_or_link(self, command: list[str], **_: object) -> None:
+        """Run the linker, or the compiler unless its object is there and up to date."""
+        words = shlex.join(command)
+        target = Path(command[command.index("-o") + 1])
+        if "-c" not in command:
+            if failed(command, None):
+                raise LinkError(f"the linker could not make {target}")
+            return
+        warnings = target.with_suffix(".warnings")
+        if not is_current(target, words):
+            written = target.with_suffix(".command")
+            written.unlink(missing_ok=True)
+            begin = time.time_ns()
+            with warnings.open("w", encoding="utf-8") as file:
+                broken = failed(command, file)
+            sys.stderr.write(warnings.read_text(encoding="utf-8"))
+            if broken:
+                raise CompileError(f"the compiler could not make {target}")
+            written.write_text(words, encoding="utf-8")
+            os.utime(written, ns=(begin, begin))  # what changes meanwhile is newer
+        if self.strict and (text := warnings.read_text(encoding="utf-8")):
+            raise CompileError(f"the compiler warns:\n{text}")
+
+
+def failed(command: list[str], errors: IO[str] | None) -> bool:
+    """Run a command, and say whether it failed."""
+    logging.info(shlex.join(command))
+    try:
+        return subprocess.run(command, stderr=errors, check=False).returncode != 0
+    except FileNotFoundError:
+        raise CompileError(f"there is no {command[0]}; CXX names another compiler") from None
+
+
+def is_current(target: Path, command: str) -> bool:
+    """Whether an object was made by this command and is newer than all that it was made from."""
+    try:
+        if target.with_suffix(".command").read_text(encoding="utf-8") != command or (
+            not target.exists()
+        ):
+            return False
+        made = target.with_suffix(".command").stat().st_mtime_ns
+        rule = target.with_suffix(".d").read_text(encoding="utf-8").replace("\\\n", " ")
+        files = shlex.split(rule.partition(": ")[2])
+        return all(Path(file).stat().st_mtime_ns < made for file in files)
+    except OSError:  # one is missing
+        return False
+
+
+ParallelCompile(default=0).install()
 
 setup(
     packages=[
@@ -22,4 +139,16 @@ setup(
         ],
         "catenary.postproc": ["report/templates/*", "paraview/*.template"],
     },
+    # The source archive has them all the same: an extension's sources, and what it depends on.
+    exclude_package_data={"catenary.solver.kernels": ["*.cpp", "*.hpp"]},
+    ext_modules=[
+        Pybind11Extension(
+            "catenary.solver.kernels.native",
+            sorted(glob(f"{KERNELS}/*.cpp")),
+            depends=sorted(glob(f"{KERNELS}/*.hpp")),
+            extra_compile_args=FLAGS,
+            cxx_std=20,
+        )
+    ],
+    cmdclass={"build_ext": BuildKernels},
 )

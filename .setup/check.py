@@ -44,6 +44,10 @@ def main() -> None:
     except OSError as error:
         lacking = ", ".join(missing_libraries_of_gmsh()) or str(error)
         raise SystemExit(f"gmsh cannot be loaded, the system lacks: {lacking}") from None
+    try:
+        import catenary.solver.kernels.native  # noqa: F401
+    except ImportError as error:
+        raise SystemExit(f"the compiled kernels cannot be loaded: {error}") from None
     print(
         f"catenary is ready in .venv: PETSc {'.'.join(map(str, version))}, "
         f"mpi4py {mpi4py.__version__}, h5py {h5py.__version__}, numpy {numpy.__version__}, "

@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # Sets up .venv with everything that Catenary needs; called by `make setup`, safe to repeat.
 #
-# Debian and Ubuntu: PETSc, MPI, HDF5 and gmsh's shared libraries come from apt, the rest from the
-# package index. Elsewhere (clusters, conda) the python3 on the PATH must bring petsc4py, mpi4py
-# and h5py. Either way the environment sees five packages of the system and no others. Bounds of
-# versions stand in pyproject.toml, the tested ones in .setup/tested; --newest disregards those.
+# Debian and Ubuntu: PETSc, MPI, HDF5, gmsh's shared libraries and a C++ compiler come from apt, the
+# rest from the package index. Elsewhere (clusters, conda) the python3 on the PATH must bring
+# petsc4py, mpi4py and h5py, and a C++ compiler must be there. Either way the environment sees five
+# packages of the system and no others. Bounds of versions stand in pyproject.toml, the tested ones
+# in .setup/tested; --newest disregards those. The kernels are compiled again when they changed.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -16,8 +17,10 @@ DEBIAN_PACKAGES=(
     python3-scipy python3-numpy openmpi-bin python3-venv make
     libglu1-mesa libgl1 libegl1 libxrender1 libxcursor1 libxfixes3 libxext6 libxft2 libfontconfig1
     libxinerama1 libx11-6 libgomp1
+    g++ python3-dev
 )
 STAMP=.venv/catenary-setup
+KERNELS_STAMP=.venv/catenary-kernels
 
 say() { printf '%s\n' "$*" >&2; }
 
@@ -70,6 +73,17 @@ fingerprint() {
 is_current() {
     [ -f "$STAMP" ] && [ "$(cat "$STAMP")" = "$(fingerprint)" ] &&
         .venv/bin/python -c 'import petsc4py, mpi4py, catenary.solver.base.errors' 2>/dev/null
+}
+
+# What the kernels are compiled from; their order and names too.
+fingerprint_of_kernels() {
+    printf '%s\n' solver/kernels/*.[ch]pp
+    cat setup.py solver/kernels/*.[ch]pp | cksum
+}
+
+kernels_are_current() {
+    [ -f "$KERNELS_STAMP" ] && [ "$(cat "$KERNELS_STAMP")" = "$(fingerprint_of_kernels)" ] &&
+        compgen -G 'solver/kernels/native.*.so' >/dev/null
 }
 
 # --- Debian and Ubuntu -------------------------------------------------------------------------
@@ -173,7 +187,7 @@ explain() {
     fi
     cat >&2 <<'TEXT'
   Debian, Ubuntu:  run `make setup` as root or as a user who may use sudo.
-  conda-forge:     conda create -n catenary -c conda-forge python petsc petsc4py mpi4py h5py scipy gmsh make
+  conda-forge:     conda create -n catenary -c conda-forge python petsc petsc4py mpi4py h5py scipy gmsh make cxx-compiler
                    conda activate catenary, then make setup
   Cluster:         load the modules of PETSc with petsc4py, mpi4py and h5py for one Python, typically
                    module load petsc4py mpi4py h5py      (or: petsc, python, h5py-mpi)
@@ -226,6 +240,21 @@ pip_install() {
         --no-compile "$@" >&2
 }
 
+# setup.py compiles what changed, and keeps its objects in build/kernels.
+compile_kernels() {
+    local output from
+    from=$(fingerprint_of_kernels)
+    begin "compiling the kernels" "${1-}"
+    output=$(env -u PYTHONPATH .venv/bin/python -I setup.py build_ext --inplace 2>&1 </dev/null) || {
+        say "$output"
+        fail "the kernels could not be compiled. They need a C++20 compiler (GCC 12 or newer," \
+            "Clang 16 or newer; CXX=... names another than the usual one) and the headers of Python."
+    }
+    [[ $output != *warning:* ]] || say "$output"
+    finish
+    printf '%s\n' "$from" >"$KERNELS_STAMP"
+}
+
 install_python_packages() {
     local tested
     work=$(mktemp -d)
@@ -251,6 +280,7 @@ CODE
     else
         pip_install "${wanted[@]}"
     fi
+    compile_kernels "some 30 s"
     pip_install --no-deps --no-build-isolation --editable .
     begin "compiling the packages to bytecode"
     # Bytecode on all cores at once: pip makes it on one, which took a third of its time. Packages
@@ -270,6 +300,7 @@ case "${1-}" in
 *) fail "unknown option $1; there is --newest" ;;
 esac
 if [ ! "$newest" ] && is_current; then
+    kernels_are_current || compile_kernels
     exit 0
 fi
 say "setup: preparing .venv, which takes one to three minutes the first time"

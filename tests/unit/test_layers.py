@@ -42,8 +42,8 @@ ROOMS = {
         "lumped_data", "library", "response", "lumped", "lowering", "roll", "shape", "build",
     ),
     "solver": (
-        "base", "problem", "model", "wind", "ends", "effects", "linear", "statics", "waves",
-        "window", "integrators", "contact", "contact_problem", "schemes", "time_loop",
+        "kernels", "base", "problem", "model", "wind", "ends", "effects", "linear", "statics",
+        "waves", "window", "integrators", "contact", "contact_problem", "schemes", "time_loop",
     ),
     "postproc": ("standards", "channels", "files", "read", "record", "evaluate", "film", "paraview",
         "report",
