@@ -139,8 +139,8 @@ setup(
         ],
         "catenary.postproc": ["report/templates/*", "paraview/*.template"],
     },
-    # The source archive has them all the same: an extension's sources, and what it depends on.
-    exclude_package_data={"catenary.solver.kernels": ["*.cpp", "*.hpp"]},
+    # What is installed is named above; the source archive has the sources of the extension too.
+    include_package_data=False,
     ext_modules=[
         Pybind11Extension(
             "catenary.solver.kernels.native",

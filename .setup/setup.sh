@@ -83,7 +83,7 @@ fingerprint_of_kernels() {
 
 kernels_are_current() {
     [ -f "$KERNELS_STAMP" ] && [ "$(cat "$KERNELS_STAMP")" = "$(fingerprint_of_kernels)" ] &&
-        compgen -G 'solver/kernels/native.*.so' >/dev/null
+        [ -d build/kernels ] && compgen -G 'solver/kernels/native.*.so' >/dev/null
 }
 
 # --- Debian and Ubuntu -------------------------------------------------------------------------

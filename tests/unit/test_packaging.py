@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import shutil
 import subprocess
 import sys
+import sysconfig
 import tarfile
 from pathlib import Path
 
@@ -17,6 +19,8 @@ pytestmark = pytest.mark.process
 ROOT = Path(__file__).parents[2]
 PARTS = ("meshgen", "solver", "mbs", "postproc", "cases")
 BUILT_FROM = (*PARTS, "pyproject.toml", "setup.py", "LICENSE", "README.md")
+OBJECTS = Path("build", "kernels")
+KERNELS = f"catenary/solver/kernels/native{sysconfig.get_config_var('EXT_SUFFIX')}"
 
 # What a program finds from outside the checkout, printed as JSON.
 SHOW = """
@@ -47,7 +51,9 @@ def must(done: subprocess.CompletedProcess[str]) -> str:
 
 def library_files() -> set[str]:
     """Python files of the checkout, by the names under which they are to be installed."""
-    files = (path for part in PARTS for path in (ROOT / part).rglob("*.py"))
+    files = (
+        path for part in PARTS for end in ("py", "pyi") for path in (ROOT / part).rglob(f"*.{end}")
+    )
     return {f"catenary/{path.relative_to(ROOT)}" for path in files}
 
 
@@ -71,14 +77,25 @@ def data_files() -> set[str]:
     }
 
 
+def kernel_files() -> set[str]:
+    """Sources and headers of the kernels, by their names in the checkout."""
+    return {str(path.relative_to(ROOT)) for path in ROOT.glob("solver/kernels/*.[ch]pp")}
+
+
 @pytest.fixture(scope="module")
 def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of what a package is built from: building leaves its traces there."""
+    """A copy of what a package is built from: building leaves its traces there.
+
+    The kernels' objects are part of it, or each wheel would take as long as the kernels compile.
+    """
     copy = tmp_path_factory.mktemp("sources")
+    shutil.copytree(ROOT / OBJECTS, copy / OBJECTS)
     for name in BUILT_FROM:
         if (ROOT / name).is_dir():
             shutil.copytree(
-                ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__", "results")
+                ROOT / name,
+                copy / name,
+                ignore=shutil.ignore_patterns("__pycache__", "results", "*.so"),
             )
         elif (ROOT / name).exists():
             shutil.copy2(ROOT / name, copy / name)
@@ -108,6 +125,7 @@ def test_the_wheel_is_imported_from_where_it_is_installed(installed: Path, tmp_p
         "catenary.meshgen.line",
         "catenary.solver.base.errors",
         "catenary.solver.problem.problem",
+        "catenary.solver.kernels.native",
         "catenary.mbs.lumped",
         "catenary.postproc",
         "catenary.cases",
@@ -123,7 +141,7 @@ def test_the_wheel_is_imported_from_where_it_is_installed(installed: Path, tmp_p
 def test_the_wheel_holds_all_modules_and_data_and_no_tests(installed: Path) -> None:
     there = {str(path.relative_to(installed)) for path in installed.rglob("*") if path.is_file()}
     ours = {name for name in there if name.startswith("catenary/") and "__pycache__" not in name}
-    assert ours == library_files() | data_files()
+    assert ours == library_files() | data_files() | {KERNELS}
     # beside it only the metadata and the program
     tops = {Path(name).parts[0] for name in there}
     assert {top for top in tops if not top.endswith(".dist-info")} == {"catenary", "bin"}
@@ -137,7 +155,33 @@ def test_the_source_archive_can_build_the_wheel(sources: Path, tmp_path: Path) -
     with tarfile.open(archive) as content:
         names = {name.partition("/")[2] for name in content.getnames()}
     wanted = {name.removeprefix("catenary/") for name in library_files() | data_files()}
-    assert wanted | {"pyproject.toml", "setup.py", "LICENSE"} <= names
+    assert wanted | kernel_files() | {"pyproject.toml", "setup.py", "LICENSE"} <= names
+    assert not [name for name in names if name.endswith(".so")]
+
+
+def test_a_source_is_compiled_again_when_a_header_changes(sources: Path, tmp_path: Path) -> None:
+    """Told by a compiler of the usual one's name, which writes down how it is called."""
+    (made,) = sources.glob(f"{OBJECTS}/*/solver/kernels/module.o")
+    compiler = shlex.split(made.with_suffix(".command").read_text())[0]
+    calls = tmp_path / "calls"
+    (tmp_path / Path(compiler).name).write_text(f"""#!/bin/sh
+echo "$@" >>{calls}
+while [ "$1" != -o ]; do shift; done
+echo >"$2"
+""")
+    (tmp_path / Path(compiler).name).chmod(0o755)
+
+    def compiled() -> bool:
+        calls.write_text("")
+        build = ("-I", "setup.py", "--quiet", "build_ext", "--build-lib", tmp_path / "lib")
+        must(run(sys.executable, *build, cwd=sources, PATH=f"{tmp_path}:{os.environ['PATH']}"))
+        return "-c solver/kernels/module.cpp" in calls.read_text()
+
+    assert not compiled()
+    (sources / "solver" / "kernels" / "of_nobody.hpp").write_text("")
+    assert not compiled()
+    (sources / "solver" / "kernels" / "compiler.hpp").touch()
+    assert compiled()
 
 
 @pytest.mark.parametrize("part", PARTS)
