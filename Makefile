@@ -127,7 +127,7 @@ test-readers: setup ## what other programs read of a run: versions of VTK and xa
 
 # GCC's sanitizers. The package is laid apart, with kernels that check each access and each operation,
 # and is found before the editable one; its Numba loops are kept apart too. The libraries that are loaded
-# first are those that replace malloc, and the one whose exceptions they watch.
+# first are the one that replaces malloc, and the one whose exceptions it watches. A fault ends the tests.
 SANITIZED := $(CURDIR)/build/sanitized
 SANITIZED_TESTS ?= $(addprefix tests/unit/solver/,test_station_passes.py test_varying_stations.py test_repeated_blocks.py)
 

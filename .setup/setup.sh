@@ -245,7 +245,7 @@ compile_kernels() {
     local output from
     from=$(fingerprint_of_kernels)
     begin "compiling the kernels" "${1-}"
-    output=$(env -u PYTHONPATH .venv/bin/python -I setup.py build_ext --inplace 2>&1 </dev/null) || {
+    output=$(env -u PYTHONPATH .venv/bin/python -I setup.py --quiet build_ext --inplace 2>&1 </dev/null) || {
         say "$output"
         fail "the kernels could not be compiled. They need a C++20 compiler (GCC 12 or newer," \
             "Clang 16 or newer; CXX=... names another than the usual one) and the headers of Python."
