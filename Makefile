@@ -127,7 +127,8 @@ test-readers: setup ## what other programs read of a run: versions of VTK and xa
 
 # GCC's sanitizers. The package is laid apart, with kernels that check each access and each operation,
 # and is found before the editable one; its Numba loops are kept apart too. The libraries that are loaded
-# first are the one that replaces malloc, and the one whose exceptions it watches. A fault ends the tests.
+# first are the one that replaces malloc, and the one whose exceptions it watches. A fault ends the tests,
+# with a report that pytest must not hold back.
 SANITIZED := $(CURDIR)/build/sanitized
 SANITIZED_TESTS ?= $(addprefix tests/unit/solver/,test_station_passes.py test_varying_stations.py test_repeated_blocks.py)
 
@@ -137,7 +138,7 @@ sanitize: setup ## tests with kernels that check memory and arithmetic; SANITIZE
 	PYTHONPATH=$(SANITIZED)/package CATENARY_CACHE_DIR=$(SANITIZED)/loops PYTHONMALLOC=malloc \
 	    ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
 	    LD_PRELOAD="$$(g++ -print-file-name=libasan.so) $$(g++ -print-file-name=libstdc++.so)" \
-	    $(PYTEST) -p no:benchmark --timeout=3000 $(SANITIZED_TESTS)
+	    $(PYTEST) -p no:benchmark --capture=sys --timeout=3000 $(SANITIZED_TESTS)
 
 lint: setup ## ruff (lint and format), mypy, clang-format and the compiler's warnings
 	$(PYTHON) -m ruff check .
