@@ -28,7 +28,7 @@ KERNELS = "solver/kernels"
 # loops for a newer one says so itself, by pragmas. Pybind11Extension adds -fvisibility=hidden and
 # -g0; -MMD writes down which headers a source includes.
 FLAGS = [
-    *("-O3", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math"),
+    *("-O2", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math"),
     *("-Wall", "-Wextra", "-Wno-psabi", "-MMD"),
 ]
 SANITIZED = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]

@@ -11,7 +11,6 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.solver.base.kernels.pointers import HeldCall
-from catenary.solver.integrators import passes_by_runs, two_pass_kernels
 from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps, PredictedLineState, Steps
 from catenary.solver.integrators.two_pass_kernels import (
     follow,
@@ -19,7 +18,7 @@ from catenary.solver.integrators.two_pass_kernels import (
     predict,
     predict_velocities,
 )
-from catenary.solver.linear.stations.runs import starts_of
+from catenary.solver.kernels import native
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
 from catenary.solver.window.window_kernels import NO_WINDOW, WindowArrays
@@ -34,7 +33,7 @@ class StationPasses:
 
     Attributes
     ----------
-    held : a step for compiled loops that take steps themselves; ``track_links`` replaces it
+    held : a step for compiled loops that take steps themselves, by its ``address``
     factors : as given
     known : what the motion keeps besides x, y and z, or nothing
     by_mass : whether right-hand sides are made by M, as where that is shorter than by K
@@ -58,44 +57,36 @@ class StationPasses:
     ) -> None:
         product, factors, read, velocity, answer, by_mass = parts
         _, _, low, high, _ = factors.ends.tolist()
-        self.by_mass = by_mass != 0.0
-        layout = factors.layout.changed(
-            remembers=isinstance(steps, AlphaSteps), by_mass=self.by_mass
-        )
-        factored = factors.factored._replace(layout=layout)
-        multiplied = (
-            *(product.layout, product.places, product.kinds, product.blocks, product.first),
-            *(read, velocity),
-        )
-        changes, *more = changes_of(motion, steps, by_mass)
+        self.by_mass, self.factors = by_mass != 0.0, factors
+        changes, known, predicted = changes_of(motion, steps, by_mass)
         starts = factors.starts[low : high + 1] - factors.starts[low]
         self._stretch = max(1, _STRETCH * (high - low) // max(1, int(starts[-1])))
         self._place = low, high, self._stretch, starts
-        self._parts = multiplied, factored, loads, answer, (*motion.read, *more), changes
-        self._runs = starts_of(factored.places) if layout.by_runs else None
-        self._window, self.factors = NO_WINDOW, factors
-        self.known = more[0]
+        self._changes, self._motion = changes, (*motion.read, known, predicted)
+        layouts = [
+            (of_rows.native, of_factors.native)
+            for of_rows, of_factors in zip(product.layout.parts, factors.layout.parts, strict=True)
+        ]
+        arrays = read, velocity, loads, answer, *motion.read[:3], known
+        self.held = native.Passes(
+            *(layouts, product.stations.make_ups, product.native, factors.native), arrays, changes
+        )
+        self._window, self.known = NO_WINDOW, known
         self.track_links(NO_LINKS, np.zeros(0))
 
     def track_links(self, links: LinkArrays, reserve: np.ndarray) -> None:
         """Fill ``reserve`` on the way back, as ``LineIntegrator.track_links``."""
-        window, motion, changes = self._window, self._parts[4], self._parts[5]
+        window, motion = self._window, self._motion
         if window is NO_WINDOW:
             stretch, ranges = self._stretch, left_behind(*self._place, links.unknowns)
         else:
             stretch, ranges = window.low.size, window.ranges
         count = np.zeros(1, dtype=np.int64)
-        ahead = motion, changes, links, reserve, count, window
+        ahead = motion, self._changes, links, reserve, count, window
         following = motion[:4], links, reserve, ranges, count
         # Kept, as what the passes have is where these are.
         self._around = HeldCall(predict, ahead), HeldCall(follow, following)
-        addresses = [around.address for around in self._around]
-        arguments = *self._parts, stretch, *addresses
-        if self._runs is None:
-            self.held = HeldCall(two_pass_kernels.forth_and_back, arguments)
-        else:
-            self.held = HeldCall(passes_by_runs.forth_and_back, (arguments, self._runs))
-        self._step = self.held.caller()
+        self.held.call(stretch, *(around.address for around in self._around))
 
     def open(self, window: WindowArrays, links: LinkArrays, reserve: np.ndarray) -> None:
         """Take steps of the stations in a window only from now on; links as in ``track_links``."""
@@ -105,12 +96,11 @@ class StationPasses:
     def predict_velocities(self) -> None:
         """Fill in the rank's own part of what others read of it in a product with C. A step does
         so, too, but only after these have read."""
-        motion = self._parts[4]
-        predict_velocities(motion, self._parts[5], 0, motion[0].size)
+        predict_velocities(self._motion, self._changes, 0, self._motion[0].size)
 
     def step(self) -> None:
         """Find the accelerations and what the next step starts from."""
-        self._step()
+        self.held.step()
 
 
 def changes_of(

@@ -68,9 +68,7 @@ class LineProducts:
     def prepare(self) -> None:
         """Make those that no step, and no energy, is to wait for."""
         for name in ("stiffness", "mass"):
-            product = self.by_stations(name)
-            if product is not None:
-                product.prepare()
+            self.by_stations(name)
         self._stiffness = None
 
     def destroy(self) -> None:

@@ -8,7 +8,6 @@ A^-1, so that the factors of alike spans are alike, and a solve reads little mor
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 from typing import NamedTuple
 
@@ -16,8 +15,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from catenary.solver.base.kernels.bound import bound
 from catenary.solver.base.petsc import PETSc
+from catenary.solver.kernels import native
 from catenary.solver.linear.factors.elimination import eliminate_stations, join
 from catenary.solver.linear.factors.meeting_station import (
     MIDDLES,
@@ -26,7 +25,6 @@ from catenary.solver.linear.factors.meeting_station import (
     softened,
     turn,
 )
-from catenary.solver.linear.factors.substitution import Factored, solve
 from catenary.solver.linear.stations.sections import Sections
 from catenary.solver.linear.stations.station_layout import Layout
 from catenary.solver.linear.stations.station_products import kinds_by_make_up
@@ -37,9 +35,6 @@ from catenary.solver.linear.stations.station_rows import StationRows, rows_of
 LARGE = 2**19
 # Unknowns of a plane up to which stations are narrow.
 NARROW = 4
-# Stations from which on runs of one make-up have kernels of their own: shorter lines are marched
-# before these are compiled.
-LONG = 1000
 # Where factors do not keep the matrix's own blocks.
 NO_BESIDES = np.zeros(0, dtype=np.int32), np.zeros(0)
 
@@ -51,7 +46,7 @@ class StationFactors:
     ----------
     layout : Layout
     starts : (n + 1,) first unknown of each station, and how many unknowns there are
-    places, kinds : of the stations, see ``kinds_by_make_up``
+    kinds : (n,) of the stations, see ``kinds_by_make_up``
     blocks : of each kind S^-1, -S^-1 B with its block B towards the middle, and the transpose of
         the second of the station before it in elimination, which that multiplies with; packed by
         the layout. S is a diagonal block after elimination. In the middle the second is for
@@ -63,6 +58,8 @@ class StationFactors:
         last, first own one that it takes on and the one after the last, and where elimination ends
     turning : what may move the place where elimination ends, None if it stays
     n_stations, n_kinds : in the matrix, and how many have different factors
+    stations : Sections
+    native : the same as kernels read it
     """
 
     def __init__(
@@ -79,30 +76,24 @@ class StationFactors:
     ) -> None:
         self.layout, self.kinds, self.blocks = layout, kinds, blocks
         self.beside_kinds, self.besides = besides
-        self.starts, self.places = stations.starts, stations.places()
+        self.starts, self.stations = stations.starts, stations
         self.low, self.turning = low, turning
         self.n_stations, self.n_kinds = kinds.size, n_kinds
         middle = (low + high) // 2 if turning is None else turning.place(low, high)
         self.ends = np.array([0, kinds.size, low, high, middle], dtype=np.int64)
         if turning is not None:
             turn(kinds, turning.arrays, kinds.size - 1, middle)
+        numbers = self.kinds, self.blocks, self.beside_kinds, self.besides
+        self.native = native.Factors(*numbers, low, self.ends, stations.places())
 
     @cached_property
-    def _solve(self) -> Callable[[np.ndarray, np.ndarray], None]:
-        vectors = np.zeros(0), np.zeros(0)
-        # Runs of stations make no difference here: one machine code serves lines of any length.
-        factored = self.factored._replace(layout=self.layout.changed(by_runs=False))
-        return bound(solve, factored, later=vectors)
-
-    @property
-    def factored(self) -> Factored:
-        """What kernels read of them."""
-        blocks = self.kinds, self.blocks, self.beside_kinds, self.besides
-        return Factored(self.layout, self.places, *blocks, self.low, self.ends)
+    def _solves(self) -> native.Solves:
+        layouts = [part.native for part in self.layout.parts]
+        return native.Solves(layouts, self.stations.make_ups, self.native)
 
     def solve(self, right: np.ndarray, answer: np.ndarray) -> None:
         """Make ``answer`` that to ``right``, of all unknowns, perhaps the same array."""
-        self._solve(right, answer)
+        self._solves.solve(right, answer)
 
     def apply(self, pc: PETSc.PC, right: PETSc.Vec, answer: PETSc.Vec) -> None:
         """Called by PETSc."""
@@ -191,8 +182,7 @@ def _packed(
     """Layout, kinds of factors, their numbers, how many there are, and ``besides``, as
     ``StationFactors`` keeps them; ``share`` of them is read in a step."""
     # Factors join all of a plane, whatever matrices join: the same kernels serve them all.
-    by_runs = layout.varies and stations.size >= LONG
-    layout = Layout(layout.widths, make_ups=layout.make_ups, by_runs=by_runs)
+    layout = Layout(layout.widths, make_ups=layout.make_ups)
     make_up = stations.make_up[rows.chosen][found.kinds]
     kinds, numbers, n_kinds, unfit = packed_factors(layout, make_up, lacks, found)
     besides: tuple[np.ndarray, np.ndarray] | None = NO_BESIDES
@@ -210,7 +200,7 @@ def _packed(
 def packed_blocks(layout: Layout, factors: np.ndarray) -> np.ndarray:
     """Numbers (m, k) of ``factors`` (m, 3, b, b) as ``StationFactors`` keeps them."""
     if layout.sparse:
-        return layout.packed_halves(factors[:, 0])
+        return layout.packed_inverse(factors[:, 0])
     packed = layout.packed(factors, layout.whole_terms)
     return packed.reshape(packed.shape[0], 3 * packed.shape[2])  # of no factor, too
 
@@ -248,16 +238,13 @@ def _sparse(layout: Layout, blocks: np.ndarray) -> Layout:
     """
     joined = (blocks[0] != 0).any(axis=0) | (blocks[2] != 0).any(axis=0)
     beside = tuple(sorted({0, 1, *layout.differences(joined)}))
+    sparse = Layout(layout.widths, (0,), beside, make_ups=layout.make_ups, sparse=True)
     strands = _strands(joined)
-    if max(map(len, strands)) >= len(beside):
-        strands = ()
-    return Layout(
-        *(layout.widths, (0,), beside),
-        make_ups=layout.make_ups,
-        sparse=True,
-        strands=strands,
-        by_runs=layout.by_runs,
-    )
+    by_strands = sparse.changed(strands=strands)
+    fewer = max(map(len, strands)) < len(beside)
+    if fewer and all(native.has_strands(part.native) for part in by_strands.parts):
+        return by_strands
+    return sparse
 
 
 def _strands(joined: np.ndarray) -> tuple[tuple[int, ...], ...]:

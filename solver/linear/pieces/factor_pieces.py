@@ -49,16 +49,16 @@ class FactorPieces:
         none = np.zeros((1, 3, stations.width, stations.width))
         widths = tuple(packed_blocks(part, none).shape[1] for part in layout.parts)
         room = 2 * size + size // MIDDLES
-        self._blocks = Slots(pieces.n_slots, room, widths, layout.varies)
+        self._blocks = Slots(pieces.n_slots, room, widths)
         besides = NO_BESIDES
         self._besides: Slots | None = None
         if layout.sparse:
             kept = [part.packed(none[:, 0], part.beside_terms) for part in layout.parts]
             widths = tuple(2 * numbers.shape[1] for numbers in kept)
-            self._besides = Slots(pieces.n_slots, size, widths, layout.varies)
-            besides = np.zeros(n, dtype=self._besides.kind), self._besides.numbers
-        kinds: np.ndarray = np.zeros(n, dtype=self._blocks.kind)
-        here: np.ndarray = np.zeros(-(-n // MIDDLES), dtype=kinds.dtype)
+            self._besides = Slots(pieces.n_slots, size, widths)
+            besides = np.zeros(n, dtype=np.int32), self._besides.numbers
+        kinds = np.zeros(n, dtype=np.int32)
+        here = np.zeros(-(-n // MIDDLES), dtype=np.int32)
         edges = np.zeros((2, n + 1), dtype=np.int64)
         self._turning = Turning(kinds.copy(), kinds.copy(), here, *edges)
         self.factors = StationFactors(

@@ -103,9 +103,9 @@ class OperatorPieces:
         stations, pieces = self._stations.padded(), self.pieces
         sets = 1 if damping is None else 2
         widths = tuple(sets * part.row_size for part in layout.parts)
-        table = Slots(pieces.n_slots, pieces.size, widths, layout.varies)
-        kinds: np.ndarray = np.zeros(self._stations.size, dtype=table.kind)
-        product = StationProduct(layout, stations.places(), kinds, table.numbers, 1, 0)
+        table = Slots(pieces.n_slots, pieces.size, widths)
+        kinds = np.zeros(self._stations.size, dtype=np.int32)
+        product = StationProduct(layout, stations, kinds, table.numbers, 1, 0)
         self._products.append((table, product, of, damping))
         return product
 

@@ -126,10 +126,9 @@ def most_within(numbering: Unknowns, length: float) -> int:
 
 
 class Slots:
-    """A table of numbers by slots, whose rows are the kinds of stations.
+    """A table of numbers by slots, each with the numbers of kinds of stations in a row.
 
-    Where stations are of several make-ups it is one row of numbers, of which a kind is the first;
-    see ``kinds_by_make_up``. Room that is not used takes no memory.
+    Room that is not used takes no memory.
 
     Attributes
     ----------
@@ -140,24 +139,15 @@ class Slots:
     n_slots : of the table
     room : kinds that a slot has room for
     widths : numbers of a kind of each make-up
-    varies : whether there are several
     """
 
-    def __init__(self, n_slots: int, room: int, widths: tuple[int, ...], varies: bool) -> None:
-        width = max(widths)
-        self._room = room * width if varies else room
-        self._varies = varies
-        self.numbers = aligned_arrays.zeros(n_slots * room * width)
-        self._by_rows = self.numbers.reshape(-1, 1 if varies else width)
+    def __init__(self, n_slots: int, room: int, widths: tuple[int, ...]) -> None:
+        self._room = room * max(widths)
+        self.numbers = aligned_arrays.zeros(n_slots * self._room)
 
     def put(self, slot: int, numbers: np.ndarray) -> int:
-        """Fill a slot with ``numbers`` in a row; what is to be added to their kinds."""
+        """Fill a slot with ``numbers``; what is to be added to their kinds, which are the places of
+        their first numbers."""
         first = slot * self._room
-        rows = numbers.reshape(-1, self._by_rows.shape[1])
-        self._by_rows[first : first + len(rows)] = rows
+        self.numbers[first : first + numbers.size] = numbers
         return first
-
-    @property
-    def kind(self) -> type:
-        """Type of numbers of kinds."""
-        return np.int64 if self._varies else np.int32

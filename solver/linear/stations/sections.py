@@ -7,12 +7,28 @@ column of zeros.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 
-from catenary.solver.linear.stations.make_ups import ALIKE, Places
 from catenary.solver.model.unknowns.registry import Unknowns
+
+
+class Places(NamedTuple):
+    """Where stations stand in vectors, as kernels read it: arrays without entries if all are alike.
+
+    Attributes
+    ----------
+    starts : (n,) first unknown of each
+    make_up : (n,) of each
+    """
+
+    starts: np.ndarray
+    make_up: np.ndarray
+
+
+ALIKE = Places(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.uint8))
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
-"""How the unknowns of a station stand in vector lanes, and which products with blocks need.
+"""How the unknowns of a station stand in vector lanes, and how blocks are packed for products.
 
-The layout of a line is known before its kernels are compiled, and these are compiled for it.
+Kernels are compiled for the widths of the shipped kinds of lines (``known_layouts.hpp``), in which
+``layout.hpp`` has the same lanes and the same order. All other layouts are general ones.
 """
 
 from __future__ import annotations
@@ -11,17 +12,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from catenary.solver.kernels import native
+
 # Lanes that a plane may take: the least of these that holds its unknowns.
 LANES = (2, 4, 6, 8, 10, 12, 16)
-# Unknowns of a plane that kernels take.
-WIDEST = LANES[-1]
-# Lanes of an LLVM vector, at most; more are held in several, whose sizes are powers of two.
+# Unknowns of a plane, planes and lanes of a station, that kernels take.
+WIDEST, MOST_PLANES, MOST_LANES = LANES[-1], 8, 32
+# Lanes of a register, at most; more are held in several, whose sizes are powers of two.
 REGISTER = 8
+# Lanes of each register of a general layout.
+_GENERAL = 4
 # Parameters of a layout.
-_SETTINGS = (
-    *("widths", "own", "beside", "damped", "remembers", "make_ups", "sparse"),
-    *("by_mass", "strands", "by_runs"),
-)
+_SETTINGS = ("widths", "own", "beside", "damped", "make_ups", "sparse", "strands")
 
 
 class Terms(NamedTuple):
@@ -94,19 +96,17 @@ class Layout:
     own, beside : numbers of the terms that K and C have within a station, and between a station
         and those beside it; all of them by default
     damped : whether a product with K is one with C as well
-    remembers : whether steps need an acceleration known before, as the generalized-alpha method's
-    by_mass : whether steps make their right-hand side by M in place of K
     sparse : whether factors keep the matrix's own blocks between stations, of the terms
         ``beside``, in place of products with these, which join all of a plane, and of S^-1 one half
     strands : sets of unknowns, of one plane each, to whose own the blocks between stations join
         them, as those of a wire; terms are then by the columns of all sets at once, in place of
         ``beside``
     make_ups : places in a cross-section that stations of each make-up have; none if all have all
-    by_runs : whether runs of stations of one make-up have kernels of their own
 
     Attributes
     ----------
     pitch : unknowns of a cross-section
+    general : whether no kernels were compiled for these widths
     n_lanes : lanes that they take, those without an unknown included
     registers : lanes of each of the vectors that hold these, see ``registers_of``
     turns : whether lanes 0 and 1, 2 and 3 and so on of a second sum are exchanged
@@ -124,29 +124,29 @@ class Layout:
         own: tuple[int, ...] | None = None,
         beside: tuple[int, ...] | None = None,
         damped: bool = False,
-        remembers: bool = False,
         make_ups: tuple[tuple[int, ...], ...] = (),
         sparse: bool = False,
-        by_mass: bool = False,
         strands: tuple[tuple[int, ...], ...] = (),
-        by_runs: bool = False,
     ) -> None:
         self.widths = tuple(widths)
-        self._planes = lanes_of(self.widths)
+        self.general = not native.has_widths(self.widths)
+        self._planes = _general_lanes(self.widths) if self.general else lanes_of(self.widths)
         largest = _power(max(self._planes))
         every = tuple(range(largest))
         self.own = every if own is None else tuple(own)
         self.beside = every if beside is None else tuple(beside)
-        self.damped, self.remembers = bool(damped), bool(remembers)
-        self.make_ups, self.sparse, self.by_mass = make_ups, bool(sparse), bool(by_mass)
-        self.strands, self.by_runs = strands, bool(by_runs)
+        self.damped, self.make_ups, self.sparse = bool(damped), make_ups, bool(sparse)
+        self.strands = strands
         self.pitch = sum(self.widths)
         self.n_lanes = sum(self._planes)
         # Columns where there are fewer of these than of differences.
-        self.turns = largest <= REGISTER and max(self.widths) > largest - 2
+        self.turns = not self.general and largest <= REGISTER and max(self.widths) > largest - 2
         self._first = np.repeat(np.cumsum([0, *self._planes[:-1]]), self._planes)
         self._end = self._first + np.repeat(self._planes, self._planes)
-        self.registers = registers_of(self.widths)
+        if self.general:
+            self.registers: tuple[int, ...] = (_GENERAL,) * (self.n_lanes // _GENERAL)
+        else:
+            self.registers = registers_of(self.widths)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Layout) and self.key == other.key
@@ -157,10 +157,7 @@ class Layout:
     @property
     def key(self) -> tuple[object, ...]:
         """All that makes a layout."""
-        own = (
-            *(self.widths, self.own, self.beside, self.damped, self.remembers),
-            *(self.make_ups, self.sparse, self.by_mass, self.strands, self.by_runs),
-        )
+        own = tuple(getattr(self, name) for name in _SETTINGS)
         return own if self.whole is None else (*own, self.number, self.whole.key)
 
     def changed(self, **settings: Any) -> Layout:
@@ -199,8 +196,7 @@ class Layout:
         places = np.array(self.make_ups[number])
         planes = np.searchsorted(np.cumsum(self.widths), places, side="right")
         widths = tuple(int(width) for width in np.bincount(planes) if width)
-        names = "damped", "remembers", "sparse", "by_mass"
-        settings = {name: getattr(self, name) for name in names}
+        settings: dict[str, Any] = {"damped": self.damped, "sparse": self.sparse}
         place_of = {int(place): at for at, place in enumerate(places)}
         kept = (tuple(place_of[u] for u in strand if u in place_of) for strand in self.strands)
         settings["strands"] = tuple(strand for strand in kept if strand)
@@ -212,17 +208,6 @@ class Layout:
         part = Layout(widths, own, beside, **settings)
         part.whole, part.places, part.number = self, self.make_ups[number], number
         return part
-
-    @cached_property
-    def runs(self) -> tuple[tuple[int, ...], ...]:
-        """Numbers of the make-ups that share a layout where all stations around are of one; none
-        unless it is ``by_runs``."""
-        found: dict[object, tuple[int, ...]] = {}
-        for number, part in enumerate(self.parts if self.by_runs else ()):
-            lanes = tuple(self._lane_of[list(part.places)])
-            key = part.changed(make_ups=()), lanes
-            found[key] = *found.get(key, ()), number
-        return tuple(found.values())
 
     @cached_property
     def _lane_of(self) -> np.ndarray:
@@ -237,13 +222,6 @@ class Layout:
         return lane_of
 
     @cached_property
-    def lanes_of_whole(self) -> np.ndarray:
-        """Lane of the whole that each lane of a part stands for, -1 in one without an unknown."""
-        assert self.whole is not None
-        lane_of = self.whole._lane_of_unknown[np.array(self.places)]
-        return np.where(self.unknowns >= 0, lane_of[self.unknowns], -1)
-
-    @cached_property
     def unknowns(self) -> np.ndarray:
         """Unknown of each lane, -1 in one that has none, shape (n_lanes,)."""
         place = np.arange(self.n_lanes) - self._first
@@ -255,7 +233,7 @@ class Layout:
     @cached_property
     def whole_terms(self) -> Terms:
         """Of a block that joins all unknowns of each plane."""
-        if self.turns:
+        if self.turns or self.general:
             return self._terms(tuple(range(_power(max(self._planes)))))
         lane, columns = np.arange(self.n_lanes), np.arange(max(self.widths))[:, None]
         sources = self._first + columns
@@ -319,6 +297,14 @@ class Layout:
         other = self._first + ((lane - self._first) ^ number)
         return np.where(other < self._end, other, -1)
 
+    @cached_property
+    def native(self) -> native.Layout:
+        """The layout as kernels take it."""
+        return native.Layout(
+            *(self.widths, self.own, self.beside),
+            *(self.damped, self.sparse, self.general, self.strands),
+        )
+
     def differences(self, joined: np.ndarray) -> tuple[int, ...]:
         """Numbers of the terms that hold what ``joined`` (b, b) joins, each within a plane."""
         row, column = np.nonzero(joined)
@@ -330,6 +316,10 @@ class Layout:
         Those of a part are of the whole.
         """
         return self._packed(blocks, terms.sources, terms.targets, np.ones(terms.sources.shape))
+
+    def packed_inverse(self, blocks: np.ndarray) -> np.ndarray:
+        """Symmetric blocks (..., pitch, pitch) as kernels of ``sparse`` factors read S^-1."""
+        return self.packed(blocks, self.whole_terms) if self.general else self.packed_halves(blocks)
 
     def packed_halves(self, blocks: np.ndarray) -> np.ndarray:
         """Symmetric blocks (..., pitch, pitch) as products with ``halves`` read them."""
@@ -378,6 +368,11 @@ def _power(number: int) -> int:
 def lanes_of(widths: Sequence[int]) -> list[int]:
     """Lanes of each plane of so many unknowns."""
     return [min(lanes for lanes in LANES if lanes >= width) for width in widths]
+
+
+def _general_lanes(widths: Sequence[int]) -> list[int]:
+    """Lanes of each plane of so many unknowns in a general layout."""
+    return [-(-width // _GENERAL) * _GENERAL for width in widths]
 
 
 def registers_of(widths: Sequence[int]) -> tuple[int, ...]:

@@ -16,33 +16,11 @@ import numpy as np
 from scipy import sparse
 
 from catenary.solver.base.kernels import aligned_arrays
-from catenary.solver.base.kernels.bound import bound
-from catenary.solver.base.kernels.compiled import compiled, inner
-from catenary.solver.base.kernels.pointers import pointed
-from catenary.solver.linear.stations.lane_products import (
-    add_beside,
-    add_own,
-    numbers_from,
-    sums_from,
-    total_of,
-)
-from catenary.solver.linear.stations.lanes import (
-    beside_size,
-    is_damped,
-    narrowed,
-    own_size,
-    store,
-    zero,
-)
-from catenary.solver.linear.stations.make_ups import (
-    Places,
-    block_at,
-    by_make_up,
-    load_at,
-    start_of,
-)
+from catenary.solver.kernels import native
 from catenary.solver.linear.stations.sections import Sections
 from catenary.solver.linear.stations.station_layout import (
+    MOST_LANES,
+    MOST_PLANES,
     REGISTER,
     WIDEST,
     Layout,
@@ -58,18 +36,21 @@ def layout_of(
     """Layout of a line by its blocks of A and K, see ``neighbours``, and by the make-ups of its
     stations if there are several.
 
-    None if a plane is wider than kernels are.
+    None if there are more unknowns, or planes, than kernels take.
     """
     joined = (operator != 0).any(axis=(0, 1)) | (stiffness != 0).any(axis=(0, 1))
     planes = _planes(joined)
     if max(planes) > WIDEST:
         return None
     widths = _without_gaps(planes)
+    if len(widths) > MOST_PLANES:
+        return None
     # A plane of one or two wires has the terms of beams that droppers join, some of which a bare or
     # a straight line lacks: few kernels serve them all.
     usual = ((0, 1, 2), (0, 1)) if max(widths) in (3, 4) else ((0, 1), (0, 1))
     own, beside = usual if max(widths) <= 4 else ((), ())
-    return joining(Layout(widths, own, beside, make_ups=make_ups), stiffness)
+    layout = Layout(widths, own, beside, make_ups=make_ups)
+    return joining(layout, stiffness) if layout.n_lanes <= MOST_LANES else None
 
 
 def with_damping(layout: Layout, damping: np.ndarray | None) -> Layout:
@@ -114,38 +95,28 @@ def _without_gaps(widths: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(planes)
 
 
-def by_kinds(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Kind (n,) of each station of whose ``numbers`` (n, m), and those of the kinds in a row."""
-    first, kinds = kinds_of(numbers)
-    return kinds, aligned_arrays.copy(numbers[first])
-
-
 def kinds_by_make_up(
     layout: Layout, make_up: np.ndarray, pack: Callable[[Layout, Any], np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, int, int]:
     """Kinds (n,) of stations, the numbers of all kinds in a row, how many kinds there are, and how
     many numbers of all stations are not zero.
 
-    ``pack`` returns the numbers of stations in the layout of their make-up, (n, m). Where
-    make-ups vary a kind is the place of its first number; see ``block_at``.
+    ``pack`` returns the numbers of stations in the layout of their make-up, (n, m). A kind is the
+    place of its first number, int32.
     """
-    if not layout.varies:
-        packed = pack(layout, slice(None))
-        kinds, numbers = by_kinds(packed)
-        return kinds, numbers, int(kinds.max(initial=-1)) + 1, np.count_nonzero(packed)
-    begins, parts = np.zeros(make_up.size, dtype=np.int64), [np.zeros(0)]
+    begins, numbers = np.zeros(make_up.size, dtype=np.int32), [np.zeros(0)]
     end = n_kinds = count = 0
     # Blocks of large registers begin at lines of a cache if those of small ones stand behind them.
-    for part in sorted(layout.parts, key=lambda part: -max(part.registers)):
-        stations = np.flatnonzero(make_up == part.number)
-        packed = pack(part, stations)
+    for number in sorted(range(len(layout.parts)), key=lambda n: -max(layout.parts[n].registers)):
+        stations = np.flatnonzero(make_up == number) if layout.varies else slice(None)
+        packed = pack(layout.parts[number], stations)
         count += np.count_nonzero(packed)
         first, kinds = kinds_of(packed)
         begins[stations] = end + packed.shape[1] * kinds
-        parts.append(packed[first].ravel())
-        end += parts[-1].size
+        numbers.append(packed[first].ravel())
+        end += numbers[-1].size
         n_kinds += first.size
-    return begins, aligned_arrays.copy(np.concatenate(parts)), n_kinds, count
+    return begins, aligned_arrays.copy(np.concatenate(numbers)), n_kinds, count
 
 
 class StationProduct:
@@ -154,49 +125,45 @@ class StationProduct:
     Attributes
     ----------
     layout : Layout
-    places : of the stations of the factor
-    kinds : (n,) of its rows
+    stations : of the factor
+    kinds : (n,) of its rows, see ``kinds_by_make_up``
     blocks : of each kind the diagonal block of K, then what joins it to the stations before and
         after it; the same of -C; all as products read them, see ``Layout``
     first : station in the factor of the first row; the factor has one before and one after all
         rows, which is zero where the line ends
     n_kinds : how many rows are different
+    native : the same as kernels read it
     """
 
     def __init__(
         self,
         layout: Layout,
-        places: Places,
+        stations: Sections,
         kinds: np.ndarray,
         blocks: np.ndarray,
         first: int,
         n_kinds: int,
     ) -> None:
-        self.layout, self.places, self.kinds = layout, places, kinds
+        self.layout, self.stations, self.kinds = layout, stations, kinds
         self.blocks, self.first, self.n_kinds = blocks, first, n_kinds
-
-    def prepare(self) -> None:
-        """Compile ``multiply``, which else its first call does: of most products with C, for one,
-        there is none, as steps in two passes make them."""
-        assert self._multiply is not None
+        self.native = native.Rows(kinds, blocks, first, stations.places())
 
     @cached_property
-    def _multiply(self) -> Callable[..., None]:
-        later = 0, 0, np.zeros(0), np.zeros(0), np.zeros(0)
-        stations = self.layout, self.places, self.kinds, self.blocks, self.first
-        return bound(multiply, *stations, later=later)
+    def _products(self) -> native.Products:
+        layouts = [part.native for part in self.layout.parts]
+        return native.Products(layouts, self.stations.make_ups, self.native)
 
     def multiply(
         self, factor: np.ndarray, result: np.ndarray, velocity: np.ndarray | None = None
     ) -> None:
         """Make ``result`` K ``factor``, less C ``velocity`` if the layout is damped."""
         velocity = factor if velocity is None else velocity
-        self._multiply(0, self.kinds.size, factor, velocity, result)
+        self._products.multiply(0, self.kinds.size, factor, velocity, result)
 
     def multiply_rows(self, begin: int, end: int, factor: np.ndarray, result: np.ndarray) -> None:
         """The rows from ``begin`` to ``end`` of that, where the layout is not damped; of others
         ``result`` stays as it is."""
-        self._multiply(begin, end, factor, factor, result)
+        self._products.multiply(begin, end, factor, factor, result)
 
 
 def station_product(
@@ -223,7 +190,7 @@ def station_product(
     packed = packed_rows(layout, rows, damped, stations.make_up[first + 1 : first + 1 + n_rows])
     if packed is None:
         return None
-    return StationProduct(layout, stations.places(), *packed[:2], first + 1, packed[2])
+    return StationProduct(layout, stations, *packed[:2], first + 1, packed[2])
 
 
 def packed_rows(
@@ -247,65 +214,3 @@ def packed_rows(
     if count != sum(np.count_nonzero(blocks) for blocks, _ in numbers):
         return None
     return kinds[rows.kinds], packed, n_kinds
-
-
-@inner
-def row_sums(part, multiplied, row, positions, velocities):
-    """Sums of a row of a product, with what the factor and the velocity hold before, at and after
-    its station.
-
-    ``multiplied`` holds layout, places, kinds, blocks and first of ``StationProduct`` and both
-    vectors; ``part`` is the layout of the station's make-up.
-    """
-    _, _, kinds, blocks, _, _, _ = multiplied
-    size, beside = own_size(part), beside_size(part)
-    stored = size + np.uint64(2) * beside
-    if is_damped(part):
-        numbers = numbers_from(blocks, block_at(part, kinds, row, np.uint64(2) * stored))
-    else:
-        numbers = numbers_from(blocks, block_at(part, kinds, row, stored))
-    sums = sums_from(part, zero(part))
-    sums = add_own(part, sums, numbers, np.uint64(0), narrowed(part, positions[1]))
-    sums = add_beside(part, sums, numbers, size, narrowed(part, positions[0]))
-    sums = add_beside(part, sums, numbers, size + beside, narrowed(part, positions[2]))
-    if is_damped(part):
-        sums = add_own(part, sums, numbers, stored, narrowed(part, velocities[1]))
-        sums = add_beside(part, sums, numbers, stored + size, narrowed(part, velocities[0]))
-        after = narrowed(part, velocities[2])
-        sums = add_beside(part, sums, numbers, stored + size + beside, after)
-    return sums
-
-
-@inner
-def read_station(multiplied, row):
-    """What the factor and the velocity hold at the station of a row, which may be one before or
-    after all rows."""
-    layout, places, _, _, first, factor, velocity = multiplied
-    position = load_at(layout, places, first + row, factor)
-    if is_damped(layout):
-        return position, load_at(layout, places, first + row, velocity)
-    return position, position
-
-
-@by_make_up
-def put_row(layout, places, station, multiplied, positions, velocities, result):
-    """Fill in the row of a station of the product."""
-    first = multiplied[4]
-    row = station - first
-    total = total_of(layout, row_sums(layout, multiplied, row, positions, velocities))
-    at = start_of(layout, places, station) - start_of(layout, places, first)
-    store(layout, result, at, total)
-
-
-@compiled
-def multiply(layout, places, kinds, blocks, first, begin, end, factor, velocity, result):
-    """Rows from ``begin`` to ``end`` of ``result`` = K ``factor``, less C ``velocity``; see
-    ``StationProduct``."""
-    multiplied = pointed((layout, places, kinds, blocks, first, factor, velocity))
-    filled = pointed(result)
-    before, here = read_station(multiplied, begin - 1), read_station(multiplied, begin)
-    for i in range(begin, end):
-        after = read_station(multiplied, i + 1)
-        positions, velocities = (before[0], here[0], after[0]), (before[1], here[1], after[1])
-        put_row(layout, multiplied[1], first + i, multiplied, positions, velocities, filled)
-        before, here = here, after

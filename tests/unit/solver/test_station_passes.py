@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from repeating_line import layout, line, widths_of
 
+from catenary.solver.base.kernels.bound import bound
+from catenary.solver.base.kernels.pointers import call_once
 from catenary.solver.integrators import state_kernels
 from catenary.solver.integrators.line_state import LineState, PredictedLineState, Steps
 from catenary.solver.integrators.two_pass_step import StationPasses
@@ -106,7 +108,7 @@ def test_a_compiled_loop_takes_the_same_steps_with_kernel_and_arguments() -> Non
         passes = StationPasses(
             ByStations(product, factors, read, read, answer, 0.0), np.zeros(0), motion, STEPS
         )
-        by_address = passes.held.caller()
+        by_address = bound(call_once, passes.held.address)
         for _ in range(3):
             if by_kernel:
                 by_address()

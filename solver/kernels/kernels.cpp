@@ -1,0 +1,97 @@
+// Chooses kernels by layout and by processor.
+#include <algorithm>
+#include <string>
+
+#include "known_layouts.hpp"
+#include "line.hpp"
+
+#define CATENARY_DECLARE(target)                                              \
+    namespace catenary::target {                                              \
+    std::unique_ptr<Kernels> make(const Layout& rows, const Layout& factors); \
+    }
+CATENARY_DECLARE(baseline)
+#if defined(__x86_64__) && !defined(__clang__)
+#define CATENARY_X86 1
+CATENARY_DECLARE(avx2)
+CATENARY_DECLARE(avx512)
+#endif
+
+namespace catenary {
+
+namespace {
+
+using Make = std::unique_ptr<Kernels> (*)(const Layout&, const Layout&);
+struct Target {
+    std::string name;
+    Make make;
+    bool has_known;
+};
+
+/// What this processor can be told to be, the best last.
+const std::vector<Target>& of_processor() {
+    static const std::vector<Target> found = [] {
+        std::vector<Target> targets;
+#ifdef CATENARY_X86
+        targets.push_back({"baseline", baseline::make, false});
+        __builtin_cpu_init();
+        if (__builtin_cpu_supports("x86-64-v3")) targets.push_back({"avx2", avx2::make, true});
+        if (__builtin_cpu_supports("x86-64-v4")) targets.push_back({"avx512", avx512::make, true});
+#else
+        targets.push_back({"baseline", baseline::make, true});
+#endif
+        return targets;
+    }();
+    return found;
+}
+
+const Target*& chosen() {
+    static const Target* target = &of_processor().back();
+    return target;
+}
+
+}  // namespace
+
+std::vector<std::string> targets() {
+    std::vector<std::string> names;
+    for (const Target& target : of_processor()) names.push_back(target.name);
+    return names;
+}
+
+bool set_target(const std::string& name) {
+    for (const Target& target : of_processor())
+        if (target.name == name) {
+            chosen() = &target;
+            return true;
+        }
+    return false;
+}
+
+bool has_widths(const Widths& widths) {
+    return chosen()->has_known &&
+           std::find(std::begin(kWidths), std::end(kWidths), widths) != std::end(kWidths);
+}
+
+bool has_strands(const Layout& factors) {
+    return chosen()->has_known && factors == kTensioned.factors;
+}
+
+std::unique_ptr<Kernels> kernels_of(const Layout& rows, const Layout& factors) {
+    if (rows.widths != factors.widths || rows.general != factors.general) return nullptr;
+    return chosen()->make(rows, factors);
+}
+
+std::unique_ptr<Kernels> kernels_of_rows(const Layout& rows) {
+    for (const Shipped& shipped : kShipped)
+        if (shipped.rows == rows) return kernels_of(rows, shipped.factors);
+    return kernels_of(rows, sparse_factors(rows));
+}
+
+std::unique_ptr<Kernels> kernels_of_factors(const Layout& factors) {
+    Layout rows;
+    rows.widths = factors.widths;
+    rows.general = factors.general;
+    rows.own = rows.beside = 1;
+    return kernels_of(rows, factors);
+}
+
+}  // namespace catenary

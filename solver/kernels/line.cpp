@@ -1,0 +1,188 @@
+#include "line.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace catenary {
+
+Line::Line(std::vector<std::unique_ptr<Kernels>> kernels, std::vector<std::vector<int>> make_ups)
+    : kernels_(std::move(kernels)), make_ups_(std::move(make_ups)) {
+    const size_t n = make_ups_.size();
+    place_.assign(n * n * kMostLanes, -1);
+    for (size_t from = 0; from < n; ++from)
+        for (size_t to = 0; to < n; ++to)
+            for (size_t u = 0; u < make_ups_[to].size(); ++u) {
+                const auto& there = make_ups_[from];
+                const auto found = std::find(there.begin(), there.end(), make_ups_[to][u]);
+                if (found != there.end())
+                    place_[(from * n + to) * kMostLanes + u] =
+                        static_cast<int8_t>(found - there.begin());
+            }
+}
+
+void Line::set_runs(const Work& work, int64_t n, int64_t low) {
+    runs_.clear();
+    run_number_.clear();
+    const Places &solved = work.factored.places, &read = work.product.places;
+    const int64_t first = work.product.first;
+    if (!solved.make_up) {
+        const int64_t pitch = kernels_[0]->rows.pitch();
+        // There is one station more to be read at both ends.
+        runs_.push_back({-1, n + 1, pitch * first, 0, -pitch * low});
+        return;
+    }
+    run_number_.resize(n);
+    for (int64_t begin = 0, end; begin < n; begin = end) {
+        for (end = begin; end < n && solved.make_up[end] == solved.make_up[begin]; ++end)
+            run_number_[end] = static_cast<int32_t>(runs_.size());
+        const int64_t before = kernels_[solved.make_up[begin]]->rows.pitch() * begin;
+        const int64_t here = solved.starts[begin] - before;
+        const int64_t by_read = read.starts ? read.starts[first + begin] - before : 0;
+        runs_.push_back({begin, end, by_read, here, here - solved.starts[low]});
+    }
+}
+
+void Line::convert(int from, int to, Station& station) const {
+    if (from == to) return;
+    const Station given = station;
+    const int8_t* place = &place_[(from * make_ups_.size() + to) * kMostLanes];
+    for (size_t u = 0; u < make_ups_[to].size(); ++u)
+        station.unknowns[u] = place[u] < 0 ? 0.0 : given.unknowns[place[u]];
+}
+
+/// Fill in a station in the order of another make-up.
+void Line::outside(const Work& work, int64_t station, int make_up, Outside& found) const {
+    const Product& product = work.product;
+    const int64_t at = product.first + station;
+    const int8_t* place =
+        &place_[(product.places.make_up[at] * make_ups_.size() + make_up) * kMostLanes];
+    const double* position = product.factor + product.places.starts[at];
+    const double* velocity = product.velocity + product.places.starts[at];
+    for (size_t u = 0; u < make_ups_[make_up].size(); ++u) {
+        found.position[u] = place[u] < 0 ? 0.0 : position[place[u]];
+        found.velocity[u] = place[u] < 0 ? 0.0 : velocity[place[u]];
+    }
+}
+
+/// Find what products need of the stations beside a chain, where these are of other make-ups.
+void Line::look_outside(const Work& work, Chain& chain, int make_up, int step) const {
+    const Run& run = *chain.run;
+    if (work.right) return;
+    const int64_t before = chain.first - step, after = chain.first + step * chain.n;
+    chain.has_before = before < run.begin || before >= run.end;
+    chain.has_after = after < run.begin || after >= run.end;
+    if (chain.has_before) outside(work, before, make_up, chain.before);
+    if (chain.has_after) outside(work, after, make_up, chain.after);
+}
+
+void Line::multiply(const Work& work, int64_t begin, int64_t end, double* result) const {
+    Chain chain;
+    for (int64_t i = begin; i < end; i += chain.n) {
+        chain.run = &run_of(i);
+        chain.first = i;
+        chain.n = std::min(end, chain.run->end) - i;
+        look_outside(work, chain, make_up(work, i), 1);
+        kernels_[make_up(work, i)]->multiply(work, chain, result + chain.run->solved);
+    }
+}
+
+/// One of two chains: how far it is, and what it has of the station before.
+struct Line::Way {
+    int step;            ///< 1 towards the end of the line, -1 towards its start
+    int64_t next, left;  ///< next station, and how many are left
+    int make_up = 0;     ///< that `beside` has the order of
+    Station beside{};
+    Chain chain{};
+};
+
+/// Begin a chain of n stations at most.
+void Line::begin(Way& way, int64_t n) const {
+    if (way.left == 0) return;
+    const Run& run = run_of(way.next);
+    const int64_t in_run = way.step > 0 ? run.end - way.next : way.next - run.begin + 1;
+    way.chain.run = &run;
+    way.chain.first = way.next;
+    way.chain.n = std::min({n, way.left, in_run});
+}
+
+/// Take one chain, or two of equal length, forth or back.
+void Line::take(const Work& work, bool forth, Way& one, Way* other) const {
+    for (Way* way : {&one, other}) {
+        if (!way) continue;
+        const int here = make_up(work, way->next);
+        convert(way->make_up, here, way->beside);
+        way->make_up = here;
+        way->chain.beside = &way->beside;
+        if (forth) look_outside(work, way->chain, here, way->step);
+    }
+    const Kernels& kernels = *kernels_[one.make_up];
+    if (other)
+        forth ? kernels.forth(work, one.chain, other->chain)
+              : kernels.back(work, one.chain, other->chain);
+    else
+        forth ? kernels.forth(work, one.chain, one.step) : kernels.back(work, one.chain, one.step);
+    for (Way* way : {&one, other}) {
+        if (!way) continue;
+        way->next += way->step * way->chain.n;
+        way->left -= way->chain.n;
+    }
+}
+
+/// Take both ways on by n stations at most: side by side through runs that are alike, else the one
+/// that is sooner at the end of its run, so that both fall into step.
+void Line::go_on(const Work& work, bool forth, Way& a, Way& b, int64_t n) const {
+    begin(a, n);
+    begin(b, n);
+    if (a.left > 0 && b.left > 0 && alike(make_up(work, a.next), make_up(work, b.next))) {
+        a.chain.n = b.chain.n = std::min(a.chain.n, b.chain.n);
+        take(work, forth, a, &b);
+    } else if (b.left == 0 || (a.left > 0 && a.chain.n <= b.chain.n)) {
+        take(work, forth, a, nullptr);
+    } else {
+        take(work, forth, b, nullptr);
+    }
+}
+
+bool Line::alike(int one, int other) const {
+    return one == other || (kernels_[one]->rows == kernels_[other]->rows &&
+                            kernels_[one]->factors == kernels_[other]->factors);
+}
+
+/// Eliminate from both ends, and solve for the station where both chains meet.
+Station Line::forth(const Work& work, int64_t begin, int64_t end, int64_t middle) const {
+    Way a{1, begin, middle - begin + 1, make_up(work, begin)};
+    Way b{-1, end - 1, end - 1 - middle, make_up(work, end - 1)};
+    while (a.left + b.left > 0) go_on(work, true, a, b, end - begin);
+    const int here = make_up(work, middle);
+    convert(b.make_up, here, b.beside);
+    kernels_[here]->meet(work, run_of(middle), middle, b.beside);
+    return b.beside;
+}
+
+void Line::solve(const Work& work, int64_t n, int64_t middle) const {
+    const Station met = forth(work, 0, n, middle);
+    Way a{-1, middle - 1, middle, make_up(work, middle), met};
+    Way b{1, middle + 1, n - 1 - middle, make_up(work, middle), met};
+    while (a.left + b.left > 0) go_on(work, false, a, b, n);
+}
+
+void Line::step(const Work& work, const Ends& ends, int64_t stretch, Call ahead,
+                Call following) const {
+    ahead();
+    // They may have been moved.
+    const auto [begin, end, low, high, middle] = ends;
+    const Station met = forth(work, begin, end, middle);
+    Way a{-1, middle - 1, middle - low, make_up(work, middle), met};
+    Way b{1, middle + 1, high - 1 - middle, make_up(work, middle), met};
+    const int64_t pairs = std::min(a.left, b.left);
+    int64_t followed = 0;
+    while (a.left + b.left > 0) {
+        go_on(work, false, a, b, stretch);
+        const int64_t done = std::min(middle - 1 - a.next, b.next - middle - 1);
+        for (; (followed + 1) * stretch <= done && (followed + 1) * stretch < pairs; ++followed)
+            following();
+    }
+    following();
+}
+
+}  // namespace catenary

@@ -1,0 +1,184 @@
+#pragma once
+// A line's step without contacts in two passes over its state, for Newmark's family.
+//
+// The step operator A is block tridiagonal by stations. With S_i its diagonal blocks after
+// elimination and B_i what joins station i to the next one inwards, forth from both ends
+//     r_i = f_i - B_(i-1)^T S_(i-1)^-1 r_(i-1),
+// and back from the middle, where both meet,
+//     a_i = S_i^-1 r_i - S_i^-1 B_i a_(i+1).
+// The pass forth makes f_i, a row of -K x - C v and of loads, at its station; the pass back takes
+// the motion on from one prediction to the next (Newmark; Chung and Hulbert, 1993). So the state is
+// read from memory once in each pass. Two chains go side by side, from both ends: each waits for
+// itself only.
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "layout.hpp"
+
+namespace catenary {
+
+/// Numbers of stations, those of each kind once.
+struct Table {
+    const int32_t* begins = nullptr;  ///< of each station the place of its first number
+    const double* numbers = nullptr;
+    const double* at(int64_t station) const { return numbers + begins[station]; }
+};
+
+/// Where stations begin in vectors, and of which make-up each is; none if all are alike.
+struct Places {
+    const int64_t* starts = nullptr;
+    const uint8_t* make_up = nullptr;
+};
+
+/// What products read. Station i of the line is `first` + i of `places`.
+struct Product {
+    Table rows;
+    int64_t first = 0;
+    Places places;
+    const double *factor = nullptr, *velocity = nullptr;
+};
+
+struct Factored {
+    Table inverse;  ///< S^-1 alone if factors are sparse, else what a solve multiplies with
+    Table beside;   ///< the matrix's own blocks then
+    Places places;
+};
+
+/// Stations that a step solves for, those that it takes on, and where elimination ends.
+struct Ends {
+    int64_t begin, end, low, high, middle;
+};
+
+/// What takes a state from one prediction to the next; see `changes_of`.
+struct Changes {
+    double dt, by_position, by_velocity, damping_share;
+    double known[2], velocity[2], balance[2];  ///< of the generalized-alpha method
+    double by_mass;
+};
+
+/// Motion of a rank's own stations: arrays begin at station `low` of all that is solved for.
+struct Motion {
+    double *x = nullptr, *y = nullptr, *z = nullptr, *known = nullptr;
+    Changes changes{};
+};
+
+/// Stations of one make-up beside each other, at equal distances in vectors.
+struct Run {
+    int64_t begin = 0, end = 0;
+    /// Where station 0 would be if all had this make-up: in what products read, in what is solved
+    /// for, in the motion.
+    int64_t read = 0, solved = 0, own = 0;
+};
+
+/// All that a pass works on.
+struct Work {
+    Product product;
+    Factored factored;
+    const double* loads = nullptr;  ///< of all that is solved for, or none
+    const double* right = nullptr;  ///< right-hand side of a solve that makes no product
+    double* answer = nullptr;
+    Motion motion;
+};
+
+/// Unknowns of a station in the order of its make-up.
+struct Station {
+    double unknowns[kMostLanes];
+};
+/// Displacement and velocity of a station outside of a run, in the order of the run's make-up.
+struct Outside {
+    double position[kMostLanes], velocity[kMostLanes];
+};
+/// A chain of n stations of one run: from `first` on, towards the end of the line or its start.
+struct Chain {
+    const Run* run;
+    int64_t first, n;
+    Outside before, after;  ///< of the stations beside it, as far as they are outside of the run
+    bool has_before = false, has_after = false;
+    Station* beside;  ///< of the station before: in and out, in the order of the run's make-up
+};
+
+/// Kernels of the stations of one make-up.
+class Kernels {
+  public:
+    virtual ~Kernels() = default;
+    /// Rows of a product with K, and -C.
+    virtual void multiply(const Work&, const Chain&, double* result) const = 0;
+    /// The pass forth through one chain, whose next station is a `step` of 1 or -1 further, or
+    /// through two of equal length.
+    virtual void forth(const Work&, Chain&, int step) const = 0;
+    virtual void forth(const Work&, Chain& from_start, Chain& from_end) const = 0;
+    /// Solve for the station where both chains meet.
+    virtual void meet(const Work&, const Run&, int64_t middle, Station& from_end) const = 0;
+    /// The pass back.
+    virtual void back(const Work&, Chain&, int step) const = 0;
+    virtual void back(const Work&, Chain& to_start, Chain& to_end) const = 0;
+
+    Layout rows, factors;
+};
+
+/// Kernels of these layouts: those that were compiled for them, or general ones; null if there are
+/// more unknowns than these take.
+std::unique_ptr<Kernels> kernels_of(const Layout& rows, const Layout& factors);
+/// Kernels that make products only, and kernels that solve only.
+std::unique_ptr<Kernels> kernels_of_rows(const Layout& rows);
+std::unique_ptr<Kernels> kernels_of_factors(const Layout& factors);
+/// Whether kernels were compiled for stations of these widths; if not their layouts are general.
+bool has_widths(const Widths& widths);
+/// Whether they were compiled for factors with these strands.
+bool has_strands(const Layout& factors);
+/// Names of the processors that kernels were compiled for, and this one can be: the best last.
+std::vector<std::string> targets();
+/// Choose one of these; whether there is such a one.
+bool set_target(const std::string& name);
+
+/// A function that compiled loops call with what it works on.
+struct Call {
+    void (*function)(void*) = nullptr;
+    void* with = nullptr;
+    void operator()() const {
+        if (function) function(with);
+    }
+};
+
+/// A line whose stations are of one or of several make-ups.
+class Line {
+  public:
+    /// `make_ups`: places in a cross-section of the stations of each make-up, of which the first
+    /// `kernels.size()` have kernels; one that has all places if stations are alike.
+    Line(std::vector<std::unique_ptr<Kernels>> kernels, std::vector<std::vector<int>> make_ups);
+
+    /// Find the runs of stations that are solved for, n in all, of which motion begins at `low`.
+    void set_runs(const Work&, int64_t n, int64_t low);
+    void multiply(const Work&, int64_t begin, int64_t end, double* result) const;
+    void solve(const Work&, int64_t n, int64_t middle) const;
+    /// Both passes. `ahead` is called before, `following` after each `stretch` of the pass back.
+    void step(const Work&, const Ends&, int64_t stretch, Call ahead, Call following) const;
+
+  private:
+    const Run& run_of(int64_t station) const {
+        return runs_[run_number_.empty() ? 0 : run_number_[station]];
+    }
+    int make_up(const Work& work, int64_t station) const {
+        const uint8_t* of = work.factored.places.make_up;
+        return of ? of[station] : 0;
+    }
+    struct Way;
+    bool alike(int one, int other) const;
+    void convert(int from, int to, Station&) const;
+    void outside(const Work&, int64_t station, int make_up, Outside&) const;
+    void look_outside(const Work&, Chain&, int make_up, int step) const;
+    void begin(Way&, int64_t n) const;
+    void take(const Work&, bool forth, Way& one, Way* other) const;
+    void go_on(const Work&, bool forth, Way& a, Way& b, int64_t n) const;
+    Station forth(const Work&, int64_t begin, int64_t end, int64_t middle) const;
+
+    std::vector<std::unique_ptr<Kernels>> kernels_;
+    std::vector<std::vector<int>> make_ups_;
+    std::vector<int8_t> place_;  ///< of each unknown of a make-up in another, -1 if it has none
+    std::vector<Run> runs_;
+    std::vector<int32_t> run_number_;
+};
+
+}  // namespace catenary

@@ -1,0 +1,363 @@
+#pragma once
+// The kernels of `line.hpp` for one kind of blocks.
+#include "general_blocks.hpp"
+#include "known_blocks.hpp"
+#include "line.hpp"
+
+namespace catenary::CATENARY_TARGET {
+
+/// What is done with the unknowns of a station: they are the answer of a solve, or accelerations by
+/// which the motion goes on.
+enum class Then { kStore, kNewmark, kAlpha };
+inline Then then_of(const Work& work) {
+    if (work.right) return Then::kStore;
+    return work.motion.known ? Then::kAlpha : Then::kNewmark;
+}
+
+/// What a chain works on, by values that a compiler keeps in registers.
+template <class Blocks>
+struct Chained {
+    using X = typename Blocks::X;
+    struct State {
+        X position, velocity;
+    };
+    struct Place {
+        const double *position, *velocity;
+    };
+
+    const Blocks& blocks;
+    Table rows, inverse, joined;
+    const double *factor, *velocity, *loads, *right_side;
+    double *answer, *x, *y, *z, *known;
+    Changes changes;
+
+    Chained(const Blocks& of, const Work& work, const Run& run)
+        : blocks(of),
+          rows(work.product.rows),
+          inverse(work.factored.inverse),
+          joined(work.factored.beside),
+          factor(work.product.factor + run.read),
+          velocity(work.product.velocity + run.read),
+          loads(work.loads ? work.loads + run.solved : nullptr),
+          right_side(work.right + run.solved),
+          answer(work.answer + run.solved),
+          x(work.motion.x + run.own),
+          y(work.motion.y + run.own),
+          z(work.motion.z + run.own),
+          known(work.motion.known ? work.motion.known + run.own : nullptr),
+          changes(work.motion.changes) {}
+
+    CATENARY_INLINE static const double* kept(const double* numbers) {
+        asm("" : "+r"(numbers));  // or the compiler computes the address anew for each number
+        return numbers;
+    }
+    /// Where products read a station of the run.
+    CATENARY_INLINE Place place(int64_t station) const {
+        return {factor + station * blocks.pitch, velocity + station * blocks.pitch};
+    }
+    CATENARY_INLINE State state(const Place& at) const {
+        const X here = blocks.load(at.position);
+        if (blocks.is_damped()) return {here, blocks.load(at.velocity)};
+        return {here, here};
+    }
+    /// The station before a chain.
+    CATENARY_INLINE State outwards(const Chain& chain, int step) const {
+        if (!chain.has_before) return state(place(chain.first - step));
+        return state({chain.before.position, chain.before.velocity});
+    }
+    /// Where the one after it is read.
+    CATENARY_INLINE Place inwards(const Chain& chain, int step) const {
+        if (!chain.has_after) return place(chain.first + step * chain.n);
+        return {chain.after.position, chain.after.velocity};
+    }
+    /// Rows of a product, from the stations before and after it in a chain with this step.
+    CATENARY_INLINE Sums<X> product(int64_t i, int step, const State& before, const State& here,
+                                    const State& after) const {
+        const double* numbers = kept(rows.at(i));
+        const int to_start = blocks.own_size(), to_end = to_start + blocks.row_beside_size();
+        Sums<X> sums = no_sums<X>();
+        blocks.add_own(sums, numbers, here.position);
+        blocks.add_row_beside(sums, numbers + (step > 0 ? to_start : to_end), before.position);
+        blocks.add_row_beside(sums, numbers + (step > 0 ? to_end : to_start), after.position);
+        if (blocks.is_damped()) {
+            numbers += to_end + blocks.row_beside_size();
+            blocks.add_own(sums, numbers, here.velocity);
+            blocks.add_row_beside(sums, numbers + (step > 0 ? to_start : to_end), before.velocity);
+            blocks.add_row_beside(sums, numbers + (step > 0 ? to_end : to_start), after.velocity);
+        }
+        return sums;
+    }
+    /// A row of the right-hand side.
+    CATENARY_INLINE Sums<X> row(int64_t i, int step, const State& before, const State& here,
+                                const State& after) const {
+        Sums<X> sums = product(i, step, before, here, after);
+        if (loads) sums.one += blocks.load(loads + i * blocks.pitch);
+        return sums;
+    }
+    CATENARY_INLINE Sums<X> right(int64_t i) const {
+        return sums_from(blocks.load(right_side + i * blocks.pitch));
+    }
+    /// S^-1 times what is left of a right-hand side.
+    CATENARY_INLINE X divided(int64_t i, const X& left) const {
+        Sums<X> sums = no_sums<X>();
+        blocks.add_inverse(sums, kept(inverse.at(i)), left);
+        return blocks.total_of(sums);
+    }
+    /// Add the matrix's own block with the station behind in a chain with this step.
+    CATENARY_INLINE void add_behind(Sums<X>& sums, int64_t i, int step, const X& behind) const {
+        blocks.add_beside(sums, kept(joined.at(i)) + (step > 0 ? 0 : blocks.beside_size()), behind);
+    }
+    /// Leave in `answer` what the right-hand side is after the stations outwards are eliminated;
+    /// what the one inwards takes of it.
+    CATENARY_INLINE X eliminate(int64_t i, int step, Sums<X> sums, const X& outward) const {
+        double* at = answer + i * blocks.pitch;
+        if (blocks.is_sparse)
+            add_behind(sums, i, step, outward);
+        else
+            blocks.add_whole(sums, kept(inverse.at(i)) + 2 * blocks.whole_size, outward);
+        const X left = blocks.total_of(sums);
+        blocks.store(at, left);
+        return blocks.is_sparse ? divided(i, left) : left;
+    }
+    /// Unknowns from those of the station inwards, from which the chain comes.
+    template <Then T>
+    CATENARY_INLINE X solved(int64_t i, int step, const X& inward) const {
+        double* at = answer + i * blocks.pitch;
+        X own = blocks.load(at);
+        if (blocks.is_sparse) {
+            Sums<X> sums = sums_from(own);
+            add_behind(sums, i, step, inward);
+            own = divided(i, blocks.total_of(sums));
+        } else {
+            const double* numbers = kept(inverse.at(i));
+            Sums<X> sums = no_sums<X>();
+            blocks.add_whole(sums, numbers, own);
+            blocks.add_whole(sums, numbers + blocks.whole_size, inward);
+            own = blocks.total_of(sums);
+        }
+        if constexpr (T == Then::kStore)
+            blocks.store(at, own);
+        else
+            go_on<T>(i, own);
+        return own;
+    }
+    /// Unknowns of the station where both chains meet, from what is left of it and of the one
+    /// after.
+    CATENARY_INLINE X met(int64_t middle, const X& after) const {
+        double* at = answer + middle * blocks.pitch;
+        Sums<X> sums = sums_from(blocks.load(at));
+        if (blocks.is_sparse)
+            blocks.add_beside(sums, joined.at(middle) + blocks.beside_size(), after);
+        else
+            blocks.add_whole(sums, inverse.at(middle) + blocks.whole_size, after);
+        const X own = divided(middle, blocks.total_of(sums));
+        blocks.store(at, own);
+        return own;
+    }
+    /// Take a station from one prediction to the next. What was solved for is its acceleration but
+    /// for damping on mass, and for its share of x if the right-hand side was made by M.
+    template <Then T>
+    CATENARY_INLINE void go_on(int64_t i, X solution) const {
+        const Changes& c = changes;
+        const int64_t at = i * blocks.pitch;
+        const X here = blocks.load(x + at);
+        if (c.by_mass != 0.0) solution = solution.plus(c.by_mass, here);
+        if constexpr (T == Then::kAlpha) return go_on_by_alpha(at, here, solution);
+        const X v = blocks.load(y + at), a = solution.plus(-c.damping_share, v);
+        blocks.store(z + at, a);
+        blocks.store(x + at, here.plus(-c.dt, v).plus(c.by_position, a));
+        blocks.store(y + at, v.plus(c.by_velocity, a));
+    }
+    /// The same for the generalized-alpha method; see `AlphaAhead`.
+    CATENARY_INLINE void go_on_by_alpha(int64_t at, const X& here, const X& solution) const {
+        const Changes& c = changes;
+        const X before = blocks.load(z + at), then = blocks.load(known + at), none = X::all(0.0);
+        const X known_now = none.plus(c.known[0], before).plus(c.known[1], then);
+        const X v = blocks.load(y + at).plus(c.velocity[0], before).plus(c.velocity[1], then);
+        const X b = solution.plus(-c.damping_share, v);
+        const X total = none.plus(c.balance[0], b).plus(c.balance[1], known_now);
+        blocks.store(known + at, known_now);
+        blocks.store(x + at, here.plus(-c.dt, v).plus(c.by_position, b).plus(-1.0, total));
+        blocks.store(y + at, v.plus(c.by_velocity, b));
+        blocks.store(z + at, total);
+    }
+};
+
+/// The pass forth through one chain; its right-hand sides are given, or products.
+template <bool FromRight, class Blocks>
+void go_forth(const Blocks& blocks, const Work& work, Chain& chain, int step) {
+    using X = typename Blocks::X;
+    const Chained<Blocks> one(blocks, work, *chain.run);
+    X x = blocks.load(chain.beside->unknowns);
+    int64_t i = chain.first;
+    if constexpr (FromRight) {
+        for (int64_t k = 0; k < chain.n; ++k, i += step)
+            x = one.eliminate(i, step, one.right(i), x);
+    } else {
+        auto before = one.outwards(chain, step), here = one.state(one.place(i));
+        const auto last = one.inwards(chain, step);
+        for (int64_t k = 1; k <= chain.n; ++k, i += step) {
+            const auto after = one.state(k == chain.n ? last : one.place(i + step));
+            x = one.eliminate(i, step, one.row(i, step, before, here, after), x);
+            before = here;
+            here = after;
+        }
+    }
+    blocks.store(chain.beside->unknowns, x);
+}
+
+/// The same through two chains of equal length, side by side.
+template <bool FromRight, class Blocks>
+void go_forth(const Blocks& blocks, const Work& work, Chain& from_start, Chain& from_end) {
+    using X = typename Blocks::X;
+    const Chained<Blocks> one(blocks, work, *from_start.run), other(blocks, work, *from_end.run);
+    X x = blocks.load(from_start.beside->unknowns), y = blocks.load(from_end.beside->unknowns);
+    int64_t i = from_start.first, j = from_end.first;
+    const int64_t n = from_start.n;
+    if constexpr (FromRight) {
+        for (int64_t k = 0; k < n; ++k, ++i, --j) {
+            x = one.eliminate(i, 1, one.right(i), x);
+            y = other.eliminate(j, -1, other.right(j), y);
+        }
+    } else {
+        auto before = one.outwards(from_start, 1), here = one.state(one.place(i));
+        auto beyond = other.outwards(from_end, -1), there = other.state(other.place(j));
+        const auto last = one.inwards(from_start, 1), first = other.inwards(from_end, -1);
+        for (int64_t k = 1; k <= n; ++k, ++i, --j) {
+            const auto after = one.state(k == n ? last : one.place(i + 1));
+            const auto ahead = other.state(k == n ? first : other.place(j - 1));
+            x = one.eliminate(i, 1, one.row(i, 1, before, here, after), x);
+            y = other.eliminate(j, -1, other.row(j, -1, beyond, there, ahead), y);
+            before = here, here = after, beyond = there, there = ahead;
+        }
+    }
+    blocks.store(from_start.beside->unknowns, x);
+    blocks.store(from_end.beside->unknowns, y);
+}
+
+/// The pass back through one chain.
+template <Then T, class Blocks>
+void go_back(const Blocks& blocks, const Work& work, Chain& chain, int step) {
+    const Chained<Blocks> one(blocks, work, *chain.run);
+    auto x = blocks.load(chain.beside->unknowns);
+    for (int64_t k = 0, i = chain.first; k < chain.n; ++k, i += step)
+        x = one.template solved<T>(i, step, x);
+    blocks.store(chain.beside->unknowns, x);
+}
+
+/// The same through two chains of equal length, side by side.
+template <Then T, class Blocks>
+void go_back(const Blocks& blocks, const Work& work, Chain& to_start, Chain& to_end) {
+    const Chained<Blocks> one(blocks, work, *to_start.run), other(blocks, work, *to_end.run);
+    auto x = blocks.load(to_start.beside->unknowns), y = blocks.load(to_end.beside->unknowns);
+    int64_t i = to_start.first, j = to_end.first;
+    for (int64_t k = 0; k < to_start.n; ++k, --i, ++j) {
+        x = one.template solved<T>(i, -1, x);
+        y = other.template solved<T>(j, 1, y);
+    }
+    blocks.store(to_start.beside->unknowns, x);
+    blocks.store(to_end.beside->unknowns, y);
+}
+
+template <class Blocks>
+void multiply_rows(const Blocks& blocks, const Work& work, const Chain& chain, double* result) {
+    const Chained<Blocks> one(blocks, work, *chain.run);
+    auto before = one.outwards(chain, 1), here = one.state(one.place(chain.first));
+    const auto last = one.inwards(chain, 1);
+    for (int64_t k = 1, i = chain.first; k <= chain.n; ++k, ++i) {
+        const auto after = one.state(k == chain.n ? last : one.place(i + 1));
+        const auto sums = one.product(i, 1, before, here, after);
+        blocks.store(result + i * blocks.pitch, blocks.total_of(sums));
+        before = here;
+        here = after;
+    }
+}
+
+/// All kernels of one kind of blocks.
+template <class Blocks>
+class KernelsOf final : public Kernels {
+  public:
+    KernelsOf(const Layout& r, const Layout& f) : blocks_(r, f) {
+        rows = r;
+        factors = f;
+    }
+    void multiply(const Work& work, const Chain& chain, double* result) const override {
+        multiply_rows(blocks_, work, chain, result);
+    }
+    void forth(const Work& work, Chain& chain, int step) const override {
+        work.right ? go_forth<true>(blocks_, work, chain, step)
+                   : go_forth<false>(blocks_, work, chain, step);
+    }
+    void forth(const Work& work, Chain& from_start, Chain& from_end) const override {
+        work.right ? go_forth<true>(blocks_, work, from_start, from_end)
+                   : go_forth<false>(blocks_, work, from_start, from_end);
+    }
+    void meet(const Work& work, const Run& run, int64_t middle, Station& from_end) const override {
+        const Chained<Blocks> one(blocks_, work, run);
+        const auto own = one.met(middle, blocks_.load(from_end.unknowns));
+        blocks_.store(from_end.unknowns, own);
+        if (then_of(work) == Then::kNewmark) one.template go_on<Then::kNewmark>(middle, own);
+        if (then_of(work) == Then::kAlpha) one.template go_on<Then::kAlpha>(middle, own);
+    }
+    void back(const Work& work, Chain& chain, int step) const override {
+        switch (then_of(work)) {
+            case Then::kStore:
+                return go_back<Then::kStore>(blocks_, work, chain, step);
+            case Then::kNewmark:
+                return go_back<Then::kNewmark>(blocks_, work, chain, step);
+            case Then::kAlpha:
+                return go_back<Then::kAlpha>(blocks_, work, chain, step);
+        }
+    }
+    void back(const Work& work, Chain& to_start, Chain& to_end) const override {
+        switch (then_of(work)) {
+            case Then::kStore:
+                return go_back<Then::kStore>(blocks_, work, to_start, to_end);
+            case Then::kNewmark:
+                return go_back<Then::kNewmark>(blocks_, work, to_start, to_end);
+            case Then::kAlpha:
+                return go_back<Then::kAlpha>(blocks_, work, to_start, to_end);
+        }
+    }
+
+  private:
+    Blocks blocks_;
+};
+
+/// Kernels of one kind of blocks for what steps of Newmark's family spend their time with; others
+/// do the rest.
+template <class Blocks>
+class QuickKernels final : public Kernels {
+  public:
+    QuickKernels(const Layout& r, const Layout& f, std::unique_ptr<Kernels> rest)
+        : blocks_(r, f), rest_(std::move(rest)) {
+        rows = r;
+        factors = f;
+    }
+    void multiply(const Work& work, const Chain& chain, double* result) const override {
+        multiply_rows(blocks_, work, chain, result);
+    }
+    void forth(const Work& work, Chain& chain, int step) const override {
+        rest_->forth(work, chain, step);
+    }
+    void forth(const Work& work, Chain& from_start, Chain& from_end) const override {
+        work.right ? rest_->forth(work, from_start, from_end)
+                   : go_forth<false>(blocks_, work, from_start, from_end);
+    }
+    void meet(const Work& work, const Run& run, int64_t middle, Station& from_end) const override {
+        rest_->meet(work, run, middle, from_end);
+    }
+    void back(const Work& work, Chain& chain, int step) const override {
+        rest_->back(work, chain, step);
+    }
+    void back(const Work& work, Chain& to_start, Chain& to_end) const override {
+        then_of(work) == Then::kNewmark ? go_back<Then::kNewmark>(blocks_, work, to_start, to_end)
+                                        : rest_->back(work, to_start, to_end);
+    }
+
+  private:
+    Blocks blocks_;
+    std::unique_ptr<Kernels> rest_;
+};
+
+}  // namespace catenary::CATENARY_TARGET
