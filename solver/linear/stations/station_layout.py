@@ -301,8 +301,13 @@ class Layout:
     def native(self) -> native.Layout:
         """The layout as kernels take it."""
         return native.Layout(
-            *(self.widths, self.own, self.beside),
-            *(self.damped, self.sparse, self.general, self.strands),
+            widths=self.widths,
+            own=self.own,
+            beside=self.beside,
+            damped=self.damped,
+            sparse=self.sparse,
+            general=self.general,
+            strands=self.strands,
         )
 
     def differences(self, joined: np.ndarray) -> tuple[int, ...]:

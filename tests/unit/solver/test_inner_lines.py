@@ -58,7 +58,7 @@ def test_nothing_but_compiled_code_calls_inner_lines() -> None:
     inner = inner_lines()
     assert (
         "add_scaled" not in inner
-        and "eliminate" in inner["catenary.solver.linear.factors.substitution"]
+        and "condense" in inner["catenary.solver.linear.factors.elimination"]
     )
     names = re.compile(rf"\b({'|'.join(set().union(*inner.values()))})\b")
     for path in FILES:
